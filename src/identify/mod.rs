@@ -1,0 +1,1 @@
+//! Where measurement and theory meet: joint stiffness from natural frequencies.

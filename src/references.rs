@@ -1,0 +1,13 @@
+//! Bibliography (documentation only). Other modules cite these entries by name.
+//!
+//! - **Ingole & Chatterjee**: "Structural joint modeling and identification: numerical and
+//!   experimental investigation". The method: frequency equations by substructure synthesis and
+//!   the multi-linear regression over mode pairs.
+//! - **Bishop & Johnson 1960**: "The Mechanics of Vibration", Cambridge University Press.
+//!   Receptances of the uniform beam; the functions F1 to F10.
+//! - **Wittrick & Williams 1971**: "A general algorithm for computing natural frequencies of
+//!   elastic structures", Quarterly Journal of Mechanics and Applied Mathematics 24, 263-284.
+//!   Counts the natural frequencies below a trial frequency, so that none is missed.
+//! - **ISO 7626-5:2019**: measurement of mechanical mobility by impact excitation.
+//! - **Oppenheim & Schafer**: "Discrete-Time Signal Processing". Kaiser window design,
+//!   chirp z-transform.

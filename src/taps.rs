@@ -1,0 +1,1 @@
+//! Finding taps in a recording.

@@ -1,0 +1,16 @@
+//! Integration tests: one module per stage of the pipeline.
+
+mod cli;
+mod description;
+mod errors;
+mod identify;
+mod layers;
+mod modal;
+mod pipeline;
+mod real_data;
+mod recording;
+mod report;
+mod simulate;
+mod spectral;
+mod structure;
+mod taps;

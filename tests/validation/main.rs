@@ -1,0 +1,3 @@
+//! Published numbers: one module per source.
+
+mod ingole_chatterjee;

@@ -1,1 +1,15 @@
-//! Stage.
+//! From spectra to natural frequencies, each with the bound of its reading.
+//!
+//! Peaks are found on a composite level over all sensors ([`find_peaks`]), read on their line with
+//! the half-line bound and, independently, interpolated between lines ([`interpolate_pole`]), mains
+//! lines are recognised, and the readings of several recordings are merged ([`merge_modes`]).
+
+mod interpolation;
+mod mains;
+mod merge;
+mod peaks;
+
+pub use interpolation::{Interpolation, interpolate_parabola, interpolate_pole};
+pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic};
+pub use merge::{MergedMode, ModeReading, merge_modes};
+pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};

@@ -1,1 +1,1 @@
-//! Reading recordings: WAV and CSV time series as physical quantities.
+//! x

@@ -1,1 +1,55 @@
-//! Stage.
+//! From tap records to spectra and frequency response functions on a stated frequency axis.
+//!
+//! A spectrum carries its [`Lines`]: the frequencies at which it was computed and, separately, the
+//! length of signal it was computed from. Resolution is 1/(length of signal); zooming or zero
+//! padding adds lines, never resolution.
+
+mod block;
+mod decay;
+mod frf;
+mod lines;
+mod transform;
+mod window;
+mod zoom;
+
+pub use block::{largest_smooth_block, smallest_smooth_block};
+pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
+pub use frf::{AveragedSpectra, SpectralAverager};
+pub use lines::{DISPLAY_RATIO, Lines};
+pub use transform::transform_block;
+pub use window::Window;
+pub use zoom::chirp_z;
+
+/// What makes a spectrum impossible.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpectralError {
+    /// The band does not fit the sample rate.
+    #[error(
+        "the band {low} to {high} Hz does not fit a sample rate of {sample_rate} Hz: its upper end must lie above its lower end and not above {limit:.6} Hz (half the sample rate)"
+    )]
+    Band {
+        /// Lower end (Hz).
+        low: f64,
+        /// Upper end (Hz).
+        high: f64,
+        /// Sample rate (Hz).
+        sample_rate: f64,
+        /// Highest possible upper end (Hz).
+        limit: f64,
+    },
+    /// The block size is unusable.
+    #[error("a block of {block} samples is not usable: give {least} to {most} samples")]
+    Block {
+        /// Block size as given (samples).
+        block: usize,
+        /// Smallest possible.
+        least: usize,
+        /// Largest possible.
+        most: usize,
+    },
+}
+
+/// Smallest block (samples): fewer displayed lines than six show no resonance.
+pub const LEAST_BLOCK: usize = 16;
+/// Largest block (samples): a bound on memory, 3 h at 12 kHz.
+pub const MOST_BLOCK: usize = 1 << 27;

@@ -1,0 +1,91 @@
+//! One list of modes from several recordings and bands.
+
+/// One resonance as one recording reads it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeReading {
+    /// Best frequency (Hz): interpolated where that succeeded, else on the line.
+    pub frequency: f64,
+    /// Frequency of the peak's line (Hz).
+    pub line_frequency: f64,
+    /// Bound of the line reading (Hz).
+    pub half_line: f64,
+    /// Frequency between the lines (Hz), where it could be had.
+    pub interpolated: Option<f64>,
+    /// Bound of that (Hz).
+    pub bound: Option<f64>,
+    /// Standard deviation of the best frequency (Hz).
+    pub std: Option<f64>,
+    /// Damping ratio.
+    pub damping_ratio: Option<f64>,
+    /// Its standard deviation.
+    pub damping_std: Option<f64>,
+    /// How far the peak stands out (dB).
+    pub prominence_db: f64,
+    /// Height above the noise (dB), where known.
+    pub above_noise_db: Option<f64>,
+    /// What it is when it is no mode of the structure: "mains 50 Hz".
+    pub label: Option<String>,
+}
+
+/// A resonance of the structure, from the recording that resolves it best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MergedMode {
+    /// Index of that recording.
+    pub recording: usize,
+    /// The reading.
+    pub reading: ModeReading,
+}
+
+/// Merges the readings of several recordings, ascending in frequency.
+///
+/// Readings are the same resonance when they differ by less than their half lines together plus
+/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency); the one with the smallest
+/// half line stays, among equals the one that stands out most. Two readings of one recording are
+/// never merged.
+pub fn merge_modes(recordings: &[Vec<ModeReading>]) -> Vec<MergedMode> {
+    let mut merged: Vec<(MergedMode, Vec<usize>)> = Vec::new();
+    for (recording, readings) in recordings.iter().enumerate() {
+        for reading in readings {
+            let candidate = MergedMode {
+                recording,
+                reading: reading.clone(),
+            };
+            let nearest = merged
+                .iter_mut()
+                .filter(|(mode, seen)| {
+                    !seen.contains(&recording) && same_resonance(&mode.reading, reading)
+                })
+                .min_by(|a, b| {
+                    let distance =
+                        |mode: &MergedMode| (mode.reading.frequency - reading.frequency).abs();
+                    distance(&a.0).total_cmp(&distance(&b.0))
+                });
+            match nearest {
+                Some((mode, seen)) => {
+                    seen.push(recording);
+                    if resolves_better(reading, &mode.reading) {
+                        *mode = candidate;
+                    }
+                }
+                None => merged.push((candidate, vec![recording])),
+            }
+        }
+    }
+    let mut modes: Vec<MergedMode> = merged.into_iter().map(|(mode, _)| mode).collect();
+    modes.sort_by(|a, b| a.reading.frequency.total_cmp(&b.reading.frequency));
+    modes
+}
+
+fn same_resonance(a: &ModeReading, b: &ModeReading) -> bool {
+    let allowed = a.half_line + b.half_line + 0.003 * a.frequency.max(b.frequency);
+    (a.frequency - b.frequency).abs() <= allowed
+}
+
+fn resolves_better(a: &ModeReading, b: &ModeReading) -> bool {
+    // Half lines that differ by less than 1 % come from blocks of nearly the same length.
+    if (a.half_line - b.half_line).abs() > 0.01 * a.half_line.max(b.half_line) {
+        a.half_line < b.half_line
+    } else {
+        a.prominence_db > b.prominence_db
+    }
+}

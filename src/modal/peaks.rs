@@ -1,0 +1,165 @@
+//! Finding resonances: prominence, height over the noise, separation, number.
+
+use crate::spectral::Lines;
+
+/// Level of a spectrum over all sensors, and of its noise, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompositeLevel {
+    /// The axis.
+    pub lines: Lines,
+    /// Level (dB, arbitrary reference).
+    pub level_db: Vec<f64>,
+    /// Level that noise alone would have (dB, same reference); `None` where nothing is known.
+    pub noise_db: Option<Vec<f64>>,
+}
+
+impl CompositeLevel {
+    /// Combines the powers of several sensors. Each is scaled by its own median over the lines, so
+    /// that sensors of different kind or sensitivity count alike.
+    ///
+    /// `noise` are the powers that noise alone would leave, per sensor, where known.
+    pub fn new(lines: Lines, powers: &[Vec<f64>], noise: Option<&[Vec<f64>]>) -> Self {
+        let weights: Vec<f64> = powers
+            .iter()
+            .map(|power| 1.0 / median(power).max(f64::MIN_POSITIVE) / powers.len() as f64)
+            .collect();
+        CompositeLevel {
+            lines,
+            level_db: weighted_db(powers, &weights, lines.points()),
+            noise_db: noise.map(|noise| weighted_db(noise, &weights, lines.points())),
+        }
+    }
+}
+
+fn weighted_db(powers: &[Vec<f64>], weights: &[f64], points: usize) -> Vec<f64> {
+    (0..points)
+        .map(|index| {
+            let sum: f64 = powers
+                .iter()
+                .zip(weights)
+                .map(|(power, weight)| weight * power.get(index).copied().unwrap_or(0.0))
+                .sum();
+            // A power of exactly zero has no level; -400 dB keeps it out of every comparison.
+            if sum > 0.0 {
+                10.0 * sum.log10()
+            } else {
+                -400.0
+            }
+        })
+        .collect()
+}
+
+/// Middle value of the positive entries; 0 when there are none.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|&v| v > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// What counts as a resonance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PeakSettings {
+    /// Least prominence (dB): how far the level falls on both sides before it rises above the peak.
+    /// 8 dB: a resonance of 2 % damping next to an equal one still has it.
+    pub prominence_db: f64,
+    /// Least height above the noise (dB). 15 dB: noise alone passes it on one line in 10^13.
+    pub above_noise_db: f64,
+    /// Least distance of two peaks (lines). 3: two peaks nearer than that share their flanks.
+    pub separation: usize,
+    /// At most so many peaks, the most prominent ones. 30.
+    pub most: usize,
+}
+
+impl Default for PeakSettings {
+    fn default() -> Self {
+        PeakSettings {
+            prominence_db: 8.0,
+            above_noise_db: 15.0,
+            separation: 3,
+            most: 30,
+        }
+    }
+}
+
+/// A local maximum that counts as a resonance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// Index of its line.
+    pub index: usize,
+    /// How far it stands out (dB).
+    pub prominence_db: f64,
+    /// Height above the noise (dB), where the noise is known.
+    pub above_noise_db: Option<f64>,
+}
+
+/// Resonances of a composite level, ascending in frequency.
+///
+/// The first two resolution widths are left out: drift and offsets live there.
+pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> {
+    let lines = &level.lines;
+    let first = lines.frequency(0);
+    let mut peaks: Vec<Peak> = local_maxima(&level.level_db)
+        .into_iter()
+        .filter(|&index| first > 0.0 || lines.frequency(index) > 2.0 * lines.resolution())
+        .map(|index| Peak {
+            index,
+            prominence_db: prominence(&level.level_db, index),
+            above_noise_db: level
+                .noise_db
+                .as_ref()
+                .map(|noise| level.level_db[index] - noise[index]),
+        })
+        .filter(|peak| peak.prominence_db >= settings.prominence_db)
+        .filter(|peak| {
+            let height = peak
+                .above_noise_db
+                .unwrap_or_else(|| above_surroundings(&level.level_db, peak.index));
+            height >= settings.above_noise_db
+        })
+        .collect();
+    peaks.sort_by(|a, b| b.prominence_db.total_cmp(&a.prominence_db));
+    let mut kept: Vec<Peak> = Vec::new();
+    for peak in peaks {
+        let clear = kept
+            .iter()
+            .all(|other| peak.index.abs_diff(other.index) >= settings.separation);
+        if clear && kept.len() < settings.most {
+            kept.push(peak);
+        }
+    }
+    kept.sort_by_key(|peak| peak.index);
+    kept
+}
+
+/// Interior local maxima; the first line of a plateau stands for it.
+fn local_maxima(level: &[f64]) -> Vec<usize> {
+    (1..level.len().saturating_sub(1))
+        .filter(|&i| level[i] > level[i - 1] && level[i] >= level[i + 1])
+        .collect()
+}
+
+/// Height over the higher of the two lowest points between the peak and the next higher ground (or
+/// the end of the axis).
+fn prominence(level: &[f64], index: usize) -> f64 {
+    let height = level[index];
+    let valley = |values: &mut dyn Iterator<Item = &f64>| {
+        values
+            .take_while(|&&v| v <= height)
+            .copied()
+            .fold(height, f64::min)
+    };
+    let left = valley(&mut level[..index].iter().rev());
+    let right = valley(&mut level[index + 1..].iter());
+    height - left.max(right)
+}
+
+/// Height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the
+/// position to either side, whichever is more. A peak of noise stands at most some 12 dB above it.
+fn above_surroundings(level: &[f64], index: usize) -> f64 {
+    let reach = (index / 10).max(25);
+    let first = index.saturating_sub(reach);
+    let last = (index + reach + 1).min(level.len());
+    let mut around = level[first..last].to_vec();
+    around.sort_by(f64::total_cmp);
+    level[index] - around[around.len() / 2]
+}

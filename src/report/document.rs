@@ -1,0 +1,284 @@
+//! The report as data: what `report.json` holds.
+//!
+//! Units are SI, frequencies Hz. A value that does not exist is `null`, never 0. `low` and `high`
+//! are 95 % limits, `null` where unbounded or unknown.
+
+use serde::Serialize;
+
+/// Version of the document's layout.
+pub const VERSION: u32 = 1;
+
+/// The whole document. Sections that a command did not compute are left out.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Document {
+    /// Version of the layout.
+    pub version: u32,
+    /// What was tested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub test: Option<TestSection>,
+    /// Each recording: taps, spectra, its own readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recordings: Option<Vec<RecordingSection>>,
+    /// Resonances merged over the recordings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modes: Option<Vec<ModeSection>>,
+    /// The joint; `Some(None)` = asked for, but without an answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimate: Option<Option<EstimateSection>>,
+    /// Why there is no estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimate_reason: Option<String>,
+    /// Measured beside predicted frequencies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prediction: Option<Vec<PredictionSection>>,
+    /// Estimates under changed frequencies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbation: Option<Vec<PerturbationSection>>,
+    /// Spans of the estimates over all sign patterns of the half-line bounds, and what each mode
+    /// contributes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resolution_span: Option<ResolutionSpanSection>,
+    /// What a reader has to know.
+    pub warnings: Vec<WarningSection>,
+}
+
+/// What was tested.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct TestSection {
+    /// Name of the test.
+    pub name: String,
+    /// "cantilever", "lap" or "free"; null for a bare recording.
+    pub kind: Option<String>,
+    /// "2p" or "3p"; null where there is no joint.
+    pub model: Option<String>,
+    /// "timoshenko" or "euler": the beam theory of the prediction.
+    pub beam_theory: Option<String>,
+    /// Length (m).
+    pub length: Option<f64>,
+    /// Bending stiffness E I (N m2).
+    pub bending_stiffness: Option<f64>,
+    /// Mass per length (kg/m).
+    pub mass_per_length: Option<f64>,
+}
+
+/// One recording.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RecordingSection {
+    /// File as the description names it.
+    pub file: String,
+    /// Sample rate (Hz).
+    pub sample_rate: f64,
+    /// Number of channels.
+    pub channels: usize,
+    /// Length (s).
+    pub seconds: f64,
+    /// Taps in order of time.
+    pub taps: Vec<TapSection>,
+    /// Distance of the spectral lines (Hz).
+    pub line_spacing: Option<f64>,
+    /// Resolution 1/T (Hz), T the length of signal used.
+    pub resolution: Option<f64>,
+    /// Bound of a line reading (Hz).
+    pub half_line: Option<f64>,
+    /// Block size (samples at the zoomed rate).
+    pub block: Option<usize>,
+    /// Displayed lines.
+    pub lines: Option<usize>,
+    /// Taps averaged.
+    pub averages: usize,
+    /// Band (Hz).
+    pub band: Option<[f64; 2]>,
+    /// "rectangular", "hann" or "exponential".
+    pub window: Option<String>,
+    /// Decay the window adds (1/s).
+    pub window_decay: Option<f64>,
+    /// Level at the record's end relative to its start, the largest of the responses.
+    pub remaining_at_end: Option<f64>,
+    /// This recording's own readings.
+    pub modes: Vec<ModeSection>,
+}
+
+/// One tap.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct TapSection {
+    /// When it begins (s from the start of the recording).
+    pub time: f64,
+    /// Peak force (N); null without a hammer.
+    pub peak_force: Option<f64>,
+    /// Peak of the response on which it was found (SI); null with a hammer.
+    pub peak_response: Option<f64>,
+    /// Whether it enters the averages.
+    pub accepted: bool,
+    /// Why not.
+    pub reason: Option<String>,
+}
+
+/// One resonance.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ModeSection {
+    /// The model's number; null for a peak that belongs to no mode.
+    pub mode: Option<usize>,
+    /// Best frequency (Hz).
+    pub frequency: f64,
+    /// "line" or "interpolated" ("given" when read elsewhere).
+    pub method: String,
+    /// Frequency on the line (Hz).
+    pub line_frequency: Option<f64>,
+    /// Bound of the line reading (Hz).
+    pub half_line: Option<f64>,
+    /// Frequency between the lines (Hz).
+    pub interpolated_frequency: Option<f64>,
+    /// Its bound (Hz), about 95 %.
+    pub interpolated_bound: Option<f64>,
+    /// Standard deviation of the best frequency (Hz).
+    pub std: Option<f64>,
+    /// Damping ratio.
+    pub damping: Option<f64>,
+    /// Its standard deviation.
+    pub damping_std: Option<f64>,
+    /// Non-dimensional frequency (Euler).
+    pub lambda: Option<f64>,
+    /// Prominence of the peak (dB).
+    pub prominence_db: Option<f64>,
+    /// Height above the noise (dB).
+    pub above_noise_db: Option<f64>,
+    /// The recording it was read from.
+    pub recording: Option<String>,
+    /// What a peak that is no mode is: "mains 50 Hz".
+    pub label: Option<String>,
+}
+
+/// A value with its uncertainty.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ValueSection {
+    /// The value.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: Option<f64>,
+    /// Lower 95 % limit.
+    pub low: Option<f64>,
+    /// Upper 95 % limit.
+    pub high: Option<f64>,
+}
+
+/// The joint, or the free beam's material.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct EstimateSection {
+    /// "pairs", or "free-beam".
+    pub method: String,
+    /// Modes that entered.
+    pub modes_used: Vec<usize>,
+    /// Why the estimate is doubtful, if it is.
+    pub reason: Option<String>,
+    /// Kx, non-dimensional.
+    pub kx: Option<ValueSection>,
+    /// Ky, non-dimensional.
+    pub ky: Option<ValueSection>,
+    /// Kz, non-dimensional.
+    pub kz: Option<ValueSection>,
+    /// sqrt(Kx Ky)/Kz.
+    pub coupling: Option<ValueSection>,
+    /// Kt (N/m).
+    pub kt: Option<ValueSection>,
+    /// Kr (N m/rad).
+    pub kr: Option<ValueSection>,
+    /// Ktr (N/rad).
+    pub ktr: Option<ValueSection>,
+    /// Young's modulus (Pa).
+    pub modulus: Option<ValueSection>,
+    /// Density (kg/m3).
+    pub density: Option<ValueSection>,
+    /// Correlations between the parameters.
+    pub correlations: Vec<f64>,
+    /// The pair regression.
+    pub pairs: Option<PairsSection>,
+}
+
+/// The pair regression's values.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PairsSection {
+    /// Kx.
+    pub kx: Option<f64>,
+    /// Ky.
+    pub ky: Option<f64>,
+    /// Kz.
+    pub kz: Option<f64>,
+    /// Product implied by the regression over the product of its own estimates, minus 1.
+    pub closure: Option<f64>,
+}
+
+/// One measured mode beside its prediction. error_percent = 100 (predicted - measured)/measured.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PredictionSection {
+    /// Mode number.
+    pub mode: usize,
+    /// Measured (Hz).
+    pub measured: Option<f64>,
+    /// Predicted (Hz).
+    pub predicted: Option<f64>,
+    /// Predicted, non-dimensional.
+    pub lambda: Option<f64>,
+    /// Error (%).
+    pub error_percent: Option<f64>,
+    /// Whether the mode entered the estimate.
+    pub used: bool,
+}
+
+/// An estimate from frequencies changed by the same percentage.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PerturbationSection {
+    /// Change of all frequencies (%), signed.
+    pub percent: f64,
+    /// "pairs".
+    pub method: String,
+    /// Kx.
+    pub kx: Option<f64>,
+    /// Ky.
+    pub ky: Option<f64>,
+    /// Kz.
+    pub kz: Option<f64>,
+}
+
+/// What the resolution of the readings does to the estimate.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ResolutionSpanSection {
+    /// Number of sign patterns tried.
+    pub patterns: usize,
+    /// Patterns that left no estimate.
+    pub failed: usize,
+    /// Smallest and largest Kx.
+    pub kx: Option<[f64; 2]>,
+    /// Smallest and largest Ky.
+    pub ky: Option<[f64; 2]>,
+    /// Smallest and largest Kz.
+    pub kz: Option<[f64; 2]>,
+    /// All estimates over the patterns, for a picture: (Kx, Ky).
+    #[serde(skip)]
+    pub cloud: Vec<[f64; 2]>,
+    /// Change of each parameter (%) when one mode moves by its own bound.
+    pub sensitivity: Vec<SensitivitySection>,
+}
+
+/// What one mode's bound does.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SensitivitySection {
+    /// Mode number.
+    pub mode: usize,
+    /// The bound (Hz).
+    pub half_line: f64,
+    /// Change of Kx (%).
+    pub kx_percent: Option<f64>,
+    /// Change of Ky (%).
+    pub ky_percent: Option<f64>,
+    /// Change of Kz (%).
+    pub kz_percent: Option<f64>,
+}
+
+/// A warning.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct WarningSection {
+    /// Short code that scripts may look for.
+    pub code: String,
+    /// What happened, why it might be, what helps.
+    pub text: String,
+}

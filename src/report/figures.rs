@@ -1,0 +1,98 @@
+//! The data that pictures are drawn from.
+
+use crate::spectral::Lines;
+
+/// What the pictures of one recording need.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingFigure {
+    /// File as the description names it.
+    pub file: String,
+    /// Envelope over time of the channel on which taps were found.
+    pub overview: TimeOverview,
+    /// The spectra; `None` when no tap was accepted.
+    pub spectra: Option<SpectraFigure>,
+}
+
+/// Smallest and largest value in equal pieces of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeOverview {
+    /// What is shown: "force (N)" or "response A (m/s2)".
+    pub label: String,
+    /// Length of a piece (s).
+    pub step: f64,
+    /// Smallest value in each piece.
+    pub low: Vec<f64>,
+    /// Largest value in each piece.
+    pub high: Vec<f64>,
+    /// Taps: time (s), peak value, accepted.
+    pub taps: Vec<TapMark>,
+}
+
+/// A tap in the time overview.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapMark {
+    /// Time (s).
+    pub time: f64,
+    /// Peak value (unit of the overview).
+    pub peak: f64,
+    /// Why it was rejected; `None` = accepted.
+    pub rejected: Option<String>,
+}
+
+/// Magnitudes over the lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectraFigure {
+    /// The axis.
+    pub lines: Lines,
+    /// Taps averaged.
+    pub averages: usize,
+    /// Root mean square of the force's transforms (N s); `None` without a hammer.
+    pub force: Option<Vec<f64>>,
+    /// One curve for each response: its transform's root mean square (unit s).
+    pub responses: Vec<Curve>,
+    /// One curve for each frequency response function, complex parts kept; empty without a hammer.
+    pub frfs: Vec<FrfCurve>,
+    /// Resonances to mark.
+    pub peaks: Vec<PeakMark>,
+}
+
+/// A named curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Sensor's name and what it senses: "A, acceleration".
+    pub name: String,
+    /// Unit of the values: "m/s2 s".
+    pub unit: String,
+    /// One value a line.
+    pub values: Vec<f64>,
+}
+
+/// A frequency response function.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrfCurve {
+    /// Sensor's name.
+    pub name: String,
+    /// "accelerance", "mobility", "receptance" or "sound pressure per force".
+    pub form: String,
+    /// Its unit: "(m/s2)/N".
+    pub unit: String,
+    /// Magnitude (unit above).
+    pub magnitude: Vec<f64>,
+    /// Phase (degrees), -180 to 180.
+    pub phase: Vec<f64>,
+}
+
+/// A resonance in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PeakMark {
+    /// Mode number of this recording's peak, or `None` for mains and the like.
+    pub mode: Option<usize>,
+    /// Best frequency (Hz).
+    pub frequency: f64,
+    /// Frequency on the line (Hz).
+    pub line_frequency: f64,
+    /// Bound of the line reading (Hz).
+    pub half_line: f64,
+    /// "mains 50 Hz" and the like.
+    pub label: Option<String>,
+}

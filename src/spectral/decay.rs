@@ -1,0 +1,69 @@
+//! How far a tap record rings down, and the window that follows from it.
+
+use super::Window;
+
+/// Level at a record's end that counts as rung down: 1 % (field practice after ISO 7626-5).
+pub const RUNG_DOWN: f64 = 0.01;
+
+/// The end of a record judged against its start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DecayCheck {
+    /// rms over the last twentieth of the record over the largest rms of any twentieth, the
+    /// noise power taken out of both.
+    pub remaining: f64,
+    /// The noise alone, on the same scale: below it nothing can be said.
+    pub noise: f64,
+}
+
+/// Measures how far `samples` (a tap record without window) rings down.
+///
+/// `noise_rms` is the rms of the noise before the taps (same unit as the samples).
+pub fn measure_decay(samples: &[f64], noise_rms: f64) -> DecayCheck {
+    let piece = (samples.len() / 20).max(1);
+    let powers: Vec<f64> = samples
+        .chunks_exact(piece)
+        .map(|chunk| {
+            let mean = chunk.iter().sum::<f64>() / piece as f64;
+            chunk.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / piece as f64
+        })
+        .collect();
+    let noise_power = noise_rms * noise_rms;
+    let largest = powers.iter().copied().fold(0.0, f64::max) - noise_power;
+    if largest <= 0.0 {
+        return DecayCheck {
+            remaining: 0.0,
+            noise: 1.0,
+        };
+    }
+    let last = (powers.last().copied().unwrap_or(0.0) - noise_power).max(0.0);
+    DecayCheck {
+        remaining: (last / largest).sqrt(),
+        noise: noise_rms / largest.sqrt(),
+    }
+}
+
+/// Rectangular where the slowest response rings down to 1 % in the record (or into its noise), else
+/// the exponential window that takes it there: e^{-aT} = 1 %/remaining.
+///
+/// `duration` is the record's length T (s).
+pub fn choose_window(checks: &[DecayCheck], duration: f64) -> Window {
+    let remaining = checks
+        .iter()
+        .filter(|check| check.remaining > check.noise)
+        .map(|check| check.remaining)
+        .fold(0.0, f64::max);
+    if remaining <= RUNG_DOWN {
+        Window::Rectangular
+    } else {
+        exponential_to(remaining, duration)
+    }
+}
+
+/// The exponential window that brings a response which keeps `remaining` of its level down to 1 %.
+/// A record already down there gets one that falls to 10 %: asked for, but gentle.
+pub fn exponential_to(remaining: f64, duration: f64) -> Window {
+    let fall = (RUNG_DOWN / remaining.max(f64::MIN_POSITIVE)).clamp(RUNG_DOWN, 0.1);
+    Window::Exponential {
+        decay: -fall.ln() / duration,
+    }
+}

@@ -1,0 +1,112 @@
+//! The frequency axis of a spectrum, and what it can resolve.
+
+use super::{LEAST_BLOCK, MOST_BLOCK, SpectralError};
+
+/// Ratio of sample rate to displayed bandwidth: analysers show N/2.56 lines of a block of N.
+pub const DISPLAY_RATIO: f64 = 2.56;
+
+/// Equally spaced spectral lines over a band, with the length of signal behind them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lines {
+    /// Frequency of the first line (Hz).
+    pub low: f64,
+    /// End of the displayed band (Hz).
+    pub high: f64,
+    /// Distance between lines (Hz): 2.56 (high - low)/block.
+    pub spacing: f64,
+    /// Block size (real samples at the zoomed rate 2.56 (high - low)).
+    pub block: usize,
+    /// Length of signal actually used, T (s); at most block/(2.56 (high - low)).
+    pub duration: f64,
+}
+
+impl Lines {
+    /// Lines of a block without a zoom band: 0 to rate/2.56, spacing rate/block.
+    ///
+    /// `available` is the length of signal at hand (s).
+    ///
+    /// # Errors
+    /// [`SpectralError::Block`] for a block outside 16 to 2^27 samples.
+    pub fn baseband(
+        sample_rate: f64,
+        block: usize,
+        available: f64,
+    ) -> Result<Lines, SpectralError> {
+        Self::zoom(
+            (0.0, sample_rate / DISPLAY_RATIO),
+            sample_rate,
+            block,
+            available,
+        )
+    }
+
+    /// Lines of a zoom band `(low, high)` (Hz) with `block` real samples at the zoomed rate.
+    ///
+    /// # Errors
+    /// [`SpectralError::Band`] where the band is empty or passes half the sample rate,
+    /// [`SpectralError::Block`] for a block outside 16 to 2^27 samples.
+    pub fn zoom(
+        (low, high): (f64, f64),
+        sample_rate: f64,
+        block: usize,
+        available: f64,
+    ) -> Result<Lines, SpectralError> {
+        let limit = sample_rate / 2.0;
+        if !(low >= 0.0 && low < high && high <= limit) {
+            return Err(SpectralError::Band {
+                low,
+                high,
+                sample_rate,
+                limit,
+            });
+        }
+        if !(LEAST_BLOCK..=MOST_BLOCK).contains(&block) {
+            return Err(SpectralError::Block {
+                block,
+                least: LEAST_BLOCK,
+                most: MOST_BLOCK,
+            });
+        }
+        let zoomed_rate = DISPLAY_RATIO * (high - low);
+        Ok(Lines {
+            low,
+            high,
+            spacing: zoomed_rate / block as f64,
+            block,
+            duration: available.min(block as f64 / zoomed_rate),
+        })
+    }
+
+    /// Number of displayed lines, block/2.56; the axis has one point more, its lower end.
+    pub fn displayed(&self) -> usize {
+        // A hair more than exact, so that 800 lines of 2048 are not 799 by rounding.
+        (self.block as f64 / DISPLAY_RATIO * (1.0 + 1e-12)) as usize
+    }
+
+    /// Number of points on the axis.
+    pub fn points(&self) -> usize {
+        self.displayed() + 1
+    }
+
+    /// Frequency of point `index` (Hz).
+    pub fn frequency(&self, index: usize) -> f64 {
+        self.low + index as f64 * self.spacing
+    }
+
+    /// All frequencies (Hz).
+    pub fn frequencies(&self) -> Vec<f64> {
+        (0..self.points())
+            .map(|index| self.frequency(index))
+            .collect()
+    }
+
+    /// What the signal can resolve, 1/T (Hz).
+    pub fn resolution(&self) -> f64 {
+        1.0 / self.duration
+    }
+
+    /// Bound of a frequency read on a line (Hz): half of the larger of line spacing and resolution.
+    pub fn half_line(&self) -> f64 {
+        0.5 * self.spacing.max(self.resolution())
+    }
+}

@@ -30,19 +30,23 @@ pub struct Interpolation {
 /// Lines to each side of the peak: at least two, so that five complex values stand against three
 /// unknowns.
 const LEAST_REACH: usize = 2;
-/// At most so many: farther out the background is no longer straight.
-const MOST_REACH: usize = 12;
+/// At most so many: a bound on the work for very long blocks.
+const MOST_REACH: usize = 500;
+/// From this reach on the background may slope: nine complex values against four unknowns.
+const SLOPING_REACH: usize = 4;
 /// Iterations of the weights; they settle in two.
 const REWEIGHTINGS: usize = 3;
 
 /// Fits one pole, common to all `spectra`, to the lines around `peak`.
 ///
-/// Model: H(u) = r/(u - q) + b with u the distance from the peak in lines, q the complex pole, and a
-/// residue r and background b for every spectrum; written H u = c0 + c1 u + q H and solved by least
-/// squares with the weights 1/|u - q|^2 of the previous pass (Sanathanan & Koerner).
+/// Model: H(u) = r/(u - q) + b with u the distance from the peak in lines, q the complex pole, a
+/// residue r and a background b (constant, or linear in u where there are lines enough) for every
+/// spectrum; written H u = c0 + c1 u + c2 u^2 + q H and solved by least squares with the weights
+/// 1/|u - q|^2 of the previous pass (Sanathanan & Koerner).
+/// The lines within the half-power width, at least two to either side, take part.
 /// `added_decay` is the exponential window's (1/s); `room` how many lines to either side belong to
-/// this peak alone. `None` when there are too few lines or the pole lies more than a line from the
-/// peak.
+/// this peak alone. `None` when there are too few lines, or the pole lies farther from the peak than
+/// a line and half the half-power width.
 pub fn interpolate_pole(
     lines: &Lines,
     spectra: &[&[Complex64]],
@@ -50,21 +54,15 @@ pub fn interpolate_pole(
     room: usize,
     added_decay: f64,
 ) -> Option<Interpolation> {
-    let first = fit_pole(spectra, peak, LEAST_REACH)?;
-    // Half-power width in lines is 2 Im q: reach about one width to either side.
-    let wanted = (2.0 * first.pole.im.abs()).ceil() as usize + 1;
-    let reach = wanted
+    let half_width = half_power_reach(spectra, peak)?;
+    let reach = (half_width + 1)
         .clamp(LEAST_REACH, MOST_REACH)
         .min(room.max(LEAST_REACH));
-    let fit = if reach == LEAST_REACH {
-        first
-    } else {
-        fit_pole(spectra, peak, reach)?
-    };
+    let fit = fit_pole(spectra, peak, reach)?;
     let narrower = fit_pole(spectra, peak, (reach / 2).max(1)).unwrap_or(fit);
     // Resolution, not line spacing, is the measure of "near": zero padding must not tighten it.
     let line = lines.resolution().max(lines.spacing) / lines.spacing;
-    if !fit.pole.is_finite() || fit.pole.re.abs() > line {
+    if !fit.pole.is_finite() || fit.pole.re.abs() > line + 0.5 * half_width as f64 {
         return None;
     }
     let damped = lines.frequency(peak) + fit.pole.re * lines.spacing;
@@ -78,6 +76,21 @@ pub fn interpolate_pole(
         damping_ratio: (decay > 0.0).then(|| decay / frequency),
         damping_std: std / frequency,
     })
+}
+
+/// Lines from the peak to where the summed power has fallen by half, on the farther side.
+fn half_power_reach(spectra: &[&[Complex64]], peak: usize) -> Option<usize> {
+    let power = |line: usize| -> Option<f64> {
+        spectra
+            .iter()
+            .map(|spectrum| spectrum.get(line).map(Complex64::norm_sqr))
+            .sum()
+    };
+    let half = 0.5 * power(peak)?;
+    let above = |line: Option<usize>| line.and_then(power).is_some_and(|p| p > half);
+    let right = (1..MOST_REACH).find(|&k| !above(Some(peak + k)))?;
+    let left = (1..MOST_REACH).find(|&k| !above(peak.checked_sub(k)))?;
+    Some(left.max(right))
 }
 
 #[derive(Clone, Copy)]
@@ -116,6 +129,7 @@ fn solve_pole(
     offsets: &[f64],
     weights: &[f64],
 ) -> Option<PoleFit> {
+    let basis = polynomial_basis(offsets, weights);
     let (mut numerator, mut denominator) = (Complex64::ZERO, 0.0);
     let mut parts = Vec::with_capacity(spectra.len());
     for spectrum in spectra {
@@ -123,10 +137,7 @@ fn solve_pole(
             .map(|i| spectrum[first + i] * weights[i].sqrt())
             .collect();
         let sloped: Vec<Complex64> = values.iter().zip(offsets).map(|(h, u)| h * u).collect();
-        let (h, uh) = (
-            project(values, offsets, weights),
-            project(sloped, offsets, weights),
-        );
+        let (h, uh) = (project(values, &basis), project(sloped, &basis));
         numerator += h
             .iter()
             .zip(&uh)
@@ -143,8 +154,9 @@ fn solve_pole(
         .iter()
         .flat_map(|(h, uh)| h.iter().zip(uh).map(|(h, uh)| (uh - pole * h).norm_sqr()))
         .sum();
-    // Complex values less two unknowns per spectrum less the common pole.
-    let freedom = (offsets.len() * spectra.len()).saturating_sub(2 * spectra.len() + 1);
+    // Complex values less the polynomial's unknowns per spectrum less the common pole.
+    let unknowns = basis.len() * spectra.len() + 1;
+    let freedom = (offsets.len() * spectra.len()).saturating_sub(unknowns);
     let std = if freedom == 0 {
         0.0
     } else {
@@ -153,26 +165,47 @@ fn solve_pole(
     Some(PoleFit { pole, std })
 }
 
-/// Takes the weighted constant and slope out of `values`.
-fn project(mut values: Vec<Complex64>, offsets: &[f64], weights: &[f64]) -> Vec<Complex64> {
-    let total: f64 = weights.iter().sum();
-    let mean = weights.iter().zip(offsets).map(|(w, u)| w * u).sum::<f64>() / total;
-    for centre in [None, Some(mean)] {
-        let basis: Vec<f64> = weights
+/// Orthonormal basis of the polynomials 1, u (and u^2 where there are lines enough) under the
+/// weights, by Gram and Schmidt.
+fn polynomial_basis(offsets: &[f64], weights: &[f64]) -> Vec<Vec<f64>> {
+    let degrees = if offsets.len() > 2 * SLOPING_REACH {
+        3
+    } else {
+        2
+    };
+    let mut basis: Vec<Vec<f64>> = Vec::with_capacity(degrees);
+    for degree in 0..degrees {
+        let mut vector: Vec<f64> = offsets
             .iter()
-            .zip(offsets)
-            .map(|(w, u)| w.sqrt() * centre.map_or(1.0, |centre| u - centre))
+            .zip(weights)
+            .map(|(u, w)| w.sqrt() * u.powi(degree as i32))
             .collect();
-        let norm: f64 = basis.iter().map(|b| b * b).sum();
+        for earlier in &basis {
+            let share: f64 = vector.iter().zip(earlier).map(|(v, e)| v * e).sum();
+            vector
+                .iter_mut()
+                .zip(earlier)
+                .for_each(|(v, e)| *v -= share * e);
+        }
+        let norm = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
+        vector.iter_mut().for_each(|v| *v /= norm);
+        basis.push(vector);
+    }
+    basis
+}
+
+/// Takes the span of `basis` out of `values`.
+fn project(mut values: Vec<Complex64>, basis: &[Vec<f64>]) -> Vec<Complex64> {
+    for vector in basis {
         let share = values
             .iter()
-            .zip(&basis)
+            .zip(vector)
             .map(|(v, b)| v * b)
-            .sum::<Complex64>()
-            / norm;
-        for (value, b) in values.iter_mut().zip(&basis) {
-            *value -= share * b;
-        }
+            .sum::<Complex64>();
+        values
+            .iter_mut()
+            .zip(vector)
+            .for_each(|(v, b)| *v -= share * b);
     }
     values
 }

@@ -8,8 +8,10 @@ mod interpolation;
 mod mains;
 mod merge;
 mod peaks;
+mod reading;
 
 pub use interpolation::{Interpolation, interpolate_parabola, interpolate_pole};
 pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic};
 pub use merge::{MergedMode, ModeReading, merge_modes};
 pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};
+pub use reading::{NO_RESONANCE, read_peaks};

@@ -15,17 +15,14 @@ pub struct DecayCheck {
     pub noise: f64,
 }
 
-/// Measures how far `samples` (a tap record without window) rings down.
+/// Measures how far `samples` (a tap record without window, its mean taken out) rings down.
 ///
 /// `noise_rms` is the rms of the noise before the taps (same unit as the samples).
 pub fn measure_decay(samples: &[f64], noise_rms: f64) -> DecayCheck {
     let piece = (samples.len() / 20).max(1);
     let powers: Vec<f64> = samples
         .chunks_exact(piece)
-        .map(|chunk| {
-            let mean = chunk.iter().sum::<f64>() / piece as f64;
-            chunk.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / piece as f64
-        })
+        .map(|chunk| chunk.iter().map(|x| x * x).sum::<f64>() / piece as f64)
         .collect();
     let noise_power = noise_rms * noise_rms;
     let largest = powers.iter().copied().fold(0.0, f64::max) - noise_power;

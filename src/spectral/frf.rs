@@ -97,3 +97,16 @@ fn divide(cross: &[Complex64], power: &[f64]) -> Vec<Complex64> {
         .map(|(c, &p)| if p > 0.0 { c / p } else { Complex64::ZERO })
         .collect()
 }
+
+impl AveragedSpectra {
+    /// Averages over nothing, on an axis.
+    pub fn empty(lines: Lines) -> Self {
+        AveragedSpectra {
+            lines,
+            taps: 0,
+            force: None,
+            responses: Vec::new(),
+            h1: None,
+        }
+    }
+}

@@ -93,6 +93,12 @@ impl Lines {
         self.low + index as f64 * self.spacing
     }
 
+    /// Index of the line nearest to a frequency (Hz).
+    pub fn nearest(&self, frequency: f64) -> usize {
+        let index = ((frequency - self.low) / self.spacing).round().max(0.0) as usize;
+        index.min(self.points() - 1)
+    }
+
     /// All frequencies (Hz).
     pub fn frequencies(&self) -> Vec<f64> {
         (0..self.points())

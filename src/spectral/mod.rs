@@ -8,6 +8,7 @@ mod block;
 mod decay;
 mod frf;
 mod lines;
+mod noise;
 mod transform;
 mod window;
 mod zoom;
@@ -16,9 +17,10 @@ pub use block::{largest_smooth_block, smallest_smooth_block};
 pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
 pub use frf::{AveragedSpectra, SpectralAverager};
 pub use lines::{DISPLAY_RATIO, Lines};
+pub use noise::{line_amplitude, noise_power};
 pub use transform::transform_block;
-pub use window::Window;
-pub use zoom::chirp_z;
+pub use window::{Window, apply_force_window};
+pub use zoom::{band_limited, chirp_z};
 
 /// What makes a spectrum impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

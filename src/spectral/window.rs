@@ -55,3 +55,18 @@ impl Window {
         }
     }
 }
+
+/// The force window: unity over the first `unity` samples (pre-trigger, pulse and the filter's
+/// ringing), a half-cosine taper over `taper` samples, exact zero after. It takes the noise of a
+/// whole record out of a force that lasts a millisecond; a second hit must have been looked for
+/// before.
+pub fn apply_force_window(samples: &mut [f64], unity: usize, taper: usize) {
+    for (n, x) in samples.iter_mut().enumerate().skip(unity) {
+        let share = (n - unity + 1) as f64 / (taper + 1) as f64;
+        *x *= if share < 1.0 {
+            0.5 * (1.0 + (std::f64::consts::PI * share).cos())
+        } else {
+            0.0
+        };
+    }
+}

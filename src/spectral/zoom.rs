@@ -92,6 +92,32 @@ pub(super) fn mix_and_decimate(
     }
 }
 
+/// Magnitude over time of what `samples` have between `low` and `high` (Hz): mixed down, filtered and
+/// decimated, the filter's tails cut off; the samples themselves where the band is most of what
+/// there is.
+pub fn band_limited(samples: &[f64], sample_rate: f64, (low, high): (f64, f64)) -> Vec<f64> {
+    let factor = (sample_rate / (1.28 * (high - low))).floor() as usize;
+    if factor < 3 {
+        return samples.to_vec();
+    }
+    let zoomed = mix_and_decimate(
+        samples,
+        sample_rate,
+        (0.5 * (low + high), high - low),
+        factor,
+    );
+    let skip = zoomed.delay / factor;
+    let keep = samples.len() / factor;
+    // A real oscillation of amplitude a leaves a magnitude of a/2.
+    zoomed
+        .samples
+        .iter()
+        .skip(skip)
+        .take(keep)
+        .map(|z| 2.0 * z.norm())
+        .collect()
+}
+
 /// One output of the symmetric filter, centred on `index`.
 fn filtered(mixed: &[Complex64], filter: &[f64], index: i64) -> Complex64 {
     let half = (filter.len() / 2) as i64;

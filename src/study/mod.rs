@@ -1,1 +1,1 @@
-//! Stage.
+//! Studies that need measurement and theory together.

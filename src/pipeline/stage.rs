@@ -1,0 +1,278 @@
+//! The steps of one recording's measurement that read samples.
+
+use num_complex::Complex64;
+
+use super::measure::{MeasureSettings, MeasuredSpectra};
+use crate::description::WindowKind;
+use crate::modal::{
+    CompositeLevel, LineAmplitudes, ModeReading, find_peaks, mains_harmonic, read_peaks,
+};
+use crate::recording::{Recording, RecordingError};
+use crate::spectral::{
+    AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, apply_force_window, band_limited,
+    choose_window, exponential_to, line_amplitude, measure_decay, noise_power, transform_block,
+};
+use crate::taps::{Tap, TapSource, Taps};
+
+/// What every step of one recording's measurement needs.
+pub(super) struct Stage<'a> {
+    recording: &'a Recording,
+    settings: &'a MeasureSettings,
+    taps: &'a Taps,
+    lines: Lines,
+    /// Force first, where there is one, then the responses.
+    channels: Vec<usize>,
+    has_force: bool,
+    /// Frames of a block.
+    gate: u64,
+}
+
+impl<'a> Stage<'a> {
+    pub(super) fn new(
+        recording: &'a Recording,
+        settings: &'a MeasureSettings,
+        taps: &'a Taps,
+        lines: Lines,
+    ) -> Self {
+        Stage {
+            recording,
+            settings,
+            taps,
+            lines,
+            channels: settings.source.channels(),
+            has_force: matches!(settings.source, TapSource::Hammer { .. }),
+            gate: (lines.duration * recording.sample_rate()).round() as u64,
+        }
+    }
+
+    /// Samples of all channels in a range of frames, each channel's mean taken out.
+    fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let mut channels = self.recording.read_channels(&self.channels, range)?;
+        for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
+            let mean = self.recording.mean(channel);
+            samples.iter_mut().for_each(|x| *x -= mean);
+        }
+        Ok(channels)
+    }
+
+    fn record(&self, tap: &Tap) -> Result<Vec<Vec<f64>>, RecordingError> {
+        self.read(tap.record.start..tap.record.start + self.gate)
+    }
+
+    /// The quiet stretch before the first tap, at most a block.
+    fn quiet(&self) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let quiet = self.taps.quiet();
+        let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
+        Ok(self
+            .read(start..quiet.end)?
+            .split_off(usize::from(self.has_force)))
+    }
+
+    pub(super) fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
+        let quiet = self.quiet()?;
+        let checks = self.decay_checks(&quiet)?;
+        let slowest = |checks: &[DecayCheck]| {
+            checks
+                .iter()
+                .copied()
+                .max_by(|a, b| a.remaining.total_cmp(&b.remaining))
+        };
+        let decay = slowest(&checks).unwrap_or(DecayCheck {
+            remaining: 0.0,
+            noise: 1.0,
+        });
+        let window = match self.settings.window {
+            None => choose_window(&checks, self.lines.duration),
+            Some(WindowKind::Rectangular) => Window::Rectangular,
+            Some(WindowKind::Hann) => Window::Hann,
+            Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
+        };
+        let (averages, transforms) = self.averages(window)?;
+        let readings = self.readings(&averages, &transforms, &quiet, window);
+        Ok(MeasuredSpectra {
+            averages,
+            window,
+            decay,
+            readings,
+        })
+    }
+
+    /// The decay of each response inside the band, the largest over the accepted taps.
+    fn decay_checks(&self, quiet: &[Vec<f64>]) -> Result<Vec<DecayCheck>, RecordingError> {
+        let rate = self.recording.sample_rate();
+        let band = (self.lines.low, self.lines.high);
+        let noise: Vec<f64> = quiet
+            .iter()
+            .map(|x| rms(&band_limited(x, rate, band)))
+            .collect();
+        let mut checks = vec![
+            DecayCheck {
+                remaining: 0.0,
+                noise: 1.0
+            };
+            noise.len()
+        ];
+        for tap in self.taps.accepted() {
+            let responses = self.record(tap)?.split_off(usize::from(self.has_force));
+            for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
+                let found = measure_decay(&band_limited(samples, rate, band), noise);
+                if found.remaining >= check.remaining {
+                    *check = found;
+                }
+            }
+        }
+        Ok(checks)
+    }
+
+    /// Averages, and without a hammer also every tap's own transforms (their phases differ, so they
+    /// cannot be averaged), up to a bound on memory.
+    fn averages(
+        &self,
+        window: Window,
+    ) -> Result<(AveragedSpectra, Vec<Vec<Complex64>>), RecordingError> {
+        let rate = self.recording.sample_rate();
+        let responses = self.channels.len() - usize::from(self.has_force);
+        let mut averager = SpectralAverager::new(self.lines, responses);
+        let mut kept: Vec<Vec<Complex64>> = Vec::new();
+        for tap in self.taps.accepted() {
+            let mut samples = self.record(tap)?;
+            if let (Some(end), Some(force)) = (tap.pulse_end, samples.first_mut()) {
+                // As long again as the pulse, then a taper of the same length.
+                let pulse = (end - tap.record.start) as usize;
+                apply_force_window(force, 2 * pulse, pulse);
+            }
+            let mut transforms: Vec<Vec<Complex64>> = samples
+                .iter_mut()
+                .map(|samples| {
+                    window.apply(samples, rate);
+                    transform_block(samples, rate, &self.lines)
+                })
+                .collect();
+            let responses = transforms.split_off(usize::from(self.has_force));
+            averager.add(transforms.first().map(Vec::as_slice), &responses);
+            if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
+                kept.extend(responses);
+            }
+        }
+        // At least one tap was accepted, or there would be no axis.
+        let averages = averager
+            .finish()
+            .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
+        Ok((averages, kept))
+    }
+
+    /// Peaks of the composite level over all sensors, read and labelled.
+    fn readings(
+        &self,
+        averages: &AveragedSpectra,
+        transforms: &[Vec<Complex64>],
+        quiet: &[Vec<f64>],
+        window: Window,
+    ) -> Vec<ModeReading> {
+        let powers: Vec<Vec<f64>> = match &averages.h1 {
+            Some(h1) => h1
+                .iter()
+                .map(|h| h.iter().map(Complex64::norm_sqr).collect())
+                .collect(),
+            None => averages
+                .responses
+                .iter()
+                .map(|x| x.iter().map(|x| x * x).collect())
+                .collect(),
+        };
+        let noise = self.noise_powers(averages, quiet, window);
+        let level = CompositeLevel::new(self.lines, &powers, noise.as_deref());
+        let peaks = find_peaks(&level, &self.settings.peaks);
+        let spectra: Vec<&[Complex64]> = averages
+            .h1
+            .as_deref()
+            .unwrap_or(transforms)
+            .iter()
+            .map(Vec::as_slice)
+            .collect();
+        let mut readings = read_peaks(&level, &spectra, &peaks, window);
+        for (reading, peak) in readings.iter_mut().zip(&peaks) {
+            if let Some(label) = self.mains_label(peak.index, averages, quiet, window) {
+                *reading = as_mains(reading, self.lines.frequency(peak.index), label);
+            }
+        }
+        readings
+    }
+
+    /// Power that noise alone would leave in the averages, per response.
+    fn noise_powers(
+        &self,
+        averages: &AveragedSpectra,
+        quiet: &[Vec<f64>],
+        window: Window,
+    ) -> Option<Vec<Vec<f64>>> {
+        let rate = self.recording.sample_rate();
+        let mut weights = vec![1.0; self.gate as usize];
+        window.apply(&mut weights, rate);
+        let energy: f64 = weights.iter().map(|w| w * w).sum();
+        quiet
+            .iter()
+            .map(|samples| {
+                let mut power = noise_power(samples.clone(), rate, &self.lines)?;
+                for (index, value) in power.iter_mut().enumerate() {
+                    let force = averages.force.as_ref().map_or(1.0, |force| {
+                        averages.taps as f64 * force[index] * force[index]
+                    });
+                    *value *= energy / force.max(f64::MIN_POSITIVE);
+                }
+                Some(power)
+            })
+            .collect()
+    }
+
+    /// "mains 50 Hz" where a peak is hum, judged on the response in which it is strongest.
+    fn mains_label(
+        &self,
+        index: usize,
+        averages: &AveragedSpectra,
+        quiet: &[Vec<f64>],
+        window: Window,
+    ) -> Option<String> {
+        let rate = self.recording.sample_rate();
+        let frequency = self.lines.frequency(index);
+        let strength =
+            |s: &usize| averages.responses[*s][index] / averages.responses[*s].iter().sum::<f64>();
+        let strongest =
+            (0..averages.responses.len()).max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
+        let mut weights = vec![1.0; self.gate as usize];
+        window.apply(&mut weights, rate);
+        let within =
+            2.0 * averages.responses[strongest][index] * rate / weights.iter().sum::<f64>();
+        let before = line_amplitude(quiet.get(strongest)?, rate, frequency)?;
+        let amplitudes = LineAmplitudes { before, within };
+        mains_harmonic(
+            frequency,
+            self.lines.half_line(),
+            amplitudes,
+            &self.settings.mains,
+        )
+        .map(|harmonic| format!("mains {harmonic} Hz"))
+    }
+}
+
+/// Bound on the transforms kept for a test without hammer (values; 16 bytes each).
+const MOST_KEPT: usize = 1 << 24;
+
+/// A mains line keeps its line reading and loses what only a resonance has.
+fn as_mains(reading: &ModeReading, line_frequency: f64, label: String) -> ModeReading {
+    ModeReading {
+        frequency: line_frequency,
+        line_frequency,
+        interpolated: None,
+        bound: None,
+        std: Some(reading.half_line / 3f64.sqrt()),
+        damping_ratio: None,
+        damping_std: None,
+        label: Some(label),
+        ..reading.clone()
+    }
+}
+
+fn rms(samples: &[f64]) -> f64 {
+    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,260 @@
+//! Doubts about a result: what happened, why it might be, what helps.
+
+use std::fmt;
+
+use super::measure::MeasuredSpectra;
+use crate::recording::Recording;
+use crate::spectral::{RUNG_DOWN, Window};
+use crate::taps::{TapSource, Taps};
+
+/// A warning that travels with the result.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Warning {
+    /// Something about a recording's data or its search for taps.
+    Recording {
+        /// Short code for scripts.
+        code: &'static str,
+        /// The recording.
+        file: String,
+        /// What happened, why, what helps.
+        text: String,
+    },
+    /// Something about the test description.
+    Description {
+        /// What happened, why, what helps.
+        text: String,
+    },
+    /// Taps were rejected.
+    RejectedTaps {
+        /// The recording.
+        file: String,
+        /// How many.
+        rejected: usize,
+        /// Of how many.
+        total: usize,
+    },
+    /// Only one tap was averaged.
+    SingleTap {
+        /// The recording.
+        file: String,
+    },
+    /// The response does not ring down in the record.
+    NotRungDown {
+        /// The recording.
+        file: String,
+        /// Level at the end relative to the start.
+        remaining: f64,
+        /// The window in force.
+        window: Window,
+    },
+    /// A window that is wrong for taps.
+    HannOnTaps {
+        /// The recording.
+        file: String,
+    },
+    /// A peak was taken for mains hum.
+    Mains {
+        /// The recording.
+        file: String,
+        /// Where (Hz).
+        frequency: f64,
+        /// What it is.
+        label: String,
+    },
+    /// The pair regression contradicts its own frequency equation.
+    Closure {
+        /// Product implied over product of the estimates, minus 1.
+        closure: f64,
+    },
+    /// The regression left something that no joint can have.
+    UnphysicalEstimate {
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The model with the estimated joint misses the measurement.
+    Misfit {
+        /// Mode number.
+        mode: usize,
+        /// Error (%).
+        error_percent: f64,
+        /// Error over the reading's standard deviation, where known.
+        deviations: Option<f64>,
+    },
+    /// Something the method leaves out.
+    Neglected {
+        /// What and with what effect.
+        text: String,
+    },
+}
+
+impl Warning {
+    /// Short code that scripts may look for.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Warning::Recording { code, .. } => code,
+            Warning::Description { .. } => "description",
+            Warning::RejectedTaps { .. } => "rejected-taps",
+            Warning::SingleTap { .. } => "single-tap",
+            Warning::NotRungDown { .. } => "not-rung-down",
+            Warning::HannOnTaps { .. } => "hann-on-taps",
+            Warning::Mains { .. } => "mains",
+            Warning::Closure { .. } => "closure",
+            Warning::UnphysicalEstimate { .. } => "unphysical",
+            Warning::Misfit { .. } => "misfit",
+            Warning::Neglected { .. } => "neglected",
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Warning::Recording { file, text, .. } => write!(f, "{file}: {text}"),
+            Warning::Description { text } | Warning::Neglected { text } => f.write_str(text),
+            Warning::RejectedTaps {
+                file,
+                rejected,
+                total,
+            } => write!(
+                f,
+                "{file}: {rejected} of {total} taps were rejected; the list of taps says why"
+            ),
+            Warning::SingleTap { file } => write!(
+                f,
+                "{file}: only one tap was averaged, so nothing shows how well it repeats and a \
+                 coherence would mean nothing; record three to five taps"
+            ),
+            Warning::NotRungDown {
+                file,
+                remaining,
+                window,
+            } => {
+                write!(
+                    f,
+                    "{file}: at the end of the block the response still has {:.0} % of its level \
+                     (1 % is wanted); ",
+                    100.0 * remaining
+                )?;
+                match window {
+                    Window::Exponential { decay } => write!(
+                        f,
+                        "an exponential window with a decay of {decay:.3} 1/s was applied to force and \
+                         response, and taken out of every damping; taps farther apart need none"
+                    ),
+                    _ => f.write_str(
+                        "readings on lines suffer from it; leave the window to the program, or set the \
+                         taps farther apart",
+                    ),
+                }
+            }
+            Warning::HannOnTaps { file } => write!(
+                f,
+                "{file}: a Hann window suppresses the start of every record, where a tap has its \
+                 signal; it is meant for steady signals"
+            ),
+            Warning::Mains {
+                file,
+                frequency,
+                label,
+            } => write!(
+                f,
+                "{file}: the peak at {frequency:.2} Hz was there before the tap and is taken for \
+                 {label}, not for a mode; check the grounding of the sensor cables"
+            ),
+            Warning::Closure { closure } => write!(
+                f,
+                "the pair regression does not satisfy its own frequency equation: the product it \
+                 implies differs from the product of its estimates by {:+.0} %; the eliminated product \
+                 is left free by the method, and an error of this size means that the stiffnesses are \
+                 not to be trusted singly",
+                100.0 * closure
+            ),
+            Warning::UnphysicalEstimate { what } => write!(
+                f,
+                "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
+                 mode, a wrong model or readings too coarse for it are the usual causes"
+            ),
+            Warning::Misfit {
+                mode,
+                error_percent,
+                deviations,
+            } => {
+                write!(
+                    f,
+                    "with the estimated joint the model misses mode {mode} by {error_percent:+.2} %"
+                )?;
+                if let Some(deviations) = deviations {
+                    write!(
+                        f,
+                        " ({:.0} standard deviations of its reading)",
+                        deviations.abs()
+                    )?;
+                }
+                f.write_str(
+                    "; the estimator, a mode numbered wrongly, or something the model lacks may be the \
+                     cause",
+                )
+            }
+        }
+    }
+}
+
+/// Doubts about a recording and its taps.
+pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
+    let file = recording.name().to_string();
+    let mut warnings: Vec<Warning> = recording
+        .warnings()
+        .iter()
+        .map(|warning| Warning::Recording {
+            code: warning.code(),
+            file: file.clone(),
+            text: warning.to_string(),
+        })
+        .collect();
+    warnings.extend(taps.remarks.iter().map(|remark| Warning::Recording {
+        code: "taps",
+        file: file.clone(),
+        text: remark.to_string(),
+    }));
+    let accepted = taps.accepted().count();
+    let rejected = taps.taps.len() - accepted;
+    if rejected > 0 {
+        warnings.push(Warning::RejectedTaps {
+            file: file.clone(),
+            rejected,
+            total: taps.taps.len(),
+        });
+    }
+    if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
+        warnings.push(Warning::SingleTap { file });
+    }
+    warnings
+}
+
+/// Doubts about a recording's spectra.
+pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let decay = &spectra.decay;
+    if decay.remaining > RUNG_DOWN && decay.remaining > decay.noise {
+        warnings.push(Warning::NotRungDown {
+            file: file.to_string(),
+            remaining: decay.remaining,
+            window: spectra.window,
+        });
+    }
+    if spectra.window == Window::Hann {
+        warnings.push(Warning::HannOnTaps {
+            file: file.to_string(),
+        });
+    }
+    for reading in &spectra.readings {
+        if let Some(label) = &reading.label {
+            warnings.push(Warning::Mains {
+                file: file.to_string(),
+                frequency: reading.line_frequency,
+                label: label.clone(),
+            });
+        }
+    }
+    warnings
+}

@@ -1,1 +1,0 @@
-//! Finding taps in a recording.

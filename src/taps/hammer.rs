@@ -1,0 +1,183 @@
+//! Pulses of force: a threshold over noise and drift, with hysteresis.
+
+use super::{Event, Found, TapRemark, TapSettings};
+use crate::recording::{Recording, RecordingError};
+
+/// Length of the pieces in which drift and noise are surveyed (s). A pulse of a few milliseconds
+/// does not move the median of 0.1 s.
+const PIECE: f64 = 0.1;
+/// An excursion longer than this is no hammer pulse but a moving cable or hand (s).
+const LONGEST_PULSE: f64 = 0.05;
+
+/// Median, noise and extremes of one piece of the channel.
+struct Piece {
+    median: f64,
+    deviation: f64,
+    low: f64,
+    high: f64,
+}
+
+/// The channel's drift, piece by piece, interpolated between their middles.
+pub(super) struct Baseline {
+    medians: Vec<f64>,
+    frames: f64,
+}
+
+impl Baseline {
+    pub(super) fn at(&self, frame: u64) -> f64 {
+        let position = frame as f64 / self.frames - 0.5;
+        let index = position.floor().max(0.0);
+        let share = (position - index).clamp(0.0, 1.0);
+        let value = |i: usize| {
+            self.medians
+                .get(i)
+                .or(self.medians.last())
+                .copied()
+                .unwrap_or(0.0)
+        };
+        value(index as usize) * (1.0 - share) + value(index as usize + 1) * share
+    }
+}
+
+/// Survey of the force channel.
+pub(super) struct Survey {
+    pub baseline: Baseline,
+    pub noise: f64,
+    pub polarity: f64,
+    /// Largest excursion from the baseline, in the pulses' direction.
+    pub largest: f64,
+}
+
+/// Surveys drift, noise and direction of the force channel.
+pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, RecordingError> {
+    let frames = ((PIECE * recording.sample_rate()) as usize).max(32);
+    let mut pieces = Vec::new();
+    for block in recording.blocks(&[channel], frames) {
+        if let Some(samples) = block?.samples.into_iter().next() {
+            pieces.extend(piece(samples));
+        }
+    }
+    let mut deviations: Vec<f64> = pieces.iter().map(|piece| piece.deviation).collect();
+    // 1.4826 turns a median deviation into a standard deviation of normal noise.
+    let noise = 1.4826 * middle(&mut deviations);
+    let up = pieces.iter().map(|p| p.high - p.median).fold(0.0, f64::max);
+    let down = pieces.iter().map(|p| p.median - p.low).fold(0.0, f64::max);
+    // A filter's ringing swings to the other side by up to a quarter: only a clear excess inverts.
+    let polarity = if down > 1.5 * up { -1.0 } else { 1.0 };
+    let medians = pieces.iter().map(|piece| piece.median).collect();
+    Ok(Survey {
+        baseline: Baseline {
+            medians,
+            frames: frames as f64,
+        },
+        noise,
+        polarity,
+        largest: if polarity > 0.0 { up } else { down },
+    })
+}
+
+fn piece(mut samples: Vec<f64>) -> Option<Piece> {
+    let low = samples.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if samples.is_empty() {
+        return None;
+    }
+    let median = middle(&mut samples);
+    for x in &mut samples {
+        *x = (*x - median).abs();
+    }
+    Some(Piece {
+        median,
+        deviation: middle(&mut samples),
+        low,
+        high,
+    })
+}
+
+/// Median (the upper one of an even count); 0 of nothing.
+fn middle(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
+}
+
+/// Finds the pulses of force.
+pub(super) fn find(
+    recording: &Recording,
+    channel: usize,
+    settings: &TapSettings,
+) -> Result<Found, RecordingError> {
+    let survey = survey(recording, channel)?;
+    let threshold = (settings.over_noise * survey.noise).max(settings.of_largest * survey.largest);
+    let mut remarks = Vec::new();
+    if survey.polarity < 0.0 {
+        remarks.push(TapRemark::InvertedForce);
+    }
+    let excursions = if survey.largest > settings.over_noise * survey.noise {
+        excursions(recording, channel, &survey, threshold)?
+    } else {
+        Vec::new()
+    };
+    if excursions.first().is_some_and(|first| first.trigger == 0) {
+        remarks.push(TapRemark::StartsWithinTap);
+    }
+    let distance = (settings.least_distance * recording.sample_rate()) as u64;
+    Ok(Found {
+        events: group(excursions, distance),
+        noise: survey.noise,
+        survey: Some(survey),
+        remarks,
+    })
+}
+
+/// Excursions above the threshold, each until the force falls below half of it.
+fn excursions(
+    recording: &Recording,
+    channel: usize,
+    survey: &Survey,
+    threshold: f64,
+) -> Result<Vec<Event>, RecordingError> {
+    let longest = (LONGEST_PULSE * recording.sample_rate()).max(8.0) as u64;
+    let mut found = Vec::new();
+    let mut open: Option<Event> = None;
+    for block in recording.blocks(&[channel], 1 << 16) {
+        let block = block?;
+        for (index, x) in block.samples.iter().flatten().enumerate() {
+            let frame = block.start + index as u64;
+            let force = survey.polarity * (x - survey.baseline.at(frame));
+            match &mut open {
+                None if force > threshold => {
+                    open = Some(Event {
+                        trigger: frame,
+                        peak: force,
+                    })
+                }
+                Some(event) if force < 0.5 * threshold => {
+                    if frame - event.trigger <= longest {
+                        found.push(event.clone());
+                    }
+                    open = None;
+                }
+                Some(event) => event.peak = event.peak.max(force),
+                None => {}
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Excursions nearer than `distance` frames belong to one event.
+pub(super) fn group(excursions: Vec<Event>, distance: u64) -> Vec<Event> {
+    let mut events: Vec<Event> = Vec::new();
+    for excursion in excursions {
+        match events.last_mut() {
+            Some(event) if excursion.trigger - event.trigger < distance => {
+                event.peak = event.peak.max(excursion.peak);
+            }
+            _ => events.push(excursion),
+        }
+    }
+    events
+}

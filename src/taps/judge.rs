@@ -1,0 +1,254 @@
+//! Accepting and rejecting taps, each with its reason.
+
+use std::ops::Range;
+
+use super::hammer::Survey;
+use super::{Event, Found, Rejection, Tap, TapSettings, TapSource, Taps};
+use crate::recording::{Recording, RecordingError};
+
+/// A record shorter than this share of the median one is not worth shortening all others for.
+const SHORT_OF_MEDIAN: f64 = 0.5;
+/// The last record may be cut to this share of the shortest other one.
+const CUT_OF_SHORTEST: f64 = 0.8;
+
+/// Judges the events found.
+pub(super) fn judge(
+    recording: &Recording,
+    source: &TapSource,
+    found: Found,
+    settings: &TapSettings,
+) -> Result<Taps, RecordingError> {
+    let records = records(recording, &found.events, settings);
+    let hammer = match (source, &found.survey) {
+        (TapSource::Hammer { channel, .. }, Some(survey)) => Some(Hammer {
+            recording,
+            channel: *channel,
+            survey,
+        }),
+        _ => None,
+    };
+    let weakest = settings.weak * median(found.events.iter().map(|event| event.peak));
+    let mut taps = Vec::with_capacity(found.events.len());
+    for (event, record) in found.events.iter().zip(records) {
+        let force = hammer
+            .as_ref()
+            .map(|hammer| hammer.force(event, settings))
+            .transpose()?;
+        let mut tap = Tap {
+            time: event.trigger as f64 / recording.sample_rate(),
+            peak: event.peak,
+            pulse_end: force.as_ref().map(|force| force.pulse_end(event)),
+            record,
+            rejection: None,
+        };
+        tap.rejection = if event.peak < weakest {
+            Some(Rejection::TooWeak {
+                peak: event.peak,
+                limit: weakest,
+            })
+        } else if let Some(double) = force.and_then(|force| force.double_hit(event, settings)) {
+            Some(double)
+        } else {
+            overload(recording, source, &tap.record)?
+        };
+        taps.push(tap);
+    }
+    reject_short(&mut taps, recording.sample_rate(), settings.wanted);
+    Ok(Taps {
+        taps,
+        noise: found.noise,
+        remarks: found.remarks,
+    })
+}
+
+/// Each event's record: from the pre-trigger to the next event's pre-trigger or the file's end.
+fn records(recording: &Recording, events: &[Event], settings: &TapSettings) -> Vec<Range<u64>> {
+    let before = ((settings.pre_trigger * recording.sample_rate()) as u64).max(16);
+    let starts: Vec<u64> = events
+        .iter()
+        .map(|event| event.trigger.saturating_sub(before))
+        .collect();
+    let ends = starts.iter().skip(1).copied().chain([recording.frames()]);
+    starts
+        .iter()
+        .zip(ends)
+        .map(|(&start, end)| start..end.max(start))
+        .collect()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// One excursion of the force above the double-hit limit.
+struct Excursion {
+    frame: usize,
+    peak: f64,
+}
+
+/// The hammer channel, with its drift and noise.
+struct Hammer<'a> {
+    recording: &'a Recording,
+    channel: usize,
+    survey: &'a Survey,
+}
+
+impl Hammer<'_> {
+    /// The force about an event, drift taken out, pulses upwards: from a little before the trigger
+    /// to the least distance of the next tap.
+    fn force(&self, event: &Event, settings: &TapSettings) -> Result<Force, RecordingError> {
+        let rate = self.recording.sample_rate();
+        let first = event.trigger.saturating_sub((2e-3 * rate) as u64 + 8);
+        let last = event.trigger + (settings.least_distance * rate) as u64;
+        let samples = self.recording.read(self.channel, first..last)?;
+        let drift = |frame: usize| self.survey.baseline.at(first + frame as u64);
+        let samples = samples
+            .iter()
+            .enumerate()
+            .map(|(i, x)| self.survey.polarity * (x - drift(i)))
+            .collect();
+        Ok(Force {
+            first,
+            samples,
+            noise: self.survey.noise,
+            rate,
+        })
+    }
+}
+
+/// The force about one event.
+struct Force {
+    /// Frame of the first sample.
+    first: u64,
+    samples: Vec<f64>,
+    noise: f64,
+    rate: f64,
+}
+
+impl Force {
+    /// Looks for a second excursion above `double_hit` of the peak after the force has fallen below
+    /// `rearm` of it.
+    fn double_hit(&self, event: &Event, settings: &TapSettings) -> Option<Rejection> {
+        let limit = (settings.double_hit * event.peak).max(6.0 * self.noise);
+        let rearm = (settings.rearm * event.peak).max(3.0 * self.noise);
+        let excursions = excursions(&self.samples, limit, rearm);
+        let main = excursions.iter().max_by(|a, b| a.peak.total_cmp(&b.peak))?;
+        excursions
+            .iter()
+            .filter(|other| other.frame != main.frame && !is_ringing(&self.samples, main, other))
+            .max_by(|a, b| a.peak.total_cmp(&b.peak))
+            .map(|second| Rejection::DoubleHit {
+                delay: main.frame.abs_diff(second.frame) as f64 / self.rate,
+                ratio: second.peak / main.peak,
+                limit: settings.double_hit,
+            })
+    }
+
+    /// Frame after which the force stays within its noise, or 1 % of its peak, for a millisecond.
+    fn pulse_end(&self, event: &Event) -> u64 {
+        let limit = (4.0 * self.noise).max(0.01 * event.peak);
+        let rest = ((1e-3 * self.rate) as usize).max(8);
+        let start = (event.trigger - self.first.min(event.trigger)) as usize;
+        let mut calm = 0;
+        for (index, force) in self.samples.iter().enumerate().skip(start) {
+            calm = if force.abs() < limit { calm + 1 } else { 0 };
+            if calm == rest {
+                return self.first + (index + 1 - rest) as u64;
+            }
+        }
+        self.first + self.samples.len() as u64
+    }
+}
+
+fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
+    let mut found: Vec<Excursion> = Vec::new();
+    let mut armed = true;
+    for (frame, &x) in force.iter().enumerate() {
+        if armed && x > limit {
+            found.push(Excursion { frame, peak: x });
+            armed = false;
+        } else if !armed && x < rearm {
+            armed = true;
+        } else if let Some(open) = found.last_mut().filter(|open| !armed && x > open.peak) {
+            *open = Excursion { frame, peak: x };
+        }
+    }
+    found
+}
+
+/// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
+/// pulls. An excursion with a comparable downward swing between it and the pulse is such ringing.
+fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
+    let between = main.frame.min(other.frame)..main.frame.max(other.frame);
+    let lowest = force
+        .get(between)
+        .into_iter()
+        .flatten()
+        .copied()
+        .fold(0.0, f64::min);
+    -lowest > 0.5 * other.peak
+}
+
+/// Samples at a channel's limit: at the integer format's full scale, or on a flat top at the
+/// channel's largest value.
+fn overload(
+    recording: &Recording,
+    source: &TapSource,
+    record: &Range<u64>,
+) -> Result<Option<Rejection>, RecordingError> {
+    for channel in source.channels() {
+        let Some(limit) = recording.clipping_level(channel) else {
+            continue;
+        };
+        let samples = recording.read(channel, record.clone())?;
+        let count = samples.iter().filter(|x| x.abs() >= limit).count();
+        if count > 0 {
+            return Ok(Some(Rejection::Overload {
+                channel: channel + 1,
+                samples: count,
+            }));
+        }
+    }
+    Ok(None)
+}
+
+/// Rejects records much shorter than the others: all averages share one block, and the shortest
+/// record sets its length.
+fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
+    let last = taps.len().saturating_sub(1);
+    let lengths: Vec<f64> = taps
+        .iter()
+        .filter(|tap| tap.accepted())
+        .map(|tap| tap.frames() as f64 / rate)
+        .collect();
+    let typical = median(lengths.iter().copied());
+    let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
+    for (index, tap) in taps
+        .iter_mut()
+        .enumerate()
+        .filter(|(_, tap)| tap.rejection.is_none())
+    {
+        let available = tap.frames() as f64 / rate;
+        if available < SHORT_OF_MEDIAN * needed {
+            tap.rejection = Some(if index == last {
+                Rejection::CutOff { available, needed }
+            } else {
+                Rejection::NextTooSoon { available, needed }
+            });
+        }
+    }
+    let shortest = taps[..last]
+        .iter()
+        .filter(|tap| tap.accepted())
+        .map(|tap| tap.frames() as f64 / rate)
+        .fold(f64::INFINITY, f64::min);
+    let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
+    if let Some(tap) = taps.last_mut().filter(|tap| tap.rejection.is_none()) {
+        let available = tap.frames() as f64 / rate;
+        if needed.is_finite() && available < CUT_OF_SHORTEST * needed {
+            tap.rejection = Some(Rejection::CutOff { available, needed });
+        }
+    }
+}

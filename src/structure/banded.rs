@@ -1,0 +1,1 @@
+//! Banded symmetric matrices.

@@ -1,0 +1,1 @@
+//! Finite-element models of the same structures, independent of the closed form.

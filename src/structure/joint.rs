@@ -1,0 +1,115 @@
+//! The joint: two or three springs, from none at all to rigid.
+
+use super::{Beam, StructureError};
+
+/// Stiffness of a joint, non-dimensional by the beam it holds (Ingole & Chatterjee):
+/// Kx = Kt L^3/(E I), Ky = Kr L/(E I), Kz = Ktr L^2/(E I); of a lap joint L is the total length.
+///
+/// The joint's compliance matrix for (force, moment) -> (w, theta), theta = dw/dx with x from the
+/// joint along the beam, is `[[1/Kx, -1/Kz], [-1/Kz, 1/Ky]]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointStiffness {
+    /// Translation, Kx (1), from 0 (free) to infinity (rigid).
+    pub kx: f64,
+    /// Rotation, Ky (1), from 0 (free) to infinity (rigid).
+    pub ky: f64,
+    /// Cross compliance 1/Kz (1); 0 without coupling. Negative where the support is elastic.
+    pub cross_compliance: f64,
+}
+
+impl JointStiffness {
+    /// No joint: the beam is free.
+    pub const FREE: Self = Self::two_parameter(0.0, 0.0);
+
+    /// Held without give: the beam is clamped.
+    pub const RIGID: Self = Self::two_parameter(f64::INFINITY, f64::INFINITY);
+
+    /// A joint without cross coupling, from Kx and Ky (1).
+    pub const fn two_parameter(kx: f64, ky: f64) -> Self {
+        Self {
+            kx,
+            ky,
+            cross_compliance: 0.0,
+        }
+    }
+
+    /// A joint with cross coupling, from Kx, Ky and Kz (1); Kz = infinity means no coupling.
+    pub fn three_parameter(kx: f64, ky: f64, kz: f64) -> Self {
+        Self {
+            kx,
+            ky,
+            cross_compliance: 1.0 / kz,
+        }
+    }
+
+    /// From stiffnesses in SI units: kt (N/m), kr (N m/rad), ktr (N/rad), the last `None` without
+    /// coupling.
+    pub fn from_dimensional(beam: &Beam, kt: f64, kr: f64, ktr: Option<f64>) -> Self {
+        let unit = StiffnessUnits::of(beam);
+        Self {
+            kx: kt / unit.kt,
+            ky: kr / unit.kr,
+            cross_compliance: ktr.map_or(0.0, |ktr| unit.ktr / ktr),
+        }
+    }
+
+    /// Cross-coupling stiffness Kz (1); `None` without coupling.
+    pub fn kz(&self) -> Option<f64> {
+        (self.cross_compliance != 0.0).then(|| 1.0 / self.cross_compliance)
+    }
+
+    /// Coupling sqrt(Kx Ky)/Kz (1), between -1 and 1 for a physical joint.
+    pub fn coupling(&self) -> f64 {
+        if self.cross_compliance == 0.0 {
+            0.0
+        } else {
+            self.kx.sqrt() * self.ky.sqrt() * self.cross_compliance
+        }
+    }
+
+    /// Checks that the joint can exist: stiffnesses at least zero, and a compliance matrix that
+    /// is positive definite, Kz^2 > Kx Ky.
+    ///
+    /// # Errors
+    /// [`StructureError::Stiffness`] or [`StructureError::NotPhysical`].
+    pub fn check(&self) -> Result<(), StructureError> {
+        for (quantity, value) in [("kx", self.kx), ("ky", self.ky)] {
+            if value.is_nan() || value < 0.0 {
+                return Err(StructureError::Stiffness { quantity, value });
+            }
+        }
+        let kz = 1.0 / self.cross_compliance.abs();
+        if self.cross_compliance == 0.0 {
+            return Ok(());
+        }
+        let limit = self.kx.sqrt() * self.ky.sqrt();
+        if kz > limit {
+            Ok(())
+        } else {
+            Err(StructureError::NotPhysical { kz, limit })
+        }
+    }
+}
+
+/// What one unit of each non-dimensional stiffness is worth for a given beam.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StiffnessUnits {
+    /// Kt per Kx: E I/L^3 (N/m).
+    pub kt: f64,
+    /// Kr per Ky: E I/L (N m/rad).
+    pub kr: f64,
+    /// Ktr per Kz: E I/L^2 (N/rad).
+    pub ktr: f64,
+}
+
+impl StiffnessUnits {
+    /// Of this beam.
+    pub fn of(beam: &Beam) -> Self {
+        let (stiffness, length) = (beam.bending_stiffness(), beam.length);
+        Self {
+            kt: stiffness / length.powi(3),
+            kr: stiffness / length,
+            ktr: stiffness / (length * length),
+        }
+    }
+}

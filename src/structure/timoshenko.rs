@@ -1,0 +1,205 @@
+//! End functions of a beam with shear deformation and rotary inertia, exact for a uniform beam.
+//!
+//! In units of the length, with b^2 = lambda^4, r^2 and s^2 from [`Slenderness`], displacement W
+//! and rotation T of the cross-section, shear force V = (W' - T)/s^2 and moment M = T':
+//!
+//! ```text
+//! V' + b^2 W = 0,   M' + V + b^2 r^2 T = 0.
+//! ```
+//!
+//! Solutions e^{px} have p = +-i beta, +-alpha with
+//! p^4 + b^2 (r^2 + s^2) p^2 - b^2 (1 - b^2 r^2 s^2) = 0. Two solutions leave one end free:
+//! `ma cos + mb cosh` and `beta sin + alpha sinh`, where ma = alpha^2 + s^2 b^2 and
+//! mb = beta^2 - s^2 b^2, whose product is b^2. The determinants of two of (W, T, V, M) at the
+//! other end are the end functions; each becomes Bishop's for r = s = 0. Above the second
+//! spectrum's onset b^2 r^2 s^2 = 1, alpha^2 is negative, and cosh alpha, sinh alpha / alpha
+//! turn into cos and sin; everything below depends on alpha^2 alone and stays real.
+
+use super::Slenderness;
+use super::receptance::EndFunctions;
+use std::f64::consts::PI;
+
+/// The wave numbers and the amplitudes that go with them.
+struct Waves {
+    /// b^2 = lambda^4.
+    b2: f64,
+    /// r^2 + s^2.
+    both: f64,
+    /// beta^2 - alpha^2 = b^2 (r^2 + s^2).
+    difference: f64,
+    /// beta^2 + alpha^2.
+    sum: f64,
+    alpha2: f64,
+    beta2: f64,
+    /// alpha^2 beta^2 / b^2 = 1 - b^2 r^2 s^2.
+    below_onset: f64,
+    /// alpha^2 + s^2 b^2.
+    ma: f64,
+    /// beta^2 - s^2 b^2.
+    mb: f64,
+}
+
+impl Waves {
+    fn new(lambda: f64, slenderness: &Slenderness) -> Self {
+        let (r2, s2) = (slenderness.rotary, slenderness.shear);
+        let b2 = lambda.powi(4);
+        let both = r2 + s2;
+        let difference = b2 * both;
+        let sum = ((b2 * (r2 - s2)).powi(2) + 4.0 * b2).sqrt();
+        let below_onset = 1.0 - b2 * r2 * s2;
+        let beta2 = 0.5 * (difference + sum);
+        // Shear outweighs rotary inertia in every real beam, so that this sum does not cancel.
+        let ma = 0.5 * (b2 * (s2 - r2) + sum);
+        Self {
+            b2,
+            both,
+            difference,
+            sum,
+            // From the product of the roots: their difference would cancel.
+            alpha2: b2 * below_onset / beta2,
+            beta2,
+            below_onset,
+            ma,
+            mb: b2 / ma,
+        }
+    }
+
+    /// (ma^2 alpha^2 - mb^2 beta^2) / b^4, written so that the leading terms do not cancel.
+    fn free_coefficient(&self, s2: f64) -> f64 {
+        let spread = self.both * self.difference;
+        -self.both * (spread + 3.0 * self.below_onset)
+            + 2.0 * s2 * (spread + 2.0 * self.below_onset)
+            - s2 * s2 * self.difference
+    }
+
+    /// (mb beta^2 + ma alpha^2) / b^2, likewise.
+    fn coupling_coefficient(&self, s2: f64) -> f64 {
+        self.both * self.difference + 2.0 * self.below_onset - s2 * self.difference
+    }
+
+    /// Natural frequencies of the pinned-pinned beam below this one: beta = n pi in the first
+    /// spectrum; alpha = i n pi, n = 0 included, in the second.
+    fn pinned_pinned_count(&self) -> usize {
+        let first = (self.beta2.sqrt() / PI) as usize;
+        if self.alpha2 < 0.0 {
+            first + (self.alpha2.abs().sqrt() / PI) as usize + 1
+        } else {
+            first
+        }
+    }
+}
+
+/// Products of the circular and the hyperbolic functions, all scaled alike.
+struct Products {
+    /// 1, scaled.
+    one: f64,
+    /// cos beta cosh alpha.
+    cos_cosh: f64,
+    /// (cos beta cosh alpha - 1) / b^2.
+    cos_cosh_less_one: f64,
+    /// (sin beta / beta) (sinh alpha / alpha).
+    sin_sinh: f64,
+    /// cos beta sinh alpha / alpha.
+    cos_sinh: f64,
+    /// sin beta / beta cosh alpha.
+    sin_cosh: f64,
+    /// (alpha cos sinh ma - beta sin cosh mb) / b^4.
+    pinned: f64,
+}
+
+/// At frequencies where the products can be formed directly.
+pub(super) fn closed_form(lambda: f64, slenderness: &Slenderness) -> EndFunctions {
+    let waves = Waves::new(lambda, slenderness);
+    let beta = waves.beta2.sqrt();
+    let (sine, cosine) = beta.sin_cos();
+    let (one, cosh, sinh) = hyperbolic(waves.alpha2);
+    let (cos_sinh, sin_cosh) = (cosine * sinh, sine / beta * cosh);
+    let products = Products {
+        one,
+        cos_cosh: cosine * cosh,
+        cos_cosh_less_one: (cosine * cosh - one) / waves.b2,
+        sin_sinh: sine / beta * sinh,
+        cos_sinh,
+        sin_cosh,
+        pinned: (waves.ma * waves.alpha2 * cos_sinh - waves.mb * waves.beta2 * sin_cosh)
+            / (waves.b2 * waves.b2),
+    };
+    assemble(lambda, slenderness, &waves, &products)
+}
+
+/// (1, cosh alpha, sinh alpha / alpha) scaled by e^-alpha where alpha is real.
+fn hyperbolic(alpha2: f64) -> (f64, f64, f64) {
+    let alpha = alpha2.abs().sqrt();
+    if alpha2 < 0.0 {
+        (1.0, alpha.cos(), alpha.sin() / alpha)
+    } else if alpha < 1e-8 {
+        // sinh x / x = 1 + x^2/6 is 1 to the last digit.
+        (1.0, 1.0, 1.0)
+    } else {
+        let decay = (-alpha).exp();
+        let cosh = 0.5 * (1.0 + decay * decay);
+        // 1 - e^{-2 alpha} without cancellation.
+        let sinh = -0.5 * (-2.0 * alpha).exp_m1();
+        (decay, cosh, sinh / alpha)
+    }
+}
+
+/// At low frequency: series in z = (alpha + i beta)^2 = -d + 2 i alpha beta, from
+/// cosh(alpha + i beta) = cos cosh + i sin sinh = sum z^k/(2k)! and
+/// sinh(alpha + i beta) = (alpha + i beta) sum z^k/(2k+1)!.
+/// With z^k = p + 2 i alpha beta q, both p and q are real and depend on alpha^2 beta^2 alone.
+pub(super) fn series(lambda: f64, slenderness: &Slenderness) -> EndFunctions {
+    // |z| <= 2 for slender beams below lambda = 1; 2^14/28! is far below the last digit.
+    const TERMS: u32 = 14;
+    let waves = Waves::new(lambda, slenderness);
+    let d = waves.difference;
+    let y2 = 4.0 * waves.b2 * waves.below_onset;
+    let (mut p, mut q) = (1.0, 0.0);
+    let (mut even, mut odd) = (1.0, 1.0);
+    let (mut less_one, mut u) = (0.0, 1.0);
+    let (mut sin_sinh, mut v) = (0.0, 0.0);
+    for k in 1..=TERMS {
+        // p of this k over b^2, so that the sum for cos cosh - 1 starts at its leading term.
+        let reduced = -p * waves.both - 4.0 * waves.below_onset * q;
+        (p, q) = (-p * d - y2 * q, p - q * d);
+        even /= f64::from(2 * k * (2 * k - 1));
+        odd /= f64::from(2 * k * (2 * k + 1));
+        less_one += reduced * even;
+        sin_sinh += 2.0 * q * even;
+        u += p * odd;
+        v += 2.0 * q * odd;
+    }
+    let scale = (-waves.alpha2.max(0.0).sqrt()).exp();
+    let products = Products {
+        one: scale,
+        cos_cosh: scale * (1.0 + waves.b2 * less_one),
+        cos_cosh_less_one: scale * less_one,
+        sin_sinh: scale * sin_sinh,
+        cos_sinh: scale * (u - waves.beta2 * v),
+        sin_cosh: scale * (u + waves.alpha2 * v),
+        // ma alpha^2 - mb beta^2 = -(alpha^2 + beta^2) b^2 r^2 leaves no cancellation.
+        pinned: -scale * waves.sum * (slenderness.rotary * u + waves.below_onset * v) / waves.b2,
+    };
+    assemble(lambda, slenderness, &waves, &products)
+}
+
+/// The determinants, divided by 2 b^2 and by the powers of lambda that [`EndFunctions`] states.
+fn assemble(lambda: f64, slenderness: &Slenderness, w: &Waves, p: &Products) -> EndFunctions {
+    let (r2, s2) = (slenderness.rotary, slenderness.shear);
+    EndFunctions {
+        lambda,
+        // W with V: [ (ma - mb)(1 - cos cosh) + (mb beta^2 + ma alpha^2) sin sinh ] / (2 b^2).
+        f1: 0.5
+            * ((r2 - s2) * w.b2 * p.cos_cosh_less_one + w.coupling_coefficient(s2) * p.sin_sinh),
+        // V with M: cos cosh - 1 + (ma^2 alpha^2 - mb^2 beta^2) sin sinh / (2 b^2).
+        f3: p.cos_cosh_less_one + 0.5 * w.free_coefficient(s2) * p.sin_sinh,
+        // W with T: 1 + (ma/mb + mb/ma) cos cosh / 2 + (alpha^2 - beta^2) sin sinh / 2.
+        f4: p.one + 0.5 * (w.ma / w.mb + w.mb / w.ma) * p.cos_cosh
+            - 0.5 * w.difference * p.sin_sinh,
+        // W with M: (ma + mb)(ma alpha^2 cos sinh - mb beta^2 sin cosh) / (2 b^2).
+        f5: 0.5 * w.sum * p.pinned,
+        // T with V: (ma + mb)(mb cos sinh + ma sin cosh) / 2.
+        f6: 0.5 * w.sum / w.b2 * (w.mb * p.cos_sinh + w.ma * p.sin_cosh),
+        pinned_pinned_count: w.pinned_pinned_count(),
+    }
+}

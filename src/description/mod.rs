@@ -4,6 +4,22 @@
 //! SI units, or a [`DescriptionError`] that names the line, the key, what is allowed and the
 //! nearest known key. It opens no files.
 
+mod analysis;
+mod beam;
+mod error;
+mod joint;
+mod keys;
+mod measured;
+mod parse;
+mod reader;
+mod recordings;
+mod sensors;
+mod template;
+
+pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
+pub use parse::ChannelRefError;
+pub use template::template;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -26,6 +42,8 @@ pub struct TestDescription {
     pub measured: Option<MeasuredFrequencies>,
     /// How to analyse.
     pub analysis: AnalysisDescription,
+    /// What is odd but usable, in the order of reading.
+    pub warnings: Vec<DescriptionWarning>,
 }
 
 /// A uniform beam of rectangular cross-section, bending in the direction of its thickness.
@@ -184,11 +202,11 @@ pub enum SensorKind {
 pub struct SensorDescription {
     /// Its name.
     pub name: String,
-    /// Where its signal is.
+    /// Where its signal is; when the file is silent, the column of the sensor's name.
     pub channel: ChannelRef,
     /// SI units per unit of the file, negative when mounted the other way; `None` when not given.
     pub scale: Option<f64>,
-    /// Where it sits (m); `None` for a microphone.
+    /// Where it sits (m); `None` for a microphone, or when unknown (it then has no mass either).
     pub position: Option<f64>,
     /// Its mass (kg), where the data sheet is known.
     pub mass: Option<f64>,
@@ -212,7 +230,7 @@ pub enum FrfForm {
 pub struct RecordingDescription {
     /// File as written in the description, relative to it.
     pub file: PathBuf,
-    /// Line of the description where the recording begins.
+    /// Line of the description that names the file.
     pub line: usize,
     /// Where the hammer strikes (m).
     pub tap: Option<f64>,

@@ -1,0 +1,112 @@
+//! `[analysis]`: how to analyse.
+
+use super::error::{DescriptionError, DescriptionProblem};
+use super::reader::{Entry, Limits, Table};
+use super::{
+    AnalysisDescription, FitParameter, JointDescription, JointKind, JointModel, Weights, WindowKind,
+};
+
+const WINDOWS: [(&str, WindowKind); 3] = [
+    ("rectangular", WindowKind::Rectangular),
+    ("hann", WindowKind::Hann),
+    ("exponential", WindowKind::Exponential),
+];
+const WEIGHTS: [(&str, Weights); 2] = [
+    ("measured", Weights::Measured),
+    ("relative", Weights::Relative),
+];
+const PARAMETERS: [(&str, FitParameter); 5] = [
+    ("kt", FitParameter::Kt),
+    ("kr", FitParameter::Kr),
+    ("ktr", FitParameter::Ktr),
+    ("modulus", FitParameter::Modulus),
+    ("density", FitParameter::Density),
+];
+const FIT_MODES: Limits = Limits::between(1.0, 1000.0, "leave it out to use all modes");
+
+/// Reads `[analysis]`; an absent table is all defaults.
+pub(super) fn read_analysis(
+    table: Option<&Table<'_>>,
+    joint: &JointDescription,
+) -> Result<AnalysisDescription, DescriptionError> {
+    let mut analysis = AnalysisDescription {
+        window: None,
+        fit_modes: None,
+        weights: None,
+        sensor_mass: true,
+        fit: None,
+    };
+    if let Some(table) = table {
+        analysis.window = table.optional("window", |entry| entry.choice(&WINDOWS))?;
+        analysis.fit_modes = table.optional("fit_modes", |entry| entry.count(&FIT_MODES))?;
+        analysis.weights = table.optional("weights", |entry| entry.choice(&WEIGHTS))?;
+        analysis.sensor_mass = table
+            .optional("sensor_mass", Entry::boolean)?
+            .unwrap_or(true);
+        analysis.fit = table.optional("fit", |entry| read_fit(entry, joint))?;
+    }
+    Ok(analysis)
+}
+
+fn read_fit(
+    entry: &Entry<'_>,
+    joint: &JointDescription,
+) -> Result<Vec<FitParameter>, DescriptionError> {
+    let items = entry.list("a list such as [\"kr\", \"modulus\"]")?;
+    if items.is_empty() {
+        return Err(entry.error(DescriptionProblem::Count {
+            found: 0,
+            allowed: "at least 1".to_owned(),
+            remedy: "leave `fit` out for the joint's stiffnesses",
+        }));
+    }
+    let mut fit: Vec<FitParameter> = Vec::new();
+    for item in &items {
+        let parameter = item.choice(&PARAMETERS)?;
+        if let Some((reason, remedy)) = objection(parameter, joint) {
+            let reason = reason.to_owned();
+            return Err(item.error(DescriptionProblem::Conflict { reason, remedy }));
+        }
+        if fit.contains(&parameter) {
+            let value = format!("\"{}\"", item.as_text().unwrap_or_default());
+            let (first_line, remedy) = (entry.line, "list each parameter once");
+            return Err(item.error(DescriptionProblem::Duplicate {
+                value,
+                first_line,
+                remedy,
+            }));
+        }
+        fit.push(parameter);
+    }
+    Ok(fit)
+}
+
+/// Why a parameter cannot be fitted with this joint, and what to do.
+fn objection(
+    parameter: FitParameter,
+    joint: &JointDescription,
+) -> Option<(&'static str, &'static str)> {
+    let known = match parameter {
+        FitParameter::Kt => joint.kt,
+        FitParameter::Kr => joint.kr,
+        FitParameter::Ktr => joint.ktr,
+        FitParameter::Modulus | FitParameter::Density => return None,
+    };
+    if joint.kind == JointKind::Free {
+        return Some((
+            "a free beam has no joint stiffness",
+            "fit \"modulus\" or \"density\"",
+        ));
+    }
+    if parameter == FitParameter::Ktr && joint.model == JointModel::TwoParameter {
+        return Some((
+            "the two-parameter model has no coupling stiffness",
+            "write `model = \"3p\"` in [joint], or remove it here",
+        ));
+    }
+    known.map(|_| {
+        let reason =
+            "this stiffness is stated as known in [joint], and known ones are compared, not fitted";
+        (reason, "remove it here or there")
+    })
+}

@@ -1,0 +1,185 @@
+//! The keys a test description knows, and the one that was probably meant.
+
+use super::error::Suggestion;
+
+/// A table and its keys.
+pub(super) struct KnownTable {
+    /// As messages call it.
+    pub(super) header: &'static str,
+    /// Its keys, in the order in which people write them.
+    pub(super) keys: &'static [&'static str],
+}
+
+pub(super) const TOP: KnownTable = KnownTable {
+    header: "the top level",
+    keys: &[
+        "name",
+        "beam",
+        "joint",
+        "hammer",
+        "sensor",
+        "recording",
+        "measured",
+        "analysis",
+    ],
+};
+pub(super) const BEAM: KnownTable = KnownTable {
+    header: "[beam]",
+    keys: &[
+        "length",
+        "width",
+        "thickness",
+        "modulus",
+        "density",
+        "poisson",
+        "tolerance",
+        "right",
+    ],
+};
+pub(super) const TOLERANCE: KnownTable = KnownTable {
+    header: "beam.tolerance",
+    keys: &["length", "width", "thickness", "modulus", "density"],
+};
+pub(super) const RIGHT: KnownTable = KnownTable {
+    header: "[beam.right]",
+    keys: &["width", "thickness", "modulus", "density", "poisson"],
+};
+pub(super) const JOINT: KnownTable = KnownTable {
+    header: "[joint]",
+    keys: &[
+        "kind", "model", "kt", "kr", "ktr", "beam", "position", "overlap",
+    ],
+};
+pub(super) const OVERLAP: KnownTable = KnownTable {
+    header: "joint.overlap",
+    keys: &["length", "mass"],
+};
+pub(super) const HAMMER: KnownTable = KnownTable {
+    header: "[hammer]",
+    keys: &["channel", "scale", "sensitivity"],
+};
+pub(super) const SENSOR: KnownTable = KnownTable {
+    header: "[[sensor]]",
+    keys: &[
+        "name",
+        "channel",
+        "scale",
+        "sensitivity",
+        "position",
+        "mass",
+        "kind",
+    ],
+};
+pub(super) const RECORDING: KnownTable = KnownTable {
+    header: "[[recording]]",
+    keys: &[
+        "file",
+        "tap",
+        "band",
+        "block",
+        "at",
+        "sample_rate",
+        "form",
+        "sensor",
+        "torque",
+        "temperature",
+        "date",
+    ],
+};
+pub(super) const MEASURED: KnownTable = KnownTable {
+    header: "[measured]",
+    keys: &["frequencies", "modes", "half_line", "std", "scatter"],
+};
+pub(super) const ANALYSIS: KnownTable = KnownTable {
+    header: "[analysis]",
+    keys: &["window", "fit_modes", "weights", "sensor_mass", "fit"],
+};
+
+const ALL: [&KnownTable; 11] = [
+    &TOP, &BEAM, &TOLERANCE, &RIGHT, &JOINT, &OVERLAP, &HAMMER, &SENSOR, &RECORDING, &MEASURED,
+    &ANALYSIS,
+];
+
+/// What the field also calls these keys; no spelling distance leads from "rho" to "density".
+const SYNONYMS: [(&str, &str); 18] = [
+    ("l", "length"),
+    ("b", "width"),
+    ("breadth", "width"),
+    ("h", "thickness"),
+    ("t", "thickness"),
+    ("height", "thickness"),
+    ("depth", "thickness"),
+    ("e", "modulus"),
+    ("youngs_modulus", "modulus"),
+    ("rho", "density"),
+    ("nu", "poisson"),
+    ("fs", "sample_rate"),
+    ("rate", "sample_rate"),
+    ("path", "file"),
+    ("type", "kind"),
+    ("location", "position"),
+    ("weight", "mass"),
+    ("location", "tap"),
+];
+
+/// What an unknown `key` of `table` may have been meant to be: a similar key of that table, else
+/// the same or a similar key of another.
+pub(super) fn suggest(key: &str, table: &'static KnownTable) -> Suggestion {
+    let lower = key.to_lowercase().replace('-', "_");
+    if let Some(found) = table.keys.iter().find(|known| **known == lower) {
+        return Suggestion::Nearest(found);
+    }
+    if let Some(found) = elsewhere(&lower) {
+        return found;
+    }
+    let synonym = SYNONYMS
+        .iter()
+        .find(|(word, meant)| *word == lower && table.keys.contains(meant));
+    if let Some((_, meant)) = synonym {
+        return Suggestion::Nearest(meant);
+    }
+    if let Some(found) = nearest(&lower, table.keys.iter().copied()) {
+        return Suggestion::Nearest(found);
+    }
+    let everywhere = ALL.iter().flat_map(|table| table.keys.iter().copied());
+    nearest(&lower, everywhere)
+        .and_then(elsewhere)
+        .unwrap_or(Suggestion::Nothing)
+}
+
+fn elsewhere(key: &str) -> Option<Suggestion> {
+    let holders = ALL.iter().filter(|table| table.keys.contains(&key));
+    let tables: Vec<_> = holders.map(|table| table.header).collect();
+    let key = ALL
+        .iter()
+        .flat_map(|table| table.keys)
+        .find(|known| **known == key)?;
+    Some(Suggestion::BelongsInto { key, tables })
+}
+
+/// The known word most like `word`, when one is like it at all.
+///
+/// Two measures, because people err in two ways: a slip of the finger is one or two
+/// Damerau-Levenshtein edits away (at most a third of the word), an abbreviation shares its
+/// beginning, which Jaro-Winkler rewards (0.88 admits "freq" for "frequencies" and keeps
+/// unrelated short words out).
+pub(super) fn nearest<'w>(word: &str, known: impl Iterator<Item = &'w str>) -> Option<&'w str> {
+    // Words far longer than any key are not worth a quadratic comparison.
+    if word.chars().count() > 64 {
+        return None;
+    }
+    let resembles = |candidate: &str| {
+        let edits = strsim::damerau_levenshtein(word, candidate);
+        edits <= 2 && 3 * edits <= candidate.chars().count()
+            || strsim::jaro_winkler(word, candidate) >= 0.88
+    };
+    let score = |candidate: &str| {
+        strsim::normalized_damerau_levenshtein(word, candidate)
+            + strsim::jaro_winkler(word, candidate)
+    };
+    known
+        .filter(|candidate| resembles(candidate))
+        .map(|candidate| (score(candidate), candidate))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate)
+}

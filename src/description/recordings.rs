@@ -1,0 +1,153 @@
+//! `[[recording]]`: the files, and what is particular to each.
+
+use super::beam::along;
+use super::error::{DescriptionError, DescriptionProblem};
+use super::keys;
+use super::reader::{Entry, Limits, Table, quantities_by_name};
+use super::{FrfForm, RecordingDescription, SensorDescription};
+use crate::quantity::Dimension;
+use std::collections::BTreeMap;
+use std::ops::Bound;
+
+const FORMS: [(&str, FrfForm); 3] = [
+    ("accelerance", FrfForm::Accelerance),
+    ("mobility", FrfForm::Mobility),
+    ("receptance", FrfForm::Receptance),
+];
+/// Below 16 samples there are six lines; 2^24 samples are six minutes at 50 kHz.
+const BLOCK: Limits = Limits::between(
+    16.0,
+    16_777_216.0,
+    "a block of 2048 samples shows 800 lines; leave it out to have it chosen",
+);
+const SAMPLE_RATE: Limits = Limits::between(
+    1.0,
+    1e8,
+    "give samples per second, such as 5120 or \"51.2 kHz\"",
+);
+const BAND_EDGE: Limits =
+    Limits::between(0.0, 1e8, "write two frequencies in Hz: `band = [0, 200]`");
+const TORQUE: Limits = Limits::between(0.0, 1e9, "give the tightening torque in N m");
+const TEMPERATURE: Limits = Limits::between(
+    -273.15,
+    5000.0,
+    "give degrees Celsius, or a unit: \"293 K\"",
+);
+
+/// What the recordings refer to.
+pub(super) struct Surroundings<'s> {
+    /// Length of the beam (m).
+    pub(super) length: f64,
+    /// The sensors declared.
+    pub(super) sensors: &'s [SensorDescription],
+}
+
+/// Reads one `[[recording]]`.
+pub(super) fn read_recording(
+    entry: &Entry<'_>,
+    surroundings: &Surroundings<'_>,
+) -> Result<RecordingDescription, DescriptionError> {
+    let table = entry.table(&keys::RECORDING)?;
+    let file = table.need("file", "a file", "file = \"taps.wav\"")?;
+    let position = along(surroundings.length);
+    let at = table.optional("at", |entry| read_moves(entry, surroundings))?;
+    let (form, sensor) = read_form(&table, surroundings)?;
+    Ok(RecordingDescription {
+        file: file.text("a file such as \"taps.wav\"")?.into(),
+        line: file.line,
+        tap: table.optional("tap", |entry| entry.within(Dimension::Length, &position))?,
+        band: table.optional("band", read_band)?,
+        block: table.optional("block", |entry| entry.count(&BLOCK))?,
+        at: at.unwrap_or_default(),
+        sample_rate: table.optional("sample_rate", |entry| {
+            entry.within(Dimension::Rate, &SAMPLE_RATE)
+        })?,
+        form,
+        sensor,
+        torque: table.optional("torque", |entry| entry.within(Dimension::Torque, &TORQUE))?,
+        temperature: table.optional("temperature", |entry| {
+            entry.within(Dimension::Temperature, &TEMPERATURE)
+        })?,
+        date: table.optional("date", Entry::date)?,
+    })
+}
+
+fn read_band(entry: &Entry<'_>) -> Result<(f64, f64), DescriptionError> {
+    let edges = entry.list("two frequencies such as [0, 200] (Hz)")?;
+    let [low, high] = edges.as_slice() else {
+        return Err(entry.error(DescriptionProblem::Count {
+            found: edges.len(),
+            allowed: "2, the lower and the upper edge in Hz".to_owned(),
+            remedy: "write `band = [0, 200]`",
+        }));
+    };
+    let low = low.within(Dimension::Frequency, &BAND_EDGE)?;
+    let upper = high.within(Dimension::Frequency, &BAND_EDGE)?;
+    if upper > low {
+        return Ok((low, upper));
+    }
+    let above = Limits {
+        low: Bound::Excluded(low),
+        high: BAND_EDGE.high,
+        remedy: "write the lower edge first: `band = [0, 200]`",
+    };
+    Err(high.out_of_range(upper, "Hz", &above))
+}
+
+fn read_moves(
+    entry: &Entry<'_>,
+    surroundings: &Surroundings<'_>,
+) -> Result<BTreeMap<String, f64>, DescriptionError> {
+    let table = entry.free_table("a table of sensors and positions such as { A = 0.20 }")?;
+    let position = along(surroundings.length);
+    quantities_by_name(&table, |name, entry| {
+        check_sensor(name, entry, surroundings.sensors)?;
+        entry.within(Dimension::Length, &position)
+    })
+}
+
+fn check_sensor(
+    name: &str,
+    entry: &Entry<'_>,
+    sensors: &[SensorDescription],
+) -> Result<(), DescriptionError> {
+    let known: Vec<String> = sensors.iter().map(|sensor| sensor.name.clone()).collect();
+    if known.iter().any(|sensor| sensor == name) {
+        return Ok(());
+    }
+    let nearest = keys::nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+    Err(entry.error(DescriptionProblem::UnknownSensor {
+        name: name.to_owned(),
+        known,
+        nearest,
+    }))
+}
+
+/// Form and sensor of a file that holds a frequency response function.
+fn read_form(
+    table: &Table<'_>,
+    surroundings: &Surroundings<'_>,
+) -> Result<(Option<FrfForm>, Option<String>), DescriptionError> {
+    let form = table.optional("form", |entry| entry.choice(&FORMS))?;
+    let sensor = table.optional("sensor", |entry| {
+        let name = entry.text("a sensor's name such as \"A\"")?;
+        check_sensor(&name, entry, surroundings.sensors)?;
+        Ok(name)
+    })?;
+    if let Some(entry) = table
+        .get("form")
+        .filter(|_| sensor.is_none() && surroundings.sensors.len() > 1)
+    {
+        return Err(entry.error(DescriptionProblem::Conflict {
+            reason: "a response function belongs to one sensor, and several are declared".into(),
+            remedy: "add `sensor = \"A\"`",
+        }));
+    }
+    if let Some(entry) = table.get("sensor").filter(|_| form.is_none()) {
+        return Err(entry.error(DescriptionProblem::Conflict {
+            reason: "`sensor` names the sensor of a response function, and `form` is missing".into(),
+            remedy: "add `form = \"accelerance\"`, or remove `sensor`: a time recording finds its sensors by channel",
+        }));
+    }
+    Ok((form, sensor))
+}

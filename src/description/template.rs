@@ -1,0 +1,130 @@
+//! The commented `test.toml` that a new test begins with.
+
+use super::JointKind;
+
+const HEAD: &str = r#"# Test description for tapjoint. Replace the values by those of your test, then: tapjoint run test.toml
+#
+# A bare number is SI; a text may carry a unit: "423 mm", "207 GPa", "24 g", "2 %".
+# Positions are measured along the beam, in m, from @ORIGIN@.
+# Lines such as `# key = value` show what holds when the key is left out, or an example of it.
+
+name = "@NAME@"                # default: the name of this file; the report goes to <name>-report
+
+[beam]                         # @BEAM@
+length = 0.423                 # m
+width = 0.05                   # m
+thickness = 0.005              # m, in the direction of vibration
+modulus = "207 GPa"            # Young's modulus, Pa
+density = 7850                 # kg/m3
+# poisson = 0.3                # Poisson's ratio, default 0.3; enters shear deformation only
+# tolerance = { length = "1 mm", width = "0.1 mm", thickness = "0.05 mm", modulus = "2 %", density = "1 %" }   # standard uncertainties, default: none stated
+"#;
+
+const CANTILEVER: &str = r#"
+[joint]
+kind = "cantilever"            # "cantilever": held at one end | "lap": two halves joined | "free": no joint
+model = "2p"                   # "2p" (default): translation and rotation | "3p": and their coupling
+# kt = 1.4e6                   # N/m, default: fitted. A stated value, or "rigid", is compared instead of fitted
+# kr = 320                     # N m/rad, default: fitted
+#   ktr = 2e4, N/rad, only with model = "3p", default: fitted; negative where elasticity reaches into the support
+# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+"#;
+
+const LAP: &str = r#"
+#   [beam.right] holds width, thickness, modulus, density, poisson of the right half where they
+#   differ from the left one's, default: the same.
+
+[joint]
+kind = "lap"                   # "cantilever": held at one end | "lap": two halves joined | "free": no joint
+# model = "2p"                 # translation and rotation, the only model of a lap joint
+# kt = 1.4e6                   # N/m, default: fitted. A stated value, or "rigid", is compared instead of fitted
+# kr = 320                     # N m/rad, default: fitted
+# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+# position = 0.2115            # m, default: the middle
+# overlap = { length = "40 mm", mass = "50 g" }   # the overlapping piece with its bolts, default: none
+"#;
+
+const FREE: &str = r#"
+[joint]
+kind = "free"                  # "cantilever": held at one end | "lap": two halves joined | "free": no joint
+# beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
+"#;
+
+const INSTRUMENTS: &str = r#"
+[hammer]                       # remove this table for a test without an instrumented hammer
+channel = 1                    # 1-based, not counting a time column; or the name of a CSV column
+# scale = 1.0                  # N per unit of the file, default 1 or the unit in the CSV header; integer WAV: full scale = 1
+#   sensitivity = "2.25 mV/N" instead of scale for files in volts
+
+[[sensor]]                     # once for each sensor
+name = "A"
+channel = 2                    # default: the CSV column called like the sensor
+# scale = 1.0                  # m/s2 per unit of the file (m/s, m, Pa by kind), default as above; negative: mounted the other way
+#   sensitivity = "100 mV/g" instead of scale for files in volts
+position = 0.338               # m
+# mass = "24 g"                # kg, from the data sheet, default: not known
+# kind = "acceleration"        # "acceleration" (default) | "velocity" | "displacement" | "sound"
+
+[[recording]]                  # once for each file; the same file may be read in several bands
+file = "taps.wav"              # WAV or CSV, seen from the folder of this file
+# tap = 0.04                   # m, where the hammer strikes, default: not known
+# band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
+# block = 2048                 # samples, block/2.56 lines are shown; default: what fits the shortest tap
+# at = { A = 0.20 }            # m, sensors moved for this recording, default: none
+# sample_rate = 5120           # Hz, for a CSV file without a time column, default: from the file
+# torque = 12                  # N m, carried to the outputs, default: none
+# temperature = 21             # degrees Celsius, carried to the outputs, default: none
+# date = 2024-05-17            # carried to the outputs, default: none
+#   form = "accelerance" | "mobility" | "receptance" and sensor = "A" where the file holds a frequency response function
+
+#   Or, instead of all [[recording]] tables, natural frequencies that were read elsewhere:
+# [measured]
+# frequencies = [17, 118, 335.625, 628.75, 994.5]   # Hz, ascending
+# modes = [1, 2, 3, 4, 5]      # default 1..n; gaps allowed
+# half_line = 0.125            # Hz, half the line spacing, one number or a list; or std = ..., one standard deviation in Hz
+# scatter = "0.3 %"            # repeatability, default: none; std^2 = half_line^2/3 + (scatter f)^2
+
+[analysis]
+# window = "exponential"       # "rectangular" | "hann" | "exponential"; default: rectangular where the tap rings down to 1 % in the block, else exponential
+# fit_modes = 4                # the first so many modes enter the estimate, default: all
+# weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights
+# sensor_mass = true           # whether the sensors' masses enter the model, default: true
+"#;
+
+const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\", and \"ktr\" with model = \"3p\"\n";
+const FIT_LAP: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\"\n";
+const FIT_FREE: &str =
+    "# fit = [\"modulus\"]            # what is estimated, default: modulus; also \"density\"\n";
+
+/// A commented test description: every key with its default and unit. It parses as it stands;
+/// replace its numbers by those of the test.
+pub fn template(kind: JointKind) -> String {
+    let (name, origin, beam, joint, fit) = match kind {
+        JointKind::Cantilever => (
+            "Cantilever",
+            "the joint",
+            "the part that is free to vibrate",
+            CANTILEVER,
+            FIT_JOINT,
+        ),
+        JointKind::Lap => (
+            "Lap joint",
+            "the left end",
+            "both halves together, length = total",
+            LAP,
+            FIT_LAP,
+        ),
+        JointKind::Free => (
+            "Free beam",
+            "the left end",
+            "the whole beam",
+            FREE,
+            FIT_FREE,
+        ),
+    };
+    let head = HEAD
+        .replace("@NAME@", name)
+        .replace("@ORIGIN@", origin)
+        .replace("@BEAM@", beam);
+    [head.as_str(), joint, INSTRUMENTS, fit].concat()
+}

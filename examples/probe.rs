@@ -5,22 +5,7 @@ use tapjoint::recording::*;
 use tapjoint::simulate::*;
 use tapjoint::taps::*;
 fn wav(p: &str) -> Recording {
-    let mut r = hound::WavReader::open(p).unwrap();
-    let s = r.spec();
-    let all: Vec<f64> = if s.sample_format == hound::SampleFormat::Float {
-        r.samples::<f32>().map(|x| x.unwrap() as f64).collect()
-    } else {
-        let m = 2f64.powi(s.bits_per_sample as i32 - 1);
-        r.samples::<i32>().map(|x| x.unwrap() as f64 / m).collect()
-    };
-    let c = s.channels as usize;
-    Recording::from_samples(
-        "x",
-        s.sample_rate as f64,
-        (0..c)
-            .map(|k| all.iter().skip(k).step_by(c).copied().collect())
-            .collect(),
-    )
+    Recording::open(std::path::Path::new(p), &ReadSettings::default()).unwrap()
 }
 fn show(n: &str, r: &Recording, s: &MeasureSettings) {
     let t0 = std::time::Instant::now();
@@ -89,16 +74,7 @@ fn main() {
             }),
         );
     }
-    let txt =
-        std::fs::read_to_string(format!("{d}slater_cantilever/DERIVED_case1_time.csv")).unwrap();
-    let mut a = vec![];
-    let mut b = vec![];
-    for l in txt.lines().skip(1) {
-        let v: Vec<f64> = l.split(',').map(|x| x.parse().unwrap()).collect();
-        a.push(v[1]);
-        b.push(v[2]);
-    }
-    let r = Recording::from_samples("x", 1280.0, vec![a, b]);
+    let r = wav(&format!("{d}slater_cantilever/DERIVED_case1_time.csv"));
     show(
         "slater",
         &r,
@@ -111,6 +87,11 @@ fn main() {
         "slater resp",
         &r,
         &MeasureSettings::new(TapSource::Responses(vec![1])),
+    );
+    show(
+        "slater resp both",
+        &r,
+        &MeasureSettings::new(TapSource::Responses(vec![0, 1])),
     );
     let modes: Vec<SimulatedMode> = [
         (17.13, 0.011),
@@ -129,9 +110,14 @@ fn main() {
     })
     .collect();
     let t = simulate_tap_test(&modes, &TapTestSettings::default(), 3);
-    let mut ch = vec![t.force.clone()];
-    ch.extend(t.responses.clone());
-    let r = Recording::from_samples("x", 5120.0, ch);
+    let ch = std::iter::once(t.force.clone())
+        .chain(t.responses.clone())
+        .map(|s| Channel {
+            samples: s,
+            ..Default::default()
+        })
+        .collect();
+    let r = Recording::from_samples("x", 5120.0, ch).unwrap();
     let mut s = MeasureSettings::new(TapSource::Hammer {
         channel: 0,
         responses: vec![1, 2],

@@ -1,5 +1,7 @@
 //! One list of modes from several recordings and bands.
 
+use std::fmt;
+
 /// One resonance as one recording reads it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeReading {
@@ -23,8 +25,26 @@ pub struct ModeReading {
     pub prominence_db: f64,
     /// Height above the noise (dB), where known.
     pub above_noise_db: Option<f64>,
-    /// What it is when it is no mode of the structure: "mains 50 Hz".
-    pub label: Option<String>,
+    /// What it is when it is no mode of the structure.
+    pub label: Option<PeakLabel>,
+}
+
+/// A peak that is no mode of the structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PeakLabel {
+    /// Mains hum at this multiple (Hz) of 50 or 60 Hz.
+    Mains(f64),
+    /// No decaying oscillation explains it: speckle of noise or reverberation.
+    NoResonance,
+}
+
+impl fmt::Display for PeakLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
+            PeakLabel::NoResonance => f.write_str("no clear resonance"),
+        }
+    }
 }
 
 /// A resonance of the structure, from the recording that resolves it best.

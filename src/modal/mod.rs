@@ -12,6 +12,6 @@ mod reading;
 
 pub use interpolation::{Interpolation, interpolate_parabola, interpolate_pole};
 pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic};
-pub use merge::{MergedMode, ModeReading, merge_modes};
+pub use merge::{MergedMode, ModeReading, PeakLabel, merge_modes};
 pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};
-pub use reading::{NO_RESONANCE, read_peaks};
+pub use reading::read_peaks;

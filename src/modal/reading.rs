@@ -3,12 +3,9 @@
 use num_complex::Complex64;
 
 use super::interpolation::{Interpolation, interpolate_parabola, interpolate_pole};
-use super::merge::ModeReading;
+use super::merge::{ModeReading, PeakLabel};
 use super::peaks::{CompositeLevel, Peak};
 use crate::spectral::Window;
-
-/// Label of a peak that no decaying oscillation explains: speckle of noise or reverberation.
-pub const NO_RESONANCE: &str = "no clear resonance";
 
 /// Reads all `peaks` of one recording.
 ///
@@ -33,8 +30,7 @@ pub fn read_peaks(
                 Window::Rectangular | Window::Exponential { .. } => {
                     let room = room_around(&places, peak.index);
                     let decay = window.added_decay();
-                    interpolate_pole(&level.lines, spectra, peak.index, room, decay)
-                        .filter(|found| found.damping_ratio.is_some())
+                    interpolate_pole(&level.lines, spectra, peak.index, room, decay).filter(decays)
                 }
             };
             reading(level, peak, between)
@@ -42,10 +38,17 @@ pub fn read_peaks(
         .collect()
 }
 
+/// Whether the fitted oscillation decays beyond doubt (two standard deviations).
+fn decays(found: &Interpolation) -> bool {
+    found
+        .damping_ratio
+        .is_some_and(|damping_ratio| damping_ratio > 2.0 * found.damping_std)
+}
+
 fn reading(level: &CompositeLevel, peak: &Peak, between: Option<Interpolation>) -> ModeReading {
     let lines = &level.lines;
     let half_line = lines.half_line();
-    let label = between.is_none().then(|| NO_RESONANCE.to_string());
+    let label = between.is_none().then_some(PeakLabel::NoResonance);
     let sharp = between.filter(|found| found.bound < half_line);
     let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
     ModeReading {

@@ -70,7 +70,7 @@ pub struct MeasuredSpectra {
 }
 
 /// What stops a measurement.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// The recording could not be read.
     #[error(transparent)]

@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use super::measure::{MeasureSettings, MeasuredSpectra};
 use crate::description::WindowKind;
 use crate::modal::{
-    CompositeLevel, LineAmplitudes, ModeReading, find_peaks, mains_harmonic, read_peaks,
+    CompositeLevel, LineAmplitudes, ModeReading, PeakLabel, find_peaks, mains_harmonic, read_peaks,
 };
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
@@ -225,14 +225,14 @@ impl<'a> Stage<'a> {
             .collect()
     }
 
-    /// "mains 50 Hz" where a peak is hum, judged on the response in which it is strongest.
+    /// The label of a peak that is hum, judged on the response in which it is strongest.
     fn mains_label(
         &self,
         index: usize,
         averages: &AveragedSpectra,
         quiet: &[Vec<f64>],
         window: Window,
-    ) -> Option<String> {
+    ) -> Option<PeakLabel> {
         let rate = self.recording.sample_rate();
         let frequency = self.lines.frequency(index);
         let strength =
@@ -251,7 +251,7 @@ impl<'a> Stage<'a> {
             amplitudes,
             &self.settings.mains,
         )
-        .map(|harmonic| format!("mains {harmonic} Hz"))
+        .map(PeakLabel::Mains)
     }
 }
 
@@ -259,7 +259,7 @@ impl<'a> Stage<'a> {
 const MOST_KEPT: usize = 1 << 24;
 
 /// A mains line keeps its line reading and loses what only a resonance has.
-fn as_mains(reading: &ModeReading, line_frequency: f64, label: String) -> ModeReading {
+fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> ModeReading {
     ModeReading {
         frequency: line_frequency,
         line_frequency,

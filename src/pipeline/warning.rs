@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::measure::MeasuredSpectra;
+use crate::modal::PeakLabel;
 use crate::recording::Recording;
 use crate::spectral::{RUNG_DOWN, Window};
 use crate::taps::{TapSource, Taps};
@@ -59,7 +60,7 @@ pub enum Warning {
         /// Where (Hz).
         frequency: f64,
         /// What it is.
-        label: String,
+        label: PeakLabel,
     },
     /// The pair regression contradicts its own frequency equation.
     Closure {
@@ -248,11 +249,11 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
         });
     }
     for reading in &spectra.readings {
-        if let Some(label) = &reading.label {
+        if let Some(label @ PeakLabel::Mains(_)) = reading.label {
             warnings.push(Warning::Mains {
                 file: file.to_string(),
                 frequency: reading.line_frequency,
-                label: label.clone(),
+                label,
             });
         }
     }

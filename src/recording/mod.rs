@@ -1,82 +1,514 @@
-//! temp
+//! Reading recordings: WAV and CSV time series as physical quantities.
+//!
+//! [`Recording::open`] recognises the format by the first bytes, reads the file once in blocks,
+//! checks it and gathers the health of every channel. The [`Recording`] is a handle: samples are
+//! read from the file when they are asked for, so an hour of recording need not fit into memory.
+//! Values are in file units (integer WAV: full scale = 1) times the channel's
+//! [`scale`](ChannelInfo::scale).
+//!
+//! Important conventions: channel indices are 0-based and do not count a time column; the channel
+//! numbers that users write and messages show are 1-based. Sample positions are 0-based.
+//!
+//! This stage knows nothing of taps, spectra or beams, and repairs no samples.
+
 use std::ops::Range;
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("x")]
-#[allow(missing_docs)]
-pub struct RecordingError;
-#[allow(missing_docs)]
-#[derive(Debug, Clone)]
-pub struct Recording {
-    rate: f64,
-    data: Vec<Vec<f64>>,
+use std::path::{Path, PathBuf};
+
+mod csv;
+mod error;
+mod health;
+mod layout;
+mod open;
+mod riff;
+mod sniff;
+mod source;
+mod text;
+mod time;
+mod units;
+mod warning;
+mod wav;
+mod write;
+
+pub use error::RecordingError;
+pub use health::{ChannelHealth, Dropout, FlatTop};
+pub use text::Separator;
+pub use units::{STANDARD_GRAVITY, channel_unit};
+pub use warning::{ChannelLabel, RecordingWarning};
+pub use write::{WavFormat, encode_wav, write_wav};
+
+use health::HealthMeter;
+use source::{Cursor, Source};
+use text::LARGEST;
+use warning::health_warnings;
+
+/// What the caller knows about a file that the file may not say.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ReadSettings {
+    /// Sample rate (Hz) of a CSV file without a time column. A file's own rate wins, with a
+    /// warning where they differ. Default: none, because a guessed rate scales every frequency.
+    pub sample_rate: Option<f64>,
 }
-#[allow(missing_docs)]
+
+/// Format of an opened recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// WAV with integer samples of so many valid bits; full scale = 1.
+    WavInteger {
+        /// Valid bits.
+        bits: u16,
+    },
+    /// WAV with floating-point samples of so many bits.
+    WavFloat {
+        /// 32 or 64.
+        bits: u16,
+    },
+    /// Text.
+    Csv {
+        /// What separates the columns.
+        separator: Separator,
+        /// Decimal mark, `.` where no number shows one.
+        decimal: char,
+        /// Whether the sample rate comes from a time column.
+        timed: Timing,
+    },
+    /// Samples in memory.
+    Memory,
+}
+
+/// Where a text file's sample rate comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Timing {
+    /// From its time column.
+    TimeColumn,
+    /// From the caller.
+    Given,
+}
+
+/// What is known about one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelInfo {
+    /// Name without the unit, where the file gives one.
+    pub name: Option<String>,
+    /// The unit that values have: SI where the header's unit is known, the header's text where it
+    /// is not; `None` without a unit and after a scale was set.
+    pub unit: Option<String>,
+    /// The unit as the header has it.
+    pub header_unit: Option<String>,
+    /// What file units are multiplied by: the scale set, else the header unit's factor to SI, else 1.
+    pub scale: f64,
+    /// Quality of the samples, in the unit that values have.
+    pub health: ChannelHealth,
+}
+
+/// A channel held in memory.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Channel {
+    /// Its name.
+    pub name: Option<String>,
+    /// The unit of its samples.
+    pub unit: Option<String>,
+    /// The samples.
+    pub samples: Vec<f64>,
+}
+
+/// Samples of some channels from one place of the recording.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Block {
+    /// First sample (0-based).
     pub start: u64,
+    /// Samples of the wanted channels, in the order asked for.
     pub samples: Vec<Vec<f64>>,
 }
-#[allow(missing_docs)]
-pub struct W;
-impl W {
-    #[allow(missing_docs)]
-    pub fn code(&self) -> &'static str {
-        ""
-    }
+
+/// A recording: uniformly sampled channels, read from their file when asked for.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    name: String,
+    path: Option<PathBuf>,
+    format: Format,
+    sample_rate: f64,
+    frames: u64,
+    channels: Vec<ChannelInfo>,
+    warnings: Vec<RecordingWarning>,
+    source: Source,
 }
-impl std::fmt::Display for W {
-    fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        Ok(())
-    }
-}
-#[allow(missing_docs)]
+
 impl Recording {
-    pub fn from_samples(_n: &str, rate: f64, data: Vec<Vec<f64>>) -> Self {
-        Recording { rate, data }
+    /// Opens a file: one pass checks every sample and gathers the channels' health.
+    ///
+    /// # Errors
+    /// Files that cannot be read or understood: see [`RecordingError`]; merely poor data are
+    /// [`warnings`](Self::warnings).
+    pub fn open(path: &Path, settings: &ReadSettings) -> Result<Self, RecordingError> {
+        open::open(path, settings)
     }
-    pub fn sample_rate(&self) -> f64 {
-        self.rate
+
+    /// A recording in memory, for simulated signals and tests. `sample_rate` in Hz.
+    ///
+    /// # Errors
+    /// No channels, no samples, unequal lengths, samples that are not finite, a sample rate that is
+    /// not positive.
+    pub fn from_samples(
+        name: impl Into<String>,
+        sample_rate: f64,
+        channels: Vec<Channel>,
+    ) -> Result<Self, RecordingError> {
+        open::from_samples(name.into(), sample_rate, channels)
     }
-    pub fn frames(&self) -> u64 {
-        self.data[0].len() as u64
-    }
+
+    /// The file as the caller named it, or the name of a recording in memory.
     pub fn name(&self) -> &str {
-        "x"
+        &self.name
     }
-    pub fn warnings(&self) -> Vec<W> {
-        vec![]
+
+    /// The file; `None` for a recording in memory.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
     }
-    pub fn mean(&self, c: usize) -> f64 {
-        self.data[c].iter().sum::<f64>() / self.data[c].len() as f64
+
+    /// What kind of file it is.
+    pub fn format(&self) -> Format {
+        self.format
     }
-    pub fn clipping_level(&self, _c: usize) -> Option<f64> {
-        None
+
+    /// Samples per second (Hz).
+    pub fn sample_rate(&self) -> f64 {
+        self.sample_rate
     }
-    pub fn read(&self, c: usize, r: Range<u64>) -> Result<Vec<f64>, RecordingError> {
-        let n = self.data[c].len();
-        Ok(self.data[c][(r.start as usize).min(n)..(r.end as usize).min(n)].to_vec())
+
+    /// Samples per channel.
+    pub fn frames(&self) -> u64 {
+        self.frames
     }
+
+    /// Length (s): samples per channel over sample rate.
+    pub fn duration(&self) -> f64 {
+        self.frames as f64 / self.sample_rate
+    }
+
+    /// The channels, in the order of the file, without the time column.
+    pub fn channels(&self) -> &[ChannelInfo] {
+        &self.channels
+    }
+
+    /// Mean of a channel (its unit): the offset that spectra leave out; 0 for an unknown channel.
+    pub fn mean(&self, channel: usize) -> f64 {
+        self.channels
+            .get(channel)
+            .map_or(0.0, |info| info.health.mean)
+    }
+
+    /// The doubts about this recording: of the file as a whole, then channel by channel.
+    pub fn warnings(&self) -> Vec<RecordingWarning> {
+        let mut warnings = self.warnings.clone();
+        for (at, channel) in self.channels.iter().enumerate() {
+            let label = channel_label(at, channel);
+            warnings.extend(health_warnings(&label, &channel.health, self.sample_rate));
+        }
+        warnings
+    }
+
+    /// Samples of one channel. The range is cut to the recording.
+    ///
+    /// # Errors
+    /// An unknown channel; a file that can no longer be read.
+    pub fn read(&self, channel: usize, range: Range<u64>) -> Result<Vec<f64>, RecordingError> {
+        let mut samples = self.read_channels(&[channel], range)?;
+        Ok(samples.pop().unwrap_or_default())
+    }
+
+    /// Samples of several channels from the same place, in the order asked for, read in one go.
+    ///
+    /// # Errors
+    /// An unknown channel; a file that can no longer be read.
     pub fn read_channels(
         &self,
-        c: &[usize],
-        r: Range<u64>,
+        channels: &[usize],
+        range: Range<u64>,
     ) -> Result<Vec<Vec<f64>>, RecordingError> {
-        c.iter().map(|&c| self.read(c, r.clone())).collect()
+        self.check_channels(channels)?;
+        let end = range.end.min(self.frames);
+        let start = range.start.min(end);
+        if start == end {
+            return Ok(vec![Vec::new(); channels.len()]);
+        }
+        let samples = self.source.cursor(start)?.read(channels, end - start)?;
+        Ok(self.scaled(channels, samples))
     }
-    pub fn blocks(
-        &self,
-        c: &[usize],
-        b: usize,
-    ) -> impl Iterator<Item = Result<Block, RecordingError>> {
-        let c = c.to_vec();
-        let n = self.data[0].len();
-        (0..n.div_ceil(b)).map(move |i| {
-            Ok(Block {
-                start: (i * b) as u64,
-                samples: c
-                    .iter()
-                    .map(|&c| self.data[c][i * b..((i + 1) * b).min(n)].to_vec())
-                    .collect(),
+
+    /// The whole recording in blocks of `block` samples (at least 1), the last one shorter. After
+    /// an error the iteration ends.
+    pub fn blocks(&self, channels: &[usize], block: usize) -> Blocks<'_> {
+        Blocks {
+            recording: self,
+            channels: channels.to_vec(),
+            block: block.max(1) as u64,
+            at: 0,
+            cursor: None,
+        }
+    }
+
+    /// Sets what file units of a channel (0-based) are multiplied by: SI units per file unit,
+    /// negative when the sensor was mounted the other way. It replaces the factor of a unit in the
+    /// header, with a warning.
+    ///
+    /// # Errors
+    /// An unknown channel; a scale that is 0 or not finite.
+    pub fn set_scale(&mut self, channel: usize, scale: f64) -> Result<(), RecordingError> {
+        self.check_channels(&[channel])?;
+        if !scale.is_finite() || scale == 0.0 {
+            return Err(RecordingError::BadScale {
+                file: self.name.clone(),
+                channel: channel + 1,
+                value: scale,
+            });
+        }
+        let Some(info) = self.channels.get_mut(channel) else {
+            return Ok(());
+        };
+        let overruled = |warning: &RecordingWarning| match warning {
+            RecordingWarning::ScaleOverUnit { channel: label, .. }
+            | RecordingWarning::UnknownUnit { channel: label, .. } => label.number == channel + 1,
+            _ => false,
+        };
+        self.warnings.retain(|warning| !overruled(warning));
+        if let Some(unit) = &info.header_unit {
+            self.warnings.push(RecordingWarning::ScaleOverUnit {
+                channel: channel_label(channel, info),
+                scale,
+                unit: unit.clone(),
+            });
+        }
+        info.health = info.health.scaled(scale / info.scale);
+        info.scale = scale;
+        info.unit = None;
+        Ok(())
+    }
+
+    /// [`set_scale`](Self::set_scale) by value.
+    ///
+    /// # Errors
+    /// Those of [`set_scale`](Self::set_scale).
+    pub fn with_scale(mut self, channel: usize, scale: f64) -> Result<Self, RecordingError> {
+        self.set_scale(channel, scale)?;
+        Ok(self)
+    }
+
+    /// The index (0-based) of the channel with a 1-based number.
+    ///
+    /// # Errors
+    /// No such channel; the message lists what exists.
+    pub fn channel_by_number(&self, number: usize) -> Result<usize, RecordingError> {
+        match number.checked_sub(1) {
+            Some(index) if index < self.channels.len() => Ok(index),
+            _ => Err(RecordingError::UnknownChannelNumber {
+                file: self.name.clone(),
+                number,
+                existing: self.existing_channels(),
+            }),
+        }
+    }
+
+    /// The index (0-based) of the channel with a name, without or with its unit; upper and lower
+    /// case count only where both occur.
+    ///
+    /// # Errors
+    /// No channel or several channels of that name; the message lists what exists and the nearest.
+    pub fn channel_by_name(&self, name: &str) -> Result<usize, RecordingError> {
+        let wanted = name.trim();
+        let without_unit = units::split_unit(wanted).0;
+        let rules: [&dyn Fn(&str) -> bool; 4] = [
+            &|name| name == wanted,
+            &|name| name == without_unit,
+            &|name| name.eq_ignore_ascii_case(wanted),
+            &|name| units::split_unit(name).0.eq_ignore_ascii_case(without_unit),
+        ];
+        for rule in rules {
+            let named = |channel: &ChannelInfo| channel.name.as_deref().is_some_and(rule);
+            let mut found = (0..).zip(&self.channels).filter(|(_, c)| named(c));
+            if let Some((index, _)) = found.next() {
+                return match found.count() {
+                    0 => Ok(index),
+                    others => Err(RecordingError::AmbiguousChannelName {
+                        file: self.name.clone(),
+                        name: wanted.to_owned(),
+                        count: others + 1,
+                        existing: self.existing_channels(),
+                    }),
+                };
+            }
+        }
+        Err(self.unknown_name(wanted))
+    }
+
+    /// The index (0-based) of the channel that a user means by a text: a name, else a number.
+    ///
+    /// # Errors
+    /// Those of [`channel_by_name`](Self::channel_by_name) and
+    /// [`channel_by_number`](Self::channel_by_number).
+    pub fn channel_index(&self, text: &str) -> Result<usize, RecordingError> {
+        match (self.channel_by_name(text), text.trim().parse()) {
+            (Err(RecordingError::UnknownChannelName { .. }), Ok(number)) => {
+                self.channel_by_number(number)
+            }
+            (by_name, _) => by_name,
+        }
+    }
+
+    fn unknown_name(&self, wanted: &str) -> RecordingError {
+        // Beyond this similarity (Jaro-Winkler, 1 = equal) a name is worth proposing.
+        const NEAR: f64 = 0.7;
+        let names = self.channels.iter().filter_map(|c| c.name.as_deref());
+        let nearest = names
+            .map(|name| {
+                let (name_lower, wanted) = (name.to_lowercase(), wanted.to_lowercase());
+                (strsim::jaro_winkler(&name_lower, &wanted), name)
             })
+            .filter(|(similarity, _)| *similarity >= NEAR)
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        RecordingError::UnknownChannelName {
+            file: self.name.clone(),
+            name: wanted.to_owned(),
+            nearest: nearest.map_or(String::new(), |(_, name)| {
+                format!("; did you mean \"{name}\"?")
+            }),
+            existing: self.existing_channels(),
+        }
+    }
+
+    /// `1 ("force"), 2 ("response")`, for messages.
+    fn existing_channels(&self) -> String {
+        // More would hide the message.
+        const SHOWN: usize = 12;
+        let shown = self.channels.iter().enumerate().take(SHOWN);
+        let mut shown: Vec<String> = shown
+            .map(|(at, channel)| match &channel.name {
+                Some(name) => format!("{} (\"{name}\")", at + 1),
+                None => (at + 1).to_string(),
+            })
+            .collect();
+        if self.channels.len() > SHOWN {
+            shown.push(format!("... {}", self.channels.len()));
+        }
+        shown.join(", ")
+    }
+
+    fn check_channels(&self, channels: &[usize]) -> Result<(), RecordingError> {
+        channels
+            .iter()
+            .try_for_each(|channel| self.channel_by_number(channel.saturating_add(1)).map(drop))
+    }
+
+    fn scaled(&self, channels: &[usize], mut samples: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        for (channel, samples) in channels.iter().zip(&mut samples) {
+            let scale = self.channels.get(*channel).map_or(1.0, |info| info.scale);
+            if scale != 1.0 {
+                samples.iter_mut().for_each(|sample| *sample *= scale);
+            }
+        }
+        samples
+    }
+}
+
+fn channel_label(at: usize, channel: &ChannelInfo) -> ChannelLabel {
+    ChannelLabel {
+        number: at + 1,
+        name: channel.name.clone(),
+    }
+}
+
+/// Checks channels in memory and returns their common length.
+fn check_samples(
+    name: &str,
+    sample_rate: f64,
+    channels: &[&[f64]],
+) -> Result<usize, RecordingError> {
+    let file = || name.to_owned();
+    let frames = channels.first().map_or(0, |samples| samples.len());
+    if frames == 0 {
+        return Err(RecordingError::NoSamples { file: file() });
+    }
+    for (at, samples) in channels.iter().enumerate() {
+        if samples.len() != frames {
+            return Err(RecordingError::LengthMismatch {
+                file: file(),
+                channel: at + 1,
+                found: samples.len(),
+                expected: frames,
+            });
+        }
+        check_finite(name, sample_rate, (at, 0), samples)?;
+    }
+    Ok(frames)
+}
+
+/// Checks that samples of one channel, the first of them at `place.1`, are finite and not absurd.
+fn check_finite(
+    name: &str,
+    sample_rate: f64,
+    place: (usize, u64),
+    samples: &[f64],
+) -> Result<(), RecordingError> {
+    // NaN is in no range.
+    let usable = |value: &&f64| !(-LARGEST..=LARGEST).contains(*value);
+    match samples
+        .iter()
+        .zip(place.1..)
+        .find(|(value, _)| usable(value))
+    {
+        None => Ok(()),
+        Some((value, frame)) => Err(RecordingError::NotFinite {
+            file: name.to_owned(),
+            channel: place.0 + 1,
+            frame,
+            time: frame as f64 / sample_rate,
+            value: *value,
+        }),
+    }
+}
+
+/// The blocks of a recording, see [`Recording::blocks`].
+#[derive(Debug)]
+pub struct Blocks<'a> {
+    recording: &'a Recording,
+    channels: Vec<usize>,
+    block: u64,
+    at: u64,
+    cursor: Option<Cursor<'a>>,
+}
+
+impl Blocks<'_> {
+    fn next_block(&mut self) -> Result<Block, RecordingError> {
+        let recording = self.recording;
+        let cursor = match &mut self.cursor {
+            Some(cursor) => cursor,
+            none => {
+                recording.check_channels(&self.channels)?;
+                none.insert(recording.source.cursor(self.at)?)
+            }
+        };
+        let start = self.at;
+        let frames = self.block.min(recording.frames - start);
+        let samples = cursor.read(&self.channels, frames)?;
+        self.at += frames;
+        Ok(Block {
+            start,
+            samples: recording.scaled(&self.channels, samples),
         })
+    }
+}
+
+impl Iterator for Blocks<'_> {
+    type Item = Result<Block, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.at >= self.recording.frames {
+            return None;
+        }
+        let block = self.next_block();
+        if block.is_err() {
+            self.at = self.recording.frames;
+        }
+        Some(block)
     }
 }

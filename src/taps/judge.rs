@@ -191,19 +191,19 @@ fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
     -lowest > 0.5 * other.peak
 }
 
-/// Samples at a channel's limit: at the integer format's full scale, or on a flat top at the
-/// channel's largest value.
+/// Samples at a channel's limit: at the integer format's full scale, or at the level of its flat
+/// tops.
 fn overload(
     recording: &Recording,
     source: &TapSource,
     record: &Range<u64>,
 ) -> Result<Option<Rejection>, RecordingError> {
     for channel in source.channels() {
-        let Some(limit) = recording.clipping_level(channel) else {
+        let Some((low, high)) = limits(recording, channel) else {
             continue;
         };
         let samples = recording.read(channel, record.clone())?;
-        let count = samples.iter().filter(|x| x.abs() >= limit).count();
+        let count = samples.iter().filter(|&&x| x >= high || x <= low).count();
         if count > 0 {
             return Ok(Some(Rejection::Overload {
                 channel: channel + 1,
@@ -212,6 +212,24 @@ fn overload(
         }
     }
     Ok(None)
+}
+
+/// The levels at which a channel is cut off; `None` where it never was.
+fn limits(recording: &Recording, channel: usize) -> Option<(f64, f64)> {
+    let health = &recording.channels().get(channel)?.health;
+    let tops = health.flat_tops.iter().map(|top| top.value);
+    let full = (health.full_scale_samples > 0).then_some(health.peak);
+    let high = tops
+        .clone()
+        .chain(full)
+        .filter(|&x| x > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let low = tops
+        .chain(full.map(|x| -x))
+        .filter(|&x| x < 0.0)
+        .fold(f64::NEG_INFINITY, f64::max);
+    // The flat top itself is exact; a hair below it keeps a rescaled level from slipping through.
+    (high.is_finite() || low.is_finite()).then_some((low * 0.9999, high * 0.9999))
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tapjoint::modal::{
-    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, NO_RESONANCE, PeakSettings,
+    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings,
     find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
 };
 use tapjoint::spectral::{Lines, Window, transform_block};

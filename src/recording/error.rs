@@ -1,0 +1,397 @@
+//! What can go wrong so badly that a recording cannot be used.
+
+use std::io;
+
+/// Why a recording cannot be opened, read or written.
+///
+/// Every message begins with the file, and the line where there is one; then what was found, what
+/// is allowed and what to do. Data that are merely poor are [`super::RecordingWarning`]s instead.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The operating system refused.
+    #[error("{file}: cannot be read: {source}; check the path and the permissions")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file became shorter after it was opened.
+    #[error(
+        "{file}: ended before sample {frame}, though it was longer when opened; is it still being written?"
+    )]
+    Changed {
+        /// The file.
+        file: String,
+        /// First sample (0-based) that is no longer there.
+        frame: u64,
+    },
+    /// Zero bytes.
+    #[error("{file}: the file is empty (0 bytes); record or export it again")]
+    EmptyFile {
+        /// The file.
+        file: String,
+    },
+    /// A format that is known but not read.
+    #[error("{file}: {format} is not read by this version; export as WAV or CSV")]
+    UnsupportedFormat {
+        /// The file.
+        file: String,
+        /// What the first bytes say it is.
+        format: &'static str,
+    },
+    /// Neither a WAV file nor text.
+    #[error(
+        "{file}: neither a WAV file nor text (first bytes {first_bytes}); export as WAV or CSV"
+    )]
+    UnknownFormat {
+        /// The file.
+        file: String,
+        /// The first bytes, in hexadecimal.
+        first_bytes: String,
+    },
+    /// A chunk without which the samples have no meaning.
+    #[error(
+        "{file}: no \"{chunk}\" chunk{place}: not a usable WAV file; record or export it again"
+    )]
+    MissingChunk {
+        /// The file.
+        file: String,
+        /// Its four-letter name.
+        chunk: &'static str,
+        /// Where it was expected, empty for "anywhere".
+        place: &'static str,
+    },
+    /// A header field that cannot be true.
+    #[error("{file}: the WAV header says {field} {value}; allowed: {allowed}; export it again")]
+    BadHeader {
+        /// The file.
+        file: String,
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        value: u64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Samples coded in a way that is not read.
+    #[error(
+        "{file}: WAV coding {name} (format tag 0x{tag:04x}, {bits} bits) is not read; allowed: integer of 8 to 32 bits, float of 32 or 64 bits; export as PCM or float"
+    )]
+    UnsupportedCoding {
+        /// The file.
+        file: String,
+        /// The format tag, of the subformat where the header is extensible.
+        tag: u16,
+        /// Its common name.
+        name: &'static str,
+        /// Bits per sample.
+        bits: u16,
+    },
+    /// A valid frame without samples.
+    #[error("{file}: holds no samples; record or export it again")]
+    NoSamples {
+        /// The file.
+        file: String,
+    },
+    /// A sample that is no number of physical size.
+    #[error(
+        "{file}: channel {channel}, sample {frame} ({time} s) is {value}; allowed: finite numbers of magnitude up to 1e100; remove the damaged part and export it again"
+    )]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// Channel, 1-based.
+        channel: usize,
+        /// Sample, 0-based.
+        frame: u64,
+        /// When (s).
+        time: f64,
+        /// The value.
+        value: f64,
+    },
+    /// Not one line of numbers.
+    #[error(
+        "{file}:{line}: no line of numbers found; the best candidate holds \"{value}\" where a number is needed; allowed: numbers separated by comma, semicolon, tab or blanks"
+    )]
+    NoNumbers {
+        /// The file.
+        file: String,
+        /// The line, 1-based, that came nearest.
+        line: u64,
+        /// What stands there.
+        value: String,
+    },
+    /// Text where a number is needed.
+    #[error(
+        "{file}:{line}: column {column}{name} holds \"{value}\", which is not a number; allowed: numbers such as -1.25e-3; correct or remove this line"
+    )]
+    TextInCell {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// Column in the file, 1-based.
+        column: usize,
+        /// ` ("name")` where the header names the column, empty otherwise.
+        name: String,
+        /// The text.
+        value: String,
+    },
+    /// NaN or infinity in a cell.
+    #[error(
+        "{file}:{line}: column {column}{name} holds \"{value}\"; allowed: finite numbers of magnitude up to 1e100; remove the damaged rows and take what stays connected"
+    )]
+    CellNotFinite {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// Column in the file, 1-based.
+        column: usize,
+        /// ` ("name")` where the header names the column, empty otherwise.
+        name: String,
+        /// The text.
+        value: String,
+    },
+    /// An empty cell, or a row that ends early.
+    #[error(
+        "{file}:{line}: column {column}{name} is missing; every row needs {columns} numbers; fill the cell or remove the column"
+    )]
+    MissingCell {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// Column in the file, 1-based.
+        column: usize,
+        /// ` ("name")` where the header names the column, empty otherwise.
+        name: String,
+        /// Columns of the file.
+        columns: usize,
+    },
+    /// More cells than columns.
+    #[error(
+        "{file}:{line}: {found} cells where the rows have {columns}; the first surplus cell holds \"{value}\"; correct this line"
+    )]
+    SurplusCells {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// Cells in this line.
+        found: usize,
+        /// Columns of the file.
+        columns: usize,
+        /// The first cell too many.
+        value: String,
+    },
+    /// An empty line between rows of a file without a time column.
+    #[error(
+        "{file}:{line}: empty line between rows; without a time column it cannot be told whether a row was lost; remove the line or add a time column"
+    )]
+    BlankLine {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+    },
+    /// Decimal point and decimal comma in one file.
+    #[error(
+        "{file}:{line}: column {column}{name} holds \"{value}\", but the numbers before use \"{decimal}\" as decimal mark; allowed: one decimal mark, no thousands separators"
+    )]
+    MixedDecimal {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// Column in the file, 1-based.
+        column: usize,
+        /// ` ("name")` where the header names the column, empty otherwise.
+        name: String,
+        /// The text.
+        value: String,
+        /// The mark used so far.
+        decimal: char,
+    },
+    /// Commas both as separators and within numbers.
+    #[error(
+        "{file}:{line}: {names} names head {columns} columns; when the comma is the decimal mark the separator must be semicolon, tab or blank; export it again"
+    )]
+    AmbiguousComma {
+        /// The file.
+        file: String,
+        /// Line of the header, 1-based.
+        line: u64,
+        /// Names in the header.
+        names: usize,
+        /// Columns below it.
+        columns: usize,
+    },
+    /// A line too long to be a row of numbers.
+    #[error(
+        "{file}:{line}: this line has more than {limit} bytes; allowed: one row of numbers per line"
+    )]
+    LineTooLong {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// The limit (bytes).
+        limit: usize,
+    },
+    /// More channels than any recorder has.
+    #[error("{file}: {channels} channels; at most {limit} are read; is the header damaged?")]
+    TooManyChannels {
+        /// The file.
+        file: String,
+        /// Channels found.
+        channels: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// Only a time column.
+    #[error(
+        "{file}:{line}: column {column} is time and there is no other; allowed: at least one channel beside the time"
+    )]
+    OnlyTime {
+        /// The file.
+        file: String,
+        /// Line of the first row, 1-based.
+        line: u64,
+        /// The time column, 1-based.
+        column: usize,
+    },
+    /// A time column in something else than time.
+    #[error(
+        "{file}:{line}: the time column's unit \"{unit}\" is not one of time; allowed: s, ms, us, ns, min, h"
+    )]
+    TimeUnit {
+        /// The file.
+        file: String,
+        /// Line of the first row, 1-based.
+        line: u64,
+        /// The unit as the header has it.
+        unit: String,
+    },
+    /// Sampling that is not uniform.
+    #[error(
+        "{file}:{line}: uneven sampling: time {time} s comes {step} s after the row before, the step elsewhere is {expected} s{lost}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly"
+    )]
+    UnevenSampling {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// Time in that line (s).
+        time: f64,
+        /// Step to it (s).
+        step: f64,
+        /// Step elsewhere (s).
+        expected: f64,
+        /// ` (about N rows are missing)` where the gap is a whole number of steps, empty otherwise.
+        lost: String,
+    },
+    /// Nothing says how fast the file was sampled.
+    #[error(
+        "{file}:{line}: no time column and no sample rate{hint}; name the time column t or time (unit in brackets allowed), or give sample_rate in Hz"
+    )]
+    NoSampleRate {
+        /// The file.
+        file: String,
+        /// Line of the first row, 1-based.
+        line: u64,
+        /// ` (column N rises evenly: is it the time?)` where one does, empty otherwise.
+        hint: String,
+    },
+    /// A rate that is none.
+    #[error("{file}: sample rate {value} Hz; allowed: a finite number above 0")]
+    BadSampleRate {
+        /// The file.
+        file: String,
+        /// The value (Hz).
+        value: f64,
+    },
+    /// A scale that loses the signal.
+    #[error(
+        "{file}: channel {channel}: scale {value}; allowed: a finite number other than 0 (negative = mounted the other way)"
+    )]
+    BadScale {
+        /// The file.
+        file: String,
+        /// Channel, 1-based.
+        channel: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A channel number that does not exist.
+    #[error("{file}: no channel {number}; there are: {existing}")]
+    UnknownChannelNumber {
+        /// The file.
+        file: String,
+        /// The number asked for, 1-based.
+        number: usize,
+        /// What exists.
+        existing: String,
+    },
+    /// A channel name that does not exist.
+    #[error("{file}: no channel named \"{name}\"{nearest}; there are: {existing}")]
+    UnknownChannelName {
+        /// The file.
+        file: String,
+        /// The name asked for.
+        name: String,
+        /// `; did you mean "..."?` where one is near, empty otherwise.
+        nearest: String,
+        /// What exists.
+        existing: String,
+    },
+    /// A name that several channels share.
+    #[error("{file}: {count} channels are named \"{name}\"; use the channel's number: {existing}")]
+    AmbiguousChannelName {
+        /// The file.
+        file: String,
+        /// The name asked for.
+        name: String,
+        /// How many have it.
+        count: usize,
+        /// What exists.
+        existing: String,
+    },
+    /// Channels of different lengths.
+    #[error(
+        "{file}: channel {channel} has {found} samples, channel 1 has {expected}; allowed: equal lengths"
+    )]
+    LengthMismatch {
+        /// The file.
+        file: String,
+        /// Channel, 1-based.
+        channel: usize,
+        /// Its samples.
+        found: usize,
+        /// Samples of channel 1.
+        expected: usize,
+    },
+    /// A WAV file that the format cannot hold.
+    #[error(
+        "{file}: {channels} channels of {frames} samples at {bits} bits do not fit into a WAV file; allowed: 1 to 65535 channels and less than 4 GiB; write less"
+    )]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// Channels.
+        channels: usize,
+        /// Samples per channel.
+        frames: usize,
+        /// Bits per sample.
+        bits: u16,
+    },
+    /// The operating system refused to write.
+    #[error("{file}: cannot be written: {source}; check the folder, its permissions and its space")]
+    Unwritable {
+        /// The file.
+        file: String,
+        /// The system's reason.
+        source: io::Error,
+    },
+}

@@ -1,0 +1,346 @@
+//! What a channel's samples say about the quality of the recording, gathered in one pass.
+
+/// Longest list of places kept for one channel and one fault; beyond it only the count grows.
+const PLACES_KEPT: usize = 32;
+
+/// Shortest run of equal samples at the extreme level that counts as a flat top. Two equal samples
+/// around a crest are common, three need a limit (or coarse quantisation, see `MIN_DROP_QUANTA`).
+const MIN_FLAT_TOP: u64 = 3;
+
+/// A flat top must fall off at one side by more than this many quantisation steps between
+/// neighbouring samples. The rounded crest of a slow signal holds k >= 3 equal samples within one
+/// step and falls by at most (1 + 2/k)^2 < 2.8 steps plus one of rounding to the next sample.
+const MIN_DROP_QUANTA: f64 = 4.0;
+
+/// Part of the peak by which a flat top must fall off besides, because a printed number of few
+/// digits has coarser steps near its peak than near zero.
+const MIN_DROP_OF_PEAK: f64 = 1e-4;
+
+/// Part of the channel's peak that a level must reach to be taken for a limit: the noise floor on
+/// the idle side of a hammer signal is none.
+const MIN_LEVEL_OF_PEAK: f64 = 0.5;
+
+/// Shortest run of equal samples that counts as dropped. Recorders lose whole buffers, of 32
+/// samples at least; a moving signal does not repeat a value that often by chance.
+const MIN_DROPOUT: u64 = 32;
+
+/// Before a dropout the signal must have moved by more than this many quantisation steps from
+/// sample to sample: a signal that fades into silence repeats its value without any loss.
+const MIN_ACTIVITY_QUANTA: f64 = 8.0;
+
+/// Weight of the newest step in the running mean of steps: a memory of about 16 samples, half of
+/// the shortest dropout.
+const ACTIVITY_WEIGHT: f64 = 1.0 / 16.0;
+
+/// Part of the recording that may stand still before standing still is taken for the channel's
+/// rest (a gated or noise-free channel) instead of lost samples.
+const MAX_STILL_PART: f64 = 0.5;
+
+/// A run of equal samples at the channel's highest or lowest level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlatTop {
+    /// First sample (0-based).
+    pub start: u64,
+    /// Samples.
+    pub len: u64,
+    /// The level (the channel's unit).
+    pub value: f64,
+}
+
+/// A run of exactly repeated samples inside an otherwise moving signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dropout {
+    /// First repeated sample (0-based).
+    pub start: u64,
+    /// Samples.
+    pub len: u64,
+    /// The repeated value (the channel's unit).
+    pub value: f64,
+}
+
+/// The quality of one channel over the whole recording, in the channel's unit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ChannelHealth {
+    /// Mean value, the DC offset (the channel's unit).
+    pub mean: f64,
+    /// Root mean square about the mean (the channel's unit).
+    pub rms: f64,
+    /// Largest magnitude (the channel's unit).
+    pub peak: f64,
+    /// Lowest value (the channel's unit).
+    pub minimum: f64,
+    /// Highest value (the channel's unit).
+    pub maximum: f64,
+    /// Samples at the largest or smallest number of an integer format; 0 for other formats.
+    pub full_scale_samples: u64,
+    /// The first of them (0-based).
+    pub first_full_scale: Option<u64>,
+    /// Runs of at least 3 equal samples at the channel's highest or lowest level, the first 32 of
+    /// each side.
+    pub flat_tops: Vec<FlatTop>,
+    /// How many there are.
+    pub flat_top_count: u64,
+    /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
+    pub dropped: Vec<Dropout>,
+    /// How many there are.
+    pub dropout_count: u64,
+    /// Samples in all of them together.
+    pub dropped_samples: u64,
+    /// All samples are equal: nothing was connected, or nothing was recorded.
+    pub constant: bool,
+}
+
+impl ChannelHealth {
+    /// The same health in another unit: every value multiplied by `factor`.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let (low, high) = (self.minimum * factor, self.maximum * factor);
+        let mut scaled = self.clone();
+        scaled.mean *= factor;
+        scaled.rms *= factor.abs();
+        scaled.peak *= factor.abs();
+        (scaled.minimum, scaled.maximum) = (low.min(high), low.max(high));
+        for flat_top in &mut scaled.flat_tops {
+            flat_top.value *= factor;
+        }
+        for dropout in &mut scaled.dropped {
+            dropout.value *= factor;
+        }
+        scaled
+    }
+}
+
+/// Gathers [`ChannelHealth`] sample by sample, in memory that does not grow with the recording.
+#[derive(Debug, Clone)]
+pub(super) struct HealthMeter {
+    full_scale: Option<f64>,
+    count: u64,
+    mean: f64,
+    sum_of_squares: f64,
+    full_scale_samples: u64,
+    first_full_scale: Option<u64>,
+    last: f64,
+    run: Run,
+    quantum: f64,
+    activity: f64,
+    high: Side,
+    low: Side,
+    dropped: Vec<Dropout>,
+    dropout_count: u64,
+    dropped_samples: u64,
+    still_samples: u64,
+}
+
+/// The run of equal samples that is going on.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    start: u64,
+    len: u64,
+    /// Magnitude of the step that led into it.
+    entry: f64,
+    /// Mean step before it.
+    activity: f64,
+}
+
+/// Flat tops at one extreme. `sign` turns the lowest level into a highest one.
+#[derive(Debug, Clone)]
+struct Side {
+    sign: f64,
+    level: f64,
+    places: Vec<FlatTop>,
+    count: u64,
+}
+
+impl Side {
+    fn new(sign: f64) -> Self {
+        Self {
+            sign,
+            level: f64::NEG_INFINITY,
+            places: Vec::new(),
+            count: 0,
+        }
+    }
+
+    /// A higher level makes all runs at the old one ordinary.
+    fn see(&mut self, value: f64) {
+        if value * self.sign > self.level {
+            self.level = value * self.sign;
+            self.places.clear();
+            self.count = 0;
+        }
+    }
+
+    fn holds(&self, value: f64) -> bool {
+        value * self.sign == self.level
+    }
+
+    fn note(&mut self, flat_top: FlatTop) {
+        self.count += 1;
+        if self.places.len() < PLACES_KEPT {
+            self.places.push(flat_top);
+        }
+    }
+}
+
+impl HealthMeter {
+    /// `full_scale` is the magnitude from which on a sample sits at the end of an integer format.
+    pub(super) fn new(full_scale: Option<f64>) -> Self {
+        Self {
+            full_scale,
+            count: 0,
+            mean: 0.0,
+            sum_of_squares: 0.0,
+            full_scale_samples: 0,
+            first_full_scale: None,
+            last: 0.0,
+            run: Run {
+                start: 0,
+                len: 0,
+                entry: 0.0,
+                activity: 0.0,
+            },
+            quantum: f64::INFINITY,
+            activity: 0.0,
+            high: Side::new(1.0),
+            low: Side::new(-1.0),
+            dropped: Vec::new(),
+            dropout_count: 0,
+            dropped_samples: 0,
+            still_samples: 0,
+        }
+    }
+
+    /// Adds the next samples.
+    pub(super) fn add(&mut self, samples: &[f64]) {
+        self.add_moments(samples);
+        for &value in samples {
+            self.add_sample(value);
+        }
+    }
+
+    /// Mean and sum of squares of a block, merged into those of all before.
+    ///
+    /// With d = mean_b - mean_a and n = n_a + n_b: mean = mean_a + d n_b/n and
+    /// M = M_a + M_b + d^2 n_a n_b/n (the pairwise update), exact for any block size and
+    /// free of the cancellation of sum(x^2) - n mean^2.
+    fn add_moments(&mut self, samples: &[f64]) {
+        if samples.is_empty() {
+            return;
+        }
+        let added = samples.len() as f64;
+        let before = self.count as f64;
+        let mean = samples.iter().sum::<f64>() / added;
+        let squares: f64 = samples.iter().map(|x| (x - mean) * (x - mean)).sum();
+        let difference = mean - self.mean;
+        let total = before + added;
+        self.mean += difference * added / total;
+        self.sum_of_squares += squares + difference * difference * before * added / total;
+    }
+
+    fn add_sample(&mut self, value: f64) {
+        let at = self.count;
+        self.count += 1;
+        if self.full_scale.is_some_and(|level| value.abs() >= level) {
+            self.full_scale_samples += 1;
+            self.first_full_scale.get_or_insert(at);
+        }
+        let step = (value - self.last).abs();
+        if at > 0 && step == 0.0 {
+            self.run.len += 1;
+        } else {
+            if at > 0 {
+                self.quantum = self.quantum.min(step);
+                self.end_run(step);
+            }
+            self.high.see(value);
+            self.low.see(value);
+            self.run = Run {
+                start: at,
+                len: 1,
+                entry: if at > 0 { step } else { 0.0 },
+                activity: self.activity,
+            };
+        }
+        if at > 0 {
+            self.activity += ACTIVITY_WEIGHT * (step - self.activity);
+        }
+        self.last = value;
+    }
+
+    /// Judges the run that ends with a step of magnitude `exit` (0 at the end of the recording).
+    fn end_run(&mut self, exit: f64) {
+        let run = self.run;
+        if run.len < MIN_FLAT_TOP {
+            return;
+        }
+        let peak = self.high.level.abs().max(self.low.level.abs());
+        let smallest_drop = (MIN_DROP_QUANTA * self.quantum).max(MIN_DROP_OF_PEAK * peak);
+        let extreme = self.high.holds(self.last) || self.low.holds(self.last);
+        if extreme && run.entry.max(exit) > smallest_drop {
+            let flat_top = FlatTop {
+                start: run.start,
+                len: run.len,
+                value: self.last,
+            };
+            for side in [&mut self.high, &mut self.low] {
+                if side.holds(self.last) {
+                    side.note(flat_top);
+                }
+            }
+        }
+        if run.len >= MIN_DROPOUT {
+            self.still_samples += run.len;
+            // A long run at a limit is a flat top, whatever else it looks like.
+            let at_limit = extreme && self.last.abs() >= MIN_LEVEL_OF_PEAK * peak;
+            if exit > 0.0 && !at_limit && run.activity > MIN_ACTIVITY_QUANTA * self.quantum {
+                self.note_dropout(Dropout {
+                    start: run.start,
+                    len: run.len,
+                    value: self.last,
+                });
+            }
+        }
+    }
+
+    fn note_dropout(&mut self, dropout: Dropout) {
+        self.dropout_count += 1;
+        self.dropped_samples += dropout.len;
+        if self.dropped.len() < PLACES_KEPT {
+            self.dropped.push(dropout);
+        }
+    }
+
+    /// The result.
+    pub(super) fn finish(mut self) -> ChannelHealth {
+        if self.count == 0 {
+            return ChannelHealth::default();
+        }
+        self.end_run(0.0);
+        let (maximum, minimum) = (self.high.level, -self.low.level);
+        let peak = maximum.abs().max(minimum.abs());
+        let constant = maximum == minimum;
+        let mut health = ChannelHealth {
+            mean: self.mean,
+            rms: (self.sum_of_squares / self.count as f64).sqrt(),
+            peak,
+            minimum,
+            maximum,
+            full_scale_samples: self.full_scale_samples,
+            first_full_scale: self.first_full_scale,
+            constant,
+            ..ChannelHealth::default()
+        };
+        for side in [self.high, self.low] {
+            if !constant && side.level.abs() >= MIN_LEVEL_OF_PEAK * peak {
+                health.flat_top_count += side.count;
+                health.flat_tops.extend(side.places);
+            }
+        }
+        health.flat_tops.sort_by_key(|flat_top| flat_top.start);
+        if self.still_samples as f64 <= MAX_STILL_PART * self.count as f64 {
+            health.dropped = self.dropped;
+            health.dropout_count = self.dropout_count;
+            health.dropped_samples = self.dropped_samples;
+        }
+        health
+    }
+}

@@ -1,0 +1,271 @@
+//! Lines, cells and numbers of a text file.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::Path;
+
+/// A longer line is not a row of numbers; the limit keeps a file without line ends out of memory.
+pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
+
+/// What stands between the numbers of a CSV file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Separator {
+    /// `\t`.
+    Tab,
+    /// `;`.
+    Semicolon,
+    /// `,`.
+    Comma,
+    /// One or more blanks or tabs.
+    Blanks,
+}
+
+impl Separator {
+    /// In order of preference where several fit equally well.
+    pub(super) const ALL: [Self; 4] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Blanks];
+
+    fn byte(self) -> Option<u8> {
+        match self {
+            Self::Tab => Some(b'\t'),
+            Self::Semicolon => Some(b';'),
+            Self::Comma => Some(b','),
+            Self::Blanks => None,
+        }
+    }
+}
+
+/// Where a cell stands in its line (bytes).
+pub(super) type Cell = Range<usize>;
+
+/// Splits a line into cells, quotes and surrounding blanks removed. `cells` is reused.
+pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cell>) {
+    cells.clear();
+    let end = line.trim_ascii_end_keeping_tabs().len();
+    let line = line.get(..end).unwrap_or_default();
+    match separator.byte() {
+        Some(byte) => split_at_byte(line, byte, cells),
+        None => split_at_blanks(line, cells),
+    }
+}
+
+/// Trimming that leaves tabs, which may be separators before an empty last cell.
+trait TrimEnd {
+    fn trim_ascii_end_keeping_tabs(&self) -> &[u8];
+}
+
+impl TrimEnd for [u8] {
+    fn trim_ascii_end_keeping_tabs(&self) -> &[u8] {
+        let is_end = |byte: &u8| matches!(byte, b'\r' | b'\n' | b' ' | 0x1a | 0x0c);
+        let kept = self.iter().rposition(|byte| !is_end(byte));
+        self.get(..kept.map_or(0, |last| last + 1))
+            .unwrap_or_default()
+    }
+}
+
+fn split_at_byte(line: &[u8], separator: u8, cells: &mut Vec<Cell>) {
+    let (mut start, mut quoted) = (0, false);
+    for (at, byte) in line.iter().enumerate() {
+        if *byte == b'"' {
+            quoted = !quoted;
+        } else if *byte == separator && !quoted {
+            cells.push(trimmed(line, start..at));
+            start = at + 1;
+        }
+    }
+    cells.push(trimmed(line, start..line.len()));
+}
+
+fn split_at_blanks(line: &[u8], cells: &mut Vec<Cell>) {
+    let (mut start, mut quoted) = (None, false);
+    for (at, byte) in line.iter().enumerate() {
+        if *byte == b'"' {
+            quoted = !quoted;
+        }
+        if matches!(byte, b' ' | b'\t') && !quoted {
+            if let Some(start) = start.take() {
+                cells.push(trimmed(line, start..at));
+            }
+        } else {
+            start.get_or_insert(at);
+        }
+    }
+    if let Some(start) = start {
+        cells.push(trimmed(line, start..line.len()));
+    }
+}
+
+/// The cell without surrounding blanks and without one pair of quotes.
+fn trimmed(line: &[u8], cell: Cell) -> Cell {
+    let blanks_off = |cell: Cell| {
+        let bytes = line.get(cell.clone()).unwrap_or_default();
+        let front = bytes.len() - bytes.trim_ascii_start().len();
+        cell.start + front..cell.start + front + bytes.trim_ascii().len()
+    };
+    let cell = blanks_off(cell);
+    match line.get(cell.clone()) {
+        Some([b'"', .., b'"']) => blanks_off(cell.start + 1..cell.end - 1),
+        _ => cell,
+    }
+}
+
+/// Why a cell is no usable number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CellProblem {
+    Missing,
+    Text,
+    NotFinite,
+    /// The other decimal mark than the file's, which is this one.
+    MixedDecimal(u8),
+}
+
+/// Magnitudes from here on are damage and not physics; their squares must stay finite.
+pub(super) const LARGEST: f64 = 1e100;
+
+/// Reads a number. `decimal` is the file's decimal mark, settled by the first number that has one.
+pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64, CellProblem> {
+    if cell.is_empty() {
+        return Err(CellProblem::Missing);
+    }
+    let mut mark = None;
+    for byte in cell {
+        match byte {
+            b',' | b'.' if mark.is_none() => mark = Some(*byte),
+            // A second mark: thousands separators, a date, an address.
+            b',' | b'.' => return Err(CellProblem::Text),
+            _ => {}
+        }
+    }
+    let value = match mark {
+        Some(b',') => parse_with_comma(cell),
+        _ => parse_plain(cell),
+    };
+    let value = value.ok_or(CellProblem::Text)?;
+    match (mark, *decimal) {
+        (Some(found), Some(settled)) if found != settled => {
+            return Err(CellProblem::MixedDecimal(settled));
+        }
+        (Some(found), None) => *decimal = Some(found),
+        _ => {}
+    }
+    match value.abs() <= LARGEST {
+        true => Ok(value),
+        false => Err(CellProblem::NotFinite),
+    }
+}
+
+fn parse_plain(cell: &[u8]) -> Option<f64> {
+    let text = str::from_utf8(cell).ok()?;
+    text.parse().ok().or_else(|| parse_fortran(text))
+}
+
+/// Fortran writes double precision exponents with D.
+fn parse_fortran(text: &str) -> Option<f64> {
+    let (mantissa, exponent) = text.split_once(['d', 'D'])?;
+    let digits = mantissa.contains(|c: char| c.is_ascii_digit());
+    digits.then(|| format!("{mantissa}e{exponent}").parse().ok())?
+}
+
+/// A decimal comma has digits on both sides, unlike a comma that separates.
+fn parse_with_comma(cell: &[u8]) -> Option<f64> {
+    let at = cell.iter().position(|byte| *byte == b',')?;
+    let before = cell.get(at.checked_sub(1)?)?;
+    let after = cell.get(at + 1)?;
+    if !before.is_ascii_digit() || !after.is_ascii_digit() || cell.len() > 64 {
+        return None;
+    }
+    let mut with_point = [0_u8; 64];
+    let with_point = with_point.get_mut(..cell.len())?;
+    with_point.copy_from_slice(cell);
+    *with_point.get_mut(at)? = b'.';
+    parse_plain(with_point)
+}
+
+/// Bytes of a text file as characters: UTF-8 where it is valid, else latin-1.
+pub(super) fn decode_text(bytes: &[u8]) -> String {
+    match str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
+/// A cell as messages show it: short, without control characters.
+pub(super) fn shown(cell: &[u8]) -> String {
+    const SHOWN: usize = 40;
+    let text = decode_text(cell);
+    let mut short: String = text.chars().take(SHOWN).collect();
+    if text.chars().nth(SHOWN).is_some() {
+        short.push_str("...");
+    }
+    short.replace(char::is_control, " ")
+}
+
+/// Whether a line is a comment, of a kind that recorders and numerical programs write.
+pub(super) fn is_comment(line: &[u8]) -> bool {
+    let line = line.trim_ascii_start();
+    line.starts_with(b"#") || line.starts_with(b"%") || line.starts_with(b"//")
+}
+
+/// Why the next line cannot be had.
+#[derive(Debug)]
+pub(super) enum LineProblem {
+    Io(io::Error),
+    TooLong,
+}
+
+/// Reads a file line by line, knowing where it is.
+#[derive(Debug)]
+pub(super) struct LineReader {
+    reader: BufReader<File>,
+    line: Vec<u8>,
+    end: u8,
+    /// Number of the line that was read last, 1-based.
+    pub number: u64,
+    /// Where the next line begins (bytes).
+    pub next_offset: u64,
+}
+
+impl LineReader {
+    /// Starts at byte `offset`, which begins the line after line `number`. `end` ends a line.
+    pub(super) fn open(path: &Path, end: u8, offset: u64, number: u64) -> io::Result<Self> {
+        let mut file = File::open(path)?;
+        file.seek(SeekFrom::Start(offset))?;
+        Ok(Self {
+            reader: BufReader::with_capacity(1 << 17, file),
+            line: Vec::new(),
+            end,
+            number,
+            next_offset: offset,
+        })
+    }
+
+    /// The next line with its end, `None` after the last one.
+    pub(super) fn next_line(&mut self) -> Result<Option<&[u8]>, LineProblem> {
+        self.line.clear();
+        loop {
+            let available = match self.reader.fill_buf() {
+                Ok(available) => available,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(LineProblem::Io(error)),
+            };
+            let end = available.iter().position(|byte| *byte == self.end);
+            let taken = end.map_or(available.len(), |at| at + 1);
+            self.line
+                .extend_from_slice(available.get(..taken).unwrap_or_default());
+            self.reader.consume(taken);
+            self.next_offset += taken as u64;
+            if self.line.len() > MAX_LINE_BYTES {
+                self.number += 1;
+                return Err(LineProblem::TooLong);
+            }
+            if end.is_some() || taken == 0 {
+                break;
+            }
+        }
+        if self.line.is_empty() {
+            return Ok(None);
+        }
+        self.number += 1;
+        Ok(Some(&self.line))
+    }
+}

@@ -1,0 +1,248 @@
+//! Doubts about a recording that do not keep it from being used.
+
+use std::fmt;
+
+use super::health::ChannelHealth;
+
+/// A channel, as a warning names it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelLabel {
+    /// 1-based number.
+    pub number: usize,
+    /// Name, where the file gives one.
+    pub name: Option<String>,
+}
+
+impl fmt::Display for ChannelLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.name {
+            Some(name) => write!(f, "channel {} (\"{name}\")", self.number),
+            None => write!(f, "channel {}", self.number),
+        }
+    }
+}
+
+/// A doubt about a recording: what happened, why it might be, what helps.
+///
+/// [`code`](Self::code) is short and stable, for reports; `Display` is the sentence.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RecordingWarning {
+    /// The file ends before the header says.
+    #[error(
+        "the file is truncated: {present} of the promised {promised} samples per channel are there; the recorder or a copy was probably interrupted; what is there is used"
+    )]
+    Truncated {
+        /// Samples per channel in the file.
+        present: u64,
+        /// Samples per channel by the header.
+        promised: u64,
+    },
+    /// The header does not say how long the file is.
+    #[error(
+        "the header gives no valid length (data size {size}); the recorder probably stopped without closing the file; read to the end of the file, {present} samples per channel"
+    )]
+    UnknownLength {
+        /// What the header says (bytes).
+        size: u64,
+        /// Samples per channel in the file.
+        present: u64,
+    },
+    /// Integers that sit at the wrong end of their container.
+    #[error(
+        "{bits}-bit samples sit at the low end of their {container}-bit containers, not at the high end as the format demands; full scale is taken as {bits} bits; check the levels"
+    )]
+    RightAligned {
+        /// Valid bits.
+        bits: u16,
+        /// Bits of a container.
+        container: u16,
+    },
+    /// Samples at the end of the number range.
+    #[error(
+        "{channel}: {count} samples at full scale, the first at {time:.6} s; the input was probably overloaded; lower the gain or tap more softly"
+    )]
+    FullScale {
+        /// The channel.
+        channel: ChannelLabel,
+        /// How many samples.
+        count: u64,
+        /// The first one (s).
+        time: f64,
+    },
+    /// Crests that are cut off.
+    #[error(
+        "{channel}: {count} flat tops at its extreme level, the first at {time:.6} s ({len} equal samples at {level}); an amplifier or sensor was probably overloaded; lower the gain or tap more softly"
+    )]
+    FlatTops {
+        /// The channel.
+        channel: ChannelLabel,
+        /// How many runs.
+        count: u64,
+        /// Start of the first one (s).
+        time: f64,
+        /// Samples of the first one.
+        len: u64,
+        /// Level of the first one (the channel's unit).
+        level: f64,
+    },
+    /// Runs of repeated samples.
+    #[error(
+        "{channel}: {count} runs of repeated samples inside the moving signal, {samples} samples in all, the first at {time:.6} s ({len} samples of {level}); the recorder probably lost data; leave these taps out or record again"
+    )]
+    Dropped {
+        /// The channel.
+        channel: ChannelLabel,
+        /// How many runs.
+        count: u64,
+        /// Samples in all of them.
+        samples: u64,
+        /// Start of the first one (s).
+        time: f64,
+        /// Samples of the first one.
+        len: u64,
+        /// Repeated value of the first one (the channel's unit).
+        level: f64,
+    },
+    /// A channel that never moves.
+    #[error(
+        "{channel}: every sample is {level}; nothing was probably connected; check the cable and the channel numbers"
+    )]
+    Constant {
+        /// The channel.
+        channel: ChannelLabel,
+        /// The value (the channel's unit).
+        level: f64,
+    },
+    /// A mean far from zero.
+    #[error(
+        "{channel}: mean {mean:.4e} where the peak is {peak:.4e}; the sensor's supply or the amplifier's zero probably shifts it; couple it AC, or ignore this where the mean is removed"
+    )]
+    Offset {
+        /// The channel.
+        channel: ChannelLabel,
+        /// The mean (the channel's unit).
+        mean: f64,
+        /// Largest magnitude (the channel's unit).
+        peak: f64,
+    },
+    /// A scale was given for a column whose header has a unit.
+    #[error(
+        "{channel}: the scale {scale} is used and the unit \"{unit}\" of the header is not; drop one of them if they say the same"
+    )]
+    ScaleOverUnit {
+        /// The channel.
+        channel: ChannelLabel,
+        /// The scale (SI units per unit of the file).
+        scale: f64,
+        /// The unit as the header has it.
+        unit: String,
+    },
+    /// A unit that is not known.
+    #[error(
+        "{channel}: the unit \"{unit}\" of the header is not known; the numbers are taken as they stand; give a scale"
+    )]
+    UnknownUnit {
+        /// The channel.
+        channel: ChannelLabel,
+        /// The unit as the header has it.
+        unit: String,
+    },
+    /// A sample rate was given for a file that has its own.
+    #[error(
+        "the sample rate given ({given} Hz) differs from the file's own ({used} Hz), which is used; drop the one given or correct the file"
+    )]
+    SampleRateIgnored {
+        /// The rate given (Hz).
+        given: f64,
+        /// The file's own (Hz).
+        used: f64,
+    },
+    /// A rate taken as the whole number next to it.
+    #[error(
+        "the time column's mean step gives {mean:.4} Hz; its steps scatter enough for {used} Hz, which is used; the time was probably summed or printed with few digits"
+    )]
+    RateRounded {
+        /// From first and last time (Hz).
+        mean: f64,
+        /// The whole number used (Hz).
+        used: f64,
+    },
+}
+
+impl RecordingWarning {
+    /// Short name of the kind of doubt, for reports.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Truncated { .. } => "truncated",
+            Self::UnknownLength { .. } => "unknown-length",
+            Self::RightAligned { .. } => "right-aligned",
+            Self::FullScale { .. } => "full-scale",
+            Self::FlatTops { .. } => "flat-tops",
+            Self::Dropped { .. } => "dropped-samples",
+            Self::Constant { .. } => "constant-channel",
+            Self::Offset { .. } => "offset",
+            Self::ScaleOverUnit { .. } => "scale-over-unit",
+            Self::UnknownUnit { .. } => "unknown-unit",
+            Self::SampleRateIgnored { .. } => "sample-rate-ignored",
+            Self::RateRounded { .. } => "rate-rounded",
+        }
+    }
+}
+
+/// A mean beyond this part of the peak is worth a word: a tenth shifts thresholds noticeably.
+const OFFSET_OF_PEAK: f64 = 0.1;
+
+/// The doubts that a channel's health gives rise to.
+pub(super) fn health_warnings(
+    channel: &ChannelLabel,
+    health: &ChannelHealth,
+    sample_rate: f64,
+) -> Vec<RecordingWarning> {
+    let channel = || channel.clone();
+    let seconds = |frame: u64| frame as f64 / sample_rate;
+    if health.constant {
+        let level = health.mean;
+        return vec![RecordingWarning::Constant {
+            channel: channel(),
+            level,
+        }];
+    }
+    let full_scale = health
+        .first_full_scale
+        .map(|first| RecordingWarning::FullScale {
+            channel: channel(),
+            count: health.full_scale_samples,
+            time: seconds(first),
+        });
+    let flat_tops = health
+        .flat_tops
+        .first()
+        .map(|first| RecordingWarning::FlatTops {
+            channel: channel(),
+            count: health.flat_top_count,
+            time: seconds(first.start),
+            len: first.len,
+            level: first.value,
+        });
+    let dropped = health
+        .dropped
+        .first()
+        .map(|first| RecordingWarning::Dropped {
+            channel: channel(),
+            count: health.dropout_count,
+            samples: health.dropped_samples,
+            time: seconds(first.start),
+            len: first.len,
+            level: first.value,
+        });
+    let shifted = health.mean.abs() > OFFSET_OF_PEAK * health.peak;
+    let offset = shifted.then(|| RecordingWarning::Offset {
+        channel: channel(),
+        mean: health.mean,
+        peak: health.peak,
+    });
+    [full_scale, flat_tops, dropped, offset]
+        .into_iter()
+        .flatten()
+        .collect()
+}

@@ -14,12 +14,17 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+mod blocks;
+mod channels;
+mod coding;
 mod csv;
 mod error;
+mod header;
 mod health;
 mod layout;
 mod open;
 mod riff;
+mod rows;
 mod sniff;
 mod source;
 mod text;
@@ -29,6 +34,7 @@ mod warning;
 mod wav;
 mod write;
 
+pub use blocks::Blocks;
 pub use error::RecordingError;
 pub use health::{ChannelHealth, Dropout, FlatTop};
 pub use text::Separator;
@@ -37,8 +43,7 @@ pub use warning::{ChannelLabel, RecordingWarning};
 pub use write::{WavFormat, encode_wav, write_wav};
 
 use health::HealthMeter;
-use source::{Cursor, Source};
-use text::LARGEST;
+use source::Source;
 use warning::health_warnings;
 
 /// What the caller knows about a file that the file may not say.
@@ -239,13 +244,7 @@ impl Recording {
     /// The whole recording in blocks of `block` samples (at least 1), the last one shorter. After
     /// an error the iteration ends.
     pub fn blocks(&self, channels: &[usize], block: usize) -> Blocks<'_> {
-        Blocks {
-            recording: self,
-            channels: channels.to_vec(),
-            block: block.max(1) as u64,
-            at: 0,
-            cursor: None,
-        }
+        Blocks::new(self, channels, block)
     }
 
     /// Sets what file units of a channel (0-based) are multiplied by: SI units per file unit,
@@ -294,105 +293,6 @@ impl Recording {
         Ok(self)
     }
 
-    /// The index (0-based) of the channel with a 1-based number.
-    ///
-    /// # Errors
-    /// No such channel; the message lists what exists.
-    pub fn channel_by_number(&self, number: usize) -> Result<usize, RecordingError> {
-        match number.checked_sub(1) {
-            Some(index) if index < self.channels.len() => Ok(index),
-            _ => Err(RecordingError::UnknownChannelNumber {
-                file: self.name.clone(),
-                number,
-                existing: self.existing_channels(),
-            }),
-        }
-    }
-
-    /// The index (0-based) of the channel with a name, without or with its unit; upper and lower
-    /// case count only where both occur.
-    ///
-    /// # Errors
-    /// No channel or several channels of that name; the message lists what exists and the nearest.
-    pub fn channel_by_name(&self, name: &str) -> Result<usize, RecordingError> {
-        let wanted = name.trim();
-        let without_unit = units::split_unit(wanted).0;
-        let rules: [&dyn Fn(&str) -> bool; 4] = [
-            &|name| name == wanted,
-            &|name| name == without_unit,
-            &|name| name.eq_ignore_ascii_case(wanted),
-            &|name| units::split_unit(name).0.eq_ignore_ascii_case(without_unit),
-        ];
-        for rule in rules {
-            let named = |channel: &ChannelInfo| channel.name.as_deref().is_some_and(rule);
-            let mut found = (0..).zip(&self.channels).filter(|(_, c)| named(c));
-            if let Some((index, _)) = found.next() {
-                return match found.count() {
-                    0 => Ok(index),
-                    others => Err(RecordingError::AmbiguousChannelName {
-                        file: self.name.clone(),
-                        name: wanted.to_owned(),
-                        count: others + 1,
-                        existing: self.existing_channels(),
-                    }),
-                };
-            }
-        }
-        Err(self.unknown_name(wanted))
-    }
-
-    /// The index (0-based) of the channel that a user means by a text: a name, else a number.
-    ///
-    /// # Errors
-    /// Those of [`channel_by_name`](Self::channel_by_name) and
-    /// [`channel_by_number`](Self::channel_by_number).
-    pub fn channel_index(&self, text: &str) -> Result<usize, RecordingError> {
-        match (self.channel_by_name(text), text.trim().parse()) {
-            (Err(RecordingError::UnknownChannelName { .. }), Ok(number)) => {
-                self.channel_by_number(number)
-            }
-            (by_name, _) => by_name,
-        }
-    }
-
-    fn unknown_name(&self, wanted: &str) -> RecordingError {
-        // Beyond this similarity (Jaro-Winkler, 1 = equal) a name is worth proposing.
-        const NEAR: f64 = 0.7;
-        let names = self.channels.iter().filter_map(|c| c.name.as_deref());
-        let nearest = names
-            .map(|name| {
-                let (name_lower, wanted) = (name.to_lowercase(), wanted.to_lowercase());
-                (strsim::jaro_winkler(&name_lower, &wanted), name)
-            })
-            .filter(|(similarity, _)| *similarity >= NEAR)
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        RecordingError::UnknownChannelName {
-            file: self.name.clone(),
-            name: wanted.to_owned(),
-            nearest: nearest.map_or(String::new(), |(_, name)| {
-                format!("; did you mean \"{name}\"?")
-            }),
-            existing: self.existing_channels(),
-        }
-    }
-
-    /// `1 ("force"), 2 ("response")`, for messages.
-    fn existing_channels(&self) -> String {
-        // More would hide the message.
-        const SHOWN: usize = 12;
-        let shown = self.channels.iter().enumerate().take(SHOWN);
-        let mut shown: Vec<String> = shown
-            .map(|(at, channel)| match &channel.name {
-                Some(name) => format!("{} (\"{name}\")", at + 1),
-                None => (at + 1).to_string(),
-            })
-            .collect();
-        if self.channels.len() > SHOWN {
-            shown.push(format!("... {}", self.channels.len()));
-        }
-        shown.join(", ")
-    }
-
     fn check_channels(&self, channels: &[usize]) -> Result<(), RecordingError> {
         channels
             .iter()
@@ -414,101 +314,5 @@ fn channel_label(at: usize, channel: &ChannelInfo) -> ChannelLabel {
     ChannelLabel {
         number: at + 1,
         name: channel.name.clone(),
-    }
-}
-
-/// Checks channels in memory and returns their common length.
-fn check_samples(
-    name: &str,
-    sample_rate: f64,
-    channels: &[&[f64]],
-) -> Result<usize, RecordingError> {
-    let file = || name.to_owned();
-    let frames = channels.first().map_or(0, |samples| samples.len());
-    if frames == 0 {
-        return Err(RecordingError::NoSamples { file: file() });
-    }
-    for (at, samples) in channels.iter().enumerate() {
-        if samples.len() != frames {
-            return Err(RecordingError::LengthMismatch {
-                file: file(),
-                channel: at + 1,
-                found: samples.len(),
-                expected: frames,
-            });
-        }
-        check_finite(name, sample_rate, (at, 0), samples)?;
-    }
-    Ok(frames)
-}
-
-/// Checks that samples of one channel, the first of them at `place.1`, are finite and not absurd.
-fn check_finite(
-    name: &str,
-    sample_rate: f64,
-    place: (usize, u64),
-    samples: &[f64],
-) -> Result<(), RecordingError> {
-    // NaN is in no range.
-    let usable = |value: &&f64| !(-LARGEST..=LARGEST).contains(*value);
-    match samples
-        .iter()
-        .zip(place.1..)
-        .find(|(value, _)| usable(value))
-    {
-        None => Ok(()),
-        Some((value, frame)) => Err(RecordingError::NotFinite {
-            file: name.to_owned(),
-            channel: place.0 + 1,
-            frame,
-            time: frame as f64 / sample_rate,
-            value: *value,
-        }),
-    }
-}
-
-/// The blocks of a recording, see [`Recording::blocks`].
-#[derive(Debug)]
-pub struct Blocks<'a> {
-    recording: &'a Recording,
-    channels: Vec<usize>,
-    block: u64,
-    at: u64,
-    cursor: Option<Cursor<'a>>,
-}
-
-impl Blocks<'_> {
-    fn next_block(&mut self) -> Result<Block, RecordingError> {
-        let recording = self.recording;
-        let cursor = match &mut self.cursor {
-            Some(cursor) => cursor,
-            none => {
-                recording.check_channels(&self.channels)?;
-                none.insert(recording.source.cursor(self.at)?)
-            }
-        };
-        let start = self.at;
-        let frames = self.block.min(recording.frames - start);
-        let samples = cursor.read(&self.channels, frames)?;
-        self.at += frames;
-        Ok(Block {
-            start,
-            samples: recording.scaled(&self.channels, samples),
-        })
-    }
-}
-
-impl Iterator for Blocks<'_> {
-    type Item = Result<Block, RecordingError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.at >= self.recording.frames {
-            return None;
-        }
-        let block = self.next_block();
-        if block.is_err() {
-            self.at = self.recording.frames;
-        }
-        Some(block)
     }
 }

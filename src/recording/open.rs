@@ -3,14 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::coding::Coding;
 use super::csv::{CsvRates, CsvSource};
-use super::layout::{Column, CsvLayout};
-use super::riff::Coding;
+use super::header::Column;
+use super::layout::CsvLayout;
 use super::sniff::{self, Kind};
+use super::text::LARGEST;
 use super::wav::WavSource;
 use super::{
     Channel, ChannelInfo, ChannelLabel, Format, HealthMeter, ReadSettings, Recording,
-    RecordingError, RecordingWarning, Source, Timing, channel_unit, check_finite, check_samples,
+    RecordingError, RecordingWarning, Source, Timing, channel_unit,
 };
 
 /// Samples handled at a time when a WAV file is checked, over all channels.
@@ -241,4 +243,54 @@ pub(super) fn from_samples(
         warnings: Vec::new(),
         source: Source::Memory(Arc::new(samples)),
     })
+}
+
+/// Checks channels in memory and returns their common length.
+pub(super) fn check_samples(
+    name: &str,
+    sample_rate: f64,
+    channels: &[&[f64]],
+) -> Result<usize, RecordingError> {
+    let file = || name.to_owned();
+    let frames = channels.first().map_or(0, |samples| samples.len());
+    if frames == 0 {
+        return Err(RecordingError::NoSamples { file: file() });
+    }
+    for (at, samples) in channels.iter().enumerate() {
+        if samples.len() != frames {
+            return Err(RecordingError::LengthMismatch {
+                file: file(),
+                channel: at + 1,
+                found: samples.len(),
+                expected: frames,
+            });
+        }
+        check_finite(name, sample_rate, (at, 0), samples)?;
+    }
+    Ok(frames)
+}
+
+/// Checks that samples of one channel, the first of them at `place.1`, are finite and not absurd.
+fn check_finite(
+    name: &str,
+    sample_rate: f64,
+    place: (usize, u64),
+    samples: &[f64],
+) -> Result<(), RecordingError> {
+    // NaN is in no range.
+    let usable = |value: &&f64| !(-LARGEST..=LARGEST).contains(*value);
+    match samples
+        .iter()
+        .zip(place.1..)
+        .find(|(value, _)| usable(value))
+    {
+        None => Ok(()),
+        Some((value, frame)) => Err(RecordingError::NotFinite {
+            file: name.to_owned(),
+            channel: place.0 + 1,
+            frame,
+            time: frame as f64 / sample_rate,
+            value: *value,
+        }),
+    }
 }

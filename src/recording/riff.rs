@@ -6,6 +6,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
+use super::coding::{Coding, FormatFields};
 use super::error::RecordingError;
 use super::warning::RecordingWarning;
 
@@ -20,55 +21,6 @@ const KNOWN_CHUNKS: [&[u8; 4]; 16] = [
     b"fmt ", b"data", b"fact", b"LIST", b"JUNK", b"junk", b"PAD ", b"bext", b"iXML", b"cue ",
     b"smpl", b"inst", b"id3 ", b"axml", b"chna", b"ds64",
 ];
-
-/// How the samples are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Coding {
-    /// Integers that fill their containers of `bits` bits; 8 bits are unsigned.
-    Integer { bits: u16 },
-    /// Integers of `valid` bits in wider containers of `bits` bits.
-    PaddedInteger {
-        bits: u16,
-        valid: u16,
-        right_aligned: RightAligned,
-    },
-    /// 32-bit float.
-    Float32,
-    /// 64-bit float.
-    Float64,
-}
-
-/// At which end of the container the valid bits sit. The format demands the high end; some writers
-/// use the low one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum RightAligned {
-    /// At the high end, as the format demands.
-    No,
-    /// At the low end, with the sign extended.
-    Yes,
-}
-
-impl Coding {
-    /// Bytes per sample.
-    pub(super) fn bytes(self) -> u64 {
-        match self {
-            Self::Integer { bits } | Self::PaddedInteger { bits, .. } => u64::from(bits / 8),
-            Self::Float32 => 4,
-            Self::Float64 => 8,
-        }
-    }
-
-    /// Magnitude from which on a sample sits at the end of the integer range (full scale = 1).
-    pub(super) fn full_scale(self) -> Option<f64> {
-        let bits = match self {
-            Self::Integer { bits } => bits,
-            Self::PaddedInteger { valid, .. } => valid,
-            Self::Float32 | Self::Float64 => return None,
-        };
-        // The largest positive integer is 2^(bits-1) - 1.
-        Some(1.0 - 0.5_f64.powi(i32::from(bits) - 1))
-    }
-}
 
 /// What the header says, checked against the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -212,58 +164,12 @@ impl<'a, R: Read + Seek> Walker<'a, R> {
             bits: word(14),
             valid,
         };
-        let coding = self.coding(&fields)?;
+        let coding = fields.coding(self.file)?;
         Ok(WaveFormat {
             channels,
             sample_rate,
             coding,
         })
-    }
-
-    fn coding(&self, fields: &FormatFields) -> Result<Coding, RecordingError> {
-        let unsupported = || RecordingError::UnsupportedCoding {
-            file: self.file.to_owned(),
-            tag: fields.tag,
-            name: coding_name(fields.tag),
-            bits: fields.bits,
-        };
-        let bytes = self.sample_bytes(fields)?;
-        // Writers that leave the valid bits at 0, or above the container, mean all of them.
-        let valid = match fields.valid {
-            0 => fields.bits,
-            valid => valid.min(fields.bits),
-        };
-        match (fields.tag, bytes) {
-            (1, 1..=4) if valid == 8 * bytes => Ok(Coding::Integer { bits: valid }),
-            // One byte is unsigned and cannot be shifted about; fewer than 2 bits are no signal.
-            (1, 2..=4) if valid >= 2 => Ok(Coding::PaddedInteger {
-                bits: 8 * bytes,
-                valid,
-                right_aligned: RightAligned::No,
-            }),
-            (3, 4) if fields.bits == 32 => Ok(Coding::Float32),
-            (3, 8) if fields.bits == 64 => Ok(Coding::Float64),
-            _ => Err(unsupported()),
-        }
-    }
-
-    /// Bytes of one sample of one channel: from the frame size, or from the bits where that is 0.
-    fn sample_bytes(&self, fields: &FormatFields) -> Result<u16, RecordingError> {
-        let needed = fields.bits.div_ceil(8);
-        if fields.frame_bytes == 0 {
-            return Ok(needed);
-        }
-        let bytes = fields.frame_bytes / fields.channels;
-        if !fields.frame_bytes.is_multiple_of(fields.channels)
-            || (bytes < needed && known_tag(fields.tag))
-        {
-            return Err(self.bad_header(
-                "a frame of bytes",
-                u64::from(fields.frame_bytes),
-                "channels times bytes per sample",
-            ));
-        }
-        Ok(bytes)
     }
 
     fn finish(mut self, start: u64, size: u32) -> Result<WavLayout, RecordingError> {
@@ -378,41 +284,9 @@ impl<'a, R: Read + Seek> Walker<'a, R> {
     }
 }
 
-/// The numbers of a "fmt " chunk that decide the coding.
-struct FormatFields {
-    tag: u16,
-    channels: u16,
-    frame_bytes: u16,
-    bits: u16,
-    valid: u16,
-}
-
 /// Sizes that writers put in before they know the size.
 fn is_unset(size: u64) -> bool {
     size == 0 || size == u64::from(u32::MAX) || size == u64::MAX
-}
-
-fn known_tag(tag: u16) -> bool {
-    matches!(tag, 1 | 3)
-}
-
-/// Names of the codings that occur in WAV files (mmreg.h).
-fn coding_name(tag: u16) -> &'static str {
-    match tag {
-        0x0001 => "integer PCM",
-        0x0002 => "Microsoft ADPCM",
-        0x0003 => "IEEE float",
-        0x0006 => "A-law",
-        0x0007 => "mu-law",
-        0x0011 => "IMA ADPCM",
-        0x0031 => "GSM 6.10",
-        0x0050 => "MPEG",
-        0x0055 => "MP3",
-        0x00ff => "AAC",
-        0x0161 => "Windows Media Audio",
-        0xfffe => "extensible without a subformat",
-        _ => "of an unknown kind",
-    }
 }
 
 pub(super) fn unreadable(file: &str, source: io::Error) -> RecordingError {

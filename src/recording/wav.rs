@@ -8,8 +8,9 @@ use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use super::coding::{Coding, RightAligned};
 use super::error::RecordingError;
-use super::riff::{self, Coding, RightAligned, WavLayout, read_fully, unreadable};
+use super::riff::{self, WavLayout, read_fully, unreadable};
 use super::warning::RecordingWarning;
 
 /// Bytes read at a time: large enough for speed, small against any memory.

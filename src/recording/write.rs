@@ -119,7 +119,7 @@ fn check(
         });
     }
     let slices: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
-    let frames = super::check_samples(name, f64::from(sample_rate), &slices)?;
+    let frames = super::open::check_samples(name, f64::from(sample_rate), &slices)?;
     let bytes = (frames as u64)
         .saturating_mul(channels.len() as u64)
         .saturating_mul(u64::from(format.bits() / 8));

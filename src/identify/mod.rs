@@ -1,1 +1,95 @@
 //! Where measurement and theory meet: joint stiffness from natural frequencies.
+//!
+//! ```text
+//! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
+//!                         free_beam  modulus and density of a beam without a joint
+//!                      -> estimate   with uncertainty, in SI units, with what speaks against it
+//!                      -> predict    frequencies of the estimate beside the measured ones
+//!                      -> perturbation  how far errors in the frequencies move the estimate
+//! ```
+//!
+//! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
+//! a [`Doubt`], not an error; an error means that no number exists.
+
+pub mod estimate;
+pub mod free_beam;
+pub mod pairs;
+pub mod perturbation;
+pub mod predict;
+
+pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
+pub use free_beam::{FreeBeamEstimate, estimate_modulus};
+pub use pairs::{
+    Doubt, ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap,
+    estimate_pairs, estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,
+};
+pub use perturbation::Stiffnesses;
+pub use predict::{PredictedMode, predict, predict_lambdas};
+
+use crate::structure::StructureError;
+
+/// Why an estimate does not exist.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IdentifyError {
+    /// Fewer modes than the model has unknowns and one more.
+    #[error(
+        "{found} mode(s) given, but the {model} needs at least {needed}: its {unknowns} unknown(s) \
+         and their product; measure more modes{simpler}"
+    )]
+    TooFewModes {
+        /// The model, in words.
+        model: &'static str,
+        /// How many unknown stiffnesses it has.
+        unknowns: usize,
+        /// How many modes it needs.
+        needed: usize,
+        /// How many were given.
+        found: usize,
+        /// A model that needs fewer, as the end of the sentence; empty where there is none.
+        simpler: &'static str,
+    },
+    /// The modes given do not determine all unknowns.
+    #[error(
+        "the modes given determine only {rank} of the {unknowns} unknowns of the {model}; {remedy}"
+    )]
+    Undetermined {
+        /// The model, in words.
+        model: &'static str,
+        /// How many unknowns it has.
+        unknowns: usize,
+        /// Rank of the regression.
+        rank: usize,
+        /// What helps.
+        remedy: &'static str,
+    },
+    /// A frequency that is no frequency.
+    #[error("mode {mode} has the frequency {value}, but it must be positive and finite")]
+    Frequency {
+        /// The mode's number.
+        mode: usize,
+        /// Its frequency (Hz) or lambda (1).
+        value: f64,
+    },
+    /// More sign patterns than can be tried.
+    #[error(
+        "{modes} modes have too many sign patterns to try all; at most {limit} modes, \
+         take the first {limit} or less"
+    )]
+    TooManyPatterns {
+        /// How many modes were given.
+        modes: usize,
+        /// How many are allowed.
+        limit: usize,
+    },
+    /// Two lists that belong together differ in length.
+    #[error("{frequencies} frequencies but {bounds} bounds were given; one bound for each")]
+    Bounds {
+        /// Number of frequencies.
+        frequencies: usize,
+        /// Number of bounds.
+        bounds: usize,
+    },
+    /// The beam or the joint cannot exist.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
+}

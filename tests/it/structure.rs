@@ -1,6 +1,8 @@
 //! Theory of beams and joints: limits, properties, and agreement of independent routes.
 
-use std::f64::consts::PI;
+// A test that unwraps fails as it should; the lint spares only the test functions themselves.
+#![allow(clippy::unwrap_used)]
+
 use tapjoint::structure::frequency_equation::RootedBeam;
 use tapjoint::structure::receptance::EndFunctions;
 use tapjoint::structure::{
@@ -146,4 +148,551 @@ fn modal_mass(beam: &Beam, first: &ModeShape, second: &ModeShape) -> f64 {
     let middle = 0.5 * beam.length;
     let left = integrate(product, 0.0, middle);
     beam.mass_per_length() * (left + integrate(product, middle, beam.length))
+}
+
+/// Sign changes of the frequency equation on a fine grid: slow, but knows nothing of counting.
+fn scan(beam: &RootedBeam, below: f64, steps: usize) -> Vec<f64> {
+    let value = |step: usize| beam.frequency_equation(below * step as f64 / steps as f64);
+    (1..steps)
+        .filter(|&step| value(step) * value(step + 1) < 0.0)
+        .map(|step| below * (step as f64 + 0.5) / steps as f64)
+        .collect()
+}
+
+#[test]
+fn prop_no_root_is_missed_or_invented_from_soft_to_stiff() {
+    let clamped = lambdas(Assembly::Cantilever, &JointStiffness::RIGID, 12);
+    let free = lambdas(Assembly::Free, &JointStiffness::FREE, 12);
+    let powers = || (-6..=9).map(|power| 10f64.powi(power));
+    let stiffnesses = || [0.0].into_iter().chain(powers()).chain([f64::INFINITY]);
+    for kx in stiffnesses() {
+        for ky in stiffnesses() {
+            let found = lambdas(Assembly::Cantilever, &joint(kx, ky), 12);
+            assert_eq!(found.len(), 12, "kx {kx} ky {ky}");
+            let zero = [kx, ky].iter().filter(|&&k| k == 0.0).count();
+            // Cauchy: two springs raise a free beam's frequencies by two places at most, and never
+            // beyond the clamped beam's. Spread by rounding only.
+            for (n, lambda) in found.iter().enumerate() {
+                if let Some(clamped) = clamped.get(n + zero) {
+                    assert!(
+                        *lambda <= clamped * (1.0 + 1e-14),
+                        "kx {kx} ky {ky} mode {n}"
+                    );
+                }
+                if n + zero >= 2 {
+                    let free = free[n + zero - 2];
+                    assert!(*lambda >= free * (1.0 - 1e-14), "kx {kx} ky {ky} mode {n}");
+                }
+            }
+            assert!(
+                found.windows(2).all(|pair| pair[0] < pair[1]),
+                "kx {kx} ky {ky}"
+            );
+            // The scan sees what its step of 0.01 resolves: all roots but those of weak springs.
+            let beam = RootedBeam::new(&joint(kx, ky), Slenderness::EULER);
+            let end = found[11] + 0.5;
+            let seen = scan(&beam, end, 4000);
+            let above: Vec<&f64> = found.iter().filter(|&&lambda| lambda > 0.02).collect();
+            assert_eq!(
+                seen.len(),
+                above.len(),
+                "kx {kx} ky {ky}: {found:?} against {seen:?}"
+            );
+            for (found, seen) in above.iter().zip(&seen) {
+                assert!((*found - seen).abs() <= end / 4000.0, "kx {kx} ky {ky}");
+            }
+        }
+    }
+}
+
+#[test]
+fn prop_frequencies_rise_with_either_stiffness() {
+    let cases = [(Assembly::Cantilever, 8), (Assembly::Lap, 8)];
+    for (assembly, count) in cases {
+        for fixed in [0.01, 3.0, 1e4] {
+            let mut previous = [vec![0.0; count], vec![0.0; count]];
+            for step in 0..40 {
+                let varied = 10f64.powf(-6.0 + 15.0 * f64::from(step) / 39.0);
+                let now = [joint(varied, fixed), joint(fixed, varied)]
+                    .map(|joint| lambdas(assembly, &joint, count));
+                for (now, previous) in now.iter().zip(&previous) {
+                    for (now, previous) in now.iter().zip(previous) {
+                        // Equal up to rounding where the other family does not feel the spring.
+                        assert!(
+                            *now >= previous * (1.0 - 4e-15),
+                            "{assembly:?}: {previous} fell to {now} at {varied}"
+                        );
+                    }
+                }
+                previous = now;
+            }
+        }
+    }
+}
+
+#[test]
+fn limit_weak_springs_carry_a_rigid_beam() {
+    // A rigid beam on springs: mass matrix [[1, 1/2], [1/2, 1/3]] for (w, theta) at the joint.
+    for (kx, ky) in [(1e-6, 1e-6), (1e-6, 1e-9), (1e-12, 1e-10), (1e-30, 1e-30)] {
+        let found = lambdas(Assembly::Cantilever, &joint(kx, ky), 2);
+        // u^2/12 - u (kx/3 + ky) + kx ky = 0 in u = lambda^4.
+        let half = (kx / 3.0 + ky) / 2.0;
+        let root = (half * half - kx * ky / 12.0f64).sqrt();
+        let high = 12.0 * (half + root);
+        let low = 12.0 * kx * ky / high;
+        for (found, expected) in found.iter().zip([low, high]) {
+            let expected = expected.powf(0.25);
+            // The bending left out is of the relative order of the stiffness, 1e-6.
+            assert!(
+                (found / expected - 1.0).abs() < 1e-6,
+                "{kx} {ky}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn limit_bishop_series_meet_their_closed_form() {
+    // Just below the switch to series, the closed form has lost one digit only.
+    for lambda in [0.7_f64, 0.85, 0.999] {
+        let ends = EndFunctions::euler(lambda);
+        let (s, c) = lambda.sin_cos();
+        let (sh, ch) = (lambda.sinh(), lambda.cosh());
+        let scale = (-lambda).exp();
+        let pairs = [
+            ("F1", ends.f1, s * sh / lambda.powi(2)),
+            ("F3", ends.f3, (c * ch - 1.0) / lambda.powi(4)),
+            ("F4", ends.f4, c * ch + 1.0),
+            ("F5", ends.f5, (c * sh - s * ch) / lambda.powi(3)),
+            ("F6", ends.f6, (c * sh + s * ch) / lambda),
+        ];
+        for (name, series, closed) in pairs {
+            let closed = closed * scale;
+            assert!(
+                (series / closed - 1.0).abs() < 1e-14,
+                "{name}({lambda}): {series} {closed}"
+            );
+        }
+    }
+    // A free beam at rest in space: a force at its end moves it as a rigid body,
+    // w = -4 F/(omega^2 m), theta (Bishop's sign) = -6 F/(omega^2 m L).
+    let ends = EndFunctions::euler(1e-3);
+    for (found, expected) in [
+        (ends.eta11(), -4e12),
+        (ends.eta12(), -6e12),
+        (ends.eta22(), -12e12),
+    ] {
+        // Bending adds terms of the relative order lambda^4 = 1e-12.
+        assert!(
+            (found / expected - 1.0).abs() < 1e-11,
+            "{found} against {expected}"
+        );
+    }
+}
+
+#[test]
+fn limit_timoshenko_functions_become_bishops() {
+    let slender = Slenderness {
+        rotary: 1e-20,
+        shear: 3e-20,
+    };
+    for lambda in [0.01, 0.5, 0.99, 1.01, 3.0, 7.3, 20.0, 36.5] {
+        let euler = EndFunctions::euler(lambda);
+        let timoshenko = EndFunctions::new(lambda, &slender);
+        let pairs = [
+            (euler.f1, timoshenko.f1),
+            (euler.f3, timoshenko.f3),
+            (euler.f4, timoshenko.f4),
+            (euler.f5, timoshenko.f5),
+            (euler.f6, timoshenko.f6),
+        ];
+        for (euler, timoshenko) in pairs {
+            // lambda^4 s^2 < 1e-13 is left of shear, and rounding of wave numbers up to 36.
+            assert!(
+                (euler - timoshenko).abs() < 1e-12 * (euler.abs() + 1e-3),
+                "{lambda}: {euler} against {timoshenko}"
+            );
+        }
+        assert_eq!(euler.clamped_free_count(), timoshenko.clamped_free_count());
+    }
+}
+
+#[test]
+fn val_timoshenko_pinned_and_free_beams() {
+    // A beam pinned at one end and free at the other has every second frequency of the free beam
+    // of twice the length, and a guided one the others: two evaluations of different functions.
+    let beam = Beam {
+        thickness: 0.08,
+        ..steel_strip()
+    };
+    let half = beam.slenderness(BeamTheory::Timoshenko);
+    let whole = half.of_piece(2.0);
+    let free = natural_modes(Assembly::Free, &JointStiffness::FREE, &whole, 12).unwrap();
+    let family = |kx: f64, ky: f64| {
+        let found = natural_modes(Assembly::Cantilever, &joint(kx, ky), &half, 6).unwrap();
+        found.into_iter().map(|mode| 2.0 * mode.lambda)
+    };
+    let mut halves: Vec<f64> = family(f64::INFINITY, 0.0)
+        .chain(family(0.0, f64::INFINITY))
+        .collect();
+    halves.sort_by(f64::total_cmp);
+    for (free, half) in free.iter().zip(&halves) {
+        // Both are exact; rounding of wave numbers near 40.
+        assert!(
+            (free.lambda / half - 1.0).abs() < 1e-12,
+            "{} against {half}",
+            free.lambda
+        );
+    }
+}
+
+#[test]
+fn limit_coincident_roots_are_both_found() {
+    // Lap joint: springs chosen so that both families have a root at lambda = 4 exactly.
+    let half = EndFunctions::euler(2.0);
+    let same = joint(-4.0 / half.eta11(), -1.0 / half.eta22());
+    let found = natural_modes(Assembly::Lap, &same, &Slenderness::EULER, 4).unwrap();
+    let at_four: Vec<_> = found
+        .iter()
+        .filter(|m| (m.lambda - 4.0).abs() < 1e-13)
+        .collect();
+    assert_eq!(at_four.len(), 2, "{found:?}");
+    assert_ne!(at_four[0].symmetry, at_four[1].symmetry);
+
+    // Cantilever: a joint whose compliance is minus the beam's receptance cancels it entirely,
+    // which makes a double root; it is physical in a narrow window below 3 pi/2.
+    let place = 4.71;
+    let ends = EndFunctions::euler(place);
+    let double = JointStiffness {
+        kx: -1.0 / ends.eta11(),
+        ky: -1.0 / ends.eta22(),
+        cross_compliance: -ends.eta12(),
+    };
+    let found = match natural_lambdas(Assembly::Cantilever, &double, 5) {
+        Ok(found) => found,
+        Err(_) => natural_lambdas_of_any_joint(&double, 5).unwrap(),
+    };
+    // A double root is found to the square root of the last digit, amplified by stiffness.
+    let close = found
+        .iter()
+        .filter(|&&lambda| (lambda - place).abs() < 1e-5)
+        .count();
+    assert_eq!(close, 2, "{found:?} for {double:?}");
+}
+
+#[test]
+fn limit_joints_that_cannot_exist_are_refused_with_their_limit() {
+    let beyond = JointStiffness::three_parameter(1000.0, 500.0, 700.0);
+    let error = natural_lambdas(Assembly::Cantilever, &beyond, 3).unwrap_err();
+    assert!(
+        matches!(error, StructureError::NotPhysical { .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("700"), "{error}");
+    for (joint, name) in [
+        (joint(-1.0, 1.0), "kx"),
+        (joint(1.0, f64::NAN), "ky"),
+        (
+            JointStiffness::three_parameter(f64::INFINITY, 1.0, 5.0),
+            "physical",
+        ),
+        (
+            JointStiffness::three_parameter(1.0, 1.0, f64::NAN),
+            "physical",
+        ),
+    ] {
+        let error = natural_lambdas(Assembly::Cantilever, &joint, 3).unwrap_err();
+        assert!(error.to_string().contains(name), "{error}");
+    }
+    let coupled = JointStiffness::three_parameter(1.0, 1.0, 5.0);
+    let error = natural_lambdas(Assembly::Lap, &coupled, 3).unwrap_err();
+    assert!(
+        matches!(error, StructureError::NoCoupling { .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn prop_unphysical_joints_have_their_oscillations_counted_from_zero() {
+    let cases = [
+        JointStiffness::three_parameter(1000.0, 500.0, 700.0),
+        JointStiffness::three_parameter(1000.0, 500.0, -70.0),
+        joint(-20.0, 30.0),
+        joint(20.0, -0.5),
+        joint(-20.0, -30.0),
+        JointStiffness::three_parameter(-100.0, 40.0, 50.0),
+    ];
+    for joint in cases {
+        let found = natural_lambdas_of_any_joint(&joint, 8).unwrap();
+        let beam = RootedBeam::new(&joint, Slenderness::EULER);
+        let seen = scan(&beam, found[7] + 0.3, 5000);
+        assert_eq!(
+            found.len(),
+            seen.len(),
+            "{joint:?}: {found:?} against {seen:?}"
+        );
+    }
+}
+
+mod finite_elements {
+    use super::*;
+    use tapjoint::structure::finite_elements::FiniteElementModel;
+
+    fn assemblies() -> Vec<(Assembly, JointStiffness)> {
+        vec![
+            (Assembly::Cantilever, joint(500.0, 100.0)),
+            (Assembly::Cantilever, joint(1.0, 0.3)),
+            (Assembly::Cantilever, JointStiffness::RIGID),
+            (Assembly::Cantilever, joint(f64::INFINITY, 0.0)),
+            (
+                Assembly::Cantilever,
+                JointStiffness::three_parameter(1000.0, 500.0, 1e4),
+            ),
+            (
+                Assembly::Cantilever,
+                JointStiffness::three_parameter(1000.0, 500.0, -800.0),
+            ),
+            (
+                Assembly::Cantilever,
+                JointStiffness::three_parameter(1928.972, 4.6964, 876.731),
+            ),
+            (Assembly::Lap, joint(500.0, 50.0)),
+            (Assembly::Lap, joint(f64::INFINITY, 5.0)),
+            (Assembly::Lap, joint(500.0, f64::INFINITY)),
+            (Assembly::Lap, joint(0.0, 7.0)),
+            (Assembly::Free, JointStiffness::FREE),
+        ]
+    }
+
+    fn model(
+        beam: &Beam,
+        theory: BeamTheory,
+        case: &(Assembly, JointStiffness),
+        n: usize,
+    ) -> Vec<f64> {
+        FiniteElementModel::new(theory, beam, case.0, &case.1, n)
+            .unwrap()
+            .natural_frequencies(5)
+            .unwrap()
+    }
+
+    #[test]
+    fn val_closed_form_agrees_with_200_elements_to_one_in_a_million() {
+        let beam = steel_strip();
+        for case in assemblies() {
+            let exact = natural_frequencies(BeamTheory::Euler, &beam, case.0, &case.1, 5).unwrap();
+            let found = model(&beam, BeamTheory::Euler, &case, 200);
+            for (exact, found) in exact.iter().zip(&found) {
+                // The cubic element is (lambda h)^4/1440 = 2e-8 too stiff; rounding adds as much.
+                assert!(
+                    (found / exact - 1.0).abs() < 1e-6,
+                    "{case:?}: {found} against {exact}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn val_timoshenko_closed_form_agrees_with_extrapolated_elements() {
+        for thickness in [0.005, 0.04] {
+            let beam = Beam {
+                thickness,
+                ..steel_strip()
+            };
+            for case in assemblies() {
+                let theory = BeamTheory::Timoshenko;
+                let exact = natural_frequencies(theory, &beam, case.0, &case.1, 5).unwrap();
+                let [coarse, fine] = [100, 200].map(|n| model(&beam, theory, &case, n));
+                for (exact, (coarse, fine)) in exact.iter().zip(coarse.iter().zip(&fine)) {
+                    // Shear leaves an error in h^2, which two meshes remove (Richardson).
+                    let found = (4.0 * fine - coarse) / 3.0;
+                    assert!(
+                        (found / exact - 1.0).abs() < 1e-6,
+                        "{case:?}: {found} against {exact}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn val_tip_mass_lowers_the_clamped_beam_as_in_the_textbook() {
+        // 1 + cos cosh + mu lambda (cos sinh - sin cosh) = 0 with mu the mass ratio
+        // (Bishop & Johnson 1960).
+        let beam = steel_strip();
+        let ratio = 0.03;
+        let tipped = FiniteElementModel::new(
+            BeamTheory::Euler,
+            &beam,
+            Assembly::Cantilever,
+            &JointStiffness::RIGID,
+            200,
+        )
+        .unwrap()
+        .with_point_mass(beam.length, ratio * beam.mass());
+        for frequency in tipped.natural_frequencies(4).unwrap() {
+            let lambda = beam.lambda_of(frequency);
+            let left = |lambda: f64| {
+                let (s, c) = lambda.sin_cos();
+                let sum = 1.0 + c * lambda.cosh();
+                sum + ratio * lambda * (c * lambda.sinh() - s * lambda.cosh())
+            };
+            // A change of sign within one part in a million of lambda.
+            assert!(
+                left(lambda * (1.0 - 1e-6)) * left(lambda * (1.0 + 1e-6)) < 0.0,
+                "{lambda}"
+            );
+        }
+    }
+
+    #[test]
+    fn prop_a_mass_counts_the_same_wherever_the_element_borders_lie() {
+        let beam = steel_strip();
+        let with_mass = |elements: usize| {
+            FiniteElementModel::new(
+                BeamTheory::Euler,
+                &beam,
+                Assembly::Cantilever,
+                &joint(500.0, 100.0),
+                elements,
+            )
+            .unwrap()
+            .with_point_mass(0.317, 0.024)
+            .natural_frequencies(4)
+            .unwrap()
+        };
+        for (even, odd) in with_mass(120).iter().zip(&with_mass(127)) {
+            // A mass inside an element kinks the shear force, which the cubic does not follow.
+            assert!((even / odd - 1.0).abs() < 1e-5, "{even} against {odd}");
+        }
+    }
+
+    #[test]
+    fn limit_unequal_halves_become_equal_ones() {
+        let beam = steel_strip();
+        let half = Beam {
+            length: 0.5 * beam.length,
+            ..beam
+        };
+        let joint = joint(500.0, 50.0);
+        let halves = FiniteElementModel::lap(BeamTheory::Euler, [&half, &half], &joint, 80)
+            .unwrap()
+            .natural_frequencies(6)
+            .unwrap();
+        let exact =
+            natural_frequencies(BeamTheory::Euler, &beam, Assembly::Lap, &joint, 6).unwrap();
+        for (found, exact) in halves.iter().zip(&exact) {
+            assert!(
+                (found / exact - 1.0).abs() < 1e-6,
+                "{found} against {exact}"
+            );
+        }
+        // A rigid joint off the middle is no joint at all.
+        let [short, long] = [0.3, 0.7].map(|part| Beam {
+            length: part * beam.length,
+            ..beam
+        });
+        let rigid = JointStiffness::RIGID;
+        let split = FiniteElementModel::lap(BeamTheory::Euler, [&short, &long], &rigid, 100)
+            .unwrap()
+            .natural_frequencies(4)
+            .unwrap();
+        let free =
+            natural_frequencies(BeamTheory::Euler, &beam, Assembly::Free, &rigid, 4).unwrap();
+        for (found, exact) in split.iter().zip(&free) {
+            assert!(
+                (found / exact - 1.0).abs() < 1e-6,
+                "{found} against {exact}"
+            );
+        }
+    }
+}
+
+#[test]
+fn prop_slopes_are_the_derivatives_of_displacements() {
+    let beam = steel_strip();
+    for (assembly, joint) in [
+        (Assembly::Cantilever, joint(500.0, 100.0)),
+        (Assembly::Lap, joint(500.0, 50.0)),
+        (Assembly::Free, JointStiffness::FREE),
+    ] {
+        for shape in mode_shapes(&beam, assembly, &joint, 6).unwrap() {
+            for x in [0.01, 0.1, 0.2, 0.3, 0.42] {
+                let step = 1e-6;
+                let rise = shape.displacement(x + step) - shape.displacement(x - step);
+                let slope = rise / (2.0 * step);
+                // Central differences: truncation (k step)^2/6 and rounding 1e-16/1e-6.
+                let scale = shape.lambda / beam.length * shape.displacement(beam.length);
+                assert!(
+                    (slope - shape.slope(x)).abs() < 1e-7 * scale.abs(),
+                    "{assembly:?} {x}: {slope} against {}",
+                    shape.slope(x)
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn val_symmetry_of_the_lap_joint_shows_in_shapes_and_springs() {
+    let beam = steel_strip();
+    let joint = joint(500.0, 50.0);
+    for shape in mode_shapes(&beam, Assembly::Lap, &joint, 6).unwrap() {
+        let [left, right] = [0.3, 0.7].map(|part| shape.displacement(part * beam.length));
+        let sign = match shape.symmetry {
+            Some(Symmetry::Symmetric) => 1.0,
+            Some(Symmetry::Antisymmetric) => -1.0,
+            None => panic!("a lap joint's mode has a symmetry"),
+        };
+        assert!(
+            (left - sign * right).abs() < 1e-12 * right.abs(),
+            "{shape:?}"
+        );
+        // Only the symmetric modes see the rotation spring, and only the others the translation.
+        let half = EndFunctions::euler(0.5 * shape.lambda);
+        let spring = match shape.symmetry {
+            Some(Symmetry::Symmetric) => -1.0 / half.eta22() / joint.ky,
+            _ => -4.0 / half.eta11() / joint.kx,
+        };
+        assert!((spring - 1.0).abs() < 1e-10, "{spring}");
+    }
+}
+
+#[test]
+fn val_beam_properties_and_units() {
+    let beam = steel_strip();
+    // By hand: A = 2.5e-4 m2, I = 0.05 0.005^3/12, E I, rho A.
+    assert!((beam.area() - 2.5e-4).abs() < 1e-18);
+    assert!((beam.second_moment() - 5.208_333_333_333_333e-10).abs() < 1e-24);
+    assert!((beam.bending_stiffness() - 107.8125).abs() < 1e-10);
+    assert!((beam.mass_per_length() - 1.9625).abs() < 1e-12);
+    // The geometry of table 2: 2 pi 0.423^2 sqrt(1.9625/107.8125) s.
+    assert!((1.0 / beam.unit_frequency() - 0.151_680_9).abs() < 5e-8);
+    assert!((beam.frequency_of(beam.lambda_of(335.625)) - 335.625).abs() < 1e-10);
+    let slenderness = beam.slenderness(BeamTheory::Timoshenko);
+    assert!((slenderness.rotary - (0.005_f64 / 0.423).powi(2) / 12.0).abs() < 1e-15);
+    // s^2/r^2 = E/(k G) = 2 (1 + nu) 6/5.
+    assert!((slenderness.shear / slenderness.rotary - 3.12).abs() < 1e-12);
+    assert!(
+        Beam {
+            length: 0.0,
+            ..beam
+        }
+        .check()
+        .is_err()
+    );
+    let error = Beam {
+        modulus: f64::NAN,
+        ..beam
+    }
+    .check()
+    .unwrap_err();
+    assert!(error.to_string().contains("modulus"), "{error}");
+    let error = Beam {
+        poisson: 0.7,
+        ..beam
+    }
+    .check()
+    .unwrap_err();
+    assert!(error.to_string().contains("0.7"), "{error}");
 }

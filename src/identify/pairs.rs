@@ -1,0 +1,437 @@
+//! Multi-linear regression over mode pairs (Ingole & Chatterjee, eqs. 13 to 19).
+//!
+//! Each natural frequency gives one equation that is linear in the joint's unknowns but for one
+//! term, a product of them. Subtracting the equations of every two modes removes that product;
+//! the differences are solved by least squares with the pseudo-inverse.
+//!
+//! The normal equations of all pair differences are n times those of the equations less their
+//! mean. What is computed here is therefore the same estimate from n rows instead of n(n-1)/2:
+//! ordinary least squares with the product as a free intercept. That the product is left free is
+//! also the method's weakness: an estimate need not satisfy its own frequency equation, and
+//! `closure` says by how much it does not.
+
+use super::IdentifyError;
+use super::perturbation::Stiffnesses;
+use crate::structure::JointStiffness;
+use crate::structure::receptance::EndFunctions;
+use nalgebra::{DMatrix, DVector, SVD};
+use std::fmt;
+
+/// A singular value below this part of the largest is taken for zero. Frequencies are never
+/// known to ten digits, so that nothing measurable is lost.
+const RANK_THRESHOLD: f64 = 1e-10;
+
+/// From this closure on (1) an estimate is said not to satisfy its own frequency equation: 5 %
+/// in the product is about what a whole line of 800 does to the first mode.
+const CLOSURE_LIMIT: f64 = 0.05;
+
+/// Which frequency equation the regression uses. All are those of an Euler beam without added
+/// masses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PairsModel {
+    /// Cantilever with Kx and Ky, in stiffness form:
+    /// Kx Ky = lambda^4 F3/F4 + Ky lambda^3 F6/F4 - Kx lambda F5/F4.
+    TwoParameter,
+    /// Cantilever with Kx, Ky and Kz, in compliance form with a = 1/Kx, b = 1/Ky, c = 1/Kz:
+    /// ab - c^2 = F4/(lambda^4 F3) - a F6/(lambda F3) + b F5/(lambda^3 F3) + 2c F1/(lambda^2 F3).
+    ThreeParameter,
+    /// Lap joint in the middle with Kx and Ky, with h = lambda/2, A = eta11(h)/4, B = eta22(h):
+    /// Kx Ky = -1/(AB) - Kx/B - Ky/A.
+    Lap,
+}
+
+impl PairsModel {
+    fn words(self) -> &'static str {
+        match self {
+            Self::TwoParameter => "two-parameter joint",
+            Self::ThreeParameter => "three-parameter joint",
+            Self::Lap => "lap joint",
+        }
+    }
+
+    /// Number of unknown stiffnesses.
+    pub fn unknowns(self) -> usize {
+        match self {
+            Self::TwoParameter | Self::Lap => 2,
+            Self::ThreeParameter => 3,
+        }
+    }
+
+    /// Number of modes it needs: n modes have n - 1 independent differences.
+    pub fn modes_needed(self) -> usize {
+        self.unknowns() + 1
+    }
+
+    /// One mode's equation: coefficients of the unknowns, and the right-hand side. The product,
+    /// with coefficient 1, stands on the left as well.
+    fn equation(self, lambda: f64) -> Equation {
+        let power = lambda.powi(4);
+        let ends = EndFunctions::euler(lambda);
+        match self {
+            // product + Kx lambda F5/F4 - Ky lambda^3 F6/F4 = lambda^4 F3/F4.
+            Self::TwoParameter => Equation {
+                coefficients: vec![power * ends.f5 / ends.f4, -power * ends.f6 / ends.f4],
+                right: power * power * ends.f3 / ends.f4,
+            },
+            // product + a eta22 + b eta11 - 2c eta12 = F4/(lambda^4 F3).
+            Self::ThreeParameter => Equation {
+                coefficients: vec![ends.eta22(), ends.eta11(), -2.0 * ends.eta12()],
+                right: ends.f4 / (power * power * ends.f3),
+            },
+            // product + Kx/B + Ky/A = -1/(AB).
+            Self::Lap => {
+                let half = EndFunctions::euler(0.5 * lambda);
+                let (a, b) = (half.eta11() / 4.0, half.eta22());
+                Equation {
+                    coefficients: vec![1.0 / b, 1.0 / a],
+                    right: -1.0 / (a * b),
+                }
+            }
+        }
+    }
+}
+
+struct Equation {
+    coefficients: Vec<f64>,
+    right: f64,
+}
+
+/// A measured mode, non-dimensional.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeLambda {
+    /// The mode's number in the model, from 1.
+    pub mode: usize,
+    /// Non-dimensional frequency lambda (1).
+    pub lambda: f64,
+}
+
+impl ModeLambda {
+    /// Modes 1, 2, ... of a list of lambdas (1).
+    pub fn numbered(lambdas: &[f64]) -> Vec<Self> {
+        let numbered = |(index, &lambda)| Self {
+            mode: index + 1,
+            lambda,
+        };
+        lambdas.iter().enumerate().map(numbered).collect()
+    }
+}
+
+/// What speaks against an estimate that exists.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// A stiffness came out negative: no spring does that.
+    Negative {
+        /// Which one ("kx" or "ky").
+        parameter: &'static str,
+        /// Its value (1).
+        value: f64,
+    },
+    /// A stiffness came out infinite or not a number.
+    NotFinite {
+        /// Which one.
+        parameter: &'static str,
+    },
+    /// The three stiffnesses belong to no joint: Kz^2 <= Kx Ky.
+    NotPhysical {
+        /// Kz (1).
+        kz: f64,
+        /// sqrt(Kx Ky) (1), which |Kz| must exceed.
+        limit: f64,
+    },
+    /// The estimate does not satisfy its own frequency equation.
+    Closure {
+        /// Product implied by the regression / product of its own estimates - 1.
+        closure: f64,
+    },
+    /// The interval of the coupling contains zero: Kz may be infinite, of either sign.
+    CouplingNotEstablished,
+}
+
+impl Doubt {
+    /// Short name, for reports.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Negative { .. } => "negative-stiffness",
+            Self::NotFinite { .. } => "no-finite-stiffness",
+            Self::NotPhysical { .. } => "not-physical",
+            Self::Closure { .. } => "closure",
+            Self::CouplingNotEstablished => "coupling-not-established",
+        }
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Negative { parameter, value } => write!(
+                f,
+                "{parameter} came out negative ({value:.4}): no spring does that, so the frequencies \
+                 or the model are wrong"
+            ),
+            Self::NotFinite { parameter } => write!(
+                f,
+                "{parameter} has no finite value: the frequencies do not feel that spring"
+            ),
+            Self::NotPhysical { kz, limit } => write!(
+                f,
+                "no joint has these three stiffnesses: |kz| = {:.4} should exceed \
+                 sqrt(kx ky) = {limit:.4}",
+                kz.abs()
+            ),
+            Self::Closure { closure } => write!(
+                f,
+                "the pair regression does not satisfy its own frequency equation: the product it \
+                 implies differs by {:.1} % from that of its estimates",
+                100.0 * closure
+            ),
+            Self::CouplingNotEstablished => write!(
+                f,
+                "the interval of the coupling contains zero: kz may be infinite, of either sign"
+            ),
+        }
+    }
+}
+
+/// Joint stiffness by regression over mode pairs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairsEstimate {
+    /// The frequency equation used.
+    pub model: PairsModel,
+    /// Numbers of the modes used.
+    pub modes: Vec<usize>,
+    /// Kx (1); `None` where it is not finite.
+    pub kx: Option<f64>,
+    /// Ky (1); `None` where it is not finite.
+    pub ky: Option<f64>,
+    /// Kz (1); `None` without cross coupling or where it is not finite.
+    pub kz: Option<f64>,
+    /// Coupling sqrt(Kx Ky)/Kz (1), for the three-parameter joint where it exists.
+    pub coupling: Option<f64>,
+    /// Product implied by the regression / product of its own estimates - 1 (1). 0 where the
+    /// frequencies are exactly those of such a joint.
+    pub closure: Option<f64>,
+    /// Largest over smallest singular value of the regression, its columns scaled to 1.
+    pub condition: f64,
+    /// What speaks against the estimate.
+    pub doubts: Vec<Doubt>,
+}
+
+impl PairsEstimate {
+    /// The stiffnesses where all of the model's are finite.
+    pub fn stiffnesses(&self) -> Option<Stiffnesses> {
+        let complete = self.model != PairsModel::ThreeParameter || self.kz.is_some();
+        let (kx, ky, kz) = (self.kx?, self.ky?, self.kz);
+        complete.then_some(Stiffnesses { kx, ky, kz })
+    }
+
+    /// As a joint of the theory, which may refuse it; `None` where a stiffness is not finite.
+    pub fn joint(&self) -> Option<JointStiffness> {
+        let Stiffnesses { kx, ky, kz } = self.stiffnesses()?;
+        Some(match kz {
+            Some(kz) => JointStiffness::three_parameter(kx, ky, kz),
+            None => JointStiffness::two_parameter(kx, ky),
+        })
+    }
+}
+
+/// Kx and Ky of a cantilever's joint from at least three modes.
+///
+/// # Errors
+/// As [`estimate_pairs`].
+pub fn estimate_two_parameter(modes: &[ModeLambda]) -> Result<PairsEstimate, IdentifyError> {
+    estimate_pairs(PairsModel::TwoParameter, modes)
+}
+
+/// Kx, Ky and Kz of a cantilever's joint from at least four modes.
+///
+/// # Errors
+/// As [`estimate_pairs`].
+pub fn estimate_three_parameter(modes: &[ModeLambda]) -> Result<PairsEstimate, IdentifyError> {
+    estimate_pairs(PairsModel::ThreeParameter, modes)
+}
+
+/// Kx and Ky of a lap joint in the middle from at least three modes, of both symmetries.
+///
+/// # Errors
+/// As [`estimate_pairs`].
+pub fn estimate_lap(modes: &[ModeLambda]) -> Result<PairsEstimate, IdentifyError> {
+    estimate_pairs(PairsModel::Lap, modes)
+}
+
+/// The joint's stiffness by the given frequency equation, from any subset of modes.
+///
+/// # Errors
+/// [`IdentifyError::TooFewModes`], [`IdentifyError::Frequency`] or
+/// [`IdentifyError::Undetermined`].
+pub fn estimate_pairs(
+    model: PairsModel,
+    modes: &[ModeLambda],
+) -> Result<PairsEstimate, IdentifyError> {
+    if modes.len() < model.modes_needed() {
+        return Err(IdentifyError::TooFewModes {
+            model: model.words(),
+            unknowns: model.unknowns(),
+            needed: model.modes_needed(),
+            found: modes.len(),
+            simpler: match model {
+                PairsModel::ThreeParameter => ", or take model 2p, which needs 3",
+                _ => "",
+            },
+        });
+    }
+    for &ModeLambda { mode, lambda } in modes {
+        if !(lambda > 0.0 && lambda.is_finite()) {
+            return Err(IdentifyError::Frequency {
+                mode,
+                value: lambda,
+            });
+        }
+    }
+    let equations: Vec<Equation> = modes.iter().map(|m| model.equation(m.lambda)).collect();
+    let solution = solve(model, &equations)?;
+    let mut estimate = interpret(model, &solution);
+    estimate.modes = modes.iter().map(|mode| mode.mode).collect();
+    Ok(estimate)
+}
+
+struct Solution {
+    unknowns: DVector<f64>,
+    product: f64,
+    condition: f64,
+}
+
+/// Least squares of the equations less their mean, by singular values.
+fn solve(model: PairsModel, equations: &[Equation]) -> Result<Solution, IdentifyError> {
+    let (rows, columns) = (equations.len(), model.unknowns());
+    let undetermined = |rank: usize| IdentifyError::Undetermined {
+        model: model.words(),
+        unknowns: columns,
+        rank,
+        remedy: match model {
+            PairsModel::Lap => {
+                "it needs a symmetric mode, which sees ky, and an antisymmetric one, which sees kx"
+            }
+            _ => "add modes, or leave out those that coincide or sit on a clamped beam's frequency",
+        },
+    };
+    let mut matrix = DMatrix::from_fn(rows, columns, |row, column| {
+        equations[row].coefficients[column]
+    });
+    let mut right = DVector::from_fn(rows, |row, _| equations[row].right);
+    // Scaled before the means are taken out: a column that is constant but for rounding must
+    // stay as small as that rounding.
+    let scales: Vec<f64> = matrix.column_iter().map(|column| column.amax()).collect();
+    let finite = matrix.iter().chain(right.iter()).all(|x| x.is_finite());
+    if !finite || scales.contains(&0.0) {
+        return Err(undetermined(0));
+    }
+    for (mut column, scale) in matrix.column_iter_mut().zip(&scales) {
+        column /= *scale;
+    }
+    let means: Vec<f64> = matrix.column_iter().map(|column| column.mean()).collect();
+    let right_mean = right.mean();
+    for (mut column, mean) in matrix.column_iter_mut().zip(&means) {
+        column.add_scalar_mut(-mean);
+    }
+    right.add_scalar_mut(-right_mean);
+    // The iteration limit guards against a decomposition that never settles.
+    let svd = SVD::try_new(matrix, true, true, f64::EPSILON, 1000).ok_or(undetermined(0))?;
+    let largest = svd.singular_values.max();
+    let threshold = RANK_THRESHOLD * largest;
+    let rank = svd.rank(threshold);
+    if rank < columns {
+        return Err(undetermined(rank));
+    }
+    let scaled = svd
+        .solve(&right, threshold)
+        .map_err(|_| undetermined(rank))?;
+    let explained: f64 = scaled.iter().zip(&means).map(|(x, mean)| x * mean).sum();
+    Ok(Solution {
+        unknowns: DVector::from_fn(columns, |row, _| scaled[row] / scales[row]),
+        product: right_mean - explained,
+        condition: largest / svd.singular_values.min(),
+    })
+}
+
+/// Stiffnesses, closure and doubts of a solution.
+fn interpret(model: PairsModel, solution: &Solution) -> PairsEstimate {
+    let unknowns = &solution.unknowns;
+    let (kx, ky, kz, own) = match model {
+        PairsModel::TwoParameter | PairsModel::Lap => {
+            let (kx, ky) = (unknowns[0], unknowns[1]);
+            (kx, ky, None, kx * ky)
+        }
+        PairsModel::ThreeParameter => {
+            let (a, b, c) = (unknowns[0], unknowns[1], unknowns[2]);
+            (1.0 / a, 1.0 / b, Some(1.0 / c), a * b - c * c)
+        }
+    };
+    let finite = |value: f64| value.is_finite().then_some(value);
+    let mut doubts = Vec::new();
+    for (parameter, value) in [("kx", Some(kx)), ("ky", Some(ky)), ("kz", kz)] {
+        match value {
+            Some(value) if !value.is_finite() => doubts.push(Doubt::NotFinite { parameter }),
+            Some(value) if value < 0.0 && parameter != "kz" => {
+                doubts.push(Doubt::Negative { parameter, value });
+            }
+            _ => {}
+        }
+    }
+    let positive = kx > 0.0 && ky > 0.0;
+    let limit = (kx * ky).sqrt();
+    if let Some(kz) = kz.filter(|kz| positive && kz.abs() <= limit) {
+        doubts.push(Doubt::NotPhysical { kz, limit });
+    }
+    let closure = finite(solution.product / own - 1.0);
+    if let Some(closure) = closure.filter(|closure| closure.abs() > CLOSURE_LIMIT) {
+        doubts.push(Doubt::Closure { closure });
+    }
+    PairsEstimate {
+        model,
+        modes: Vec::new(),
+        kx: finite(kx),
+        ky: finite(ky),
+        kz: kz.and_then(finite),
+        coupling: kz.filter(|_| positive).and_then(|kz| finite(limit / kz)),
+        closure,
+        condition: solution.condition,
+        doubts,
+    }
+}
+
+/// What one mode of a lap joint says on its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SingleModeStiffness {
+    /// The mode's number.
+    pub mode: usize,
+    /// Kx = -1/A (1), if the mode is antisymmetric; `None` where it is negative or infinite, so
+    /// that the mode cannot be antisymmetric.
+    pub kx: Option<f64>,
+    /// Ky = -1/B (1), if the mode is symmetric; `None` where the mode cannot be.
+    pub ky: Option<f64>,
+}
+
+/// The stiffness that each mode of a lap joint gives alone, for either symmetry.
+///
+/// # Errors
+/// [`IdentifyError::Frequency`].
+pub fn single_mode_stiffness(
+    modes: &[ModeLambda],
+) -> Result<Vec<SingleModeStiffness>, IdentifyError> {
+    let single = |&ModeLambda { mode, lambda }: &ModeLambda| {
+        if !(lambda > 0.0 && lambda.is_finite()) {
+            return Err(IdentifyError::Frequency {
+                mode,
+                value: lambda,
+            });
+        }
+        let half = EndFunctions::euler(0.5 * lambda);
+        let possible = |value: f64| (value > 0.0 && value.is_finite()).then_some(value);
+        Ok(SingleModeStiffness {
+            mode,
+            kx: possible(-4.0 / half.eta11()),
+            ky: possible(-1.0 / half.eta22()),
+        })
+    };
+    modes.iter().map(single).collect()
+}

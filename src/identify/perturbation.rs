@@ -1,0 +1,261 @@
+//! How far errors in the frequencies move an estimate.
+//!
+//! Generic over the estimator, a function from frequencies (Hz) to stiffnesses that may have no
+//! answer; what is asked of it: all frequencies off by one percentage, one mode off by its own
+//! resolution bound, and every sign pattern of all bounds.
+
+use super::IdentifyError;
+
+/// Perturbations of Ingole & Chatterjee's table 9 (%).
+pub const PAPER_PERCENTS: [f64; 2] = [0.05, 0.1];
+
+/// Beyond so many modes the sign patterns are refused: 4096 estimates take some ten milliseconds,
+/// and every further mode twice as many.
+pub const SIGN_PATTERN_MODES: usize = 12;
+
+/// Stiffnesses of one estimate (1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stiffnesses {
+    /// Kx (1).
+    pub kx: f64,
+    /// Ky (1).
+    pub ky: f64,
+    /// Kz (1), where the model has it.
+    pub kz: Option<f64>,
+}
+
+impl Stiffnesses {
+    /// 100 (self - nominal)/nominal (%) of each.
+    pub fn percent_of(&self, nominal: &Self) -> Self {
+        let percent = |value: f64, nominal: f64| 100.0 * (value - nominal) / nominal;
+        Self {
+            kx: percent(self.kx, nominal.kx),
+            ky: percent(self.ky, nominal.ky),
+            kz: self.zip_kz(nominal, percent),
+        }
+    }
+
+    fn combined(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Self {
+        Self {
+            kx: combine(self.kx, other.kx),
+            ky: combine(self.ky, other.ky),
+            kz: self.zip_kz(other, combine),
+        }
+    }
+
+    fn zip_kz(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Option<f64> {
+        Some(combine(self.kz?, other.kz?))
+    }
+}
+
+/// The estimate with every frequency off by the same percentage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UniformPerturbation {
+    /// Change of all frequencies (%).
+    pub percent: f64,
+    /// The estimate, where there is one.
+    pub estimate: Option<Stiffnesses>,
+}
+
+/// Average errors of a perturbation and its opposite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AverageError {
+    /// Size of the change of all frequencies (%).
+    pub percent: f64,
+    /// Mean of the two errors' magnitudes (%), as in table 9.
+    pub mean_magnitude: Stiffnesses,
+    /// Magnitude of the error of the two estimates' mean (%), as in table 14: smaller, because
+    /// opposite errors cancel.
+    pub of_mean: Stiffnesses,
+}
+
+/// Estimates with all frequencies raised and lowered by each percentage, in the order +p1, -p1,
+/// +p2, ...
+pub fn perturb_uniformly(
+    frequencies: &[f64],
+    percents: &[f64],
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Vec<UniformPerturbation> {
+    let perturbed = |percent: f64| {
+        let factor = 1.0 + percent / 100.0;
+        let shifted: Vec<f64> = frequencies.iter().map(|f| factor * f).collect();
+        UniformPerturbation {
+            percent,
+            estimate: estimator(&shifted),
+        }
+    };
+    let both = percents.iter().flat_map(|&percent| [percent, -percent]);
+    both.map(perturbed).collect()
+}
+
+/// Average errors of the pairs +p, -p among uniform perturbations; a pair without both estimates
+/// has none.
+pub fn average_errors(nominal: &Stiffnesses, rows: &[UniformPerturbation]) -> Vec<AverageError> {
+    let rising = rows.iter().filter(|row| row.percent > 0.0);
+    let average = |plus: &UniformPerturbation| {
+        let minus = rows.iter().find(|row| row.percent == -plus.percent)?;
+        let errors = [plus.estimate?, minus.estimate?].map(|e| e.percent_of(nominal));
+        let [plus_error, minus_error] = errors;
+        Some(AverageError {
+            percent: plus.percent,
+            mean_magnitude: plus_error.combined(&minus_error, |p, m| 0.5 * (p.abs() + m.abs())),
+            of_mean: plus_error.combined(&minus_error, |p, m| (0.5 * (p + m)).abs()),
+        })
+    };
+    rising.filter_map(average).collect()
+}
+
+/// How one mode alone moves the estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeSensitivity {
+    /// Position of the mode in the list of frequencies, from 0.
+    pub index: usize,
+    /// Half of the difference (%) between the estimates with this mode one bound high and low.
+    pub percent_per_bound: Option<Stiffnesses>,
+    /// Change of the estimate (%) per change of this frequency (%), for small changes.
+    pub percent_per_percent: Option<Stiffnesses>,
+}
+
+/// Which mode drives which parameter, one mode at a time under its own bound (Hz).
+///
+/// # Errors
+/// [`IdentifyError::Bounds`] unless there is one bound for each frequency.
+pub fn mode_sensitivities(
+    frequencies: &[f64],
+    bounds: &[f64],
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Result<Vec<ModeSensitivity>, IdentifyError> {
+    check_bounds(frequencies, bounds)?;
+    // Small enough to be a derivative, large enough for ten digits of it.
+    const SMALL_PERCENT: f64 = 1e-3;
+    let nominal = estimator(frequencies);
+    let half_difference = |index: usize, step: f64| {
+        let moved = |sign: f64| {
+            let mut shifted = frequencies.to_vec();
+            shifted[index] += sign * step;
+            estimator(&shifted)
+        };
+        let difference = moved(1.0)?.combined(&moved(-1.0)?, |high, low| 0.5 * (high - low));
+        Some(difference.combined(&nominal?, |change, nominal| 100.0 * change / nominal))
+    };
+    let sensitivity = |(index, (&frequency, &bound)): (usize, (&f64, &f64))| {
+        let small = SMALL_PERCENT / 100.0 * frequency;
+        let per_percent = half_difference(index, small)
+            .map(|change| change.combined(&change, |change, _| change / SMALL_PERCENT));
+        ModeSensitivity {
+            index,
+            percent_per_bound: half_difference(index, bound),
+            percent_per_percent: per_percent,
+        }
+    };
+    let each = frequencies.iter().zip(bounds).enumerate();
+    Ok(each.map(sensitivity).collect())
+}
+
+/// Smallest and largest value of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    /// Smallest value (1).
+    pub low: f64,
+    /// Largest value (1).
+    pub high: f64,
+}
+
+/// Spans of the estimate over all sign patterns of the bounds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SignPatternSpans {
+    /// Span of Kx; `None` where no pattern has an estimate.
+    pub kx: Option<Span>,
+    /// Span of Ky.
+    pub ky: Option<Span>,
+    /// Span of Kz; `None` as well where its sign changes, for then it passes through infinity.
+    pub kz: Option<Span>,
+    /// How many patterns were tried.
+    pub patterns: usize,
+    /// How many of them had no estimate.
+    pub failed: usize,
+}
+
+/// Estimates under each of the 2^n combinations of +bound and -bound (Hz), and unperturbed.
+///
+/// # Errors
+/// [`IdentifyError::TooManyPatterns`] beyond [`SIGN_PATTERN_MODES`] modes, and
+/// [`IdentifyError::Bounds`].
+pub fn sign_pattern_spans(
+    frequencies: &[f64],
+    bounds: &[f64],
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Result<SignPatternSpans, IdentifyError> {
+    check_bounds(frequencies, bounds)?;
+    if frequencies.len() > SIGN_PATTERN_MODES {
+        return Err(IdentifyError::TooManyPatterns {
+            modes: frequencies.len(),
+            limit: SIGN_PATTERN_MODES,
+        });
+    }
+    let patterns = 1usize << frequencies.len();
+    let mut spans = SignPatternSpans {
+        kx: None,
+        ky: None,
+        kz: None,
+        patterns,
+        failed: 0,
+    };
+    let mut kz_signs = [false, false];
+    let mut take = |estimate: &Stiffnesses| {
+        widen(&mut spans.kx, estimate.kx);
+        widen(&mut spans.ky, estimate.ky);
+        if let Some(kz) = estimate.kz {
+            widen(&mut spans.kz, kz);
+            kz_signs[usize::from(kz < 0.0)] = true;
+        }
+    };
+    if let Some(nominal) = estimator(frequencies) {
+        take(&nominal);
+    }
+    let mut failed = 0;
+    for pattern in 0..patterns {
+        let shifted: Vec<f64> = frequencies
+            .iter()
+            .zip(bounds)
+            .enumerate()
+            .map(|(index, (frequency, bound))| {
+                let up = pattern >> index & 1 == 1;
+                frequency + if up { *bound } else { -bound }
+            })
+            .collect();
+        match estimator(&shifted) {
+            Some(estimate) => take(&estimate),
+            None => failed += 1,
+        }
+    }
+    spans.failed = failed;
+    if kz_signs == [true, true] {
+        spans.kz = None;
+    }
+    Ok(spans)
+}
+
+fn widen(span: &mut Option<Span>, value: f64) {
+    *span = Some(match *span {
+        None => Span {
+            low: value,
+            high: value,
+        },
+        Some(span) => Span {
+            low: span.low.min(value),
+            high: span.high.max(value),
+        },
+    });
+}
+
+fn check_bounds(frequencies: &[f64], bounds: &[f64]) -> Result<(), IdentifyError> {
+    if frequencies.len() == bounds.len() {
+        Ok(())
+    } else {
+        Err(IdentifyError::Bounds {
+            frequencies: frequencies.len(),
+            bounds: bounds.len(),
+        })
+    }
+}

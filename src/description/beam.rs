@@ -2,7 +2,8 @@
 
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
 use super::keys;
-use super::reader::{Entry, Limits, Table};
+use super::limits::Limits;
+use super::reader::{Entry, Table};
 use super::{BeamDescription, BeamTolerance, RightHalf};
 use crate::quantity::Dimension;
 use std::ops::Bound;

@@ -150,6 +150,16 @@ pub enum DescriptionProblem {
         /// The value before it.
         previous: f64,
     },
+    /// A recording that cannot be opened.
+    #[error(
+        "{path} cannot be read: {cause}; name a file that exists, seen from the folder of this description"
+    )]
+    UnreadableFile {
+        /// Where it was looked for.
+        path: String,
+        /// What the system says.
+        cause: String,
+    },
     /// Neither recordings nor frequencies.
     #[error(
         "nothing to analyse: neither [[recording]] nor [measured] is given; add `[[recording]]` with `file = \"taps.wav\"`, or `[measured]` with `frequencies = [17, 118]`"

@@ -161,6 +161,16 @@ impl fmt::Display for ChannelRef {
     }
 }
 
+impl RecordingDescription {
+    /// The error of a recording that the caller, who opens files, cannot open: it points to the
+    /// line of the description that names the file.
+    pub fn file_error(&self, description: &str, path: &Path, cause: &str) -> DescriptionError {
+        let (path, cause) = (path.display().to_string(), cause.to_owned());
+        let problem = DescriptionProblem::UnreadableFile { path, cause };
+        Source::new(description, "").error(self.line, "recording.file", problem)
+    }
+}
+
 /// A text that names no channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ChannelRefError {

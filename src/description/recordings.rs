@@ -3,7 +3,8 @@
 use super::beam::along;
 use super::error::{DescriptionError, DescriptionProblem};
 use super::keys;
-use super::reader::{Entry, Limits, Table, quantities_by_name};
+use super::limits::Limits;
+use super::reader::{Entry, Table, quantities_by_name};
 use super::{FrfForm, RecordingDescription, SensorDescription};
 use crate::quantity::Dimension;
 use std::collections::BTreeMap;

@@ -316,11 +316,11 @@ fn measured_block(lines: &[&str]) -> (usize, usize) {
     let start = lines
         .iter()
         .position(|line| line.starts_with("# [measured]"))
-        .unwrap();
+        .expect("a template shows [measured]");
     let length = lines[start..]
         .iter()
         .position(|line| line.is_empty())
-        .unwrap();
+        .expect("a blank line ends the block");
     (start, start + length)
 }
 

@@ -81,7 +81,7 @@ impl OutputFile {
         let refuse = |cause| OutputError::NotWritable {
             path: path.clone(),
             folder: folder.to_owned(),
-            cause,
+            cause: without_path(cause),
         };
         let target = match fs::metadata(&path) {
             Ok(found) if found.is_dir() => {
@@ -155,7 +155,7 @@ impl OutputFolder {
             .map_err(|cause| OutputError::NotWritable {
                 path: path.to_owned(),
                 folder: existing.to_owned(),
-                cause,
+                cause: without_path(cause),
             })?;
         Ok(Self {
             path: path.to_owned(),
@@ -213,6 +213,13 @@ fn builder(prefix: &'static str, mode: u32) -> Builder<'static, 'static> {
     #[cfg(not(unix))]
     let _ = mode;
     builder
+}
+
+/// What the system says, without the temporary name that means nothing to anybody.
+fn without_path(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(std::error::Error::source);
+    let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
+    code.map_or(error, io::Error::from_raw_os_error)
 }
 
 fn folder_of(path: &Path) -> &Path {

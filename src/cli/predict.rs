@@ -121,7 +121,7 @@ fn given_stiffness(
     if kz.is_finite() && (ratio.is_nan() || ratio >= 1.0) {
         let limit = kx.sqrt() * ky.sqrt();
         return Err(anyhow!(
-            "--kz {kz} makes the joint a source of energy; its size must exceed sqrt(kx ky) = {limit}"
+            "--kz {kz} makes the joint a source of energy; its size must exceed sqrt(kx ky) = {limit:.6}"
         ));
     }
     Ok(Some(GivenStiffness {

@@ -1,6 +1,6 @@
 //! Ranges of values, and what to do when a value lies outside.
 
-use super::error::with_unit;
+use super::error::{number, with_unit};
 use std::ops::{Bound, RangeBounds};
 
 /// The values a quantity may take, and what to do when it does not.
@@ -37,6 +37,9 @@ impl Limits {
 
     /// The range as messages name it.
     pub(super) fn in_words(&self, unit: &str) -> String {
+        if let (Bound::Included(low), Bound::Included(high)) = (self.low, self.high) {
+            return format!("{} to {}", number(low), with_unit(high, unit));
+        }
         let low = match self.low {
             Bound::Included(low) => format!("from {}", with_unit(low, unit)),
             Bound::Excluded(low) => format!("more than {}", with_unit(low, unit)),

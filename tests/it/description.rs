@@ -401,6 +401,15 @@ fn regress_channels_on_the_command_line() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig {
+        // Parsing takes microseconds, so that many cases are affordable; the seed is fixed so
+        // that a failure comes back.
+        cases: 2000,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(20_241),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
     #[test]
     fn prop_arbitrary_text_never_panics(text in any::<String>()) {
         if let Err(error) = TestDescription::parse(&text, "x.toml") {

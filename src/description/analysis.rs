@@ -1,7 +1,8 @@
 //! `[analysis]`: how to analyse.
 
 use super::error::{DescriptionError, DescriptionProblem};
-use super::reader::{Entry, Limits, Table};
+use super::limits::Limits;
+use super::reader::{Entry, Table};
 use super::{
     AnalysisDescription, FitParameter, JointDescription, JointKind, JointModel, Weights, WindowKind,
 };

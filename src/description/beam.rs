@@ -2,7 +2,8 @@
 
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
 use super::keys;
-use super::reader::{Entry, Limits, Table};
+use super::limits::Limits;
+use super::reader::{Entry, Table};
 use super::{BeamDescription, BeamTolerance, RightHalf};
 use crate::quantity::Dimension;
 use std::ops::Bound;
@@ -250,7 +251,7 @@ fn incredible(entry: &Entry<'_>, value: f64, unit: &'static str) -> DescriptionW
 
 /// The limits of a position along the beam (m).
 pub(super) fn along(length: f64) -> Limits {
-    let remedy = "positions are measured along the beam from the joint (lap joint, free beam: from the left end)";
+    let remedy = "this is outside the beam: positions run along it from the joint (lap joint, free beam: from the left end)";
     Limits::between(0.0, length, remedy)
 }
 

@@ -20,11 +20,13 @@ pub struct DescriptionError {
 
 impl fmt::Display for DescriptionError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}:{}: ", self.file, self.line)?;
-        if !self.key.is_empty() {
-            write!(out, "`{}`: ", self.key)?;
-        }
-        write!(out, "{}", self.problem)
+        let key = if self.key.is_empty() {
+            String::new()
+        } else {
+            format!("`{}`: ", self.key)
+        };
+        let text = format!("{}:{}: {key}{}", self.file, self.line, self.problem);
+        out.write_str(&on_one_line(&text))
     }
 }
 
@@ -60,7 +62,7 @@ pub enum DescriptionProblem {
         example: &'static str,
     },
     /// Not the kind of value that belongs here.
-    #[error("{found} stands here; {wanted} is wanted")]
+    #[error("{found} stands here; wanted: {wanted}")]
     WrongType {
         /// What stands there.
         found: &'static str,
@@ -150,6 +152,16 @@ pub enum DescriptionProblem {
         /// The value before it.
         previous: f64,
     },
+    /// A recording that cannot be opened.
+    #[error(
+        "{path} cannot be read: {cause}; name a file that exists, seen from the folder of this description"
+    )]
+    UnreadableFile {
+        /// Where it was looked for.
+        path: String,
+        /// What the system says.
+        cause: String,
+    },
     /// Neither recordings nor frequencies.
     #[error(
         "nothing to analyse: neither [[recording]] nor [measured] is given; add `[[recording]]` with `file = \"taps.wav\"`, or `[measured]` with `frequencies = [17, 118]`"
@@ -200,11 +212,11 @@ pub struct DescriptionWarning {
 
 impl fmt::Display for DescriptionWarning {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            out,
+        let text = format!(
             "{}:{}: `{}`: {}",
             self.file, self.line, self.key, self.doubt
-        )
+        );
+        out.write_str(&on_one_line(&text))
     }
 }
 
@@ -264,6 +276,24 @@ pub(super) fn number(value: f64) -> String {
 /// A number and its unit.
 pub(super) fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
+}
+
+/// A message quotes what stands in the file, whatever that is: line breaks and control characters
+/// are escaped, and what is longer than anybody reads is cut.
+fn on_one_line(text: &str) -> String {
+    const LONGEST: usize = 1000;
+    let mut line = String::with_capacity(text.len().min(LONGEST));
+    for character in text.chars().take(LONGEST) {
+        if character.is_control() {
+            line.extend(character.escape_default());
+        } else {
+            line.push(character);
+        }
+    }
+    if text.chars().nth(LONGEST).is_some() {
+        line.push_str(" ...");
+    }
+    line
 }
 
 fn quoted(words: &[&str]) -> String {

@@ -3,7 +3,8 @@
 use super::beam::{read_right_half, refuse_right_half};
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
 use super::keys;
-use super::reader::{Entry, Limits, Table};
+use super::limits::Limits;
+use super::reader::{Entry, Table};
 use super::{
     BeamTheory, JointDescription, JointKind, JointModel, KnownStiffness, Overlap, RightHalf,
 };

@@ -2,7 +2,8 @@
 
 use super::MeasuredFrequencies;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
-use super::reader::{Entry, Limits, Table};
+use super::limits::Limits;
+use super::reader::{Entry, Table};
 use crate::quantity::Dimension;
 use std::ops::Bound;
 

@@ -9,6 +9,7 @@ mod beam;
 mod error;
 mod joint;
 mod keys;
+mod limits;
 mod measured;
 mod parse;
 mod reader;

@@ -47,7 +47,9 @@ impl TestDescription {
 
 fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, DescriptionError> {
     let mut warnings = Vec::new();
-    let name = top.optional("name", |entry| entry.text("a name for the test"))?;
+    let name = top.optional("name", |entry| {
+        entry.text("a name such as \"Cantilever, one-bolt clamp\"")
+    })?;
     let example = "[beam]` with `length`, `width`, `thickness`, `modulus` and `density";
     let beam_table = top
         .need("beam", "a description of the beam", example)?
@@ -143,7 +145,7 @@ fn syntax_error(source: &Source<'_>, text: &str, error: &toml::de::Error) -> Des
     let line = source.line_at(error.span().map_or(0, |span| span.start).min(last));
     let message = error.message().replace('\n', " ");
     let remedy = if message.contains("duplicate key") {
-        "each key and each [table] may stand only once; remove the second or merge the two"
+        "each key and each [table] may stand only once (but [[sensor]] and [[recording]], in double brackets); remove one or merge the two"
     } else if message.contains("string values must be quoted") {
         "put texts and numbers with a unit into quotes: \"423 mm\""
     } else {
@@ -158,6 +160,16 @@ impl fmt::Display for ChannelRef {
             Self::Number(number) => write!(out, "{number}"),
             Self::Name(name) => write!(out, "\"{name}\""),
         }
+    }
+}
+
+impl RecordingDescription {
+    /// The error of a recording that the caller, who opens files, cannot open: it points to the
+    /// line of the description that names the file.
+    pub fn file_error(&self, description: &str, path: &Path, cause: &str) -> DescriptionError {
+        let (path, cause) = (path.display().to_string(), cause.to_owned());
+        let problem = DescriptionProblem::UnreadableFile { path, cause };
+        Source::new(description, "").error(self.line, "recording.file", problem)
     }
 }
 

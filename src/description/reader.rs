@@ -1,11 +1,11 @@
 //! Typed access to the tables of a TOML text: every value knows its line and its key path, so
 //! that whatever is wrong with it can say where.
 
-use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
+use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
 use super::keys::{self, KnownTable};
+use super::limits::Limits;
 use crate::quantity::{Dimension, parse_quantity};
 use std::collections::BTreeMap;
-use std::ops::{Bound, RangeBounds};
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
@@ -142,52 +142,6 @@ impl<'t> Table<'t> {
     }
 }
 
-/// The values a quantity may take, and what to do when it does not.
-#[derive(Clone, Copy)]
-pub(super) struct Limits {
-    pub(super) low: Bound<f64>,
-    pub(super) high: Bound<f64>,
-    pub(super) remedy: &'static str,
-}
-
-impl Limits {
-    /// From `low` to `high`, both included.
-    pub(super) const fn between(low: f64, high: f64, remedy: &'static str) -> Self {
-        Self {
-            low: Bound::Included(low),
-            high: Bound::Included(high),
-            remedy,
-        }
-    }
-
-    /// Greater than zero, up to `high`.
-    pub(super) const fn positive(high: f64, remedy: &'static str) -> Self {
-        Self {
-            low: Bound::Excluded(0.0),
-            high: Bound::Included(high),
-            remedy,
-        }
-    }
-
-    fn in_words(&self, unit: &str) -> String {
-        let low = match self.low {
-            Bound::Included(low) => format!("from {}", with_unit(low, unit)),
-            Bound::Excluded(low) => format!("more than {}", with_unit(low, unit)),
-            Bound::Unbounded => String::new(),
-        };
-        let high = match self.high {
-            Bound::Included(high) => format!("up to {}", with_unit(high, unit)),
-            Bound::Excluded(high) => format!("less than {}", with_unit(high, unit)),
-            Bound::Unbounded => String::new(),
-        };
-        [low, high]
-            .into_iter()
-            .filter(|part| !part.is_empty())
-            .collect::<Vec<_>>()
-            .join(", ")
-    }
-}
-
 /// A value with its place.
 pub(super) struct Entry<'t> {
     source: &'t Source<'t>,
@@ -301,7 +255,7 @@ impl<'t> Entry<'t> {
         limits: &Limits,
     ) -> Result<f64, DescriptionError> {
         let value = self.quantity(dimension)?;
-        if (limits.low, limits.high).contains(&value) {
+        if limits.contain(value) {
             Ok(value)
         } else {
             Err(self.out_of_range(value, dimension.si_unit(), limits))
@@ -317,7 +271,7 @@ impl<'t> Entry<'t> {
             let text = written.to_string();
             return Err(self.error(DescriptionProblem::NotFinite { text }));
         };
-        let in_range = (limits.low, limits.high).contains(&(value as f64));
+        let in_range = limits.contain(value as f64);
         usize::try_from(value)
             .ok()
             .filter(|_| in_range)

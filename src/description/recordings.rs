@@ -3,7 +3,8 @@
 use super::beam::along;
 use super::error::{DescriptionError, DescriptionProblem};
 use super::keys;
-use super::reader::{Entry, Limits, Table, quantities_by_name};
+use super::limits::Limits;
+use super::reader::{Entry, Table, quantities_by_name};
 use super::{FrfForm, RecordingDescription, SensorDescription};
 use crate::quantity::Dimension;
 use std::collections::BTreeMap;
@@ -14,10 +15,10 @@ const FORMS: [(&str, FrfForm); 3] = [
     ("mobility", FrfForm::Mobility),
     ("receptance", FrfForm::Receptance),
 ];
-/// Below 16 samples there are six lines; 2^24 samples are six minutes at 50 kHz.
+/// Below 16 samples there are six lines; 10 million samples are three minutes at 51.2 kHz.
 const BLOCK: Limits = Limits::between(
     16.0,
-    16_777_216.0,
+    1e7,
     "a block of 2048 samples shows 800 lines; leave it out to have it chosen",
 );
 const SAMPLE_RATE: Limits = Limits::between(

@@ -3,7 +3,8 @@
 use super::beam::along;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
 use super::keys;
-use super::reader::{Entry, Limits, Table};
+use super::limits::Limits;
+use super::reader::{Entry, Table};
 use super::{BeamDescription, ChannelRef, HammerDescription, SensorDescription, SensorKind};
 use crate::quantity::Dimension;
 

@@ -316,11 +316,11 @@ fn measured_block(lines: &[&str]) -> (usize, usize) {
     let start = lines
         .iter()
         .position(|line| line.starts_with("# [measured]"))
-        .unwrap();
+        .expect("a template shows [measured]");
     let length = lines[start..]
         .iter()
         .position(|line| line.is_empty())
-        .unwrap();
+        .expect("a blank line ends the block");
     (start, start + length)
 }
 
@@ -401,6 +401,15 @@ fn regress_channels_on_the_command_line() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig {
+        // Parsing takes microseconds, so that many cases are affordable; the seed is fixed so
+        // that a failure comes back.
+        cases: 2000,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(20_241),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
     #[test]
     fn prop_arbitrary_text_never_panics(text in any::<String>()) {
         if let Err(error) = TestDescription::parse(&text, "x.toml") {

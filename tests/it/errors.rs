@@ -1,1 +1,890 @@
-//! Tests of errors.
+//! Tests of what is said about bad input: the file, the line, the key, what is allowed, what to do.
+
+use tapjoint::description::*;
+use tapjoint::quantity::{Dimension, QuantityError, STANDARD_GRAVITY, parse_quantity};
+
+/// A valid description. Every case changes one piece of it.
+const VALID: &str = r#"name = "Clamp"
+[beam]
+length = "423 mm"
+width = 0.05
+thickness = 0.005
+modulus = "207 GPa"
+density = 7850
+poisson = 0.29
+tolerance = { length = 0.001, modulus = "2 %" }
+[joint]
+kind = "cantilever"
+model = "3p"
+kt = "1.4 MN/m"
+kr = 320
+ktr = 1e5
+beam = "euler"
+[hammer]
+channel = 1
+scale = 500.0
+[[sensor]]
+name = "tip"
+channel = 2
+sensitivity = "100 mV/g"
+position = 0.338
+mass = "24 g"
+[[sensor]]
+name = "mic"
+channel = "level"
+kind = "sound"
+[[recording]]
+file = "low.wav"
+tap = "40 mm"
+band = [0, 200]
+block = 2048
+at = { tip = 0.20 }
+torque = 12
+[[recording]]
+file = "frf.txt"
+form = "mobility"
+sensor = "tip"
+[analysis]
+window = "exponential"
+fit_modes = 4
+sensor_mass = false
+fit = ["modulus"]
+"#;
+
+/// The same beam and joint with frequencies instead of recordings.
+const MEASURED: &str = r#"[beam]
+length = 0.423
+width = 0.05
+thickness = 0.005
+modulus = 207e9
+density = 7850
+[joint]
+kind = "cantilever"
+[measured]
+frequencies = [17, 118, 335.5]
+modes = [1, 2, 4]
+half_line = [0.1, 0.1, 0.5]
+scatter = "0.3 %"
+"#;
+
+/// What one change must lead to.
+struct Case {
+    /// What is replaced, and by what.
+    change: (&'static str, &'static str),
+    /// The line that must be named.
+    line: usize,
+    /// The key that must be named; empty for none.
+    key: &'static str,
+    /// What the message must contain: what is allowed, what is suggested.
+    says: &'static [&'static str],
+}
+
+const fn case(
+    change: (&'static str, &'static str),
+    line: usize,
+    key: &'static str,
+    says: &'static [&'static str],
+) -> Case {
+    Case {
+        change,
+        line,
+        key,
+        says,
+    }
+}
+
+fn check(base: &str, cases: &[Case]) {
+    assert!(
+        TestDescription::parse(base, "t.toml").is_ok(),
+        "the unchanged text must be valid"
+    );
+    for Case {
+        change: (from, to),
+        line,
+        key,
+        says,
+    } in cases
+    {
+        assert_eq!(
+            base.matches(from).count(),
+            1,
+            "{from:?} must stand once in the text"
+        );
+        let text = base.replace(from, to);
+        let Err(error) = TestDescription::parse(&text, "t.toml") else {
+            panic!("{to:?} was accepted");
+        };
+        assert_eq!(
+            (error.line, error.key.as_str()),
+            (*line, *key),
+            "{to:?}: {error}"
+        );
+        let shown = error.to_string();
+        let place = if key.is_empty() {
+            format!("t.toml:{line}: ")
+        } else {
+            format!("t.toml:{line}: `{key}`: ")
+        };
+        assert!(shown.starts_with(&place), "{to:?}: {shown}");
+        for part in *says {
+            assert!(
+                shown.contains(part),
+                "{to:?}: {shown:?} does not say {part:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn regress_unknown_keys_suggest_the_nearest_known_one() {
+    check(
+        VALID,
+        &[
+            case(
+                ("length = \"423", "lenght = \"423"),
+                3,
+                "beam.lenght",
+                &[
+                    "did you mean `length`?",
+                    "known keys of [beam]: length, width",
+                ],
+            ),
+            case(
+                ("width = 0.05", "Width = 0.05"),
+                4,
+                "beam.Width",
+                &["did you mean `width`?"],
+            ),
+            case(
+                ("density = 7850", "rho = 7850"),
+                7,
+                "beam.rho",
+                &["did you mean `density`?"],
+            ),
+            case(
+                ("modulus = \"2 %\"", "moduls = \"2 %\""),
+                9,
+                "beam.tolerance.moduls",
+                &["did you mean `modulus`?"],
+            ),
+            case(
+                ("width = 0.05", "width = 0.05\nkt = 3"),
+                5,
+                "beam.kt",
+                &["`kt` belongs into [joint]"],
+            ),
+            case(
+                ("scale = 500.0", "position = 0.1"),
+                19,
+                "hammer.position",
+                &["belongs into [joint] or [[sensor]]"],
+            ),
+            case(
+                ("torque = 12", "temprature = 12"),
+                36,
+                "recording[1].temprature",
+                &["did you mean `temperature`?"],
+            ),
+            case(
+                ("torque = 12", "fit_mode = 12"),
+                36,
+                "recording[1].fit_mode",
+                &["`fit_modes` belongs into [analysis]"],
+            ),
+            case(
+                ("[analysis]", "[analysys]"),
+                41,
+                "analysys",
+                &["did you mean `analysis`?"],
+            ),
+            case(
+                ("[analysis]", "[zzz]"),
+                41,
+                "zzz",
+                &["unknown key; known keys of the top level: name, beam"],
+            ),
+            case(
+                ("name = \"Clamp\"", "kind = \"lap\""),
+                1,
+                "kind",
+                &["`kind` belongs into [joint] or [[sensor]]"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_impossible_beams() {
+    check(
+        VALID,
+        &[
+            case(
+                ("length = \"423 mm\"", "length = -0.423"),
+                3,
+                "beam.length",
+                &[
+                    "-0.423 m is impossible",
+                    "allowed: more than 0 m",
+                    "\"423 mm\"",
+                ],
+            ),
+            case(
+                ("length = \"423 mm\"", "length = 0"),
+                3,
+                "beam.length",
+                &["0 m is impossible"],
+            ),
+            case(
+                ("length = \"423 mm\"", "length = 1e5"),
+                3,
+                "beam.length",
+                &["up to 10000 m"],
+            ),
+            case(
+                ("length = \"423 mm\"", "length = nan"),
+                3,
+                "beam.length",
+                &["not a finite number"],
+            ),
+            case(
+                ("length = \"423 mm\"", "length = 99999999999999999999"),
+                3,
+                "beam.length",
+                &["not a finite number"],
+            ),
+            case(
+                ("length = \"423 mm\"\n", ""),
+                2,
+                "beam.length",
+                &["missing; a length (m) is needed, such as `length = \"423 mm\"`"],
+            ),
+            case(
+                ("length = \"423 mm\"", "length = [1]"),
+                3,
+                "beam.length",
+                &["a list stands here", "a length as a number (m)"],
+            ),
+            case(
+                ("modulus = \"207 GPa\"", "modulus = -207e9"),
+                6,
+                "beam.modulus",
+                &["-2.07e11 Pa is impossible", "up to 1e13 Pa"],
+            ),
+            case(
+                ("density = 7850", "density = 0"),
+                7,
+                "beam.density",
+                &["allowed: more than 0 kg/m3"],
+            ),
+            case(
+                ("poisson = 0.29", "poisson = 0.6"),
+                8,
+                "beam.poisson",
+                &["more than -1, up to 0.5"],
+            ),
+            case(
+                ("poisson = 0.29", "poisson = -1"),
+                8,
+                "beam.poisson",
+                &["more than -1, up to 0.5"],
+            ),
+            case(
+                ("modulus = \"2 %\"", "modulus = \"200 %\""),
+                9,
+                "beam.tolerance.modulus",
+                &["less than 1", "relative (\"2 %\")"],
+            ),
+            case(
+                ("length = 0.001", "length = -0.001"),
+                9,
+                "beam.tolerance.length",
+                &["more than 0 m, less than 0.423 m"],
+            ),
+            case(
+                ("density = 7850", "density = 7850\nright = { width = 1 }"),
+                8,
+                "beam.right",
+                &["only a lap joint", "set `kind = \"lap\"`"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_units_that_do_not_fit() {
+    check(
+        VALID,
+        &[
+            case(
+                ("\"423 mm\"", "\"423 kg\""),
+                3,
+                "beam.length",
+                &[
+                    "\"423 kg\" is a mass, not a length",
+                    "units allowed: m, mm, cm",
+                ],
+            ),
+            case(
+                ("\"423 mm\"", "\"423 furlong\""),
+                3,
+                "beam.length",
+                &["unknown unit \"furlong\"", "m, mm, cm"],
+            ),
+            case(
+                ("\"423 mm\"", "\"0,423 m\""),
+                3,
+                "beam.length",
+                &["decimal comma; write a point: \"0.423 m\""],
+            ),
+            case(
+                ("\"423 mm\"", "\"long\""),
+                3,
+                "beam.length",
+                &["does not begin with a number"],
+            ),
+            case(
+                ("\"423 mm\"", "423 mm"),
+                3,
+                "",
+                &["not valid TOML", "into quotes: \"423 mm\""],
+            ),
+            case(
+                ("\"1.4 MN/m\"", "\"1.4 MN\""),
+                13,
+                "joint.kt",
+                &["is a force, not a translational stiffness"],
+            ),
+            case(
+                ("\"100 mV/g\"", "\"100 mV/N\""),
+                23,
+                "sensor[1].sensitivity",
+                &[
+                    "sensitivity of a force sensor, not the sensitivity of an accelerometer",
+                    "mV/g",
+                ],
+            ),
+            case(
+                ("torque = 12", "torque = \"12 N\""),
+                36,
+                "recording[1].torque",
+                &["a force, not a torque"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_joints_that_cannot_be() {
+    check(
+        VALID,
+        &[
+            case(
+                ("\"cantilever\"", "\"cantelever\""),
+                11,
+                "joint.kind",
+                &[
+                    "allowed: \"cantilever\", \"lap\", \"free\"",
+                    "did you mean \"cantilever\"?",
+                ],
+            ),
+            case(
+                ("\"cantilever\"", "\"lap\""),
+                12,
+                "joint.model",
+                &["a lap joint has two stiffnesses", "write `model = \"2p\"`"],
+            ),
+            case(
+                ("\"cantilever\"", "\"free\""),
+                13,
+                "joint.kt",
+                &["a free beam has no joint"],
+            ),
+            case(
+                ("model = \"3p\"", "model = \"2p\""),
+                15,
+                "joint.ktr",
+                &["two-parameter model has no coupling", "`model = \"3p\"`"],
+            ),
+            case(
+                ("model = \"3p\"", "model = \"none\""),
+                12,
+                "joint.model",
+                &["only a free beam has no joint model"],
+            ),
+            case(
+                ("kr = 320", "kr = -320"),
+                14,
+                "joint.kr",
+                &["-320 N m/rad is impossible", "\"rigid\""],
+            ),
+            case(
+                ("ktr = 1e5", "ktr = 100"),
+                15,
+                "joint.ktr",
+                &["ktr^2 > kt kr", "21166.01049 N/rad"],
+            ),
+            case(
+                ("ktr = 1e5", "ktr = 0"),
+                15,
+                "joint.ktr",
+                &["infinite compliance", "\"rigid\""],
+            ),
+            case(
+                ("kr = 320", "kr = \"rigid\""),
+                15,
+                "joint.ktr",
+                &["cannot be coupled"],
+            ),
+            case(
+                ("beam = \"euler\"", "position = 0.2"),
+                16,
+                "joint.position",
+                &["only a lap joint", "`kind = \"lap\"`"],
+            ),
+            case(
+                ("kind = \"cantilever\"\n", ""),
+                10,
+                "joint.kind",
+                &["missing", "`kind = \"cantilever\"`"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_sensors_and_hammers_that_cannot_be() {
+    check(
+        VALID,
+        &[
+            case(
+                ("position = 0.338", "position = 0.5"),
+                24,
+                "sensor[1].position",
+                &[
+                    "0.5 m is impossible",
+                    "allowed: 0 to 0.423 m",
+                    "outside the beam",
+                ],
+            ),
+            case(
+                ("position = 0.338", "position = -0.1"),
+                24,
+                "sensor[1].position",
+                &["allowed: 0 to 0.423 m"],
+            ),
+            case(
+                ("position = 0.338\n", ""),
+                24,
+                "sensor[1].mass",
+                &["`position` is missing"],
+            ),
+            case(
+                ("mass = \"24 g\"", "mass = -1"),
+                25,
+                "sensor[1].mass",
+                &["-1 kg is impossible"],
+            ),
+            case(
+                ("channel = 2", "channel = 1"),
+                22,
+                "sensor[1].channel",
+                &["channel 1 is already taken in line 18", "the hammer"],
+            ),
+            case(
+                ("channel = 2", "channel = 0"),
+                22,
+                "sensor[1].channel",
+                &["allowed: 1 to 4096", "count from 1"],
+            ),
+            case(
+                ("channel = 2", "channel = 2.5"),
+                22,
+                "sensor[1].channel",
+                &["wanted: a whole number"],
+            ),
+            case(
+                ("name = \"mic\"", "name = \"tip\""),
+                27,
+                "sensor[2].name",
+                &["\"tip\" is already taken in line 21"],
+            ),
+            case(
+                ("name = \"mic\"", "name = \"\""),
+                27,
+                "sensor[2].name",
+                &["an empty string"],
+            ),
+            case(
+                ("\"100 mV/g\"", "0"),
+                23,
+                "sensor[1].sensitivity",
+                &["any number but zero"],
+            ),
+            case(
+                ("mass = \"24 g\"", "scale = 3"),
+                23,
+                "sensor[1].sensitivity",
+                &["keep `scale`"],
+            ),
+            case(
+                ("channel = 1\n", ""),
+                17,
+                "hammer.channel",
+                &["missing", "`channel = 1`"],
+            ),
+            case(
+                ("kind = \"sound\"", "kind = \"speed\""),
+                29,
+                "sensor[2].kind",
+                &["\"velocity\", \"displacement\", \"sound\""],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_recordings_and_settings_that_cannot_be() {
+    check(
+        VALID,
+        &[
+            case(
+                ("tap = \"40 mm\"", "tap = 0.43"),
+                32,
+                "recording[1].tap",
+                &["allowed: 0 to 0.423 m"],
+            ),
+            case(
+                ("band = [0, 200]", "band = [200, 100]"),
+                33,
+                "recording[1].band[2]",
+                &["more than 200 Hz", "lower edge first"],
+            ),
+            case(
+                ("band = [0, 200]", "band = [-1, 100]"),
+                33,
+                "recording[1].band[1]",
+                &["-1 Hz is impossible"],
+            ),
+            case(
+                ("band = [0, 200]", "band = [1]"),
+                33,
+                "recording[1].band",
+                &["1 values stand here; allowed: 2"],
+            ),
+            case(
+                ("block = 2048", "block = 15"),
+                34,
+                "recording[1].block",
+                &["15 is impossible; allowed: 16 to 1e7"],
+            ),
+            case(
+                ("block = 2048", "block = -2048"),
+                34,
+                "recording[1].block",
+                &["allowed: 16 to 1e7"],
+            ),
+            case(
+                ("block = 2048", "block = 2048.5"),
+                34,
+                "recording[1].block",
+                &["wanted: a whole number"],
+            ),
+            case(
+                ("at = { tip = 0.20 }", "at = { tpi = 0.20 }"),
+                35,
+                "recording[1].at.tpi",
+                &[
+                    "no sensor is called \"tpi\"",
+                    "\"tip\", \"mic\"",
+                    "did you mean \"tip\"?",
+                ],
+            ),
+            case(
+                ("at = { tip = 0.20 }", "at = { tip = 2 }"),
+                35,
+                "recording[1].at.tip",
+                &["allowed: 0 to 0.423 m"],
+            ),
+            case(
+                ("file = \"low.wav\"\n", ""),
+                30,
+                "recording[1].file",
+                &["missing", "`file = \"taps.wav\"`"],
+            ),
+            case(
+                ("form = \"mobility\"\n", ""),
+                39,
+                "recording[2].sensor",
+                &["`form` is missing"],
+            ),
+            case(
+                ("sensor = \"tip\"\n", ""),
+                39,
+                "recording[2].form",
+                &["add `sensor = \"A\"`"],
+            ),
+            case(
+                ("fit_modes = 4", "fit_modes = 0"),
+                43,
+                "analysis.fit_modes",
+                &["allowed: 1 to 1000"],
+            ),
+            case(
+                ("sensor_mass = false", "sensor_mass = 0"),
+                44,
+                "analysis.sensor_mass",
+                &["wanted: true or false"],
+            ),
+            case(
+                ("[\"modulus\"]", "[\"kt\"]"),
+                45,
+                "analysis.fit[1]",
+                &["stated as known in [joint]"],
+            ),
+            case(
+                ("[\"modulus\"]", "[\"modulus\", \"modulus\"]"),
+                45,
+                "analysis.fit[2]",
+                &["already taken"],
+            ),
+            case(
+                ("[analysis]", "[measured]\nfrequencies = [17]\n[analysis]"),
+                41,
+                "measured",
+                &["not from both", "line 31", "remove one"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_frequencies_that_cannot_be() {
+    check(
+        MEASURED,
+        &[
+            case(
+                ("[17, 118, 335.5]", "[17, -118, 335.5]"),
+                10,
+                "measured.frequencies[2]",
+                &["-118 Hz is impossible"],
+            ),
+            case(
+                ("[17, 118, 335.5]", "[17, 118, 118]"),
+                10,
+                "measured.frequencies[3]",
+                &["value 3 is 118 and follows 118", "ascending"],
+            ),
+            case(
+                ("[17, 118, 335.5]", "[17,\n118,\n20]"),
+                12,
+                "measured.frequencies[3]",
+                &["value 3 is 20 and follows 118"],
+            ),
+            case(
+                ("[17, 118, 335.5]", "[]"),
+                10,
+                "measured.frequencies",
+                &["0 values stand here; allowed: at least 1"],
+            ),
+            case(
+                ("[17, 118, 335.5]", "17"),
+                10,
+                "measured.frequencies",
+                &["wanted: a list of frequencies such as [17, 118]"],
+            ),
+            case(
+                ("[1, 2, 4]", "[1, 2]"),
+                11,
+                "measured.modes",
+                &["2 values stand here; allowed: 3, one for each frequency"],
+            ),
+            case(
+                ("[1, 2, 4]", "[0, 2, 4]"),
+                11,
+                "measured.modes[1]",
+                &["allowed: 1 to 1000", "count from 1"],
+            ),
+            case(
+                ("[1, 2, 4]", "[1, 4, 2]"),
+                11,
+                "measured.modes[3]",
+                &["ascending"],
+            ),
+            case(
+                ("[0.1, 0.1, 0.5]", "[0.1]"),
+                12,
+                "measured.half_line",
+                &["one for each frequency"],
+            ),
+            case(
+                ("[0.1, 0.1, 0.5]", "0"),
+                12,
+                "measured.half_line",
+                &["more than 0 Hz"],
+            ),
+            case(
+                ("scatter", "std = 0.1\nscatter"),
+                13,
+                "measured.std",
+                &["keep the one you know"],
+            ),
+            case(
+                ("\"0.3 %\"", "\"300 %\""),
+                13,
+                "measured.scatter",
+                &["less than 1"],
+            ),
+        ],
+    );
+}
+
+#[test]
+fn regress_text_that_is_no_toml_names_its_line() {
+    for (text, line) in [
+        ("[beam", 1),
+        ("name = \"a\"\n[beam]\nlength = \n", 3),
+        ("name = \"a\"\nname = \"b\"\n", 2),
+        ("name = \"a\n\n\n", 1),
+        ("x = [1,\n2\n\n\n", 2),
+        ("\u{0}", 1),
+    ] {
+        let error = TestDescription::parse(text, "t.toml").expect_err("no TOML");
+        assert_eq!(error.line, line, "{text:?}: {error}");
+        assert!(
+            matches!(*error.problem, DescriptionProblem::Syntax { .. }),
+            "{text:?}: {error}"
+        );
+    }
+}
+
+#[test]
+fn regress_missing_tables_and_missing_data() {
+    let error = TestDescription::parse("", "t.toml").expect_err("nothing there");
+    assert_eq!((error.line, error.key.as_str()), (1, "beam"));
+    let (bare, _) = MEASURED.split_once("[measured]").unwrap();
+    let test = TestDescription::parse(bare, "t.toml").expect("enough for a prediction");
+    let error = test
+        .check_has_data("t.toml")
+        .expect_err("nothing to analyse");
+    let shown = error.to_string();
+    assert!(shown.starts_with("t.toml:1: nothing to analyse"), "{shown}");
+    assert!(
+        shown.contains("[[recording]]") && shown.contains("[measured]"),
+        "{shown}"
+    );
+}
+
+#[test]
+fn regress_a_message_is_one_readable_line_whatever_it_quotes() {
+    let text = VALID.replace("\"cantilever\"", "\"\"\"a\nb\\u001b[31m\"\"\"");
+    let shown = TestDescription::parse(&text, "t.toml")
+        .expect_err("no kind")
+        .to_string();
+    assert!(!shown.chars().any(char::is_control), "{shown:?}");
+    let text = VALID.replace("\"cantilever\"", &format!("\"{}\"", "x".repeat(100_000)));
+    let shown = TestDescription::parse(&text, "t.toml")
+        .expect_err("no kind")
+        .to_string();
+    assert!(shown.len() < 1100, "{} characters", shown.len());
+}
+
+#[test]
+fn regress_one_message_in_full() {
+    let text = VALID.replace("position = 0.338", "position = \"500 mm\"");
+    let shown = TestDescription::parse(&text, "dir/test.toml")
+        .expect_err("outside")
+        .to_string();
+    assert_eq!(
+        shown,
+        "dir/test.toml:24: `sensor[1].position`: 0.5 m is impossible; allowed: 0 to 0.423 m; this is outside the beam: positions run along it from the joint (lap joint, free beam: from the left end)"
+    );
+}
+
+#[test]
+fn val_units_have_their_defined_values() {
+    // Exact by definition: inch 25.4 mm, pound 0.45359237 kg, standard gravity 9.80665 m/s2
+    // (BIPM SI brochure, 9th edition; international yard and pound agreement of 1959).
+    let cases = [
+        ("423 mm", Dimension::Length, 0.423),
+        ("0.5 in", Dimension::Length, 0.0127),
+        ("207 GPa", Dimension::Pressure, 207e9),
+        ("210000 N/mm2", Dimension::Pressure, 210e9),
+        ("1 psi", Dimension::Pressure, 6_894.757_293_168),
+        ("24 g", Dimension::Mass, 0.024),
+        ("2 g", Dimension::Acceleration, 2.0 * STANDARD_GRAVITY),
+        ("2 %", Dimension::Ratio, 0.02),
+        ("7.85 g/cm³", Dimension::Density, 7850.0),
+        ("0.1 lb/in3", Dimension::Density, 2_767.990_471_02),
+        ("5 kN", Dimension::Force, 5e3),
+        ("1.4e3 kN/m", Dimension::TranslationalStiffness, 1.4e6),
+        ("320 N·m/rad", Dimension::RotationalStiffness, 320.0),
+        (
+            "1 N m/deg",
+            Dimension::RotationalStiffness,
+            57.295_779_513_082,
+        ),
+        ("-2E1kN / rad", Dimension::CouplingStiffness, -2e4),
+        ("10 mV/(m/s²)", Dimension::AccelerationSensitivity, 0.01),
+        (
+            "100 mV/g",
+            Dimension::AccelerationSensitivity,
+            0.1 / 9.80665,
+        ),
+        ("50 mV/Pa", Dimension::PressureSensitivity, 0.05),
+        ("293.15 K", Dimension::Temperature, 20.0),
+        ("68 °F", Dimension::Temperature, 20.0),
+        ("51.2 kHz", Dimension::Rate, 51_200.0),
+        ("9 lbf ft", Dimension::Torque, 12.202_361_534_983),
+        ("17", Dimension::Frequency, 17.0),
+        (" 1_000 µm ", Dimension::Length, 1e-3),
+        ("\u{2212}3 mm", Dimension::Length, -3e-3),
+        (".5 m", Dimension::Length, 0.5),
+    ];
+    for (text, dimension, expected) in cases {
+        let found = parse_quantity(text, dimension).unwrap_or_else(|error| panic!("{error}"));
+        // The expected numbers are written with twelve digits at least.
+        assert!(
+            (found - expected).abs() <= 1e-11 * expected.abs(),
+            "{text}: found {found}, expected {expected}"
+        );
+    }
+}
+
+#[test]
+fn regress_texts_that_are_no_quantities() {
+    type Kind = fn(&QuantityError) -> bool;
+    let no_number: Kind = |error| matches!(error, QuantityError::NoNumber { .. });
+    let unknown: Kind = |error| matches!(error, QuantityError::UnknownUnit { .. });
+    let cases: [(&str, Kind); 12] = [
+        ("", no_number),
+        ("mm", no_number),
+        ("inf", no_number),
+        ("nan m", no_number),
+        ("-", no_number),
+        (".", no_number),
+        ("1 e3 m", unknown),
+        ("1 2 m", unknown),
+        ("1 MM", unknown),
+        ("1,5 m", |error| {
+            matches!(error, QuantityError::DecimalComma { .. })
+        }),
+        ("1e999 m", |error| {
+            matches!(error, QuantityError::TooLarge { .. })
+        }),
+        ("5 GPa", |error| {
+            matches!(
+                error,
+                QuantityError::WrongDimension {
+                    found: Dimension::Pressure,
+                    ..
+                }
+            )
+        }),
+    ];
+    for (text, is_expected) in cases {
+        match parse_quantity(text, Dimension::Length) {
+            Ok(value) => panic!("{text:?} was read as {value} m"),
+            Err(error) => assert!(is_expected(&error), "{text:?}: {error:?}"),
+        }
+    }
+}

@@ -4,17 +4,10 @@
 //! is SI and `f64`. A quantity is read for a [`Dimension`], so "423 kg" is no length, and "g" is a
 //! gram where a mass is wanted and 9.80665 m/s2 where an acceleration is.
 
+mod units;
+
 /// Standard acceleration of free fall (m/s2), the "g" of accelerometers (exact by definition).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
-/// One inch (m), exact by definition.
-const INCH: f64 = 0.0254;
-/// One avoirdupois pound (kg), exact by definition.
-const POUND: f64 = 0.453_592_37;
-/// One pound-force (N): a pound under standard gravity.
-const POUND_FORCE: f64 = POUND * STANDARD_GRAVITY;
-/// One degree of arc (rad).
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
-
 /// What kind of quantity a text is read as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dimension {
@@ -60,193 +53,6 @@ pub enum Dimension {
     ForceSensitivity,
 }
 
-/// A unit: SI value = `factor` times number plus `offset`.
-struct Unit {
-    symbol: &'static str,
-    factor: f64,
-    offset: f64,
-}
-
-/// A unit without an offset, as all are but temperatures.
-const fn unit(symbol: &'static str, factor: f64) -> Unit {
-    Unit {
-        symbol,
-        factor,
-        offset: 0.0,
-    }
-}
-
-// The first unit of each list is the SI unit, which messages quote. Symbols stand here in the
-// form that `normalise` makes of what people write: no blanks, no dots, plain digits.
-const LENGTH: &[Unit] = &[
-    unit("m", 1.0),
-    unit("mm", 1e-3),
-    unit("cm", 1e-2),
-    unit("um", 1e-6),
-    unit("nm", 1e-9),
-    unit("km", 1e3),
-    unit("in", INCH),
-    unit("ft", 12.0 * INCH),
-];
-const PRESSURE: &[Unit] = &[
-    unit("Pa", 1.0),
-    unit("GPa", 1e9),
-    unit("MPa", 1e6),
-    unit("kPa", 1e3),
-    unit("mPa", 1e-3),
-    unit("N/m2", 1.0),
-    unit("N/mm2", 1e6),
-    unit("kN/mm2", 1e9),
-    unit("bar", 1e5),
-    unit("psi", POUND_FORCE / (INCH * INCH)),
-    unit("ksi", 1e3 * POUND_FORCE / (INCH * INCH)),
-    unit("Msi", 1e6 * POUND_FORCE / (INCH * INCH)),
-];
-const DENSITY: &[Unit] = &[
-    unit("kg/m3", 1.0),
-    unit("g/cm3", 1e3),
-    unit("kg/dm3", 1e3),
-    unit("t/m3", 1e3),
-    unit("g/m3", 1e-3),
-    unit("kg/l", 1e3),
-    unit("lb/in3", POUND / (INCH * INCH * INCH)),
-    unit("lb/ft3", POUND / (1728.0 * INCH * INCH * INCH)),
-];
-const MASS: &[Unit] = &[
-    unit("kg", 1.0),
-    unit("g", 1e-3),
-    unit("mg", 1e-6),
-    unit("t", 1e3),
-    unit("lb", POUND),
-    unit("oz", POUND / 16.0),
-];
-const FORCE: &[Unit] = &[
-    unit("N", 1.0),
-    unit("kN", 1e3),
-    unit("mN", 1e-3),
-    unit("MN", 1e6),
-    unit("lbf", POUND_FORCE),
-];
-const FREQUENCY: &[Unit] = &[
-    unit("Hz", 1.0),
-    unit("kHz", 1e3),
-    unit("mHz", 1e-3),
-    unit("MHz", 1e6),
-    unit("1/s", 1.0),
-];
-const RATE: &[Unit] = &[
-    unit("Hz", 1.0),
-    unit("kHz", 1e3),
-    unit("MHz", 1e6),
-    unit("S/s", 1.0),
-    unit("kS/s", 1e3),
-    unit("samples/s", 1.0),
-    unit("1/s", 1.0),
-];
-const TRANSLATIONAL_STIFFNESS: &[Unit] = &[
-    unit("N/m", 1.0),
-    unit("kN/m", 1e3),
-    unit("MN/m", 1e6),
-    unit("GN/m", 1e9),
-    unit("N/mm", 1e3),
-    unit("kN/mm", 1e6),
-    unit("N/um", 1e6),
-    unit("lbf/in", POUND_FORCE / INCH),
-];
-const ROTATIONAL_STIFFNESS: &[Unit] = &[
-    unit("Nm/rad", 1.0),
-    unit("kNm/rad", 1e3),
-    unit("MNm/rad", 1e6),
-    unit("Nmm/rad", 1e-3),
-    unit("Nm/deg", 1.0 / DEGREE),
-    unit("Nm", 1.0),
-    unit("kNm", 1e3),
-    unit("lbfin/rad", POUND_FORCE * INCH),
-];
-const COUPLING_STIFFNESS: &[Unit] = &[
-    unit("N/rad", 1.0),
-    unit("kN/rad", 1e3),
-    unit("MN/rad", 1e6),
-    unit("N", 1.0),
-    unit("kN", 1e3),
-    unit("lbf/rad", POUND_FORCE),
-];
-const RATIO: &[Unit] = &[unit("%", 1e-2), unit("ppm", 1e-6)];
-const TORQUE: &[Unit] = &[
-    unit("Nm", 1.0),
-    unit("kNm", 1e3),
-    unit("mNm", 1e-3),
-    unit("Nmm", 1e-3),
-    unit("Ncm", 1e-2),
-    unit("lbfin", POUND_FORCE * INCH),
-    unit("lbfft", POUND_FORCE * 12.0 * INCH),
-];
-const TEMPERATURE: &[Unit] = &[
-    unit("degC", 1.0),
-    unit("C", 1.0),
-    Unit {
-        symbol: "K",
-        factor: 1.0,
-        offset: -273.15,
-    },
-    Unit {
-        symbol: "degF",
-        factor: 5.0 / 9.0,
-        offset: -160.0 / 9.0,
-    },
-    Unit {
-        symbol: "F",
-        factor: 5.0 / 9.0,
-        offset: -160.0 / 9.0,
-    },
-];
-const ACCELERATION: &[Unit] = &[
-    unit("m/s2", 1.0),
-    unit("g", STANDARD_GRAVITY),
-    unit("mg", 1e-3 * STANDARD_GRAVITY),
-    unit("mm/s2", 1e-3),
-    unit("cm/s2", 1e-2),
-    unit("ft/s2", 12.0 * INCH),
-];
-const VELOCITY: &[Unit] = &[
-    unit("m/s", 1.0),
-    unit("mm/s", 1e-3),
-    unit("cm/s", 1e-2),
-    unit("um/s", 1e-6),
-    unit("km/h", 1.0 / 3.6),
-    unit("in/s", INCH),
-];
-const ACCELERATION_SENSITIVITY: &[Unit] = &[
-    unit("V/(m/s2)", 1.0),
-    unit("mV/g", 1e-3 / STANDARD_GRAVITY),
-    unit("V/g", 1.0 / STANDARD_GRAVITY),
-    unit("mV/(m/s2)", 1e-3),
-    unit("mVs2/m", 1e-3),
-    unit("Vs2/m", 1.0),
-];
-const VELOCITY_SENSITIVITY: &[Unit] = &[
-    unit("V/(m/s)", 1.0),
-    unit("mV/(m/s)", 1e-3),
-    unit("mV/(mm/s)", 1.0),
-    unit("V/(mm/s)", 1e3),
-    unit("mVs/m", 1e-3),
-    unit("Vs/m", 1.0),
-];
-const DISPLACEMENT_SENSITIVITY: &[Unit] = &[
-    unit("V/m", 1.0),
-    unit("V/mm", 1e3),
-    unit("mV/mm", 1.0),
-    unit("mV/um", 1e3),
-    unit("V/um", 1e6),
-];
-const PRESSURE_SENSITIVITY: &[Unit] = &[unit("V/Pa", 1.0), unit("mV/Pa", 1e-3)];
-const FORCE_SENSITIVITY: &[Unit] = &[
-    unit("V/N", 1.0),
-    unit("mV/N", 1e-3),
-    unit("uV/N", 1e-6),
-    unit("mV/lbf", 1e-3 / POUND_FORCE),
-];
-
 impl Dimension {
     /// Every dimension, in the order in which a stray unit is looked for.
     const ALL: [Self; 20] = [
@@ -271,31 +77,6 @@ impl Dimension {
         Self::PressureSensitivity,
         Self::ForceSensitivity,
     ];
-
-    fn units(self) -> &'static [Unit] {
-        match self {
-            Self::Length => LENGTH,
-            Self::Pressure => PRESSURE,
-            Self::Density => DENSITY,
-            Self::Mass => MASS,
-            Self::Force => FORCE,
-            Self::Frequency => FREQUENCY,
-            Self::Rate => RATE,
-            Self::TranslationalStiffness => TRANSLATIONAL_STIFFNESS,
-            Self::RotationalStiffness => ROTATIONAL_STIFFNESS,
-            Self::CouplingStiffness => COUPLING_STIFFNESS,
-            Self::Ratio => RATIO,
-            Self::Torque => TORQUE,
-            Self::Temperature => TEMPERATURE,
-            Self::Acceleration => ACCELERATION,
-            Self::Velocity => VELOCITY,
-            Self::AccelerationSensitivity => ACCELERATION_SENSITIVITY,
-            Self::VelocitySensitivity => VELOCITY_SENSITIVITY,
-            Self::DisplacementSensitivity => DISPLACEMENT_SENSITIVITY,
-            Self::PressureSensitivity => PRESSURE_SENSITIVITY,
-            Self::ForceSensitivity => FORCE_SENSITIVITY,
-        }
-    }
 
     /// The quantity in words, with its article: "a length".
     pub fn in_words(self) -> &'static str {
@@ -329,13 +110,15 @@ impl Dimension {
             Self::Ratio => "",
             Self::RotationalStiffness => "N m/rad",
             Self::Torque => "N m",
-            other => other.units().first().map_or("", |unit| unit.symbol),
+            other => units::units_of(other)
+                .first()
+                .map_or("", |unit| unit.symbol),
         }
     }
 
     /// The symbols this dimension accepts, SI unit first (a ratio has none).
     pub fn allowed_units(self) -> impl Iterator<Item = &'static str> {
-        self.units().iter().map(|unit| unit.symbol)
+        units::units_of(self).iter().map(|unit| unit.symbol)
     }
 
     /// How many SI units one of `symbol` is, or `None` when it is no unit of this dimension or a
@@ -346,8 +129,10 @@ impl Dimension {
             .map(|unit| unit.factor)
     }
 
-    fn find(self, normalised: &str) -> Option<&'static Unit> {
-        self.units().iter().find(|unit| unit.symbol == normalised)
+    fn find(self, normalised: &str) -> Option<&'static units::Unit> {
+        units::units_of(self)
+            .iter()
+            .find(|unit| unit.symbol == normalised)
     }
 
     fn of_unit(normalised: &str) -> Option<Self> {
@@ -409,7 +194,9 @@ fn unit_list(dimension: Dimension) -> String {
 }
 
 fn example_unit(dimension: Dimension) -> &'static str {
-    dimension.units().first().map_or("", |unit| unit.symbol)
+    units::units_of(dimension)
+        .first()
+        .map_or("", |unit| unit.symbol)
 }
 
 /// Reads a number with an optional unit as the SI value of `dimension`; without a unit the number

@@ -1,0 +1,95 @@
+//! `tapjoint identify`: joint stiffness from natural frequencies alone.
+
+use super::Outcome;
+use super::arguments::{FrequencyList, HalfLines, MethodArgument};
+use super::input::{TestFile, read_test};
+use super::terminal::Terminal;
+use anyhow::bail;
+use clap::Args;
+use std::path::PathBuf;
+use tapjoint::description::MeasuredFrequencies;
+
+/// Estimate joint stiffness from natural frequencies alone.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  tapjoint identify test.toml\n  tapjoint identify test.toml --frequencies 17,118,335.6,628.8,994.5 --half-line 0.125"
+)]
+pub(super) struct IdentifyArguments {
+    /// A test description (.toml)
+    #[arg(value_name = "TEST")]
+    test: PathBuf,
+    #[command(flatten)]
+    frequencies: FrequencyArguments,
+    /// How to estimate
+    #[arg(long, value_enum, default_value_t)]
+    method: MethodArgument,
+}
+
+/// Frequencies on the command line.
+#[derive(Debug, Args)]
+pub(super) struct FrequencyArguments {
+    /// Natural frequencies of modes 1, 2, ... (Hz); they replace what TEST says, its bounds included
+    #[arg(long, value_name = "HZ,HZ,...")]
+    frequencies: Option<FrequencyList>,
+    /// Half of the line spacing, one number or one for each frequency (Hz)
+    #[arg(long, value_name = "HZ")]
+    half_line: Option<HalfLines>,
+}
+
+impl FrequencyArguments {
+    /// Puts what the command line says in the place of what the description says.
+    ///
+    /// # Errors
+    /// As many half lines as frequencies, or one, are needed; and half lines need frequencies.
+    pub(super) fn apply(&self, file: &mut TestFile) -> anyhow::Result<()> {
+        if let Some(FrequencyList(frequencies)) = &self.frequencies {
+            file.test.recordings.clear();
+            file.test.measured = Some(MeasuredFrequencies {
+                frequencies: frequencies.clone(),
+                modes: (1..=frequencies.len()).collect(),
+                half_line: None,
+                std: None,
+                scatter: None,
+            });
+        }
+        let Some(HalfLines(half_lines)) = &self.half_line else {
+            return Ok(());
+        };
+        let Some(measured) = &mut file.test.measured else {
+            bail!(
+                "--half-line needs frequencies that were read elsewhere; give --frequencies, or [measured] in {}",
+                file.name
+            );
+        };
+        let count = measured.frequencies.len();
+        measured.half_line = match half_lines.as_slice() {
+            [one] => Some(vec![*one; count]),
+            list if list.len() == count => Some(list.to_vec()),
+            list => bail!(
+                "--half-line has {} values for {count} frequencies; give one, or one for each",
+                list.len()
+            ),
+        };
+        measured.std = None;
+        Ok(())
+    }
+}
+
+/// Reads the description, puts the command line's frequencies into it, and makes sure that there
+/// is something to analyse.
+pub(super) fn resolve(
+    test: &std::path::Path,
+    frequencies: &FrequencyArguments,
+    terminal: &Terminal,
+) -> anyhow::Result<TestFile> {
+    let mut file = read_test(test, terminal)?;
+    frequencies.apply(&mut file)?;
+    file.test.check_has_data(&file.name)?;
+    file.check_recordings()?;
+    Ok(file)
+}
+
+pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    let _file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
+    bail!("`identify` is not connected to the library yet")
+}

@@ -1,0 +1,89 @@
+//! Reading test descriptions from files.
+
+use super::terminal::Terminal;
+use anyhow::{Context, anyhow};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tapjoint::description::TestDescription;
+
+/// A test description and where it was found.
+#[derive(Debug)]
+pub(super) struct TestFile {
+    /// What it says.
+    pub(super) test: TestDescription,
+    /// The file, as the user named it.
+    pub(super) name: String,
+    /// The folder in which its recordings are looked for.
+    pub(super) folder: PathBuf,
+}
+
+/// Reads a test description and passes its warnings on.
+///
+/// # Errors
+/// The file cannot be read, is no UTF-8 text, or is no valid description.
+pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
+    let name = path.display().to_string();
+    let remedy = "give the path of a test description; `tapjoint init` prints one";
+    let bytes =
+        fs::read(path).map_err(|cause| anyhow!("{name}: cannot be read: {cause}; {remedy}"))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let good = error
+            .as_bytes()
+            .get(..error.utf8_error().valid_up_to())
+            .unwrap_or_default();
+        let line = 1 + good.iter().filter(|byte| **byte == b'\n').count();
+        anyhow!("{name}:{line}: not UTF-8 text; a test description is a text file; {remedy}")
+    })?;
+    let test = TestDescription::parse(&text, &name)?;
+    for warning in &test.warnings {
+        terminal.warn(&warning.to_string());
+    }
+    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+    Ok(TestFile { test, name, folder })
+}
+
+impl TestFile {
+    /// The path of a recording that the description names.
+    pub(super) fn path_of(&self, file: &Path) -> PathBuf {
+        self.folder.join(file)
+    }
+
+    /// Makes sure that every recording can be opened, before any work.
+    ///
+    /// # Errors
+    /// The first that cannot, with its line in the description.
+    pub(super) fn check_recordings(&self) -> anyhow::Result<()> {
+        for recording in &self.test.recordings {
+            let path = self.path_of(&recording.file);
+            readable_file(&path)
+                .map_err(|cause| recording.file_error(&self.name, &path, &cause))?;
+        }
+        Ok(())
+    }
+}
+
+/// Makes sure that a file named on the command line can be opened.
+///
+/// # Errors
+/// It cannot; the message says what the system says.
+pub(super) fn check_file(path: &Path) -> anyhow::Result<()> {
+    let readable = readable_file(path).map_err(|cause| anyhow!(cause));
+    readable.with_context(|| format!("{}: cannot be read", path.display()))
+}
+
+fn readable_file(path: &Path) -> Result<(), String> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err("it is a folder".to_owned()),
+        Ok(_) => fs::File::open(path)
+            .map(drop)
+            .map_err(|error| error.to_string()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Whether a file is a test description rather than a recording: by its name, because a
+/// recording may be any text.
+pub(super) fn is_description(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}

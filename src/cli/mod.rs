@@ -1,0 +1,130 @@
+//! The command line: arguments, one file per command, exit codes.
+//!
+//! Each command turns its clap arguments into library types, calls the library, prints and
+//! writes. Exit codes: 0 the question was answered, 1 it has no answer, 2 bad usage or bad input.
+
+mod arguments;
+mod input;
+#[cfg_attr(
+    not(test),
+    expect(dead_code, reason = "the library part is not connected yet")
+)]
+mod output;
+mod terminal;
+
+mod identify;
+mod init;
+mod inspect;
+mod perturb;
+#[expect(dead_code, reason = "the library part is not connected yet")]
+mod predict;
+mod reproduce;
+#[expect(dead_code, reason = "the library part is not connected yet")]
+mod run;
+#[expect(dead_code, reason = "the library part is not connected yet")]
+mod spectrum;
+
+use arguments::CommonArguments;
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+use terminal::Terminal;
+
+/// From hammer taps to joint stiffness.
+///
+/// Takes recordings of hammer taps on a beam (or frequencies read elsewhere), finds the natural
+/// frequencies with their resolution bounds, and estimates the stiffness of the joint that holds
+/// the beam.
+#[derive(Debug, Parser)]
+#[command(
+    name = "tapjoint",
+    version,
+    after_help = "Begin with `tapjoint init > test.toml`, edit it, then `tapjoint run test.toml`.\n\
+                  Exit codes: 0 answered, 1 the question has no answer, 2 bad usage or bad input."
+)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: CommonArguments,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Run(run::RunArguments),
+    Init(init::InitArguments),
+    Inspect(inspect::InspectArguments),
+    Spectrum(spectrum::SpectrumArguments),
+    Identify(identify::IdentifyArguments),
+    Predict(predict::PredictArguments),
+    Perturb(perturb::PerturbArguments),
+    Reproduce(reproduce::ReproduceArguments),
+}
+
+/// What a command came to, when nothing went wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// The question was answered: exit code 0.
+    Answered,
+    /// The question has no answer, and what was found has been written: exit code 1.
+    #[expect(
+        dead_code,
+        reason = "no command that can be without an answer is connected yet"
+    )]
+    NoAnswer,
+}
+
+/// Reads the arguments, runs the command, reports errors; the exit code says how it went.
+pub(super) fn main() -> ExitCode {
+    let line = match CommandLine::try_parse() {
+        Ok(line) => line,
+        Err(usage) => {
+            // Help that nobody reads to its end (`tapjoint --help | head`) is no error.
+            let _ = usage.print();
+            return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
+        }
+    };
+    match run_command(&line) {
+        Ok(Outcome::Answered) => ExitCode::SUCCESS,
+        Ok(Outcome::NoAnswer) => ExitCode::from(1),
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            terminal::print_error(&error);
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
+    line.common.set_threads()?;
+    let terminal = Terminal::new(&line.common)?;
+    match &line.command {
+        Command::Run(arguments) => run::run(arguments, terminal),
+        Command::Init(arguments) => init::run(arguments, terminal),
+        Command::Inspect(arguments) => inspect::run(arguments, terminal),
+        Command::Spectrum(arguments) => spectrum::run(arguments, terminal),
+        Command::Identify(arguments) => identify::run(arguments, terminal),
+        Command::Predict(arguments) => predict::run(arguments, terminal),
+        Command::Perturb(arguments) => perturb::run(arguments, terminal),
+        Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
+    }
+}
+
+/// Whether somebody stopped reading what we print, as `head` does.
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<std::io::Error>()
+            .is_some_and(|io| io.kind() == std::io::ErrorKind::BrokenPipe)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_clap_finds_no_contradiction_in_the_arguments() {
+        use clap::CommandFactory;
+        CommandLine::command().debug_assert();
+    }
+}

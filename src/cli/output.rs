@@ -1,0 +1,337 @@
+//! Files and folders that appear whole or not at all.
+//!
+//! A file is written under a temporary name in its own folder and renamed at the end. A report
+//! folder is filled in a temporary folder: if the report folder is new, that folder is renamed to
+//! it in one step; if it exists, the temporary one lies inside it and its files are renamed one by
+//! one, each replacing its predecessor whole, and files of other names are left alone. The
+//! temporary file or folder is made before any work, which shows that writing will be possible;
+//! when the work fails, it is removed.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use tempfile::{Builder, NamedTempFile, TempDir};
+
+/// Beginning of the names of everything temporary.
+const PREFIX: &str = ".tapjoint-";
+
+/// Why an output cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum OutputError {
+    /// The folder is missing, or nothing may be created in it.
+    #[error("{}: cannot be written: {cause}; choose another place, or make {} a folder that you may write to", path.display(), folder.display())]
+    NotWritable {
+        /// What was to be written.
+        path: PathBuf,
+        /// The folder that refuses.
+        folder: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// A file was wanted and a folder is there, or the other way round.
+    #[error("{}: is {found}, {wanted} is wanted; choose another name", path.display())]
+    WrongKind {
+        /// What was to be written.
+        path: PathBuf,
+        /// What is there.
+        found: &'static str,
+        /// What should be.
+        wanted: &'static str,
+    },
+    /// A file that must not be overwritten.
+    #[error("{}: is read-only; choose another name, or allow writing to it", path.display())]
+    ReadOnly {
+        /// That file.
+        path: PathBuf,
+    },
+    /// Writing failed on the way; nothing half-written is left.
+    #[error("{}: could not be written: {cause}; nothing was changed there", path.display())]
+    Failed {
+        /// What was to be written.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+}
+
+/// A file to be written in one piece.
+#[derive(Debug)]
+pub(super) struct OutputFile {
+    path: PathBuf,
+    target: Target,
+}
+
+#[derive(Debug)]
+enum Target {
+    /// A temporary file beside the real one.
+    Aside(NamedTempFile),
+    /// A device or pipe, which a renamed file would replace.
+    Direct(File),
+}
+
+impl OutputFile {
+    /// Makes sure that `path` can be written, without touching it.
+    ///
+    /// # Errors
+    /// [`OutputError`] when it cannot.
+    pub(super) fn prepare(path: &Path) -> Result<Self, OutputError> {
+        // A link stays a link: what it points to is replaced.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = folder_of(&path);
+        let refuse = |cause| OutputError::NotWritable {
+            path: path.clone(),
+            folder: folder.to_owned(),
+            cause: without_path(cause),
+        };
+        let target = match fs::metadata(&path) {
+            Ok(found) if found.is_dir() => {
+                return Err(OutputError::WrongKind {
+                    path,
+                    found: "a folder",
+                    wanted: "a file",
+                });
+            }
+            Ok(found) if !found.is_file() => {
+                Target::Direct(File::options().write(true).open(&path).map_err(refuse)?)
+            }
+            Ok(found) if found.permissions().readonly() => {
+                return Err(OutputError::ReadOnly { path });
+            }
+            _ => Target::Aside(
+                builder(PREFIX, READABLE_FILE)
+                    .tempfile_in(folder)
+                    .map_err(refuse)?,
+            ),
+        };
+        Ok(Self { path, target })
+    }
+
+    /// Writes the whole file and puts it in its place.
+    ///
+    /// # Errors
+    /// [`OutputError::Failed`]; what was there before is then still there.
+    pub(super) fn write(self, bytes: &[u8]) -> Result<(), OutputError> {
+        let path = self.path;
+        let written = match self.target {
+            Target::Direct(mut file) => file.write_all(bytes).and_then(|()| file.flush()),
+            Target::Aside(mut file) => file
+                .write_all(bytes)
+                .and_then(|()| file.flush())
+                .and_then(|()| file.persist(&path).map(drop).map_err(|error| error.error)),
+        };
+        written.map_err(|cause| OutputError::Failed { path, cause })
+    }
+}
+
+/// A folder of results that is filled aside and published at the end.
+#[derive(Debug)]
+pub(super) struct OutputFolder {
+    path: PathBuf,
+    staging: TempDir,
+}
+
+impl OutputFolder {
+    /// Makes sure that the folder can be made or written to.
+    ///
+    /// # Errors
+    /// [`OutputError`] when it cannot.
+    pub(super) fn prepare(path: &Path) -> Result<Self, OutputError> {
+        // The nearest folder that exists: the output folder itself, or the one it will grow in.
+        let existing = path
+            .ancestors()
+            .map(or_here)
+            .find(|ancestor| ancestor.exists());
+        let existing = existing.unwrap_or(Path::new("."));
+        if !existing.is_dir() {
+            let path = existing.to_owned();
+            return Err(OutputError::WrongKind {
+                path,
+                found: "a file",
+                wanted: "a folder",
+            });
+        }
+        let staging = builder(PREFIX, READABLE_FOLDER)
+            .tempdir_in(existing)
+            .map_err(|cause| OutputError::NotWritable {
+                path: path.to_owned(),
+                folder: existing.to_owned(),
+                cause: without_path(cause),
+            })?;
+        Ok(Self {
+            path: path.to_owned(),
+            staging,
+        })
+    }
+
+    /// Where the files are to be written for the time being.
+    pub(super) fn staging(&self) -> &Path {
+        self.staging.path()
+    }
+
+    /// Moves everything into its place.
+    ///
+    /// # Errors
+    /// [`OutputError::Failed`]; every file is then either the old or the new one, whole.
+    pub(super) fn publish(self) -> Result<(), OutputError> {
+        let moved = if self.path.exists() {
+            self.move_files()
+        } else {
+            self.rename_folder()
+        };
+        moved.map_err(|cause| OutputError::Failed {
+            path: self.path,
+            cause,
+        })
+    }
+
+    fn rename_folder(&self) -> io::Result<()> {
+        fs::create_dir_all(folder_of(&self.path))?;
+        fs::rename(self.staging.path(), &self.path)
+    }
+
+    fn move_files(&self) -> io::Result<()> {
+        let mut files = fs::read_dir(self.staging.path())?.collect::<io::Result<Vec<_>>>()?;
+        files.sort_by_key(fs::DirEntry::file_name);
+        files
+            .iter()
+            .try_for_each(|file| fs::rename(file.path(), self.path.join(file.file_name())))
+    }
+}
+
+/// Modes before the user's umask; temporary files are private by default, results are not.
+const READABLE_FILE: u32 = 0o666;
+const READABLE_FOLDER: u32 = 0o777;
+
+fn builder(prefix: &'static str, mode: u32) -> Builder<'static, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(prefix);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = mode;
+    builder
+}
+
+/// What the system says, without the temporary name that means nothing to anybody.
+fn without_path(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(std::error::Error::source);
+    let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
+    code.map_or(error, io::Error::from_raw_os_error)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    or_here(path.parent().unwrap_or(Path::new("")))
+}
+
+/// The empty path, which stands for the current folder, spelled out.
+fn or_here(path: &Path) -> &Path {
+    if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("the folder exists");
+        let mut names: Vec<_> = entries
+            .map(|entry| {
+                entry
+                    .expect("readable")
+                    .file_name()
+                    .to_string_lossy()
+                    .into_owned()
+            })
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn regress_a_file_appears_whole_and_a_dropped_one_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.json");
+        fs::write(&path, "old").unwrap();
+        drop(OutputFile::prepare(&path).unwrap());
+        assert_eq!(
+            fs::read_to_string(&path).unwrap(),
+            "old",
+            "preparing changed the file"
+        );
+        OutputFile::prepare(&path).unwrap().write(b"new").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
+        assert_eq!(
+            names(folder.path()),
+            ["a.json"],
+            "something temporary was left"
+        );
+    }
+
+    #[test]
+    fn regress_a_new_folder_is_published_with_its_parents() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep/report");
+        drop(OutputFolder::prepare(&path).unwrap());
+        assert_eq!(
+            names(folder.path()),
+            [""; 0],
+            "preparing left something behind"
+        );
+        let output = OutputFolder::prepare(&path).unwrap();
+        fs::write(output.staging().join("report.html"), "x").unwrap();
+        output.publish().unwrap();
+        assert_eq!(names(&path), ["report.html"]);
+        assert_eq!(names(folder.path()), ["deep"]);
+    }
+
+    #[test]
+    fn regress_an_existing_folder_keeps_strangers_and_replaces_ours() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("notes.txt"), "mine").unwrap();
+        fs::write(folder.path().join("report.json"), "old").unwrap();
+        let output = OutputFolder::prepare(folder.path()).unwrap();
+        fs::write(output.staging().join("report.json"), "new").unwrap();
+        output.publish().unwrap();
+        assert_eq!(names(folder.path()), ["notes.txt", "report.json"]);
+        assert_eq!(
+            fs::read_to_string(folder.path().join("report.json")).unwrap(),
+            "new"
+        );
+    }
+
+    #[test]
+    fn regress_files_in_the_way_and_devices() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "x").unwrap();
+        for path in [file.clone(), file.join("below")] {
+            let error = OutputFolder::prepare(&path).expect_err("a file is in the way");
+            assert!(
+                matches!(error, OutputError::WrongKind { .. }),
+                "{path:?}: {error}"
+            );
+        }
+        let error = OutputFile::prepare(folder.path()).expect_err("a folder is in the way");
+        assert!(matches!(error, OutputError::WrongKind { .. }), "{error}");
+        let error = OutputFile::prepare(&folder.path().join("no/such")).expect_err("no folder");
+        assert!(matches!(error, OutputError::NotWritable { .. }), "{error}");
+        #[cfg(unix)]
+        {
+            OutputFile::prepare(Path::new("/dev/null"))
+                .unwrap()
+                .write(b"gone")
+                .unwrap();
+            assert!(
+                !fs::metadata("/dev/null").unwrap().is_file(),
+                "the device was replaced"
+            );
+        }
+    }
+}

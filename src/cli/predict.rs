@@ -1,0 +1,137 @@
+//! `tapjoint predict`: natural frequencies of a known joint.
+
+use super::Outcome;
+use super::arguments::{CrossStiffness, KindArgument, Stiffness};
+use super::input::{TestFile, read_test};
+use super::terminal::Terminal;
+use anyhow::{anyhow, bail};
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use std::path::PathBuf;
+use tapjoint::description::JointKind;
+
+/// Predict the natural frequencies of a beam with a known joint, in Hz and as lambda.
+///
+/// Kx = Kt L^3/(E I), Ky = Kr L/(E I), Kz = Ktr L^2/(E I) are non-dimensional. With --joint
+/// instead of TEST there is no beam, and lambda alone is printed.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  tapjoint predict --joint cantilever --kx 500 --ky 100 --modes 5\n  tapjoint predict test.toml --kx 970.5 --ky 1.251"
+)]
+pub(super) struct PredictArguments {
+    /// A test description (.toml)
+    #[arg(
+        value_name = "TEST",
+        required_unless_present = "joint",
+        conflicts_with = "joint"
+    )]
+    test: Option<PathBuf>,
+    /// Kind of structure, instead of TEST
+    #[arg(long, value_enum, value_name = "KIND")]
+    joint: Option<KindArgument>,
+    /// Translational stiffness, 0 to inf (non-dimensional); default: kt of TEST
+    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true)]
+    kx: Option<Stiffness>,
+    /// Rotational stiffness, 0 to inf (non-dimensional); default: kr of TEST
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
+    ky: Option<Stiffness>,
+    /// Cross-coupling stiffness, negative for a soft root (non-dimensional); default: no coupling
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
+    kz: Option<CrossStiffness>,
+    /// How many modes
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = RangedU64ValueParser::<usize>::new().range(1..=100))]
+    modes: usize,
+}
+
+/// Non-dimensional stiffnesses of a joint: kx and ky from 0 to infinity, 1/kz with 0 for no
+/// coupling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct GivenStiffness {
+    kx: f64,
+    ky: f64,
+    cross_compliance: f64,
+}
+
+/// What the frequencies are wanted of.
+#[derive(Debug)]
+enum Subject {
+    /// A described beam.
+    Test(Box<TestFile>),
+    /// No beam, lambda alone.
+    Kind(JointKind),
+}
+
+/// The arguments, checked.
+#[derive(Debug)]
+struct Request {
+    subject: Subject,
+    stiffness: Option<GivenStiffness>,
+    modes: usize,
+}
+
+fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<Request> {
+    let subject = match (&arguments.test, arguments.joint) {
+        (Some(test), _) => Subject::Test(Box::new(read_test(test, terminal)?)),
+        (None, Some(kind)) => Subject::Kind(kind.into()),
+        (None, None) => bail!("nothing to predict; give a test description, or --joint"),
+    };
+    let kind = match &subject {
+        Subject::Test(file) => file.test.joint.kind,
+        Subject::Kind(kind) => *kind,
+    };
+    let stiffness = given_stiffness(arguments, kind)?;
+    if stiffness.is_none()
+        && matches!(
+            subject,
+            Subject::Kind(JointKind::Cantilever | JointKind::Lap)
+        )
+    {
+        bail!("the joint's stiffness is missing; give --kx and --ky, \"inf\" for no give");
+    }
+    Ok(Request {
+        subject,
+        stiffness,
+        modes: arguments.modes,
+    })
+}
+
+fn given_stiffness(
+    arguments: &PredictArguments,
+    kind: JointKind,
+) -> anyhow::Result<Option<GivenStiffness>> {
+    let Some((Stiffness(kx), Stiffness(ky))) = arguments.kx.zip(arguments.ky) else {
+        return Ok(None);
+    };
+    if kind == JointKind::Free {
+        bail!("a free beam has no joint; leave out --kx, --ky and --kz");
+    }
+    let Some(CrossStiffness(kz)) = arguments.kz else {
+        return Ok(Some(GivenStiffness {
+            kx,
+            ky,
+            cross_compliance: 0.0,
+        }));
+    };
+    if kind == JointKind::Lap {
+        bail!("a lap joint has no coupling stiffness; leave out --kz");
+    }
+    // A passive joint's compliance matrix is positive definite: 1/Kz^2 < 1/(Kx Ky). Taken as a
+    // quotient of roots, because products of large stiffnesses overflow.
+    let ratio = (kx / kz.abs()) * (ky / kz.abs());
+    if kz.is_finite() && (ratio.is_nan() || ratio >= 1.0) {
+        let limit = kx.sqrt() * ky.sqrt();
+        return Err(anyhow!(
+            "--kz {kz} makes the joint a source of energy; its size must exceed sqrt(kx ky) = {limit:.6}"
+        ));
+    }
+    Ok(Some(GivenStiffness {
+        kx,
+        ky,
+        cross_compliance: kz.recip(),
+    }))
+}
+
+pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    let _request = resolve(arguments, &terminal)?;
+    bail!("`predict` is not connected to the library yet")
+}

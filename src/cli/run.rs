@@ -1,0 +1,116 @@
+//! `tapjoint run`: from recordings to the joint, with a report.
+
+use super::Outcome;
+use super::arguments::RecordingArguments;
+use super::input::{TestFile, check_file, is_description, read_test};
+use super::output::OutputFolder;
+use super::terminal::Terminal;
+use anyhow::bail;
+use clap::Args;
+use std::path::PathBuf;
+
+/// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
+///
+/// Writes report.html, report.json, parameters.csv and pictures into a folder.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
+)]
+pub(super) struct RunArguments {
+    /// A test description (.toml), or a bare recording (WAV, CSV)
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Folder of the report; default: <name>-report beside FILE
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArguments,
+}
+
+/// What is to be run.
+#[derive(Debug)]
+enum Subject {
+    /// A described test.
+    Test(Box<TestFile>),
+    /// A bare recording.
+    Recording(PathBuf),
+}
+
+/// The arguments, checked.
+#[derive(Debug)]
+struct Request {
+    subject: Subject,
+    /// Where the report is to appear.
+    output: OutputFolder,
+}
+
+/// Reads the description and checks, before any work, that its recordings can be read and the
+/// report can be written.
+fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Request> {
+    let (subject, name) = if is_description(&arguments.file) {
+        if arguments.recording.hammer.is_some() || arguments.recording.sample_rate.is_some() {
+            bail!(
+                "--hammer and --sample-rate are for bare recordings; a test description says both: `channel` in [hammer], `sample_rate` in [[recording]]"
+            );
+        }
+        let file = read_test(&arguments.file, terminal)?;
+        file.test.check_has_data(&file.name)?;
+        file.check_recordings()?;
+        let name = file.test.name.clone();
+        (Subject::Test(Box::new(file)), name)
+    } else {
+        check_file(&arguments.file)?;
+        let stem = arguments.file.file_stem().unwrap_or_default();
+        (
+            Subject::Recording(arguments.file.clone()),
+            stem.to_string_lossy().into_owned(),
+        )
+    };
+    let beside = || arguments.file.with_file_name(report_folder(&name));
+    let output = OutputFolder::prepare(&arguments.out.clone().unwrap_or_else(beside))?;
+    Ok(Request { subject, output })
+}
+
+/// The folder name that belongs to a test's name. What no file system takes becomes a hyphen.
+fn report_folder(name: &str) -> String {
+    let taken = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
+    let name: String = name
+        .chars()
+        .map(|c| if taken(c) { '-' } else { c })
+        .take(100)
+        .collect();
+    let name = name.trim_matches(|c: char| c == '.' || c.is_whitespace());
+    if name.is_empty() {
+        "test-report".to_owned()
+    } else {
+        format!("{name}-report")
+    }
+}
+
+pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    let _request = resolve(arguments, &terminal)?;
+    bail!("`run` is not connected to the library yet")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn regress_report_folders_have_names_that_can_be_made() {
+        let cases = [
+            (
+                "Cantilever, one-bolt clamp",
+                "Cantilever, one-bolt clamp-report",
+            ),
+            ("../a/b", "-a-b-report"),
+            (" ... ", "test-report"),
+            ("x\ny", "x-y-report"),
+        ];
+        for (name, expected) in cases {
+            assert_eq!(report_folder(name), expected, "{name:?}");
+            assert_eq!(Path::new(expected).components().count(), 1, "{expected:?}");
+        }
+    }
+}

@@ -109,8 +109,8 @@ fn limit_hum_and_noise_speckle_are_no_resonance() {
     );
     let reading = &read_peaks(&level, &[&spectrum], &peaks, Window::Rectangular)[0];
     assert_eq!(
-        reading.label.as_deref(),
-        Some(NO_RESONANCE),
+        reading.label,
+        Some(PeakLabel::NoResonance),
         "a rising oscillation does not decay"
     );
 }

@@ -1,5 +1,7 @@
 //! Integration tests: one module per stage of the pipeline.
 
+#![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
+
 mod cli;
 mod description;
 mod errors;

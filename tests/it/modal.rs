@@ -246,6 +246,6 @@ fn prop_each_mode_comes_from_the_recording_that_resolves_it_best() {
 #[test]
 fn limit_close_modes_of_one_recording_are_never_merged() {
     let pair = vec![reading(125.0, 0.125), reading(125.3, 0.125)];
-    assert_eq!(merge_modes(&[pair.clone()]).len(), 2);
+    assert_eq!(merge_modes(std::slice::from_ref(&pair)).len(), 2);
     assert_eq!(merge_modes(&[pair.clone(), pair]).len(), 2);
 }

@@ -315,15 +315,17 @@ fn prop_smooth_blocks_have_only_small_factors_and_waste_little() {
     for most in [2usize, 17, 997, 25_545, 1 << 20] {
         let block = largest_smooth_block(most).unwrap();
         let mut rest = block;
-        for factor in [2, 3, 5] {
-            while rest % factor == 0 {
+        for factor in [2usize, 3, 5] {
+            while rest.is_multiple_of(factor) {
                 rest /= factor;
             }
         }
         assert_eq!(rest, 1, "{block}");
         // Even 5-smooth numbers are never farther apart than 12.5 % from 16 on.
         assert!(
-            block % 2 == 0 && block <= most && (most < 16 || block as f64 > 0.87 * most as f64)
+            block.is_multiple_of(2)
+                && block <= most
+                && (most < 16 || block as f64 > 0.87 * most as f64)
         );
     }
     assert_eq!(largest_smooth_block(1), None);

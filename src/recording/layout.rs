@@ -240,8 +240,9 @@ impl<'a> Candidate<'a> {
         used.map_or(0, |last| last + 1)
     }
 
-    /// The time column: named t, time, t_* or time_*, and rising in at least half of the steps of the head. (That
-    /// it rises in all of them is checked when the rows are read, and is an error there.)
+    /// The time column: named t, time, t_* or time_*, and rising in at least half of the steps of
+    /// the head. (That it rises in all of them is checked when the rows are read, and is an error
+    /// there.)
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
         let names = |exact: bool| {
             let is_time = move |column: &Column| {

@@ -511,7 +511,7 @@ fn uneven_sampling_is_named_where_it_happens() {
     }
     let message = open_error("time,a\n0,1\n0.001,2\n0.001,3\n");
     assert_message(&message, "tested.dat:4: uneven sampling", &[]);
-    // Every step off by 0.08 % to either side, beyond what rounding explains.
+    // Every step off by 0.04 % to either side, beyond what rounding explains.
     let jitter = |t: f64| format!("{:.12}", t + 4e-7 * (1e3 * t).round().rem_euclid(2.0));
     assert_eq!(
         read_all(timed(3000, 1000.0, jitter), "jitter")[0].len(),

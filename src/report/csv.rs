@@ -4,15 +4,7 @@ use super::ReportError;
 use super::document::{Document, EstimateSection, ModeSection, PairsSection, ValueSection};
 
 /// Columns of `parameters.csv`.
-const PARAMETER_COLUMNS: [&str; 7] = [
-    "parameter",
-    "method",
-    "unit",
-    "value",
-    "std",
-    "low",
-    "high",
-];
+const PARAMETER_COLUMNS: [&str; 7] = ["parameter", "method", "unit", "value", "std", "low", "high"];
 
 /// Columns of `modes.csv`.
 const MODE_COLUMNS: [&str; 13] = [

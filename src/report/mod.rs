@@ -34,7 +34,9 @@ pub struct ReportFile {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The embedded font is damaged.
-    #[error("the font inside the program cannot be read: the program file is damaged, install it again")]
+    #[error(
+        "the font inside the program cannot be read: the program file is damaged, install it again"
+    )]
     Font,
     /// A picture cannot be drawn.
     #[error("the picture \"{picture}\" cannot be drawn: {problem}")]

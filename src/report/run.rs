@@ -103,20 +103,24 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
     for (figure, stem) in figures.iter().zip(&stems) {
         pictures.extend(recording_pictures(figure, stem));
     }
-    pictures.extend(draw_frequencies(document).map(|drawing| Picture {
-        shelf: Shelf::Comparison,
-        name: "frequencies".to_owned(),
-        caption: "Errors of the predicted frequencies. A bar that passes zero means that the \
+    pictures.extend(draw_frequencies(document).map(|drawing| {
+        Picture {
+            shelf: Shelf::Comparison,
+            name: "frequencies".to_owned(),
+            caption: "Errors of the predicted frequencies. A bar that passes zero means that the \
                   reading alone explains the error."
-            .to_owned(),
-        drawing,
+                .to_owned(),
+            drawing,
+        }
     }));
-    pictures.extend(draw_cloud(document).map(|drawing| Picture {
-        shelf: Shelf::Cloud,
-        name: "cloud".to_owned(),
-        caption: "Estimates when the frequencies are changed within what their readings allow."
-            .to_owned(),
-        drawing,
+    pictures.extend(draw_cloud(document).map(|drawing| {
+        Picture {
+            shelf: Shelf::Cloud,
+            name: "cloud".to_owned(),
+            caption: "Estimates when the frequencies are changed within what their readings allow."
+                .to_owned(),
+            drawing,
+        }
     }));
     pictures
 }
@@ -182,5 +186,9 @@ fn stem(file: &str) -> String {
             if plain { c } else { '-' }
         })
         .collect();
-    if safe.is_empty() { "recording".to_owned() } else { safe }
+    if safe.is_empty() {
+        "recording".to_owned()
+    } else {
+        safe
+    }
 }

@@ -49,7 +49,11 @@ impl Axis {
     /// A logarithmic axis; values that are not positive become its lower end.
     pub fn logarithmic(values: (f64, f64), pixels: (f64, f64)) -> Axis {
         let (low, high) = values;
-        let high = if high.is_finite() && high > 0.0 { high } else { 1.0 };
+        let high = if high.is_finite() && high > 0.0 {
+            high
+        } else {
+            1.0
+        };
         let low = if low.is_finite() && low > 0.0 && low < high {
             low
         } else {
@@ -64,7 +68,7 @@ impl Axis {
         }
     }
 
-    /// Pixel of a value, kept inside the axis.
+    /// Pixel of a value, kept inside the axis; what is no number lies at its start.
     pub fn place(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -72,6 +76,7 @@ impl Axis {
                 (value.max(self.low) / self.low).ln() / (self.high / self.low).ln()
             }
         };
+        let share = if share.is_nan() { 0.0 } else { share };
         self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
     }
 
@@ -143,8 +148,12 @@ pub fn nice_step(least: f64) -> f64 {
 
 /// A tick's number; large and small ones with a power of ten.
 fn written(value: f64, step: f64, decimals: usize) -> String {
-    let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
-    let text = if value != 0.0 && (step >= 1e5 || step < 1e-4) {
+    let value = if value.abs() < step * 1e-6 {
+        0.0
+    } else {
+        value
+    };
+    let text = if value != 0.0 && !(1e-4..1e5).contains(&step) {
         let exponent = value.abs().log10().floor();
         let mantissa = value / 10f64.powf(exponent);
         let digits = (exponent - step.log10().floor()).clamp(0.0, 6.0) as usize;

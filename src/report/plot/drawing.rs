@@ -228,13 +228,27 @@ impl Drawing {
     /// Adds a diagonal cross.
     pub fn cross(&mut self, center: Point, radius: f64, stroke: Stroke) {
         let (x, y) = center;
-        self.line(vec![(x - radius, y - radius), (x + radius, y + radius)], stroke);
-        self.line(vec![(x - radius, y + radius), (x + radius, y - radius)], stroke);
+        self.line(
+            vec![(x - radius, y - radius), (x + radius, y + radius)],
+            stroke,
+        );
+        self.line(
+            vec![(x - radius, y + radius), (x + radius, y - radius)],
+            stroke,
+        );
     }
 
     /// Adds text.
     pub fn text(&mut self, text: Text) {
         self.shapes.push(Shape::Text(text));
+    }
+
+    /// Adds text, aligned in the middle, on a patch of paper that hides the lines behind it.
+    pub fn text_on_paper(&mut self, text: Text) {
+        let (x, y) = text.at;
+        let (reach, rise) = (text.width() / 2.0 + 3.0, 0.6 * text.size);
+        self.rectangle((x - reach, y - rise), (x + reach, y + rise), WHITE, 0.9);
+        self.text(text.aligned(Align::Middle));
     }
 
     /// All words of the picture, for tests.

@@ -5,12 +5,7 @@
 /// `centers` are ascending wishes and `widths` the labels' widths (pixels), `gap` the least space
 /// between two. Minimises the sum of squared moves (isotonic regression by pooling neighbours).
 /// Returns `None` when the labels do not fit.
-pub fn spread(
-    centers: &[f64],
-    widths: &[f64],
-    gap: f64,
-    bounds: (f64, f64),
-) -> Option<Vec<f64>> {
+pub fn spread(centers: &[f64], widths: &[f64], gap: f64, bounds: (f64, f64)) -> Option<Vec<f64>> {
     let count = centers.len().min(widths.len());
     let total: f64 = widths.iter().take(count).sum::<f64>() + gap * (count.max(1) - 1) as f64;
     if total > bounds.1 - bounds.0 {

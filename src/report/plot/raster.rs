@@ -31,7 +31,7 @@ fn encode(drawing: &Drawing, pixels: &[u8]) -> Result<Vec<u8>, png::EncodingErro
     encoder.set_depth(png::BitDepth::Eight);
     // Flat colours compress best unfiltered against the line above.
     encoder.set_filter(png::FilterType::Up);
-    encoder.set_compression(png::Compression::Fast);
+    encoder.set_compression(png::Compression::Default);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(pixels)?;
     writer.finish()?;
@@ -85,7 +85,9 @@ impl Canvas<'_> {
                 color,
             } => self.dot(*center, *radius, *color),
             Shape::Text(text) => {
-                font::cover(text, |x, y, coverage| self.blend(x, y, text.color, coverage));
+                font::cover(text, |x, y, coverage| {
+                    self.blend(x, y, text.color, coverage)
+                });
             }
         }
     }
@@ -187,10 +189,17 @@ impl Mask {
         let length2 = dx * dx + dy * dy;
         let steep = dy.abs() > dx.abs();
         let (major, minor) = if steep { (dy, dx) } else { (dx, dy) };
-        let (major_start, minor_start) = if steep { (from.1, from.0) } else { (from.0, from.1) };
+        let (major_start, minor_start) = if steep {
+            (from.1, from.0)
+        } else {
+            (from.0, from.1)
+        };
         let slope = if major == 0.0 { 0.0 } else { minor / major };
         let reach = (half_width + 0.5) * (1.0 + slope * slope).sqrt() + 1.0;
-        let ends = (major_start.min(major_start + major), major_start.max(major_start + major));
+        let ends = (
+            major_start.min(major_start + major),
+            major_start.max(major_start + major),
+        );
         let first = (ends.0 - half_width - 1.0).floor() as i32;
         let last = (ends.1 + half_width + 1.0).ceil() as i32;
         for step in first..=last {

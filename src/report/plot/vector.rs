@@ -95,7 +95,12 @@ fn put(backend: &mut SVGBackend<'_>, shape: &Shape) -> Result<(), String> {
             to,
             color,
             opacity,
-        } => backend.draw_rect(place(*from), place(*to), &style(*color, *opacity, 1.0), true),
+        } => backend.draw_rect(
+            place(*from),
+            place(*to),
+            &style(*color, *opacity, 1.0),
+            true,
+        ),
         Shape::Dot {
             center,
             radius,

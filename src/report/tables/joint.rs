@@ -116,12 +116,7 @@ pub fn parameters(document: &Document) -> Option<Table> {
 
 /// The pair regression's values; `None` where it was not done.
 pub fn pairs(document: &Document) -> Option<Table> {
-    let pairs = document
-        .estimate
-        .as_ref()?
-        .as_ref()?
-        .pairs
-        .as_ref()?;
+    let pairs = document.estimate.as_ref()?.as_ref()?.pairs.as_ref()?;
     let rows = [
         ("Kx", pairs.kx, 1.0, "1"),
         ("Ky", pairs.ky, 1.0, "1"),
@@ -144,9 +139,10 @@ pub fn pairs(document: &Document) -> Option<Table> {
                 vec![name.to_owned(), value, unit.to_owned()]
             })
             .collect(),
-        note: "Closure: the product of stiffnesses that the regression implies against the product \
+        note:
+            "Closure: the product of stiffnesses that the regression implies against the product \
                of its own estimates; far from 0 the model does not fit."
-            .to_owned(),
+                .to_owned(),
     })
 }
 
@@ -157,7 +153,9 @@ pub fn prediction(document: &Document) -> Option<Table> {
         .iter()
         .map(|row| {
             let bound = reading_bound(document, row.mode);
-            let percent = bound.zip(row.measured).map(|(bound, hz)| 100.0 * bound / hz);
+            let percent = bound
+                .zip(row.measured)
+                .map(|(bound, hz)| 100.0 * bound / hz);
             let hertz = |value: Option<f64>| match bound {
                 Some(_) => like(value, bound),
                 None => optional(value, 6),

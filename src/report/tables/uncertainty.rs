@@ -1,7 +1,7 @@
 //! Tables of how far the estimate moves when the frequencies do.
 
 use super::super::document::{Document, EstimateSection, SensitivitySection};
-use super::super::format::{MISSING, optional, signed_percent, significant};
+use super::super::format::{MISSING, optional, signed, signed_percent, significant};
 use super::{Column, Table, number, reading_bound, words};
 
 /// The non-dimensional values that changes are counted from.
@@ -37,7 +37,7 @@ pub fn perturbation(document: &Document) -> Option<Table> {
     let rows = rows
         .iter()
         .map(|row| {
-            let mut cells = vec![signed_percent(Some(row.percent)), row.method.clone()];
+            let mut cells = vec![signed(row.percent), row.method.clone()];
             let base = base(document, &row.method);
             for (value, base) in [row.kx, row.ky, row.kz].into_iter().zip(base) {
                 cells.push(optional(value, 5));
@@ -109,11 +109,8 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
         return None;
     }
     let with_kz = list.iter().any(|row| row.kz_percent.is_some());
-    let mut columns: Vec<Column> = vec![
-        number("Mode"),
-        number("Bound (Hz)"),
-        number("Reading (%)"),
-    ];
+    let mut columns: Vec<Column> =
+        vec![number("Mode"), number("Bound (Hz)"), number("Reading (%)")];
     for name in names(with_kz) {
         columns.push(number(&format!("{name} moves (%)")));
     }
@@ -146,14 +143,20 @@ fn reading_percent(document: &Document, row: &SensitivitySection) -> String {
     let mode = modes.iter().find(|mode| mode.mode == Some(row.mode));
     let known = mode.filter(|_| reading_bound(document, row.mode).is_some());
     known.map_or(MISSING.to_owned(), |mode| {
-        format!("\u{b1}{}", significant(100.0 * row.half_line / mode.frequency, 2))
+        format!(
+            "\u{b1}{}",
+            significant(100.0 * row.half_line / mode.frequency, 2)
+        )
     })
 }
 
 /// "Kx hangs on mode 4, Ky on mode 1."
 pub fn drivers(list: &[SensitivitySection], with_kz: bool) -> String {
-    let pick: [fn(&SensitivitySection) -> Option<f64>; 3] =
-        [|row| row.kx_percent, |row| row.ky_percent, |row| row.kz_percent];
+    let pick: [fn(&SensitivitySection) -> Option<f64>; 3] = [
+        |row| row.kx_percent,
+        |row| row.ky_percent,
+        |row| row.kz_percent,
+    ];
     let sentences: Vec<String> = names(with_kz)
         .iter()
         .zip(pick)

@@ -272,10 +272,13 @@ fn spectra(lines: Lines, peaks: Vec<PeakMark>) -> SpectraFigure {
         .iter()
         .map(|f| 0.021 * (-(f / 1300.0).powi(2)).exp() + 1e-6)
         .collect();
-    let frfs: Vec<FrfCurve> = [("A", [1.0, 0.7, 0.6, 0.9, 0.8]), ("B", [0.4, -0.8, 0.5, -0.3, 0.6])]
-        .iter()
-        .map(|(name, shape)| frf(name, shape, &lines, &mut random))
-        .collect();
+    let frfs: Vec<FrfCurve> = [
+        ("A", [1.0, 0.7, 0.6, 0.9, 0.8]),
+        ("B", [0.4, -0.8, 0.5, -0.3, 0.6]),
+    ]
+    .iter()
+    .map(|(name, shape)| frf(name, shape, &lines, &mut random))
+    .collect();
     let responses = frfs
         .iter()
         .map(|frf| Curve {
@@ -322,7 +325,10 @@ fn frf(name: &str, shape: &[f64; 5], lines: &Lines, random: &mut ChaCha8Rng) -> 
         form: "accelerance".into(),
         unit: "(m/s\u{b2})/N".into(),
         magnitude: values.iter().map(|(re, im)| re.hypot(*im)).collect(),
-        phase: values.iter().map(|(re, im)| im.atan2(*re).to_degrees()).collect(),
+        phase: values
+            .iter()
+            .map(|(re, im)| im.atan2(*re).to_degrees())
+            .collect(),
     }
 }
 

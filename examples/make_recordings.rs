@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &JointStiffness::two_parameter(1400.0, 4.8),
         20,
     )?;
-    let damping = [0.012, 0.006, 0.005, 0.004];
+    let damping = [0.012, 0.009, 0.005, 0.004];
     let usual = TapTestSettings::default();
     make(
         &cantilever,
@@ -79,7 +79,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &[0.006, 0.004, 0.003],
         &Recipe {
             file: "recordings/lap-joint/taps.wav",
-            positions: (0.015, &[0.585, 0.235]),
+            positions: (0.01, &[0.59, 0.21]),
             settings: TapTestSettings {
                 interval: 3.0,
                 pulse: 1e-3,

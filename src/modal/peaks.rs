@@ -138,19 +138,32 @@ fn local_maxima(level: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// Height over the higher of the two lowest points between the peak and the next higher ground (or
-/// the end of the axis).
+/// Height over the higher of the two lowest points between the peak and the next higher ground. A
+/// side that meets the end of the axis before higher ground says nothing: the band just ends there,
+/// perhaps on the flank. The highest peak of all stands over the lower of its two sides.
 fn prominence(level: &[f64], index: usize) -> f64 {
     let height = level[index];
-    let valley = |values: &mut dyn Iterator<Item = &f64>| {
-        values
-            .take_while(|&&v| v <= height)
-            .copied()
-            .fold(height, f64::min)
-    };
-    let left = valley(&mut level[..index].iter().rev());
-    let right = valley(&mut level[index + 1..].iter());
-    height - left.max(right)
+    let (left, left_ends) = valley(level[..index].iter().rev(), height);
+    let (right, right_ends) = valley(level[index + 1..].iter(), height);
+    height
+        - match (left_ends, right_ends) {
+            (true, false) => right,
+            (false, true) => left,
+            (true, true) => left.min(right),
+            (false, false) => left.max(right),
+        }
+}
+
+/// Lowest point before higher ground, and whether the axis ended before there was any.
+fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
+    let mut lowest = height;
+    for &level in side {
+        if level > height {
+            return (lowest, false);
+        }
+        lowest = lowest.min(level);
+    }
+    (lowest, true)
 }
 
 /// Height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the

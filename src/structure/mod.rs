@@ -25,6 +25,7 @@ pub mod roots;
 pub mod timoshenko;
 
 mod banded;
+mod element;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::JointStiffness;

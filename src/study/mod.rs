@@ -1,1 +1,3 @@
-//! Stage.
+//! Studies that need both sides: the published paper's tables beside ours.
+
+pub mod paper;

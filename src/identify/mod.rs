@@ -26,7 +26,7 @@ pub use pairs::{
     estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,
 };
 pub use perturbation::Stiffnesses;
-pub use predict::{PredictedMode, predict, predict_lambdas};
+pub use predict::{PredictedMode, compare, predict, predict_lambdas};
 
 use crate::structure::StructureError;
 

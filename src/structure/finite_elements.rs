@@ -217,9 +217,25 @@ impl FiniteElementModel {
 
     /// Adds a mass (kg) at a position (m) from the joint or the left end, anywhere on an element.
     /// Of a lap joint, the joint's own place belongs to the right half.
-    #[must_use]
-    pub fn with_point_mass(mut self, position: f64, mass: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`StructureError::OffBeam`] for a position outside, [`StructureError::NotPositive`] for a
+    /// negative mass.
+    pub fn with_point_mass(mut self, position: f64, mass: f64) -> Result<Self, StructureError> {
         let place = position / self.units.length;
+        // A sensor at the very end may have been rounded beyond it.
+        if !(0.0..=1.0 + 1e-9).contains(&place) {
+            return Err(StructureError::OffBeam {
+                position,
+                length: self.units.length,
+            });
+        }
+        if !(mass >= 0.0 && mass.is_finite()) {
+            return Err(StructureError::NotPositive {
+                quantity: "point mass",
+                value: mass,
+            });
+        }
         let found = self.pieces.iter().rev().find(|piece| piece.start <= place);
         if let Some(piece) = found.copied() {
             let along = (place - piece.start) / piece.element.length;
@@ -231,7 +247,7 @@ impl FiniteElementModel {
             let nodes = self.element_equations(&piece, index);
             scatter(&mut self.mass, &nodes, &matrix);
         }
-        self
+        Ok(self)
     }
 
     /// The lowest `count` natural frequencies (Hz), ascending, without rigid-body motions.

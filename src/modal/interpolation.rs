@@ -46,7 +46,7 @@ const REWEIGHTINGS: usize = 3;
 /// The lines within the half-power width, at least two to either side, take part.
 /// `added_decay` is the exponential window's (1/s); `room` how many lines to either side belong to
 /// this peak alone. `None` when there are too few lines, or the pole lies farther from the peak than
-/// a line and half the half-power width.
+/// a line and the half-power reach: the background of other modes pulls a weak peak that far.
 pub fn interpolate_pole(
     lines: &Lines,
     spectra: &[&[Complex64]],
@@ -62,7 +62,7 @@ pub fn interpolate_pole(
     let narrower = fit_pole(spectra, peak, (reach / 2).max(1)).unwrap_or(fit);
     // Resolution, not line spacing, is the measure of "near": zero padding must not tighten it.
     let line = lines.resolution().max(lines.spacing) / lines.spacing;
-    if !fit.pole.is_finite() || fit.pole.re.abs() > line + 0.5 * half_width as f64 {
+    if !fit.pole.is_finite() || fit.pole.re.abs() > line + half_width as f64 {
         return None;
     }
     let damped = lines.frequency(peak) + fit.pole.re * lines.spacing;
@@ -78,7 +78,8 @@ pub fn interpolate_pole(
     })
 }
 
-/// Lines from the peak to where the summed power has fallen by half, on the farther side.
+/// Lines from the peak to where the summed power has fallen by half, on the nearer side: on the
+/// farther one a neighbour may hold it up.
 fn half_power_reach(spectra: &[&[Complex64]], peak: usize) -> Option<usize> {
     let power = |line: usize| -> Option<f64> {
         spectra
@@ -90,7 +91,7 @@ fn half_power_reach(spectra: &[&[Complex64]], peak: usize) -> Option<usize> {
     let above = |line: Option<usize>| line.and_then(power).is_some_and(|p| p > half);
     let right = (1..MOST_REACH).find(|&k| !above(Some(peak + k)))?;
     let left = (1..MOST_REACH).find(|&k| !above(peak.checked_sub(k)))?;
-    Some(left.max(right))
+    Some(left.min(right))
 }
 
 #[derive(Clone, Copy)]
@@ -102,9 +103,11 @@ struct PoleFit {
 }
 
 fn fit_pole(spectra: &[&[Complex64]], peak: usize, reach: usize) -> Option<PoleFit> {
-    let first = peak.checked_sub(reach)?;
-    let last = peak + reach;
-    if spectra.is_empty() || spectra.iter().any(|spectrum| last >= spectrum.len()) {
+    // Near the ends of the axis the lines that are there must do.
+    let points = spectra.iter().map(|spectrum| spectrum.len()).min()?;
+    let first = peak.saturating_sub(reach);
+    let last = (peak + reach).min(points.checked_sub(1)?);
+    if last < first + 2 * LEAST_REACH.min(reach) {
         return None;
     }
     let offsets: Vec<f64> = (first..=last).map(|k| k as f64 - peak as f64).collect();

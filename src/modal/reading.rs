@@ -41,12 +41,23 @@ pub fn read_peaks(
 
 /// A peak that stands out by less than this (dB) must be read within its half line to count.
 const CLEAR_PROMINENCE: f64 = 8.0;
+/// From this height over the noise on (dB), noise does not make peaks any more.
+const CLEAR_OF_NOISE: f64 = 30.0;
+/// Least prominence (dB) for the same where nothing is known of the noise.
+const CLEAR_WHEN_BLIND: f64 = 20.0;
 
-/// Whether the fitted oscillation decays beyond doubt (two standard deviations).
+/// Whether the fitted oscillation decays beyond doubt: by two standard deviations where the peak is
+/// clear of the noise, by five where it is not. Speckle of noise and reverberation is as narrow as
+/// the record allows, with a decay that is zero within its uncertainty.
 fn is_resonance(found: &Interpolation, peak: &Peak, half_line: f64) -> bool {
+    let clear = match peak.above_noise_db {
+        Some(above) => above >= CLEAR_OF_NOISE,
+        None => peak.prominence_db >= CLEAR_WHEN_BLIND,
+    };
+    let deviations = if clear { 2.0 } else { 5.0 };
     let decays = found
         .damping_ratio
-        .is_some_and(|ratio| ratio > 2.0 * found.damping_std);
+        .is_some_and(|ratio| ratio > deviations * found.damping_std);
     decays && (peak.prominence_db >= CLEAR_PROMINENCE || found.bound < half_line)
 }
 

@@ -13,12 +13,14 @@
 
 pub mod estimate;
 pub mod free_beam;
+pub mod pairing;
 pub mod pairs;
 pub mod perturbation;
 pub mod predict;
 
 pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
 pub use free_beam::{FreeBeamEstimate, estimate_modulus};
+pub use pairing::pair_by_frequency;
 pub use pairs::{
     Doubt, ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap,
     estimate_pairs, estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,

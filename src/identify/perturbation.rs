@@ -214,16 +214,7 @@ pub fn sign_pattern_spans(
         take(&nominal);
     }
     let mut failed = 0;
-    for pattern in 0..patterns {
-        let shifted: Vec<f64> = frequencies
-            .iter()
-            .zip(bounds)
-            .enumerate()
-            .map(|(index, (frequency, bound))| {
-                let up = pattern >> index & 1 == 1;
-                frequency + if up { *bound } else { -bound }
-            })
-            .collect();
+    for shifted in sign_patterns(frequencies, bounds) {
         match estimator(&shifted) {
             Some(estimate) => take(&estimate),
             None => failed += 1,
@@ -234,6 +225,25 @@ pub fn sign_pattern_spans(
         spans.kz = None;
     }
     Ok(spans)
+}
+
+/// The frequencies (Hz) under each of the 2^n combinations of +bound and -bound (Hz), for at most as
+/// many modes as a machine word has bits.
+pub fn sign_patterns<'a>(
+    frequencies: &'a [f64],
+    bounds: &'a [f64],
+) -> impl Iterator<Item = Vec<f64>> + 'a {
+    (0..1usize << frequencies.len()).map(move |pattern| {
+        frequencies
+            .iter()
+            .zip(bounds)
+            .enumerate()
+            .map(|(index, (frequency, bound))| {
+                let up = pattern >> index & 1 == 1;
+                frequency + if up { *bound } else { -bound }
+            })
+            .collect()
+    })
 }
 
 fn widen(span: &mut Option<Span>, value: f64) {

@@ -1,7 +1,117 @@
 //! The whole chain as one library call.
+//!
+//! ```text
+//! test.toml -> recordings -> taps -> spectra -> readings      (measure, per recording)
+//!           -> one list of numbered modes                      (modes)
+//!           -> joint, prediction, perturbation                 (identification)
+//! ```
+//!
+//! [`run_test`] is that chain; [`run_recording`] stops after the readings. Nothing here prints or
+//! writes.
+
+mod analysis;
+mod identification;
 mod measure;
+mod model;
+mod modes;
+mod recordings;
 mod stage;
 mod warning;
 
+use std::path::Path;
+
+use rayon::prelude::*;
+
+pub use analysis::{
+    Analysis, BoundPerturbation, Estimate, Identification, ModeResult, Overview, Perturbation,
+    RecordingResult, Response,
+};
+pub use identification::{IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
+pub use model::{KnownJoint, TestedStructure, tested_structure};
+pub use modes::{modes_of_measured, modes_of_recordings};
+pub use recordings::{PipelineError, measure_bare};
 pub use warning::Warning;
+
+use crate::description::{ChannelRef, TestDescription};
+use crate::recording::Recording;
+
+/// Runs a described test: its recordings, or the frequencies it gives.
+///
+/// `place` is the folder in which recordings are looked for and the description's own name, for
+/// messages. `settings.fit_modes` yields to the description's.
+///
+/// # Errors
+/// Recordings that cannot be read or analysed. Too few taps or modes are no errors: the analysis
+/// then says what is missing.
+pub fn run_test(
+    test: &TestDescription,
+    place: (&Path, &str),
+    settings: &IdentifySettings,
+) -> Result<Analysis, PipelineError> {
+    let structure = tested_structure(test);
+    // In parallel, but collected in the description's order.
+    let mut recordings = test
+        .recordings
+        .par_iter()
+        .map(|recording| recordings::measure_described(test, recording, place))
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut warnings: Vec<Warning> = test
+        .warnings
+        .iter()
+        .map(|warning| Warning::Description {
+            text: warning.to_string(),
+        })
+        .collect();
+    warnings.extend(
+        recordings
+            .iter()
+            .flat_map(|r| r.measurement.warnings.iter().cloned()),
+    );
+    let modes = match &test.measured {
+        Some(measured) => modes_of_measured(measured, &structure),
+        None => {
+            let reference = modes::reference_configuration(test, &recordings);
+            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, &structure);
+            warnings.extend(doubts);
+            found
+        }
+    };
+    warnings.extend(warning::of_neglect(test, &structure));
+    let settings = IdentifySettings {
+        fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
+        percents: settings.percents.clone(),
+    };
+    let (identification, doubts) = identify(&structure, &modes, &settings);
+    warnings.extend(doubts);
+    Ok(Analysis {
+        name: test.name.clone(),
+        structure: Some(structure),
+        recordings,
+        modes,
+        identification: Some(identification),
+        warnings,
+    })
+}
+
+/// Takes a bare recording as far as it goes: taps, spectra, readings. `adjust` may change the
+/// defaults of the measurement.
+///
+/// # Errors
+/// An unknown hammer channel, an unreadable recording, a band or block that does not fit.
+pub fn run_recording(
+    recording: Recording,
+    hammer: Option<&ChannelRef>,
+    adjust: impl FnOnce(&mut MeasureSettings),
+) -> Result<Analysis, PipelineError> {
+    let mut recording = measure_bare(recording, hammer, adjust)?;
+    let modes = modes::modes_of_bare(&mut recording);
+    Ok(Analysis {
+        name: recording.file.clone(),
+        structure: None,
+        warnings: recording.measurement.warnings.clone(),
+        modes,
+        identification: None,
+        recordings: vec![recording],
+    })
+}

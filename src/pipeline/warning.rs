@@ -3,9 +3,12 @@
 use std::fmt;
 
 use super::measure::MeasuredSpectra;
+use super::model::TestedStructure;
+use crate::description::TestDescription;
 use crate::modal::PeakLabel;
 use crate::recording::Recording;
 use crate::spectral::{RUNG_DOWN, Window};
+use crate::structure::BeamTheory;
 use crate::taps::{TapSource, Taps};
 
 /// A warning that travels with the result.
@@ -67,6 +70,15 @@ pub enum Warning {
         /// Product implied over product of the estimates, minus 1.
         closure: f64,
     },
+    /// The frequencies do not show a cross coupling.
+    CouplingNotEstablished,
+    /// Peaks were left without a mode.
+    Unpaired {
+        /// How many.
+        count: usize,
+        /// Why.
+        text: String,
+    },
     /// The regression left something that no joint can have.
     UnphysicalEstimate {
         /// What is wrong with it.
@@ -100,6 +112,8 @@ impl Warning {
             Warning::HannOnTaps { .. } => "hann-on-taps",
             Warning::Mains { .. } => "mains",
             Warning::Closure { .. } => "closure",
+            Warning::CouplingNotEstablished => "coupling-not-established",
+            Warning::Unpaired { .. } => "unpaired",
             Warning::UnphysicalEstimate { .. } => "unphysical",
             Warning::Misfit { .. } => "misfit",
             Warning::Neglected { .. } => "neglected",
@@ -170,6 +184,11 @@ impl fmt::Display for Warning {
                  not to be trusted singly",
                 100.0 * closure
             ),
+            Warning::CouplingNotEstablished => f.write_str(
+                "the interval of the cross coupling contains zero: these frequencies do not show one, \
+                 and Kz has no interval; the two-parameter model may do",
+            ),
+            Warning::Unpaired { count, text } => write!(f, "{count} peak(s) belong to no mode: {text}"),
             Warning::UnphysicalEstimate { what } => write!(
                 f,
                 "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
@@ -258,4 +277,54 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
         }
     }
     warnings
+}
+
+/// What the pair regression leaves out of the described structure.
+pub(super) fn of_neglect(test: &TestDescription, structure: &TestedStructure) -> Vec<Warning> {
+    let mut texts = Vec::new();
+    if structure.regression.is_some() {
+        let mass: f64 = test.sensors.iter().filter_map(|sensor| sensor.mass).sum();
+        if mass > 0.0 {
+            texts.push(format!(
+                "the pair regression neglects the mass of the sensors, {:.3} g or {:.1} % of the beam, \
+                 which lowers the frequencies and thereby the stiffnesses it finds",
+                1e3 * mass,
+                100.0 * mass / structure.beam.mass()
+            ));
+        }
+        if structure.theory == BeamTheory::Timoshenko {
+            texts.push(
+                "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
+                 includes both, so that its errors show what that neglects"
+                    .to_string(),
+            );
+        }
+        if structure.known.any() {
+            texts.push(
+                "the pair regression cannot hold a stiffness at its known value: it estimates all of \
+                 them, and the prediction uses the known ones"
+                    .to_string(),
+            );
+        }
+    }
+    let joint = &test.joint;
+    if joint.overlap.is_some() || joint.right.is_some() || off_centre(test) {
+        texts.push(
+            "the lap joint's model takes two equal halves joined in the middle: overlap, position and \
+             different properties of the right half are left out"
+                .to_string(),
+        );
+    }
+    texts
+        .into_iter()
+        .map(|text| Warning::Neglected { text })
+        .collect()
+}
+
+/// Whether a lap joint sits off the middle by more than a thousandth of the length.
+fn off_centre(test: &TestDescription) -> bool {
+    let middle = 0.5 * test.beam.length;
+    test.joint
+        .position
+        .is_some_and(|position| (position - middle).abs() > 1e-3 * test.beam.length)
 }

@@ -196,6 +196,12 @@ impl Recording {
         &self.channels
     }
 
+    /// The same recording under another name, the one its description uses.
+    pub fn renamed(mut self, name: impl Into<String>) -> Self {
+        self.name = name.into();
+        self
+    }
+
     /// Mean of a channel (its unit): the offset that spectra leave out; 0 for an unknown channel.
     pub fn mean(&self, channel: usize) -> f64 {
         self.channels

@@ -1,4 +1,62 @@
 //! Words and pictures: JSON, CSV, HTML and PNG of a finished analysis. Computes no result.
+//!
+//! Everything is returned as bytes with a name; the command line writes the files.
 
+mod convert;
+mod convert_figures;
 pub mod document;
 pub mod figures;
+pub mod format;
+pub mod html;
+pub mod plot;
+pub mod summary;
+pub mod tables;
+pub mod text;
+
+mod csv;
+mod json;
+mod run;
+
+pub use convert::document as document_of;
+pub use convert_figures::figures as figures_of;
+pub use csv::{render_modes_csv, render_parameters_csv};
+pub use html::render_html;
+pub use json::render_json;
+pub use run::{render_frf_png, render_run, render_spectrum_png};
+pub use text::render_text;
+
+/// A finished file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReportFile {
+    /// Name without folder.
+    pub name: String,
+    /// Content.
+    pub bytes: Vec<u8>,
+}
+
+/// What keeps a report from being written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The embedded font is damaged.
+    #[error(
+        "the font inside the program cannot be read: the program file is damaged, install it again"
+    )]
+    Font,
+    /// A picture cannot be drawn.
+    #[error("the picture \"{picture}\" cannot be drawn: {problem}")]
+    Picture {
+        /// What it shows.
+        picture: String,
+        /// Why not.
+        problem: String,
+    },
+    /// The document cannot be serialised.
+    #[error("report.json cannot be written: {0}")]
+    Json(serde_json::Error),
+    /// A table cannot be written.
+    #[error("the table cannot be written as CSV: {0}")]
+    Csv(::csv::Error),
+    /// The page cannot be written.
+    #[error("report.html cannot be written: {0}")]
+    Html(askama::Error),
+}

@@ -1,0 +1,141 @@
+//! What the chain leaves: plain data, for the report and for callers.
+
+use super::measure::Measurement;
+use super::model::TestedStructure;
+use super::warning::Warning;
+use crate::identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
+use crate::identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Stiffnesses};
+use crate::modal::ModeReading;
+use crate::recording::ChannelHealth;
+
+/// A finished analysis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Analysis {
+    /// Name of the test.
+    pub name: String,
+    /// The structure; `None` for a bare recording.
+    pub structure: Option<TestedStructure>,
+    /// The recordings, in the order of the description.
+    pub recordings: Vec<RecordingResult>,
+    /// Resonances of the reference configuration, ascending: the first recording and all others
+    /// with its sensor positions and tap level.
+    pub modes: Vec<ModeResult>,
+    /// What the modes say about the joint; `None` for a bare recording.
+    pub identification: Option<Identification>,
+    /// What a reader has to know.
+    pub warnings: Vec<Warning>,
+}
+
+/// One recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingResult {
+    /// File as the description names it.
+    pub file: String,
+    /// Sample rate (Hz).
+    pub sample_rate: f64,
+    /// Length (s).
+    pub seconds: f64,
+    /// Health of every channel in the file.
+    pub health: Vec<ChannelHealth>,
+    /// Whether there is a hammer channel.
+    pub has_hammer: bool,
+    /// The responses analysed.
+    pub responses: Vec<Response>,
+    /// The analysed zoom band (Hz), where one was asked for.
+    pub band: Option<(f64, f64)>,
+    /// Taps, spectra, readings.
+    pub measurement: Measurement,
+    /// Numbers of the modes that this recording's readings belong to, one for each reading.
+    pub mode_numbers: Vec<Option<usize>>,
+    /// The channel on which taps were found, over time.
+    pub overview: Overview,
+}
+
+/// A response channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    /// The sensor's name, or the channel's.
+    pub name: String,
+    /// What it senses; `None` where nobody said.
+    pub kind: Option<crate::description::SensorKind>,
+}
+
+/// Smallest and largest value in equal pieces of a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overview {
+    /// Length of a piece (s).
+    pub step: f64,
+    /// Smallest value of each piece (unit of the channel, its mean taken out).
+    pub low: Vec<f64>,
+    /// Largest value of each piece.
+    pub high: Vec<f64>,
+}
+
+/// One resonance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeResult {
+    /// The model's number; `None` for a peak that belongs to no mode.
+    pub mode: Option<usize>,
+    /// Best frequency (Hz).
+    pub frequency: f64,
+    /// Bound of a line reading (Hz), where known.
+    pub half_line: Option<f64>,
+    /// Standard uncertainty of the best frequency (Hz), where known.
+    pub std: Option<f64>,
+    /// The reading behind it; `None` for frequencies read elsewhere.
+    pub reading: Option<ModeReading>,
+    /// File of the recording it was read from.
+    pub recording: Option<String>,
+    /// What a peak that is no mode is.
+    pub label: Option<String>,
+    /// Non-dimensional frequency of an Euler beam (1), where there is a beam.
+    pub lambda: Option<f64>,
+}
+
+/// What the modes say about joint or material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// The estimate; `None` with a reason.
+    pub estimate: Option<Estimate>,
+    /// Why there is no estimate.
+    pub reason: Option<String>,
+    /// Predicted beside measured frequencies; empty where no joint can be predicted with.
+    pub prediction: Vec<PredictedMode>,
+    /// How errors in the frequencies move the estimate.
+    pub perturbation: Option<Perturbation>,
+}
+
+/// An estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Estimate {
+    /// A joint, by the pair regression.
+    Joint(Box<JointEstimate>),
+    /// A free beam's material.
+    FreeBeam(FreeBeamEstimate),
+}
+
+/// How errors in the frequencies move the joint's estimate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Perturbation {
+    /// All frequencies up and down by a percentage.
+    pub uniform: Vec<UniformPerturbation>,
+    /// Average errors of the percentages as Ingole & Chatterjee state them.
+    pub averages: Vec<crate::identify::perturbation::AverageError>,
+    /// Under each mode's own bound; `None` where no bounds are known.
+    pub bounds: Option<BoundPerturbation>,
+}
+
+/// The estimate under the bounds of the readings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoundPerturbation {
+    /// Mode numbers.
+    pub modes: Vec<usize>,
+    /// Bound of each (Hz).
+    pub bounds: Vec<f64>,
+    /// Spans over all sign patterns; `None` for more modes than can be tried.
+    pub spans: Option<SignPatternSpans>,
+    /// All estimates over the patterns.
+    pub cloud: Vec<Stiffnesses>,
+    /// Which mode drives which parameter.
+    pub sensitivities: Vec<ModeSensitivity>,
+}

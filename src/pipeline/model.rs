@@ -1,0 +1,101 @@
+//! From what the description says to what the theory takes.
+
+use crate::description::{self, JointKind, KnownStiffness, TestDescription};
+use crate::identify::PairsModel;
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness};
+
+/// Poisson's ratio where the description is silent: that of most metals.
+const USUAL_POISSON: f64 = 0.3;
+
+/// The described structure in the theory's terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestedStructure {
+    /// The beam.
+    pub beam: Beam,
+    /// How it is held.
+    pub assembly: Assembly,
+    /// Beam theory of the prediction.
+    pub theory: BeamTheory,
+    /// Form of the pair regression; `None` for a free beam.
+    pub regression: Option<PairsModel>,
+    /// Known stiffnesses (1), which are compared instead of fitted.
+    pub known: KnownJoint,
+}
+
+/// Stiffnesses that the description gives, non-dimensional; infinite = rigid.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct KnownJoint {
+    /// Kx (1).
+    pub kx: Option<f64>,
+    /// Ky (1).
+    pub ky: Option<f64>,
+    /// 1/Kz (1).
+    pub cross_compliance: Option<f64>,
+}
+
+impl KnownJoint {
+    /// Whether anything is known.
+    pub fn any(&self) -> bool {
+        self.kx.is_some() || self.ky.is_some() || self.cross_compliance.is_some()
+    }
+
+    /// `joint`, with what is known in the place of its stiffnesses.
+    pub fn over(&self, joint: Option<JointStiffness>) -> Option<JointStiffness> {
+        Some(JointStiffness {
+            kx: self.kx.or(joint.map(|joint| joint.kx))?,
+            ky: self.ky.or(joint.map(|joint| joint.ky))?,
+            cross_compliance: self
+                .cross_compliance
+                .or(joint.map(|joint| joint.cross_compliance))
+                .unwrap_or(0.0),
+        })
+    }
+}
+
+/// The structure that a test description describes.
+pub fn tested_structure(test: &TestDescription) -> TestedStructure {
+    let beam = Beam {
+        length: test.beam.length,
+        width: test.beam.width,
+        thickness: test.beam.thickness,
+        modulus: test.beam.modulus,
+        density: test.beam.density,
+        poisson: test.beam.poisson.unwrap_or(USUAL_POISSON),
+    };
+    let (assembly, regression) = match (test.joint.kind, test.joint.model) {
+        (JointKind::Free, _) => (Assembly::Free, None),
+        (JointKind::Lap, _) => (Assembly::Lap, Some(PairsModel::Lap)),
+        (JointKind::Cantilever, description::JointModel::TwoParameter) => {
+            (Assembly::Cantilever, Some(PairsModel::TwoParameter))
+        }
+        (JointKind::Cantilever, description::JointModel::ThreeParameter) => {
+            (Assembly::Cantilever, Some(PairsModel::ThreeParameter))
+        }
+    };
+    TestedStructure {
+        beam,
+        assembly,
+        theory: match test.joint.beam {
+            description::BeamTheory::Timoshenko => BeamTheory::Timoshenko,
+            description::BeamTheory::Euler => BeamTheory::Euler,
+        },
+        regression,
+        known: known_joint(test, &beam),
+    }
+}
+
+fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
+    let units = StiffnessUnits::of(beam);
+    let in_units = |known: Option<KnownStiffness>, unit: f64| {
+        known.map(|known| match known {
+            KnownStiffness::Value(value) => value / unit,
+            KnownStiffness::Rigid => f64::INFINITY,
+        })
+    };
+    KnownJoint {
+        kx: in_units(test.joint.kt, units.kt),
+        ky: in_units(test.joint.kr, units.kr),
+        cross_compliance: in_units(test.joint.ktr, units.ktr).map(f64::recip),
+    }
+}

@@ -1,0 +1,260 @@
+//! One list of numbered modes from several recordings, or from frequencies read elsewhere.
+
+use super::analysis::{ModeResult, RecordingResult};
+use super::model::TestedStructure;
+use super::warning::Warning;
+use crate::description::{MeasuredFrequencies, TestDescription};
+use crate::identify::pair_by_frequency;
+use crate::modal::{ModeReading, merge_modes};
+use crate::structure::{Assembly, JointStiffness, natural_frequencies};
+
+/// Recordings count as tapped at the same level when their median peak forces differ by less than
+/// this factor.
+const SAME_LEVEL: f64 = 2.0;
+
+/// A free beam's modes are told by their nominal frequencies within this relative distance: a
+/// modulus wrong by 40 % is still recognised, the next mode is not mistaken for it.
+const FREE_BEAM_TOLERANCE: f64 = 0.2;
+
+/// So many modes of a free beam are looked for.
+const FREE_BEAM_MODES: usize = 30;
+
+/// Indices of the recordings of the reference configuration: the first, and all others with its
+/// sensor positions and tap level.
+pub(super) fn reference_configuration(
+    test: &TestDescription,
+    recordings: &[RecordingResult],
+) -> Vec<usize> {
+    let level = |recording: &RecordingResult| median_force(recording);
+    let Some(first) = recordings.first() else {
+        return Vec::new();
+    };
+    (0..recordings.len())
+        .filter(|&index| {
+            let same_places = match (test.recordings.first(), test.recordings.get(index)) {
+                (Some(a), Some(b)) => a.at == b.at,
+                _ => true,
+            };
+            let same_level = match (level(first), level(&recordings[index])) {
+                (Some(a), Some(b)) => (a / b).max(b / a) < SAME_LEVEL,
+                _ => true,
+            };
+            same_places && same_level
+        })
+        .collect()
+}
+
+/// Median peak force of the accepted taps; `None` without a hammer or tap.
+fn median_force(recording: &RecordingResult) -> Option<f64> {
+    if !recording.has_hammer {
+        return None;
+    }
+    let mut peaks: Vec<f64> = recording
+        .measurement
+        .taps
+        .accepted()
+        .map(|tap| tap.peak)
+        .collect();
+    peaks.sort_by(f64::total_cmp);
+    peaks.get(peaks.len() / 2).copied()
+}
+
+/// Merges the readings of the `reference` recordings and numbers them; every recording's own
+/// readings get the number of the mode they belong to.
+pub fn modes_of_recordings(
+    recordings: &mut [RecordingResult],
+    reference: &[usize],
+    structure: &TestedStructure,
+) -> (Vec<ModeResult>, Vec<Warning>) {
+    let merged = merge_modes(&readings_of(recordings, reference));
+    let mut modes: Vec<ModeResult> = merged
+        .into_iter()
+        .map(|mode| {
+            let file = reference
+                .get(mode.recording)
+                .map(|&index| recordings[index].file.clone());
+            let lambda = Some(structure.beam.lambda_of(mode.reading.frequency));
+            ModeResult {
+                lambda,
+                ..from_reading(mode.reading, file)
+            }
+        })
+        .collect();
+    let warnings = number(&mut modes, structure);
+    for recording in recordings.iter_mut() {
+        recording.mode_numbers = own_readings(recording)
+            .iter()
+            .map(|reading| nearest_number(&modes, reading))
+            .collect();
+    }
+    (modes, warnings)
+}
+
+/// The readings of a bare recording, numbered as they come.
+pub(super) fn modes_of_bare(recording: &mut RecordingResult) -> Vec<ModeResult> {
+    let file = Some(recording.file.clone());
+    let mut modes: Vec<ModeResult> = own_readings(recording)
+        .into_iter()
+        .map(|reading| from_reading(reading, file.clone()))
+        .collect();
+    number_in_order(&mut modes);
+    recording.mode_numbers = modes.iter().map(|mode| mode.mode).collect();
+    modes
+}
+
+/// The frequencies that the description gives.
+pub fn modes_of_measured(
+    measured: &MeasuredFrequencies,
+    structure: &TestedStructure,
+) -> Vec<ModeResult> {
+    measured
+        .frequencies
+        .iter()
+        .enumerate()
+        .map(|(index, &frequency)| {
+            let of =
+                |values: &Option<Vec<f64>>| values.as_ref().and_then(|v| v.get(index)).copied();
+            let half_line = of(&measured.half_line);
+            ModeResult {
+                mode: measured.modes.get(index).copied(),
+                frequency,
+                half_line,
+                std: standard_uncertainty(
+                    frequency,
+                    half_line,
+                    of(&measured.std),
+                    measured.scatter,
+                ),
+                reading: None,
+                recording: None,
+                label: None,
+                lambda: Some(structure.beam.lambda_of(frequency)),
+            }
+        })
+        .collect()
+}
+
+/// std^2 = half_line^2/3 + (scatter f)^2, or the stated std with the scatter added; `None` when
+/// nothing is stated. A uniform distribution of half width h has the variance h^2/3.
+fn standard_uncertainty(
+    frequency: f64,
+    half_line: Option<f64>,
+    std: Option<f64>,
+    scatter: Option<f64>,
+) -> Option<f64> {
+    let reading = std
+        .map(|std| std * std)
+        .or(half_line.map(|half| half * half / 3.0));
+    let repeat = scatter.map(|scatter| (scatter * frequency).powi(2));
+    if reading.is_none() && repeat.is_none() {
+        return None;
+    }
+    Some((reading.unwrap_or(0.0) + repeat.unwrap_or(0.0)).sqrt())
+}
+
+fn own_readings(recording: &RecordingResult) -> Vec<ModeReading> {
+    recording
+        .measurement
+        .spectra
+        .as_ref()
+        .map_or(Vec::new(), |spectra| spectra.readings.clone())
+}
+
+fn readings_of(recordings: &[RecordingResult], which: &[usize]) -> Vec<Vec<ModeReading>> {
+    which
+        .iter()
+        .map(|&index| own_readings(&recordings[index]))
+        .collect()
+}
+
+fn from_reading(reading: ModeReading, recording: Option<String>) -> ModeResult {
+    ModeResult {
+        mode: None,
+        frequency: reading.frequency,
+        half_line: Some(reading.half_line),
+        std: reading.std,
+        label: reading.label.map(|label| label.to_string()),
+        recording,
+        lambda: None,
+        reading: Some(reading),
+    }
+}
+
+/// Numbers the modes: a free beam's by their nominal frequencies, where any is near one; else in
+/// ascending order.
+fn number(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning> {
+    if structure.assembly == Assembly::Free {
+        let free: Vec<usize> = (0..modes.len())
+            .filter(|&i| modes[i].label.is_none())
+            .collect();
+        let measured: Vec<f64> = free.iter().map(|&i| modes[i].frequency).collect();
+        let nominal = natural_frequencies(
+            structure.theory,
+            &structure.beam,
+            Assembly::Free,
+            &JointStiffness::FREE,
+            FREE_BEAM_MODES,
+        )
+        .unwrap_or_default();
+        let numbers = pair_by_frequency(&measured, &nominal, FREE_BEAM_TOLERANCE);
+        if numbers.iter().any(Option::is_some) {
+            return apply_numbers(modes, &free, &numbers);
+        }
+    }
+    number_in_order(modes);
+    Vec::new()
+}
+
+fn apply_numbers(
+    modes: &mut [ModeResult],
+    which: &[usize],
+    numbers: &[Option<usize>],
+) -> Vec<Warning> {
+    let mut unpaired = 0;
+    for (&index, &number) in which.iter().zip(numbers) {
+        modes[index].mode = number;
+        if number.is_none() {
+            modes[index].label = Some("unpaired".to_string());
+            unpaired += 1;
+        }
+    }
+    let text = "none of the free beam's natural frequencies lies near them; another direction of \
+                bending, torsion, the supports or the room are the usual causes"
+        .to_string();
+    if unpaired > 0 {
+        vec![Warning::Unpaired {
+            count: unpaired,
+            text,
+        }]
+    } else {
+        Vec::new()
+    }
+}
+
+fn number_in_order(modes: &mut [ModeResult]) {
+    for (index, mode) in modes
+        .iter_mut()
+        .filter(|mode| mode.label.is_none())
+        .enumerate()
+    {
+        mode.mode = Some(index + 1);
+    }
+}
+
+/// The number of the mode that a reading belongs to: the nearest within their half lines together
+/// and 1 % (what another sensor position or tap level moves a frequency).
+fn nearest_number(modes: &[ModeResult], reading: &ModeReading) -> Option<usize> {
+    if reading.label.is_some() {
+        return None;
+    }
+    let distance = |mode: &ModeResult| (mode.frequency - reading.frequency).abs();
+    modes
+        .iter()
+        .filter(|mode| mode.mode.is_some())
+        .filter(|mode| {
+            let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
+            distance(mode) <= half_lines + 0.01 * mode.frequency
+        })
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .and_then(|mode| mode.mode)
+}

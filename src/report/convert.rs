@@ -1,0 +1,279 @@
+//! From a finished analysis to the document and the data of the pictures.
+
+use super::document::{
+    Document, EstimateSection, ModeSection, PairsSection, PerturbationSection, PredictionSection,
+    RecordingSection, ResolutionSpanSection, SensitivitySection, TapSection, TestSection, VERSION,
+    ValueSection, WarningSection,
+};
+use crate::identify::perturbation::{Span, UniformPerturbation};
+use crate::identify::{FreeBeamEstimate, JointEstimate, PairsModel, PredictedMode, Uncertain};
+use crate::modal::ModeReading;
+use crate::pipeline::{
+    Analysis, BoundPerturbation, Estimate, Identification, ModeResult, RecordingResult,
+    TestedStructure, Warning,
+};
+use crate::spectral::Window;
+use crate::structure::{Assembly, BeamTheory};
+
+/// The document of a whole analysis.
+pub fn document(analysis: &Analysis) -> Document {
+    let identification = analysis.identification.as_ref();
+    let perturbation = identification.and_then(|found| found.perturbation.as_ref());
+    let given = analysis.recordings.is_empty();
+    Document {
+        version: VERSION,
+        test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
+        recordings: (!given).then(|| analysis.recordings.iter().map(recording_section).collect()),
+        modes: Some(analysis.modes.iter().map(mode_section).collect()),
+        estimate: identification.map(estimate_section),
+        estimate_reason: identification.and_then(|found| found.reason.clone()),
+        prediction: identification
+            .map(|found| found.prediction.iter().map(prediction_section).collect()),
+        perturbation: perturbation
+            .map(|found| found.uniform.iter().map(perturbation_section).collect()),
+        resolution_span: perturbation
+            .and_then(|found| found.bounds.as_ref())
+            .map(span_section),
+        warnings: analysis.warnings.iter().map(warning_section).collect(),
+    }
+}
+
+fn test_section(name: &str, structure: Option<&TestedStructure>) -> TestSection {
+    let Some(structure) = structure else {
+        return TestSection {
+            name: name.to_string(),
+            ..Default::default()
+        };
+    };
+    let (kind, model) = match (structure.assembly, structure.regression) {
+        (Assembly::Free, _) => ("free", None),
+        (Assembly::Lap, _) => ("lap", Some("2p")),
+        (Assembly::Cantilever, Some(PairsModel::ThreeParameter)) => ("cantilever", Some("3p")),
+        (Assembly::Cantilever, _) => ("cantilever", Some("2p")),
+    };
+    TestSection {
+        name: name.to_string(),
+        kind: Some(kind.to_string()),
+        model: model.map(str::to_string),
+        beam_theory: Some(theory_name(structure.theory).to_string()),
+        length: Some(structure.beam.length),
+        bending_stiffness: Some(structure.beam.bending_stiffness()),
+        mass_per_length: Some(structure.beam.mass_per_length()),
+    }
+}
+
+fn theory_name(theory: BeamTheory) -> &'static str {
+    match theory {
+        BeamTheory::Timoshenko => "timoshenko",
+        BeamTheory::Euler => "euler",
+    }
+}
+
+fn recording_section(recording: &RecordingResult) -> RecordingSection {
+    let spectra = recording.measurement.spectra.as_ref();
+    let lines = spectra.map(|spectra| spectra.averages.lines);
+    let decay = spectra.map(|spectra| spectra.window.added_decay());
+    let modes = spectra.map_or(Vec::new(), |spectra| {
+        spectra
+            .readings
+            .iter()
+            .zip(&recording.mode_numbers)
+            .map(|(reading, &mode)| ModeSection {
+                mode,
+                recording: Some(recording.file.clone()),
+                ..reading_section(reading)
+            })
+            .collect()
+    });
+    RecordingSection {
+        file: recording.file.clone(),
+        sample_rate: recording.sample_rate,
+        channels: recording.health.len(),
+        seconds: recording.seconds,
+        taps: tap_sections(recording),
+        line_spacing: lines.map(|lines| lines.spacing),
+        resolution: lines.map(|lines| lines.resolution()),
+        half_line: lines.map(|lines| lines.half_line()),
+        block: lines.map(|lines| lines.block),
+        lines: lines.map(|lines| lines.displayed()),
+        averages: spectra.map_or(0, |spectra| spectra.averages.taps),
+        band: lines.map(|lines| [lines.low, lines.high]),
+        window: spectra.map(|spectra| spectra.window.name().to_string()),
+        window_decay: spectra
+            .filter(|spectra| matches!(spectra.window, Window::Exponential { .. }))
+            .and(decay),
+        remaining_at_end: spectra.map(|spectra| spectra.decay.remaining),
+        modes,
+    }
+}
+
+fn tap_sections(recording: &RecordingResult) -> Vec<TapSection> {
+    let taps = &recording.measurement.taps.taps;
+    let force = |peak: f64| recording.has_hammer.then_some(peak);
+    taps.iter()
+        .map(|tap| TapSection {
+            time: tap.time,
+            peak_force: force(tap.peak),
+            peak_response: if recording.has_hammer {
+                None
+            } else {
+                Some(tap.peak)
+            },
+            accepted: tap.accepted(),
+            reason: tap.rejection.as_ref().map(ToString::to_string),
+        })
+        .collect()
+}
+
+fn reading_section(reading: &ModeReading) -> ModeSection {
+    let method = if reading.interpolated.is_some() {
+        "interpolated"
+    } else {
+        "line"
+    };
+    ModeSection {
+        mode: None,
+        frequency: reading.frequency,
+        method: method.to_string(),
+        line_frequency: Some(reading.line_frequency),
+        half_line: Some(reading.half_line),
+        interpolated_frequency: reading.interpolated,
+        interpolated_bound: reading.bound,
+        std: reading.std,
+        damping: reading.damping_ratio,
+        damping_std: reading.damping_std,
+        lambda: None,
+        prominence_db: Some(reading.prominence_db),
+        above_noise_db: reading.above_noise_db,
+        recording: None,
+        label: reading.label.map(|label| label.to_string()),
+    }
+}
+
+fn mode_section(mode: &ModeResult) -> ModeSection {
+    let reading = match &mode.reading {
+        Some(reading) => reading_section(reading),
+        None => ModeSection {
+            method: "given".to_string(),
+            ..Default::default()
+        },
+    };
+    ModeSection {
+        mode: mode.mode,
+        frequency: mode.frequency,
+        half_line: mode.half_line,
+        std: mode.std,
+        lambda: mode.lambda,
+        recording: mode.recording.clone(),
+        label: mode.label.clone(),
+        ..reading
+    }
+}
+
+fn estimate_section(found: &Identification) -> Option<EstimateSection> {
+    match found.estimate.as_ref()? {
+        Estimate::Joint(joint) => Some(joint_section(joint)),
+        Estimate::FreeBeam(free) => Some(free_section(free)),
+    }
+}
+
+fn joint_section(joint: &JointEstimate) -> EstimateSection {
+    let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
+    EstimateSection {
+        method: "pairs".to_string(),
+        modes_used: joint.modes_used.clone(),
+        reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
+        kx: value(joint.kx),
+        ky: value(joint.ky),
+        kz: value(joint.kz),
+        coupling: value(joint.coupling),
+        kt: value(joint.kt),
+        kr: value(joint.kr),
+        ktr: value(joint.ktr),
+        pairs: Some(PairsSection {
+            kx: joint.pairs.kx,
+            ky: joint.pairs.ky,
+            kz: joint.pairs.kz,
+            closure: joint.pairs.closure,
+        }),
+        ..Default::default()
+    }
+}
+
+fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
+    EstimateSection {
+        method: "free-beam".to_string(),
+        modes_used: free.modes_used.clone(),
+        modulus: value(Some(free.modulus)),
+        density: value(Some(free.density)),
+        ..Default::default()
+    }
+}
+
+fn value(found: Option<Uncertain>) -> Option<ValueSection> {
+    found.map(|found| ValueSection {
+        value: found.value,
+        std: found.std,
+        low: found.low,
+        high: found.high,
+    })
+}
+
+fn prediction_section(mode: &PredictedMode) -> PredictionSection {
+    PredictionSection {
+        mode: mode.mode,
+        measured: mode.measured,
+        predicted: Some(mode.predicted),
+        lambda: Some(mode.lambda),
+        error_percent: mode.error_percent,
+        used: mode.used,
+    }
+}
+
+fn perturbation_section(row: &UniformPerturbation) -> PerturbationSection {
+    PerturbationSection {
+        percent: row.percent,
+        method: "pairs".to_string(),
+        kx: row.estimate.map(|estimate| estimate.kx),
+        ky: row.estimate.map(|estimate| estimate.ky),
+        kz: row.estimate.and_then(|estimate| estimate.kz),
+    }
+}
+
+fn span_section(found: &BoundPerturbation) -> ResolutionSpanSection {
+    let ends = |span: Option<Span>| span.map(|span| [span.low, span.high]);
+    let spans = found.spans.as_ref();
+    ResolutionSpanSection {
+        patterns: spans.map_or(0, |spans| spans.patterns),
+        failed: spans.map_or(0, |spans| spans.failed),
+        kx: ends(spans.and_then(|spans| spans.kx)),
+        ky: ends(spans.and_then(|spans| spans.ky)),
+        kz: ends(spans.and_then(|spans| spans.kz)),
+        cloud: found
+            .cloud
+            .iter()
+            .map(|estimate| [estimate.kx, estimate.ky])
+            .collect(),
+        sensitivity: found
+            .sensitivities
+            .iter()
+            .map(|row| {
+                let change = row.percent_per_bound;
+                SensitivitySection {
+                    mode: found.modes.get(row.index).copied().unwrap_or(0),
+                    half_line: found.bounds.get(row.index).copied().unwrap_or(0.0),
+                    kx_percent: change.map(|change| change.kx),
+                    ky_percent: change.map(|change| change.ky),
+                    kz_percent: change.and_then(|change| change.kz),
+                }
+            })
+            .collect(),
+    }
+}
+
+fn warning_section(warning: &Warning) -> WarningSection {
+    WarningSection {
+        code: warning.code().to_string(),
+        text: warning.to_string(),
+    }
+}

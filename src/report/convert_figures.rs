@@ -1,0 +1,130 @@
+//! The data of the pictures, from a finished analysis.
+
+use num_complex::Complex64;
+
+use super::figures::{
+    Curve, FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TapMark, TimeOverview,
+};
+use crate::description::SensorKind;
+use crate::pipeline::{Analysis, MeasuredSpectra, RecordingResult, Response};
+
+/// One set of pictures for each recording.
+pub fn figures(analysis: &Analysis) -> Vec<RecordingFigure> {
+    analysis.recordings.iter().map(recording_figure).collect()
+}
+
+fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
+    let taps = recording
+        .measurement
+        .taps
+        .taps
+        .iter()
+        .map(|tap| TapMark {
+            time: tap.time,
+            peak: tap.peak,
+            rejected: tap.rejection.as_ref().map(ToString::to_string),
+        })
+        .collect();
+    let label = match recording.responses.first() {
+        _ if recording.has_hammer => "force (N)".to_string(),
+        Some(first) => format!("response {} ({})", first.name, unit(first.kind)),
+        None => "response".to_string(),
+    };
+    RecordingFigure {
+        file: recording.file.clone(),
+        overview: TimeOverview {
+            label,
+            step: recording.overview.step,
+            low: recording.overview.low.clone(),
+            high: recording.overview.high.clone(),
+            taps,
+        },
+        spectra: recording
+            .measurement
+            .spectra
+            .as_ref()
+            .map(|spectra| spectra_figure(recording, spectra)),
+    }
+}
+
+fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> SpectraFigure {
+    let averages = &spectra.averages;
+    let named = |response: &Response| match response.kind {
+        Some(kind) => format!("{}, {}", response.name, words(kind)),
+        None => response.name.clone(),
+    };
+    SpectraFigure {
+        lines: averages.lines,
+        averages: averages.taps,
+        force: averages.force.clone(),
+        responses: recording
+            .responses
+            .iter()
+            .zip(&averages.responses)
+            .map(|(response, values)| Curve {
+                name: named(response),
+                unit: format!("{} s", unit(response.kind)),
+                values: values.clone(),
+            })
+            .collect(),
+        frfs: averages.h1.as_ref().map_or(Vec::new(), |h1| {
+            recording
+                .responses
+                .iter()
+                .zip(h1)
+                .map(|(response, h1)| frf(response, h1))
+                .collect()
+        }),
+        peaks: spectra
+            .readings
+            .iter()
+            .zip(&recording.mode_numbers)
+            .map(|(reading, &mode)| PeakMark {
+                mode,
+                frequency: reading.frequency,
+                line_frequency: reading.line_frequency,
+                half_line: reading.half_line,
+                label: reading.label.map(|label| label.to_string()),
+            })
+            .collect(),
+    }
+}
+
+fn frf(response: &Response, h1: &[Complex64]) -> FrfCurve {
+    let form = match response.kind {
+        Some(SensorKind::Acceleration) => "accelerance",
+        Some(SensorKind::Velocity) => "mobility",
+        Some(SensorKind::Displacement) => "receptance",
+        Some(SensorKind::Sound) => "sound pressure per force",
+        None => "response per force",
+    };
+    FrfCurve {
+        name: response.name.clone(),
+        form: form.to_string(),
+        unit: match response.kind {
+            Some(_) => format!("({})/N", unit(response.kind)),
+            None => "units of the file".to_string(),
+        },
+        magnitude: h1.iter().map(|value| value.norm()).collect(),
+        phase: h1.iter().map(|value| value.arg().to_degrees()).collect(),
+    }
+}
+
+fn unit(kind: Option<SensorKind>) -> &'static str {
+    match kind {
+        Some(SensorKind::Acceleration) => "m/s2",
+        Some(SensorKind::Velocity) => "m/s",
+        Some(SensorKind::Displacement) => "m",
+        Some(SensorKind::Sound) => "Pa",
+        None => "unit of the file",
+    }
+}
+
+fn words(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Acceleration => "acceleration",
+        SensorKind::Velocity => "velocity",
+        SensorKind::Displacement => "displacement",
+        SensorKind::Sound => "sound pressure",
+    }
+}

@@ -1,0 +1,196 @@
+//! Numbers as readers want them: the digits follow the uncertainty.
+
+/// Shown where a value does not exist.
+pub const MISSING: &str = "\u{2013}";
+/// Shown for a stiffness without bound.
+pub const RIGID: &str = "\u{221e} (rigid)";
+/// Digits of a value whose uncertainty is unknown.
+const DIGITS: i32 = 4;
+/// Largest magnitude written without a power of ten.
+const PLAIN_LARGEST: f64 = 1e7;
+/// Smallest step of the last digit written without a power of ten.
+const PLAIN_SMALLEST: f64 = 1e-7;
+
+/// A value and its uncertainty, rounded to the same digit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rounded {
+    /// The value.
+    pub value: String,
+    /// The uncertainty with two significant digits; `None` where unknown.
+    pub uncertainty: Option<String>,
+}
+
+impl Rounded {
+    /// "17.0030 ± 0.0041", or the value alone.
+    pub fn joined(&self) -> String {
+        match &self.uncertainty {
+            Some(uncertainty) => format!("{} \u{b1} {uncertainty}", self.value),
+            None => self.value.clone(),
+        }
+    }
+}
+
+/// Rounds `value` to the second significant digit of `uncertainty` (same unit).
+///
+/// An uncertainty that is unknown, zero or not finite leaves four significant digits of the value.
+pub fn rounded(value: f64, uncertainty: Option<f64>) -> Rounded {
+    let known = uncertainty.filter(|u| u.is_finite() && *u > 0.0);
+    match known {
+        Some(uncertainty) if value.is_finite() => {
+            let place = last_place(uncertainty, 2);
+            let (value, uncertainty) = at_place_together(value, uncertainty, place);
+            Rounded {
+                value,
+                uncertainty: Some(uncertainty),
+            }
+        }
+        _ => Rounded {
+            value: significant(value, DIGITS),
+            uncertainty: None,
+        },
+    }
+}
+
+/// A value with the given number of significant digits; "–" for NaN, "∞" beyond all bounds.
+pub fn significant(value: f64, digits: i32) -> String {
+    if value.is_nan() {
+        return MISSING.to_owned();
+    }
+    if value.is_infinite() {
+        return if value > 0.0 {
+            "\u{221e}"
+        } else {
+            "\u{2212}\u{221e}"
+        }
+        .to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    at_place(value, last_place(value, digits))
+}
+
+/// The same for a value that may not exist.
+pub fn optional(value: Option<f64>, digits: i32) -> String {
+    value.map_or_else(|| MISSING.to_owned(), |value| significant(value, digits))
+}
+
+/// A value rounded to the digit that [`rounded`] would give it beside `uncertainty`.
+pub fn like(value: Option<f64>, uncertainty: Option<f64>) -> String {
+    value.map_or_else(
+        || MISSING.to_owned(),
+        |value| rounded(value, uncertainty).value,
+    )
+}
+
+/// A percentage with its sign and two significant digits, at most two decimals: "+0.31", "−12".
+pub fn signed_percent(percent: Option<f64>) -> String {
+    let Some(percent) = percent.filter(|p| p.is_finite()) else {
+        return MISSING.to_owned();
+    };
+    let place = last_place(percent, 2).clamp(-3, 0);
+    let text = at_place(percent.abs(), place);
+    let zero = text.chars().all(|c| matches!(c, '0' | '.'));
+    match (zero, percent < 0.0) {
+        (true, _) => text,
+        (false, true) => format!("\u{2212}{text}"),
+        (false, false) => format!("+{text}"),
+    }
+}
+
+/// A reading on a spectral line and its half-line bound (Hz).
+///
+/// Lines lie at exact fractions, 335.625 ± 0.625, which rounding to two digits would spoil: where
+/// four decimals hold the bound exactly, the reading keeps them.
+pub fn line_reading(line: f64, half_line: f64) -> Rounded {
+    let exact = (0..=4).find(|decimals| {
+        let scaled = half_line * 10f64.powi(*decimals);
+        (scaled - scaled.round()).abs() < 1e-6 && scaled.round() >= 1.0
+    });
+    match exact {
+        Some(decimals) if line.is_finite() && line.abs() < PLAIN_LARGEST => {
+            // The line itself may need one decimal more than its bound.
+            let decimals = (decimals.max(1) as usize).max(needed_decimals(line));
+            Rounded {
+                value: typographic(&format!("{line:.decimals$}")),
+                uncertainty: Some(format!("{half_line:.decimals$}")),
+            }
+        }
+        _ => rounded(line, Some(half_line)),
+    }
+}
+
+/// Decimals, at most four, that hold a value exactly; 0 where four do not suffice.
+fn needed_decimals(value: f64) -> usize {
+    (0..=4)
+        .find(|decimals| {
+            let scaled = value * 10f64.powi(*decimals as i32);
+            (scaled - scaled.round()).abs() < 1e-6
+        })
+        .unwrap_or(0)
+}
+
+/// A value in the unit with the decimal prefix that leaves one to three digits before the point.
+///
+/// Returns the factor to multiply by and the prefix: 1.4e6 gives (1e-6, "M"). Small values keep
+/// their unit: "mN/m" helps nobody.
+pub fn prefix(value: f64) -> (f64, &'static str) {
+    match value.abs() {
+        v if !v.is_finite() => (1.0, ""),
+        v if v >= 1e9 => (1e-9, "G"),
+        v if v >= 1e6 => (1e-6, "M"),
+        v if v >= 1e3 => (1e-3, "k"),
+        _ => (1.0, ""),
+    }
+}
+
+/// Power of ten of the last of `digits` significant digits, after rounding: 0.0996 with two digits
+/// rounds to 0.10, so its last place is -2.
+fn last_place(value: f64, digits: i32) -> i32 {
+    if value == 0.0 || !value.is_finite() {
+        return 0;
+    }
+    // The exponent of the number as it is printed, so that rounding up to the next decade counts.
+    let printed = format!("{:.*e}", (digits - 1).max(0) as usize, value.abs());
+    let exponent = printed
+        .split_once('e')
+        .and_then(|(_, exponent)| exponent.parse::<i32>().ok());
+    exponent.unwrap_or(0) - digits + 1
+}
+
+/// A value rounded to the digit 10^place.
+fn at_place(value: f64, place: i32) -> String {
+    at_place_together(value, value, place).0
+}
+
+/// Two numbers rounded to the same digit and written in the same way.
+fn at_place_together(value: f64, other: f64, place: i32) -> (String, String) {
+    let largest = value.abs().max(other.abs());
+    let step = 10f64.powi(place);
+    if largest >= PLAIN_LARGEST || step < PLAIN_SMALLEST {
+        let exponent = last_place(largest, 1);
+        let decimals = (exponent - place).max(0) as usize;
+        let write = |number: f64| {
+            let mantissa = format!("{:.decimals$}", number / 10f64.powi(exponent));
+            format!("{}e{exponent}", typographic(&mantissa))
+        };
+        return (write(value), write(other));
+    }
+    let write = |number: f64| {
+        if place >= 0 {
+            typographic(&format!("{:.0}", (number / step).round() * step))
+        } else {
+            typographic(&format!("{:.*}", (-place) as usize, number))
+        }
+    };
+    (write(value), write(other))
+}
+
+/// The hyphen of a negative number becomes a minus sign, and minus zero becomes zero.
+fn typographic(number: &str) -> String {
+    match number.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| matches!(c, '0' | '.')) => rest.to_owned(),
+        Some(rest) => format!("\u{2212}{rest}"),
+        None => number.to_owned(),
+    }
+}

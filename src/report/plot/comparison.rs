@@ -1,0 +1,146 @@
+//! The picture of predicted beside measured frequencies.
+
+use super::super::document::{Document, PredictionSection};
+use super::super::format::{signed_percent, significant};
+use super::super::tables::reading_bound;
+use super::axis::{Axis, extent, padded};
+use super::drawing::{Align, Drawing, Stroke, Text};
+use super::palette::{BLUE, INK, SOFT, VERMILION};
+use super::panel::{Panel, Sample, TICK_SIZE, crisp, draw_legend, draw_title};
+use super::spectrum::{LEFT, RIGHT, WIDTH};
+
+/// One mode's error and the bound of its reading (%).
+struct Error<'a> {
+    prediction: &'a PredictionSection,
+    percent: f64,
+    bound: Option<f64>,
+}
+
+/// Errors of the predicted frequencies; `None` where nothing was predicted for a measured mode.
+pub fn draw_frequencies(document: &Document) -> Option<Drawing> {
+    let errors = errors(document);
+    if errors.is_empty() {
+        return None;
+    }
+    let mut drawing = Drawing::new("Errors of predicted frequencies", WIDTH, 480);
+    let title = "Predicted against measured frequencies";
+    let below = "error = 100 (predicted \u{2212} measured) / measured; bar: bound of the reading";
+    draw_title(&mut drawing, title, below);
+    let panel = panel(&errors);
+    panel.draw_y_ticks(&mut drawing, &panel.y.ticks(46.0));
+    let zero = Stroke::new(INK, 1.0);
+    let y = crisp(panel.y.place(0.0));
+    drawing.line(vec![(LEFT, y), (RIGHT, y)], zero);
+    panel.draw_frame(&mut drawing);
+    for (index, error) in errors.iter().enumerate() {
+        draw_error(&mut drawing, &panel, index, error, errors.len());
+    }
+    panel.draw_y_title(&mut drawing, "error (%)");
+    draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &legend(&errors));
+    Some(drawing)
+}
+
+fn errors(document: &Document) -> Vec<Error<'_>> {
+    let prediction = document.prediction.as_deref().unwrap_or_default();
+    prediction
+        .iter()
+        .filter_map(|prediction| {
+            let percent = prediction.error_percent.filter(|e| e.is_finite())?;
+            let bound = prediction
+                .measured
+                .zip(reading_bound(document, prediction.mode))
+                .map(|(measured, bound)| 100.0 * bound / measured);
+            Some(Error {
+                prediction,
+                percent,
+                bound,
+            })
+        })
+        .collect()
+}
+
+fn panel(errors: &[Error<'_>]) -> Panel {
+    let ends = errors.iter().flat_map(|error| {
+        let bound = error.bound.unwrap_or(0.0);
+        [error.percent - bound, error.percent + bound, 0.0]
+    });
+    let (low, high) = extent(ends).unwrap_or((-1.0, 1.0));
+    // Differences below a millionth of a percent are rounding; magnified they would mislead.
+    let low = low.min(-1e-6);
+    let high = high.max(1e-6);
+    Panel {
+        x: Axis::linear((-0.5, errors.len() as f64 - 0.5), (LEFT, RIGHT)),
+        y: Axis::linear(padded((low, high), 0.14), (396.0, 98.0)),
+    }
+}
+
+fn draw_error(drawing: &mut Drawing, panel: &Panel, index: usize, error: &Error<'_>, count: usize) {
+    let used = error.prediction.used;
+    let color = if used { BLUE } else { VERMILION };
+    let (x, y) = panel.place(index as f64, error.percent);
+    if let Some(bound) = error.bound {
+        let ends = [error.percent - bound, error.percent + bound].map(|end| panel.y.place(end));
+        let stroke = Stroke::new(color, 1.5);
+        drawing.line(vec![(x, ends[0]), (x, ends[1])], stroke);
+        for end in ends {
+            drawing.line(vec![(x - 7.0, end), (x + 7.0, end)], stroke);
+        }
+    }
+    if used {
+        drawing.dot((x, y), 6.0, color);
+    } else {
+        drawing.ring((x, y), 6.0, color);
+    }
+    let words = format!("{} %", signed_percent(Some(error.percent)));
+    // With many modes the words stand on top of each other; the table has the numbers.
+    if count <= 14 {
+        drawing.text(Text::new(words, (x + 12.0, y), TICK_SIZE).colored(color));
+    }
+    draw_mode_label(drawing, panel, x, error, count);
+}
+
+fn draw_mode_label(drawing: &mut Drawing, panel: &Panel, x: f64, error: &Error<'_>, count: usize) {
+    let below = panel.y.from;
+    let mode = error.prediction.mode;
+    let name = if count <= 14 {
+        format!("mode {mode}")
+    } else {
+        mode.to_string()
+    };
+    let name = Text::new(name, (x, below + 17.0), TICK_SIZE).bold();
+    drawing.text(name.aligned(Align::Middle));
+    if count > 10 {
+        return;
+    }
+    let rows = [
+        ("measured", error.prediction.measured),
+        ("predicted", error.prediction.predicted),
+    ];
+    for (row, (word, value)) in rows.into_iter().enumerate() {
+        let at = (x, below + 37.0 + 18.0 * row as f64);
+        let value = value.map_or(String::new(), |value| significant(value, 5));
+        let words = if count <= 6 {
+            format!("{word} {value} Hz")
+        } else {
+            format!("{value} Hz")
+        };
+        let text = Text::new(words, at, 12.0).colored(SOFT);
+        drawing.text(text.aligned(Align::Middle));
+    }
+}
+
+fn legend(errors: &[Error<'_>]) -> Vec<(Sample, String)> {
+    let used = (Sample::Dot(BLUE), "mode used in the estimate".to_owned());
+    let unused = (
+        Sample::Ring(VERMILION),
+        "mode not used: a true prediction".to_owned(),
+    );
+    let mut entries = Vec::new();
+    if errors.iter().any(|error| error.prediction.used) {
+        entries.push(used);
+    }
+    if errors.iter().any(|error| !error.prediction.used) {
+        entries.push(unused);
+    }
+    entries
+}

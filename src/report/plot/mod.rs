@@ -1,0 +1,24 @@
+//! Pictures: each is drawn once as a list of shapes and written as PNG or as SVG.
+
+pub mod axis;
+pub mod cloud;
+pub mod comparison;
+pub mod decimate;
+pub mod drawing;
+pub mod frf;
+pub mod labels;
+pub mod palette;
+pub mod spectrum;
+pub mod time;
+
+mod closeup;
+mod font;
+mod marks;
+mod panel;
+mod raster;
+mod vector;
+
+pub use drawing::Drawing;
+pub use font::Weight;
+pub use raster::render_png;
+pub use vector::render_svg;

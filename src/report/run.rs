@@ -1,0 +1,194 @@
+//! All files of one run.
+
+use rayon::prelude::*;
+
+use super::document::Document;
+use super::figures::RecordingFigure;
+use super::html::{InlineFigure, PageFigures, render_html};
+use super::plot::cloud::draw_cloud;
+use super::plot::comparison::draw_frequencies;
+use super::plot::frf::draw_frf;
+use super::plot::spectrum::draw_spectrum;
+use super::plot::time::draw_taps;
+use super::plot::{Drawing, render_png, render_svg};
+use super::{ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv};
+
+/// Where a picture stands in the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shelf {
+    Spectra,
+    Taps,
+    Comparison,
+    Cloud,
+}
+
+/// A picture on its way to a file and to the page.
+struct Picture {
+    shelf: Shelf,
+    name: String,
+    caption: String,
+    drawing: Drawing,
+}
+
+/// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`, and the
+/// pictures that apply: `spectrum-*.png`, `frf-*.png`, `taps-*.png`, `frequencies.png`,
+/// `cloud.png`.
+///
+/// # Errors
+/// The first [`ReportError`] of any file.
+pub fn render_run(
+    document: &Document,
+    figures: &[RecordingFigure],
+) -> Result<Vec<ReportFile>, ReportError> {
+    let pictures = pictures(document, figures);
+    let rendered: Vec<(ReportFile, InlineFigure)> = pictures
+        .par_iter()
+        .map(render_picture)
+        .collect::<Result<_, _>>()?;
+    let mut page = PageFigures::default();
+    let mut files = Vec::new();
+    for (picture, (file, inline)) in pictures.iter().zip(rendered) {
+        files.push(file);
+        match picture.shelf {
+            Shelf::Spectra => page.spectra.push(inline),
+            Shelf::Taps => page.taps.push(inline),
+            Shelf::Comparison => page.comparison.push(inline),
+            Shelf::Cloud => page.cloud.push(inline),
+        }
+    }
+    let words = [
+        ("report.html", render_html(document, &page)?),
+        ("report.json", render_json(document)?),
+        ("parameters.csv", render_parameters_csv(document)?),
+        ("modes.csv", render_modes_csv(document)?),
+    ];
+    files.extend(words.into_iter().map(|(name, text)| ReportFile {
+        name: name.to_owned(),
+        bytes: text.into_bytes(),
+    }));
+    Ok(files)
+}
+
+/// The averaged spectra of a recording as PNG; `None` when no tap was accepted.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_spectrum_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
+    draw_spectrum(figure).as_ref().map(render_png).transpose()
+}
+
+/// The frequency response functions of a recording as PNG; `None` without hammer or taps.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_frf_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
+    draw_frf(figure).as_ref().map(render_png).transpose()
+}
+
+fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), ReportError> {
+    let file = ReportFile {
+        name: format!("{}.png", picture.name),
+        bytes: render_png(&picture.drawing)?,
+    };
+    let inline = InlineFigure {
+        caption: picture.caption.clone(),
+        svg: render_svg(&picture.drawing)?,
+    };
+    Ok((file, inline))
+}
+
+fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
+    let stems = stems(figures);
+    let mut pictures = Vec::new();
+    for (figure, stem) in figures.iter().zip(&stems) {
+        pictures.extend(recording_pictures(figure, stem));
+    }
+    pictures.extend(draw_frequencies(document).map(|drawing| {
+        Picture {
+            shelf: Shelf::Comparison,
+            name: "frequencies".to_owned(),
+            caption: "Errors of the predicted frequencies. A bar that passes zero means that the \
+                  reading alone explains the error."
+                .to_owned(),
+            drawing,
+        }
+    }));
+    pictures.extend(draw_cloud(document).map(|drawing| {
+        Picture {
+            shelf: Shelf::Cloud,
+            name: "cloud".to_owned(),
+            caption: "Estimates when the frequencies are changed within what their readings allow."
+                .to_owned(),
+            drawing,
+        }
+    }));
+    pictures
+}
+
+fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
+    let file = &figure.file;
+    let kinds = [
+        (
+            Shelf::Spectra,
+            "spectrum",
+            draw_spectrum(figure),
+            format!("Averaged spectra of {file} with the resonances found."),
+        ),
+        (
+            Shelf::Spectra,
+            "frf",
+            draw_frf(figure),
+            format!("Response per force (H1) of {file}, magnitude over phase."),
+        ),
+        (
+            Shelf::Taps,
+            "taps",
+            draw_taps(figure),
+            format!("{file} over time; numbers count the taps."),
+        ),
+    ];
+    kinds
+        .into_iter()
+        .filter_map(|(shelf, kind, drawing, caption)| {
+            Some(Picture {
+                shelf,
+                name: format!("{kind}-{stem}"),
+                caption,
+                drawing: drawing?,
+            })
+        })
+        .collect()
+}
+
+/// File names without folder and ending, safe as part of a name, each different.
+fn stems(figures: &[RecordingFigure]) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for figure in figures {
+        let stem = stem(&figure.file);
+        let mut unique = stem.clone();
+        let mut number = 2;
+        while stems.contains(&unique) {
+            unique = format!("{stem}-{number}");
+            number += 1;
+        }
+        stems.push(unique);
+    }
+    stems
+}
+
+fn stem(file: &str) -> String {
+    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let safe: String = stem
+        .chars()
+        .map(|c| {
+            let plain = c.is_alphanumeric() || matches!(c, '-' | '_');
+            if plain { c } else { '-' }
+        })
+        .collect();
+    if safe.is_empty() {
+        "recording".to_owned()
+    } else {
+        safe
+    }
+}

@@ -1,0 +1,114 @@
+//! The report's tables as words, for the page and for the terminal.
+
+mod joint;
+mod measured;
+mod uncertainty;
+
+pub use joint::{Parameter, estimated, pairs, parameters, prediction};
+pub use measured::{modes, readings, recordings, taps};
+pub use uncertainty::{perturbation, sensitivity, spans};
+
+use super::document::{Document, ModeSection};
+
+/// A table of words.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Table {
+    /// What it shows.
+    pub caption: String,
+    /// Its columns.
+    pub columns: Vec<Column>,
+    /// Its rows: as many words as columns.
+    pub rows: Vec<Vec<String>>,
+    /// A sentence under it; may be empty.
+    pub note: String,
+}
+
+/// A column's head.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name, with the unit in round brackets.
+    pub name: String,
+    /// Numbers stand to the right, words to the left.
+    pub kind: Kind,
+    /// Whether a narrow terminal shows it.
+    pub place: Place,
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Numbers.
+    Number,
+    /// Words.
+    Words,
+}
+
+impl Kind {
+    /// Whether the column holds numbers.
+    pub fn is_number(self) -> bool {
+        self == Kind::Number
+    }
+}
+
+/// Where a column is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Everywhere.
+    Everywhere,
+    /// On the page only: a terminal of 80 columns has no room.
+    Page,
+}
+
+/// A column of numbers shown everywhere.
+fn number(name: &str) -> Column {
+    Column {
+        name: name.to_owned(),
+        kind: Kind::Number,
+        place: Place::Everywhere,
+    }
+}
+
+/// A column of words shown everywhere.
+fn words(name: &str) -> Column {
+    Column {
+        name: name.to_owned(),
+        kind: Kind::Words,
+        place: Place::Everywhere,
+    }
+}
+
+impl Column {
+    /// The same column, on the page only.
+    fn on_page(mut self) -> Column {
+        self.place = Place::Page;
+        self
+    }
+}
+
+/// Bound of the best reading of a mode (Hz): the interpolated frequency's own bound, else the half
+/// line, else two standard deviations.
+pub fn reading_bound(document: &Document, mode: usize) -> Option<f64> {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let mode = modes.iter().find(|entry| entry.mode == Some(mode))?;
+    bound_of(mode)
+}
+
+/// Bound of a resonance's best frequency (Hz).
+pub fn bound_of(mode: &ModeSection) -> Option<f64> {
+    let interpolated = mode
+        .interpolated_bound
+        .filter(|_| mode.method == "interpolated");
+    interpolated
+        .or(mode.half_line)
+        .or(mode.std.map(|std| 2.0 * std))
+        .filter(|bound| bound.is_finite() && *bound > 0.0)
+}
+
+/// "4" or "mains 50 Hz".
+fn mode_name(mode: &ModeSection) -> String {
+    match (mode.mode, &mode.label) {
+        (Some(number), _) => number.to_string(),
+        (None, Some(label)) => label.clone(),
+        (None, None) => "unpaired".to_owned(),
+    }
+}

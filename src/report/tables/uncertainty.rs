@@ -1,0 +1,176 @@
+//! Tables of how far the estimate moves when the frequencies do.
+
+use super::super::document::{Document, EstimateSection, SensitivitySection};
+use super::super::format::{MISSING, optional, signed_percent, significant};
+use super::{Column, Table, number, reading_bound, words};
+
+/// The non-dimensional values that changes are counted from.
+fn base(document: &Document, method: &str) -> [Option<f64>; 3] {
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    let Some(estimate) = estimate else {
+        return [None; 3];
+    };
+    match &estimate.pairs {
+        Some(pairs) if method == "pairs" => [pairs.kx, pairs.ky, pairs.kz],
+        _ => own(estimate),
+    }
+}
+
+fn own(estimate: &EstimateSection) -> [Option<f64>; 3] {
+    [&estimate.kx, &estimate.ky, &estimate.kz].map(|value| value.as_ref().map(|v| v.value))
+}
+
+fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
+    let (value, base) = value.zip(base)?;
+    Some(100.0 * (value - base) / base)
+}
+
+/// Estimates with all frequencies changed by the same percentage; `None` where not computed.
+pub fn perturbation(document: &Document) -> Option<Table> {
+    let rows = document.perturbation.as_deref().filter(|p| !p.is_empty())?;
+    let with_kz = rows.iter().any(|row| row.kz.is_some());
+    let mut columns = vec![number("Frequencies (%)"), words("Method").on_page()];
+    for name in names(with_kz) {
+        columns.push(number(&format!("{name} (1)")));
+        columns.push(number("change (%)"));
+    }
+    let rows = rows
+        .iter()
+        .map(|row| {
+            let mut cells = vec![signed_percent(Some(row.percent)), row.method.clone()];
+            let base = base(document, &row.method);
+            for (value, base) in [row.kx, row.ky, row.kz].into_iter().zip(base) {
+                cells.push(optional(value, 5));
+                cells.push(signed_percent(change(value, base)));
+            }
+            cells.truncate(columns.len());
+            cells
+        })
+        .collect();
+    Some(Table {
+        caption: "All frequencies changed by the same percentage".to_owned(),
+        columns,
+        rows,
+        note: "\u{2013}: the changed frequencies leave no estimate.".to_owned(),
+    })
+}
+
+fn names(with_kz: bool) -> &'static [&'static str] {
+    if with_kz {
+        &["Kx", "Ky", "Kz"]
+    } else {
+        &["Kx", "Ky"]
+    }
+}
+
+/// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
+pub fn spans(document: &Document) -> Option<Table> {
+    let span = document.resolution_span.as_ref()?;
+    let base = base(document, "pairs");
+    let rows: Vec<Vec<String>> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
+        .into_iter()
+        .zip(base)
+        .filter_map(|((name, range), base)| {
+            let [low, high] = range?;
+            Some(vec![
+                name.to_owned(),
+                significant(low, 5),
+                optional(base, 5),
+                significant(high, 5),
+                signed_percent(change(Some(low), base)),
+                signed_percent(change(Some(high), base)),
+            ])
+        })
+        .collect();
+    let failed = match span.failed {
+        0 => String::new(),
+        failed => format!(" {failed} of them leave no estimate: the span is open."),
+    };
+    Some(Table {
+        caption: "Every mode at one end of its bound or the other".to_owned(),
+        columns: vec![
+            words("Parameter (1)"),
+            number("Smallest"),
+            number("Estimate"),
+            number("Largest"),
+            number("down (%)"),
+            number("up (%)"),
+        ],
+        rows,
+        note: format!("{} sign patterns tried.{failed}", span.patterns),
+    })
+}
+
+/// What each mode's bound does to each parameter; `None` where not computed.
+pub fn sensitivity(document: &Document) -> Option<Table> {
+    let span = document.resolution_span.as_ref()?;
+    let list = span.sensitivity.as_slice();
+    if list.is_empty() {
+        return None;
+    }
+    let with_kz = list.iter().any(|row| row.kz_percent.is_some());
+    let mut columns: Vec<Column> =
+        vec![number("Mode"), number("Bound (Hz)"), number("Reading (%)")];
+    for name in names(with_kz) {
+        columns.push(number(&format!("{name} moves (%)")));
+    }
+    let rows = list
+        .iter()
+        .map(|row| {
+            let mut cells = vec![
+                row.mode.to_string(),
+                significant(row.half_line, 3),
+                reading_percent(document, row),
+                signed_percent(row.kx_percent),
+                signed_percent(row.ky_percent),
+                signed_percent(row.kz_percent),
+            ];
+            cells.truncate(columns.len());
+            cells
+        })
+        .collect();
+    Some(Table {
+        caption: "Which mode drives which parameter".to_owned(),
+        columns,
+        rows,
+        note: drivers(list, with_kz),
+    })
+}
+
+/// The bound in percent of the mode's frequency.
+fn reading_percent(document: &Document, row: &SensitivitySection) -> String {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let mode = modes.iter().find(|mode| mode.mode == Some(row.mode));
+    let known = mode.filter(|_| reading_bound(document, row.mode).is_some());
+    known.map_or(MISSING.to_owned(), |mode| {
+        format!(
+            "\u{b1}{}",
+            significant(100.0 * row.half_line / mode.frequency, 2)
+        )
+    })
+}
+
+/// "Kx hangs on mode 4, Ky on mode 1."
+pub fn drivers(list: &[SensitivitySection], with_kz: bool) -> String {
+    let pick: [fn(&SensitivitySection) -> Option<f64>; 3] = [
+        |row| row.kx_percent,
+        |row| row.ky_percent,
+        |row| row.kz_percent,
+    ];
+    let sentences: Vec<String> = names(with_kz)
+        .iter()
+        .zip(pick)
+        .filter_map(|(name, pick)| {
+            let strength = |row: &SensitivitySection| pick(row).map_or(0.0, f64::abs);
+            let strongest = list
+                .iter()
+                .filter(|row| strength(row) > 0.0)
+                .max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
+            Some(format!("{name} hangs most on mode {}", strongest.mode))
+        })
+        .collect();
+    if sentences.is_empty() {
+        return String::new();
+    }
+    format!("{}.", sentences.join(", "))
+}

@@ -2,10 +2,11 @@
 
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tapjoint::description::{ChannelRef, JointKind, WindowKind};
 use tapjoint::quantity::{Dimension, parse_quantity};
+use tapjoint::recording::{ReadSettings, Recording, RecordingError};
 
 /// Arguments of every command.
 #[derive(Debug, Args)]
@@ -75,6 +76,18 @@ pub(super) struct RecordingArguments {
     /// Sample rate of a CSV file without a time column, such as 5120 or "51.2 kHz" (Hz)
     #[arg(long, value_name = "HZ", value_parser = sample_rate)]
     pub(super) sample_rate: Option<f64>,
+}
+
+impl RecordingArguments {
+    /// Opens a recording, with the sample rate given.
+    pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
+        Recording::open(
+            path,
+            &ReadSettings {
+                sample_rate: self.sample_rate,
+            },
+        )
+    }
 }
 
 fn sample_rate(text: &str) -> Result<f64, String> {

@@ -3,11 +3,14 @@
 use super::Outcome;
 use super::arguments::{FrequencyList, HalfLines, MethodArgument};
 use super::input::{TestFile, read_test};
+use super::run::outcome;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::MeasuredFrequencies;
+use tapjoint::pipeline::{IdentifySettings, run_test};
+use tapjoint::report::{document::Document, document_of, render_text};
 
 /// Estimate joint stiffness from natural frequencies alone.
 #[derive(Debug, Args)]
@@ -90,6 +93,20 @@ pub(super) fn resolve(
 }
 
 pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let _file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
-    bail!("`identify` is not connected to the library yet")
+    let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
+    let analysis = run_test(
+        &file.test,
+        (&file.folder, &file.name),
+        &IdentifySettings::default(),
+    )?;
+    // The perturbation has a command of its own.
+    let document = Document {
+        perturbation: None,
+        perturbation_averages: None,
+        resolution_span: None,
+        ..document_of(&analysis)
+    };
+    terminal.say(&render_text(&document))?;
+    terminal.write_document(&document)?;
+    Ok(outcome(&analysis))
 }

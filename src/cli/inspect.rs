@@ -4,9 +4,10 @@ use super::Outcome;
 use super::arguments::RecordingArguments;
 use super::input::check_file;
 use super::terminal::Terminal;
-use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
+use tapjoint::pipeline::inspect_bare;
+use tapjoint::report::{inspection_of, render_text};
 
 /// Show what is in recordings: channels, rate, length, clipping, DC, taps found, what is wrong
 /// with them.
@@ -20,10 +21,32 @@ pub(super) struct InspectArguments {
     recording: RecordingArguments,
 }
 
-pub(super) fn run(arguments: &InspectArguments, _terminal: Terminal) -> anyhow::Result<Outcome> {
+pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     arguments
         .files
         .iter()
         .try_for_each(|file| check_file(file))?;
-    bail!("`inspect` is not connected to the library yet")
+    let mut recordings = Vec::with_capacity(arguments.files.len());
+    for file in &arguments.files {
+        let recording = arguments.recording.open(file)?;
+        recordings.push(inspect_bare(
+            recording,
+            arguments.recording.hammer.as_ref(),
+        )?);
+    }
+    let warnings: Vec<_> = recordings
+        .iter()
+        .flat_map(|found| found.measurement.warnings.clone())
+        .collect();
+    let found = recordings
+        .iter()
+        .any(|recording| !recording.measurement.taps.taps.is_empty());
+    let document = inspection_of(&recordings, &warnings);
+    terminal.say(&render_text(&document))?;
+    terminal.write_document(&document)?;
+    Ok(if found {
+        Outcome::Answered
+    } else {
+        Outcome::NoAnswer
+    })
 }

@@ -5,10 +5,6 @@
 
 mod arguments;
 mod input;
-#[cfg_attr(
-    not(test),
-    expect(dead_code, reason = "the library part is not connected yet")
-)]
 mod output;
 mod terminal;
 
@@ -16,12 +12,9 @@ mod identify;
 mod init;
 mod inspect;
 mod perturb;
-#[expect(dead_code, reason = "the library part is not connected yet")]
 mod predict;
 mod reproduce;
-#[expect(dead_code, reason = "the library part is not connected yet")]
 mod run;
-#[expect(dead_code, reason = "the library part is not connected yet")]
 mod spectrum;
 
 use arguments::CommonArguments;
@@ -66,10 +59,6 @@ enum Outcome {
     /// The question was answered: exit code 0.
     Answered,
     /// The question has no answer, and what was found has been written: exit code 1.
-    #[expect(
-        dead_code,
-        reason = "no command that can be without an answer is connected yet"
-    )]
     NoAnswer,
 }
 
@@ -104,7 +93,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Spectrum(arguments) => spectrum::run(arguments, terminal),
         Command::Identify(arguments) => identify::run(arguments, terminal),
         Command::Predict(arguments) => predict::run(arguments, terminal),
-        Command::Perturb(arguments) => perturb::run(arguments, terminal),
+        Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
     }
 }

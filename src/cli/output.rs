@@ -163,25 +163,34 @@ impl OutputFolder {
         })
     }
 
-    /// Where the files are to be written for the time being.
-    pub(super) fn staging(&self) -> &Path {
-        self.staging.path()
+    /// Adds a file to what will appear in the folder.
+    ///
+    /// # Errors
+    /// [`OutputError::Failed`] when it cannot be written.
+    pub(super) fn add(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
+        fs::write(self.staging.path().join(name), bytes).map_err(|cause| OutputError::Failed {
+            path: self.path.join(name),
+            cause,
+        })
     }
 
-    /// Moves everything into its place.
+    /// Moves everything into its place, and says where that is.
     ///
     /// # Errors
     /// [`OutputError::Failed`]; every file is then either the old or the new one, whole.
-    pub(super) fn publish(self) -> Result<(), OutputError> {
+    pub(super) fn publish(self) -> Result<PathBuf, OutputError> {
         let moved = if self.path.exists() {
             self.move_files()
         } else {
             self.rename_folder()
         };
-        moved.map_err(|cause| OutputError::Failed {
-            path: self.path,
-            cause,
-        })
+        match moved {
+            Ok(()) => Ok(self.path),
+            Err(cause) => Err(OutputError::Failed {
+                path: self.path,
+                cause,
+            }),
+        }
     }
 
     fn rename_folder(&self) -> io::Result<()> {

@@ -4,10 +4,11 @@ use super::Outcome;
 use super::arguments::{MethodArgument, PercentList};
 use super::identify::{FrequencyArguments, resolve};
 use super::terminal::Terminal;
-use anyhow::bail;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
+use tapjoint::pipeline::{IdentifySettings, run_test};
+use tapjoint::report::{document_of, render_text};
 
 /// Show how the estimate moves when the frequencies are wrong.
 ///
@@ -34,7 +35,27 @@ pub(super) struct PerturbArguments {
     samples: usize,
 }
 
-pub(super) fn run(arguments: &PerturbArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let _file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
-    bail!("`perturb` is not connected to the library yet")
+pub(super) fn run(
+    arguments: &PerturbArguments,
+    seed: u64,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
+    let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
+    let settings = IdentifySettings {
+        percents: arguments.percent.0.clone(),
+        monte_carlo: Some((arguments.samples, seed)),
+        ..Default::default()
+    };
+    let analysis = run_test(&file.test, (&file.folder, &file.name), &settings)?;
+    let document = document_of(&analysis);
+    terminal.say(&render_text(&document))?;
+    terminal.write_document(&document)?;
+    let perturbed = analysis
+        .identification
+        .is_some_and(|found| found.perturbation.is_some());
+    Ok(if perturbed {
+        Outcome::Answered
+    } else {
+        Outcome::NoAnswer
+    })
 }

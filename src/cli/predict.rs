@@ -9,6 +9,10 @@ use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
 use tapjoint::description::JointKind;
+use tapjoint::identify::{predict, predict_lambdas};
+use tapjoint::pipeline::{TestedStructure, tested_structure};
+use tapjoint::report::{lambdas_of, prediction_of, render_text};
+use tapjoint::structure::{Assembly, JointStiffness};
 
 /// Predict the natural frequencies of a beam with a known joint, in Hz and as lambda.
 ///
@@ -132,6 +136,62 @@ fn given_stiffness(
 }
 
 pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let _request = resolve(arguments, &terminal)?;
-    bail!("`predict` is not connected to the library yet")
+    let request = resolve(arguments, &terminal)?;
+    let document = match &request.subject {
+        Subject::Test(file) => {
+            let structure = tested_structure(&file.test);
+            let joint = match request.stiffness {
+                Some(given) => given.joint(),
+                None => described_joint(&structure, &file.name)?,
+            };
+            let place = (structure.assembly, &joint);
+            let rows = predict(
+                structure.theory,
+                &structure.beam,
+                place,
+                (&[], &[]),
+                request.modes,
+            )?;
+            prediction_of(&file.test.name, &structure, &rows)
+        }
+        Subject::Kind(kind) => {
+            let joint = request
+                .stiffness
+                .map_or(JointStiffness::FREE, |given| given.joint());
+            lambdas_of(&predict_lambdas(assembly(*kind), &joint, request.modes)?)
+        }
+    };
+    terminal.say(&render_text(&document))?;
+    terminal.write_document(&document)?;
+    Ok(Outcome::Answered)
+}
+
+impl GivenStiffness {
+    fn joint(self) -> JointStiffness {
+        JointStiffness {
+            kx: self.kx,
+            ky: self.ky,
+            cross_compliance: self.cross_compliance,
+        }
+    }
+}
+
+/// The joint that the description gives.
+fn described_joint(structure: &TestedStructure, file: &str) -> anyhow::Result<JointStiffness> {
+    if structure.assembly == Assembly::Free {
+        return Ok(JointStiffness::FREE);
+    }
+    structure.known.over(None).ok_or_else(|| {
+        anyhow!(
+            "{file}: the joint's stiffness is missing; give --kx and --ky, or kt and kr in [joint]"
+        )
+    })
+}
+
+fn assembly(kind: JointKind) -> Assembly {
+    match kind {
+        JointKind::Cantilever => Assembly::Cantilever,
+        JointKind::Lap => Assembly::Lap,
+        JointKind::Free => Assembly::Free,
+    }
 }

@@ -8,6 +8,8 @@ use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
+use tapjoint::pipeline::{Analysis, IdentifySettings, run_recording, run_test};
+use tapjoint::report::{document_of, figures_of, render_run, render_text};
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
 ///
@@ -88,8 +90,44 @@ fn report_folder(name: &str) -> String {
 }
 
 pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let _request = resolve(arguments, &terminal)?;
-    bail!("`run` is not connected to the library yet")
+    let request = resolve(arguments, &terminal)?;
+    let analysis = match &request.subject {
+        Subject::Test(file) => run_test(
+            &file.test,
+            (&file.folder, &file.name),
+            &IdentifySettings::default(),
+        )?,
+        Subject::Recording(path) => {
+            let recording = arguments.recording.open(path)?;
+            run_recording(recording, arguments.recording.hammer.as_ref(), |_| {})?
+        }
+    };
+    let document = document_of(&analysis);
+    for file in render_run(&document, &figures_of(&analysis))? {
+        request.output.add(&file.name, &file.bytes)?;
+    }
+    let folder = request.output.publish()?;
+    terminal.say(&render_text(&document))?;
+    terminal.say(&format!(
+        "\nReport: {}",
+        folder.join("report.html").display()
+    ))?;
+    terminal.write_document(&document)?;
+    Ok(outcome(&analysis))
+}
+
+/// A test is answered when there is an estimate (or known stiffnesses to predict with), a bare
+/// recording when there is a mode.
+pub(super) fn outcome(analysis: &Analysis) -> Outcome {
+    let answered = match &analysis.identification {
+        Some(found) => found.estimate.is_some() || !found.prediction.is_empty(),
+        None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
+    };
+    if answered {
+        Outcome::Answered
+    } else {
+        Outcome::NoAnswer
+    }
 }
 
 #[cfg(test)]

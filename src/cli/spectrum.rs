@@ -4,11 +4,13 @@ use super::Outcome;
 use super::arguments::{Band, RecordingArguments, WindowArgument, block_size};
 use super::input::check_file;
 use super::output::OutputFile;
+use super::run::outcome;
 use super::terminal::Terminal;
-use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::WindowKind;
+use tapjoint::pipeline::run_recording;
+use tapjoint::report::{document_of, figures_of, render_spectrum_png, render_text};
 
 /// Show the averaged spectrum of a recording and its peaks with their resolution bounds.
 ///
@@ -62,7 +64,27 @@ fn resolve(arguments: &SpectrumArguments) -> anyhow::Result<Request> {
     })
 }
 
-pub(super) fn run(arguments: &SpectrumArguments, _terminal: Terminal) -> anyhow::Result<Outcome> {
-    let _request = resolve(arguments)?;
-    bail!("`spectrum` is not connected to the library yet")
+pub(super) fn run(arguments: &SpectrumArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    let request = resolve(arguments)?;
+    let recording = arguments.recording.open(&arguments.file)?;
+    let analysis = run_recording(recording, arguments.recording.hammer.as_ref(), |settings| {
+        settings.block = request.block;
+        settings.band = request.band;
+        settings.window = request.window;
+    })?;
+    let document = document_of(&analysis);
+    if let Some(file) = request.png {
+        let picture = figures_of(&analysis)
+            .first()
+            .map(render_spectrum_png)
+            .transpose()?
+            .flatten();
+        match picture {
+            Some(bytes) => file.write(&bytes)?,
+            None => terminal.warn("no tap was accepted, so there is no spectrum to draw"),
+        }
+    }
+    terminal.say(&render_text(&document))?;
+    terminal.write_document(&document)?;
+    Ok(outcome(&analysis))
 }

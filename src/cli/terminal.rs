@@ -3,6 +3,7 @@
 use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
 use std::io::{self, Write};
+use tapjoint::report::{document::Document, render_json};
 
 /// Where a command's words go.
 #[derive(Debug)]
@@ -47,6 +48,14 @@ impl Terminal {
         if !self.quiet {
             let _ = writeln!(io::stderr(), "warning: {text}");
         }
+    }
+
+    /// Writes a report's document to where `--json` says, if it says anything. Call it last.
+    pub(super) fn write_document(self, document: &Document) -> anyhow::Result<()> {
+        if self.json.is_none() {
+            return Ok(());
+        }
+        self.write_json(&serde_json::from_str(&render_json(document)?)?)
     }
 
     /// Writes the document to where `--json` says, if it says anything. Call it last.

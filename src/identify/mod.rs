@@ -13,6 +13,7 @@
 
 pub mod estimate;
 pub mod free_beam;
+pub mod monte_carlo;
 pub mod pairing;
 pub mod pairs;
 pub mod perturbation;
@@ -20,6 +21,7 @@ pub mod predict;
 
 pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
 pub use free_beam::{FreeBeamEstimate, estimate_modulus};
+pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
 pub use pairing::pair_by_frequency;
 pub use pairs::{
     Doubt, ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap,

@@ -4,9 +4,9 @@ use super::measure::Measurement;
 use super::model::TestedStructure;
 use super::warning::Warning;
 use crate::identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
-use crate::identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Stiffnesses};
+use crate::identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
 use crate::modal::ModeReading;
-use crate::recording::ChannelHealth;
+use crate::recording::ChannelInfo;
 
 /// A finished analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,8 +35,8 @@ pub struct RecordingResult {
     pub sample_rate: f64,
     /// Length (s).
     pub seconds: f64,
-    /// Health of every channel in the file.
-    pub health: Vec<ChannelHealth>,
+    /// Every channel in the file.
+    pub channels: Vec<ChannelInfo>,
     /// Whether there is a hammer channel.
     pub has_hammer: bool,
     /// The responses analysed.
@@ -123,6 +123,8 @@ pub struct Perturbation {
     pub averages: Vec<crate::identify::perturbation::AverageError>,
     /// Under each mode's own bound; `None` where no bounds are known.
     pub bounds: Option<BoundPerturbation>,
+    /// Under random errors; `None` where no standard deviations are known, or none was asked for.
+    pub random: Option<MonteCarlo>,
 }
 
 /// The estimate under the bounds of the readings.

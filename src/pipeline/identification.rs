@@ -9,7 +9,7 @@ use crate::identify::perturbation::{
 };
 use crate::identify::{
     Doubt, IdentifyError, MeasuredMode, PairsModel, PredictedMode, estimate_joint,
-    estimate_modulus, pairs_estimator, predict,
+    estimate_modulus, monte_carlo, pairs_estimator, predict,
 };
 use crate::structure::{Beam, JointStiffness};
 
@@ -20,6 +20,8 @@ pub struct IdentifySettings {
     pub fit_modes: Option<usize>,
     /// Changes of all frequencies for the perturbation (%).
     pub percents: Vec<f64>,
+    /// Repetitions of the Monte Carlo and its seed; `None` = not wanted.
+    pub monte_carlo: Option<(usize, u64)>,
 }
 
 impl Default for IdentifySettings {
@@ -27,6 +29,7 @@ impl Default for IdentifySettings {
         IdentifySettings {
             fit_modes: None,
             percents: crate::identify::perturbation::PAPER_PERCENTS.to_vec(),
+            monte_carlo: None,
         }
     }
 }
@@ -65,7 +68,7 @@ pub fn identify(
     warnings.extend(misfit(&prediction, &measured));
     let perturbation = structure
         .regression
-        .and_then(|model| perturbation(model, &structure.beam, modes, &used, &settings.percents));
+        .and_then(|model| perturbation(model, &structure.beam, modes, (&used, settings)));
     (
         Identification {
             estimate,
@@ -161,14 +164,13 @@ fn perturbation(
     model: PairsModel,
     beam: &Beam,
     modes: &[ModeResult],
-    used: &[MeasuredMode],
-    percents: &[f64],
+    (used, settings): (&[MeasuredMode], &IdentifySettings),
 ) -> Option<Perturbation> {
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let frequencies: Vec<f64> = used.iter().map(|mode| mode.frequency).collect();
     let estimator = pairs_estimator(model, beam, &numbers).ok()?;
     let nominal = estimator(&frequencies)?;
-    let uniform = perturb_uniformly(&frequencies, percents, &estimator);
+    let uniform = perturb_uniformly(&frequencies, &settings.percents, &estimator);
     let bounds: Option<Vec<f64>> = numbers
         .iter()
         .map(|number| {
@@ -191,10 +193,18 @@ fn perturbation(
         modes: numbers.clone(),
         bounds,
     });
+    let stds: Option<Vec<f64>> = used.iter().map(|mode| mode.std).collect();
+    let random = settings
+        .monte_carlo
+        .zip(stds)
+        .and_then(|(repetitions, stds)| {
+            monte_carlo(&frequencies, &stds, repetitions, &estimator).ok()
+        });
     Some(Perturbation {
         averages: average_errors(&nominal, &uniform),
         uniform,
         bounds,
+        random,
     })
 }
 

@@ -30,7 +30,7 @@ pub use identification::{IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
-pub use recordings::{PipelineError, measure_bare};
+pub use recordings::{PipelineError, inspect_bare, measure_bare};
 pub use warning::Warning;
 
 use crate::description::{ChannelRef, TestDescription};
@@ -80,7 +80,7 @@ pub fn run_test(
     warnings.extend(warning::of_neglect(test, &structure));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
-        percents: settings.percents.clone(),
+        ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
     warnings.extend(doubts);

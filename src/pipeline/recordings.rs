@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::analysis::{Overview, RecordingResult, Response};
-use super::measure::{MeasureError, MeasureSettings, measure};
+use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
 use crate::description::{ChannelRef, RecordingDescription, TestDescription};
 use crate::recording::{ReadSettings, Recording, RecordingError};
-use crate::taps::TapSource;
+use crate::taps::{TapSettings, TapSource, find_taps};
 
 /// Pieces of the overview of a recording over time: two for each pixel of a usual picture.
 const OVERVIEW_PIECES: u64 = 2400;
@@ -122,6 +122,36 @@ pub fn measure_bare(
     finish(recording, settings, responses)
 }
 
+/// Finds the taps of a recording and goes no further: what is in it and what is wrong with it.
+///
+/// # Errors
+/// An unknown hammer channel, an unreadable recording.
+pub fn inspect_bare(
+    recording: Recording,
+    hammer: Option<&ChannelRef>,
+) -> Result<RecordingResult, PipelineError> {
+    let hammer = hammer
+        .map(|reference| channel_index(&recording, reference))
+        .transpose()?;
+    let channels = (0..recording.channels().len())
+        .filter(|&c| Some(c) != hammer)
+        .collect();
+    let source = source(hammer, channels);
+    let taps = find_taps(&recording, &source, &TapSettings::default())?;
+    let warnings = super::warning::of_recording(&recording, &source, &taps);
+    let measurement = Measurement {
+        taps,
+        spectra: None,
+        warnings,
+    };
+    result(
+        &recording,
+        &MeasureSettings::new(source),
+        Vec::new(),
+        measurement,
+    )
+}
+
 fn source(hammer: Option<usize>, responses: Vec<usize>) -> TapSource {
     match hammer {
         Some(channel) => TapSource::Hammer { channel, responses },
@@ -154,6 +184,15 @@ fn finish(
     responses: Vec<Response>,
 ) -> Result<RecordingResult, PipelineError> {
     let measurement = measure(&recording, &settings)?;
+    result(&recording, &settings, responses, measurement)
+}
+
+fn result(
+    recording: &Recording,
+    settings: &MeasureSettings,
+    responses: Vec<Response>,
+    measurement: Measurement,
+) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
     let readings = measurement
         .spectra
@@ -163,15 +202,11 @@ fn finish(
         file: recording.name().to_string(),
         sample_rate: recording.sample_rate(),
         seconds: recording.duration(),
-        health: recording
-            .channels()
-            .iter()
-            .map(|channel| channel.health.clone())
-            .collect(),
+        channels: recording.channels().to_vec(),
         has_hammer: matches!(settings.source, TapSource::Hammer { .. }),
         responses,
         band: settings.band,
-        overview: overview(&recording, shown)?,
+        overview: overview(recording, shown)?,
         measurement,
         mode_numbers: vec![None; readings],
     })

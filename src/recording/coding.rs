@@ -101,8 +101,7 @@ impl FormatFields {
             return Ok(needed);
         }
         let bytes = self.frame_bytes / self.channels.max(1);
-        if bytes < needed || u32::from(bytes) * u32::from(self.channels) != self.frame_bytes.into()
-        {
+        if bytes < needed || !self.frame_bytes.is_multiple_of(self.channels.max(1)) {
             return Err(RecordingError::BadHeader {
                 file: file.to_owned(),
                 field: "bytes per frame",

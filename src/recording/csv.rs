@@ -264,7 +264,7 @@ fn uneven_error(file: String, uneven: UnevenStep, expected: f64, factor: f64) ->
     let steps = uneven.step / expected;
     let whole = steps.round();
     // A gap within a tenth of a whole number of steps is one of lost rows.
-    let lost = whole >= 2.0 && (steps - whole).abs() <= 0.1;
+    let lost = (2.0..1e9).contains(&whole) && (steps - whole).abs() <= 0.1;
     let lost = match lost {
         true => format!(
             " (as if {} row{} were missing)",

@@ -96,7 +96,8 @@ pub enum RecordingError {
     },
     /// A sample that is no number of physical size.
     #[error(
-        "{file}: channel {channel}, sample {frame} ({time} s) is {value}; allowed: finite numbers of magnitude up to 1e100; remove the damaged part and export it again"
+        "{file}: channel {channel}, sample {frame} ({} s) is {value}; allowed: finite numbers of magnitude up to 1e100; remove the damaged part and export it again",
+        short(*.time)
     )]
     NotFinite {
         /// The file.
@@ -276,7 +277,8 @@ pub enum RecordingError {
     },
     /// Sampling that is not uniform.
     #[error(
-        "{file}:{line}: uneven sampling: time {time} s comes {step} s after the row before, the step elsewhere is {expected} s{lost}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly"
+        "{file}:{line}: uneven sampling: time {} s comes {} s after the row before, the step elsewhere is {} s{lost}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly",
+        short(*.time), short(*.step), short(*.expected)
     )]
     UnevenSampling {
         /// The file.
@@ -394,4 +396,9 @@ pub enum RecordingError {
         /// The system's reason.
         source: io::Error,
     },
+}
+
+/// A number with the digits that mean something: nine, so that roundings do not show.
+fn short(value: f64) -> f64 {
+    format!("{value:.8e}").parse().unwrap_or(value)
 }

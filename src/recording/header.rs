@@ -71,10 +71,11 @@ impl Candidate<'_> {
     /// Names and units from the line at `at`, which may itself be a line of units below the names.
     fn header(&self, at: usize) -> Vec<Column> {
         let here = self.texts(at);
-        let above = self
-            .line_above(at)
-            .filter(|above| self.kind(*above) == Some(LineKind::Text(self.cells)));
-        match above {
+        let is_header = |above: &usize| match self.kind(*above) {
+            Some(LineKind::Text(cells) | LineKind::Mixed(cells, _)) => cells == self.cells,
+            _ => false,
+        };
+        match self.line_above(at).filter(is_header) {
             Some(above) if here.iter().all(|cell| is_unit_cell(cell)) => {
                 let names = self.texts(above);
                 names.iter().zip(&here).map(name_and_unit).collect()

@@ -6,6 +6,7 @@
 use super::error::RecordingError;
 use super::header::Column;
 use super::text::{Cell, CellProblem, Separator, is_comment, parse_number, shown, split_cells};
+use super::units::split_unit;
 
 /// The layout of a text file.
 #[derive(Debug, Clone, PartialEq)]
@@ -244,7 +245,8 @@ impl<'a> Candidate<'a> {
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
         let names = |exact: bool| {
             let is_time = move |column: &Column| {
-                let name = column.name.as_deref().unwrap_or_default();
+                // An unknown unit stays in the name; it is refused later, with its own message.
+                let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
                 let name = name.to_ascii_lowercase();
                 match exact {
                     true => name == "t" || name == "time",

@@ -133,11 +133,7 @@ impl<'a, R: Read + Seek> Walker<'a, R> {
             None => 0,
         };
         if got < 16 {
-            return Err(self.bad_header(
-                "a \"fmt \" chunk of size",
-                got as u64,
-                "16 bytes or more",
-            ));
+            return Err(self.bad_header("bytes in the \"fmt \" chunk", got as u64, "16 or more"));
         }
         let word = |at: usize| match bytes.get(at..at + 2) {
             Some(&[low, high]) => u16::from_le_bytes([low, high]),

@@ -47,7 +47,7 @@ impl TimeCheck {
         let mut digits = Digits::default();
         let mut times = Vec::new();
         for (time, cell) in head {
-            digits.include(cell);
+            digits.include(time, cell);
             times.push(time);
         }
         let mut steps: Vec<f64> = times
@@ -103,7 +103,7 @@ impl TimeCheck {
         if new.step > 0.0 && deviation <= allowed * SLACK {
             return Ok(());
         }
-        self.digits.include(cell);
+        self.digits.include(new.time, cell);
         let unit = self.digits.unit_at(new.time);
         // The reference itself is known to a unit over the number of its steps.
         let by_rounding = unit * (1.0 + 1.0 / self.reference_steps);
@@ -139,14 +139,16 @@ impl TimeCheck {
     }
 }
 
-/// How many digits the times are printed with, over all cells looked at: with fixed decimals or
-/// with fixed significant digits, zeros at the end possibly left out.
+/// How many digits the times have, over all cells looked at: fixed decimals or fixed significant
+/// digits, zeros at the end possibly left out, or the 24 binary digits of single precision.
 #[derive(Debug, Clone, Copy)]
 struct Digits {
     /// Largest number of significant digits.
     significant: i32,
     /// Power of ten of the finest last digit.
     finest: i32,
+    /// Whether every cell may be a single-precision number.
+    single: bool,
 }
 
 impl Default for Digits {
@@ -154,12 +156,13 @@ impl Default for Digits {
         Self {
             significant: 1,
             finest: 0,
+            single: true,
         }
     }
 }
 
 impl Digits {
-    fn include(&mut self, cell: &[u8]) {
+    fn include(&mut self, time: f64, cell: &[u8]) {
         let (mut significant, mut decimals, mut after_mark) = (0, 0, false);
         let mut bytes = cell.iter();
         for byte in bytes.by_ref() {
@@ -176,16 +179,25 @@ impl Digits {
         }
         let exponent = str::from_utf8(bytes.as_slice()).unwrap_or_default();
         let exponent: i32 = exponent.parse().unwrap_or(0);
+        let last_digit = exponent.saturating_sub(decimals);
         self.significant = self.significant.max(significant);
         if significant > 0 {
-            self.finest = self.finest.min(exponent.saturating_sub(decimals));
+            self.finest = self.finest.min(last_digit);
         }
+        let from_single = (time - f64::from(time as f32)).abs();
+        self.single &= from_single <= 0.5 * SLACK * 10_f64.powi(last_digit);
     }
 
-    /// One unit of the last digit of a time: the coarser of what fixed decimals and fixed
-    /// significant digits make of it.
+    /// One unit of the last digit of a time: the coarsest of what fixed decimals, fixed significant
+    /// digits and single precision make of it.
     fn unit_at(&self, time: f64) -> f64 {
-        let fixed = 10_f64.powi(self.finest);
+        // Rounded to single precision and then printed with just enough digits to tell it from its
+        // neighbours, a time moves by up to one of its spacings; two steps differ by four.
+        let single = match self.single {
+            true => 4.0 * f64::from(f32::EPSILON) * time.abs(),
+            false => 0.0,
+        };
+        let fixed = single.max(10_f64.powi(self.finest));
         let leading = match time {
             0.0 => return fixed,
             time => time.abs().log10().floor() as i32,

@@ -1,19 +1,21 @@
 //! From a finished analysis to the document and the data of the pictures.
 
 use super::document::{
-    Document, EstimateSection, ModeSection, PairsSection, PerturbationSection, PredictionSection,
-    RecordingSection, ResolutionSpanSection, SensitivitySection, TapSection, TestSection, VERSION,
-    ValueSection, WarningSection,
+    AverageSection, ChannelSection, Document, EstimateSection, ModeSection, MonteCarloSection,
+    PairsSection, PerturbationSection, PredictionSection, RecordingSection, ResolutionSpanSection,
+    SensitivitySection, TapSection, TestSection, VERSION, ValueSection, WarningSection,
 };
-use crate::identify::perturbation::{Span, UniformPerturbation};
-use crate::identify::{FreeBeamEstimate, JointEstimate, PairsModel, PredictedMode, Uncertain};
+use crate::identify::perturbation::{AverageError, Span, UniformPerturbation};
+use crate::identify::{
+    FreeBeamEstimate, JointEstimate, MonteCarlo, PairsModel, PredictedMode, Spread, Uncertain,
+};
 use crate::modal::ModeReading;
 use crate::pipeline::{
     Analysis, BoundPerturbation, Estimate, Identification, ModeResult, RecordingResult,
     TestedStructure, Warning,
 };
 use crate::spectral::Window;
-use crate::structure::{Assembly, BeamTheory};
+use crate::structure::{Assembly, BeamTheory, NaturalMode};
 
 /// The document of a whole analysis.
 pub fn document(analysis: &Analysis) -> Document {
@@ -31,10 +33,52 @@ pub fn document(analysis: &Analysis) -> Document {
             .map(|found| found.prediction.iter().map(prediction_section).collect()),
         perturbation: perturbation
             .map(|found| found.uniform.iter().map(perturbation_section).collect()),
+        perturbation_averages: perturbation
+            .map(|found| found.averages.iter().map(average_section).collect()),
+        monte_carlo: perturbation
+            .and_then(|found| found.random.as_ref())
+            .map(monte_carlo_section),
         resolution_span: perturbation
             .and_then(|found| found.bounds.as_ref())
             .map(span_section),
         warnings: analysis.warnings.iter().map(warning_section).collect(),
+    }
+}
+
+/// The document of recordings that were only looked at.
+pub fn inspection(recordings: &[RecordingResult], warnings: &[Warning]) -> Document {
+    Document {
+        version: VERSION,
+        recordings: Some(recordings.iter().map(recording_section).collect()),
+        warnings: warnings.iter().map(warning_section).collect(),
+        ..Default::default()
+    }
+}
+
+/// The document of a prediction for a described beam.
+pub fn prediction(name: &str, structure: &TestedStructure, modes: &[PredictedMode]) -> Document {
+    Document {
+        version: VERSION,
+        test: Some(test_section(name, Some(structure))),
+        prediction: Some(modes.iter().map(prediction_section).collect()),
+        ..Default::default()
+    }
+}
+
+/// The document of a prediction without a beam: lambda alone.
+pub fn lambdas(modes: &[NaturalMode]) -> Document {
+    let rows = modes
+        .iter()
+        .enumerate()
+        .map(|(index, mode)| PredictionSection {
+            mode: index + 1,
+            lambda: Some(mode.lambda),
+            ..Default::default()
+        });
+    Document {
+        version: VERSION,
+        prediction: Some(rows.collect()),
+        ..Default::default()
     }
 }
 
@@ -88,7 +132,8 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
     RecordingSection {
         file: recording.file.clone(),
         sample_rate: recording.sample_rate,
-        channels: recording.health.len(),
+        channels: recording.channels.len(),
+        channel_details: channel_sections(recording),
         seconds: recording.seconds,
         taps: tap_sections(recording),
         line_spacing: lines.map(|lines| lines.spacing),
@@ -105,6 +150,26 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
         remaining_at_end: spectra.map(|spectra| spectra.decay.remaining),
         modes,
     }
+}
+
+fn channel_sections(recording: &RecordingResult) -> Vec<ChannelSection> {
+    recording
+        .channels
+        .iter()
+        .enumerate()
+        .map(|(index, channel)| ChannelSection {
+            channel: index + 1,
+            name: channel.name.clone(),
+            unit: channel.unit.clone(),
+            scale: channel.scale,
+            mean: channel.health.mean,
+            rms: channel.health.rms,
+            peak: channel.health.peak,
+            full_scale_samples: channel.health.full_scale_samples,
+            flat_tops: channel.health.flat_top_count,
+            dropped_samples: channel.health.dropped_samples,
+        })
+        .collect()
 }
 
 fn tap_sections(recording: &RecordingResult) -> Vec<TapSection> {
@@ -237,6 +302,33 @@ fn perturbation_section(row: &UniformPerturbation) -> PerturbationSection {
         kx: row.estimate.map(|estimate| estimate.kx),
         ky: row.estimate.map(|estimate| estimate.ky),
         kz: row.estimate.and_then(|estimate| estimate.kz),
+    }
+}
+
+fn average_section(row: &AverageError) -> AverageSection {
+    AverageSection {
+        percent: row.percent,
+        kx_percent: row.mean_magnitude.kx,
+        ky_percent: row.mean_magnitude.ky,
+        kz_percent: row.mean_magnitude.kz,
+    }
+}
+
+fn monte_carlo_section(found: &MonteCarlo) -> MonteCarloSection {
+    let ends = |spread: Option<Spread>| {
+        spread.map(|spread| ValueSection {
+            value: spread.median,
+            std: None,
+            low: Some(spread.low),
+            high: Some(spread.high),
+        })
+    };
+    MonteCarloSection {
+        samples: found.samples,
+        failed: found.failed,
+        kx: ends(found.kx),
+        ky: ends(found.ky),
+        kz: ends(found.kz),
     }
 }
 

@@ -34,6 +34,12 @@ pub struct Document {
     /// Estimates under changed frequencies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbation: Option<Vec<PerturbationSection>>,
+    /// Average errors of the estimates under changed frequencies, as Ingole & Chatterjee state them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbation_averages: Option<Vec<AverageSection>>,
+    /// Estimates under random errors of the frequencies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monte_carlo: Option<MonteCarloSection>,
     /// Spans of the estimates over all sign patterns of the half-line bounds, and what each mode
     /// contributes.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -70,6 +76,8 @@ pub struct RecordingSection {
     pub sample_rate: f64,
     /// Number of channels.
     pub channels: usize,
+    /// Every channel.
+    pub channel_details: Vec<ChannelSection>,
     /// Length (s).
     pub seconds: f64,
     /// Taps in order of time.
@@ -96,6 +104,31 @@ pub struct RecordingSection {
     pub remaining_at_end: Option<f64>,
     /// This recording's own readings.
     pub modes: Vec<ModeSection>,
+}
+
+/// One channel of a recording, in the unit that its values have.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ChannelSection {
+    /// Number, from 1.
+    pub channel: usize,
+    /// Name, where the file gives one.
+    pub name: Option<String>,
+    /// Unit, where known.
+    pub unit: Option<String>,
+    /// Units per unit of the file.
+    pub scale: f64,
+    /// Mean (DC offset).
+    pub mean: f64,
+    /// Root mean square about the mean.
+    pub rms: f64,
+    /// Largest magnitude.
+    pub peak: f64,
+    /// Samples at the format's full scale.
+    pub full_scale_samples: u64,
+    /// Flat tops.
+    pub flat_tops: u64,
+    /// Samples in runs that repeat one value.
+    pub dropped_samples: u64,
 }
 
 /// One tap.
@@ -237,6 +270,34 @@ pub struct PerturbationSection {
     pub ky: Option<f64>,
     /// Kz.
     pub kz: Option<f64>,
+}
+
+/// Mean magnitude of the errors (%) of +percent and -percent.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct AverageSection {
+    /// Change of all frequencies (%), its size.
+    pub percent: f64,
+    /// Of Kx (%).
+    pub kx_percent: f64,
+    /// Of Ky (%).
+    pub ky_percent: f64,
+    /// Of Kz (%).
+    pub kz_percent: Option<f64>,
+}
+
+/// Estimates under random errors of the frequencies: median and 95 % interval.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct MonteCarloSection {
+    /// Repetitions.
+    pub samples: usize,
+    /// How many of them had no estimate.
+    pub failed: usize,
+    /// Kx.
+    pub kx: Option<ValueSection>,
+    /// Ky.
+    pub ky: Option<ValueSection>,
+    /// Kz.
+    pub kz: Option<ValueSection>,
 }
 
 /// What the resolution of the readings does to the estimate.

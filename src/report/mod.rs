@@ -17,7 +17,10 @@ mod csv;
 mod json;
 mod run;
 
-pub use convert::document as document_of;
+pub use convert::{
+    document as document_of, inspection as inspection_of, lambdas as lambdas_of,
+    prediction as prediction_of,
+};
 pub use convert_figures::figures as figures_of;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use html::render_html;

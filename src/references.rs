@@ -11,3 +11,8 @@
 //! - **ISO 7626-5:2019**: measurement of mechanical mobility by impact excitation.
 //! - **Oppenheim & Schafer**: "Discrete-Time Signal Processing". Kaiser window design,
 //!   chirp z-transform.
+//! - **Brent 1973**: "Algorithms for Minimization without Derivatives". Root of a function between
+//!   two points of opposite sign.
+//! - **Bathe**: "Finite Element Procedures", 11.6. Subspace iteration.
+//! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
+//!   the beam element with shear and rotary inertia.

@@ -81,12 +81,13 @@ pub(super) struct RecordingArguments {
 impl RecordingArguments {
     /// Opens a recording, with the sample rate given.
     pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
-        Recording::open(
-            path,
-            &ReadSettings {
-                sample_rate: self.sample_rate,
-            },
-        )
+        let settings = ReadSettings {
+            sample_rate: self.sample_rate,
+        };
+        let recording = Recording::open(path, &settings)?;
+        // Errors name the whole path, tables the file.
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Ok(recording.renamed(name.to_string_lossy()))
     }
 }
 

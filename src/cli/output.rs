@@ -294,7 +294,7 @@ mod tests {
             "preparing left something behind"
         );
         let output = OutputFolder::prepare(&path).unwrap();
-        fs::write(output.staging().join("report.html"), "x").unwrap();
+        output.add("report.html", "x".as_bytes()).unwrap();
         output.publish().unwrap();
         assert_eq!(names(&path), ["report.html"]);
         assert_eq!(names(folder.path()), ["deep"]);
@@ -306,7 +306,7 @@ mod tests {
         fs::write(folder.path().join("notes.txt"), "mine").unwrap();
         fs::write(folder.path().join("report.json"), "old").unwrap();
         let output = OutputFolder::prepare(folder.path()).unwrap();
-        fs::write(output.staging().join("report.json"), "new").unwrap();
+        output.add("report.json", "new".as_bytes()).unwrap();
         output.publish().unwrap();
         assert_eq!(names(folder.path()), ["notes.txt", "report.json"]);
         assert_eq!(

@@ -1,8 +1,8 @@
 //! A joint estimate with its uncertainty and in SI units.
 
-use super::pairs::{Doubt, ModeLambda, PairsEstimate, PairsModel, estimate_pairs};
+use super::pairs::{ModeLambda, PairsEstimate, PairsModel, estimate_pairs};
 use super::perturbation::Stiffnesses;
-use super::{IdentifyError, SingleModeStiffness, single_mode_stiffness};
+use super::{Doubt, IdentifyError, SingleModeStiffness, single_mode_stiffness};
 use crate::structure::Beam;
 use crate::structure::joint::StiffnessUnits;
 

@@ -11,6 +11,7 @@
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
 
+pub mod doubt;
 pub mod estimate;
 pub mod free_beam;
 pub mod monte_carlo;
@@ -19,16 +20,17 @@ pub mod pairs;
 pub mod perturbation;
 pub mod predict;
 
+pub use doubt::Doubt;
 pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
 pub use free_beam::{FreeBeamEstimate, estimate_modulus};
 pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
 pub use pairing::pair_by_frequency;
 pub use pairs::{
-    Doubt, ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap,
-    estimate_pairs, estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,
+    ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap, estimate_pairs,
+    estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,
 };
 pub use perturbation::Stiffnesses;
-pub use predict::{PredictedMode, predict, predict_lambdas};
+pub use predict::{PredictedMode, compare, predict, predict_lambdas};
 
 use crate::structure::StructureError;
 

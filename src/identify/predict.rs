@@ -35,25 +35,37 @@ pub fn predict(
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
     beam.check()?;
-    let (measured, used) = measured;
-    let highest = measured.iter().map(|mode| mode.mode).max().unwrap_or(0);
+    let highest = measured.0.iter().map(|mode| mode.mode).max().unwrap_or(0);
     let slenderness = beam.slenderness(theory);
     let modes = natural_modes(assembly, joint, &slenderness, count.max(highest))?;
-    let row = |(index, mode): (usize, &NaturalMode)| {
+    let frequencies: Vec<f64> = modes
+        .iter()
+        .map(|mode| beam.frequency_of(mode.lambda))
+        .collect();
+    Ok(compare(beam, &frequencies, measured))
+}
+
+/// Sets predicted frequencies (Hz) of modes 1, 2, ..., wherever they come from, beside the measured
+/// modes, of which those with numbers in the second list entered the estimate.
+pub fn compare(
+    beam: &Beam,
+    predicted: &[f64],
+    (measured, used): (&[MeasuredMode], &[usize]),
+) -> Vec<PredictedMode> {
+    let row = |(index, &predicted): (usize, &f64)| {
         let number = index + 1;
-        let predicted = beam.frequency_of(mode.lambda);
         let found = measured.iter().find(|measured| measured.mode == number);
         let measured = found.map(|found| found.frequency);
         PredictedMode {
             mode: number,
             measured,
             predicted,
-            lambda: mode.lambda,
+            lambda: beam.lambda_of(predicted),
             error_percent: measured.map(|measured| 100.0 * (predicted - measured) / measured),
             used: used.contains(&number),
         }
     };
-    Ok(modes.iter().enumerate().map(row).collect())
+    predicted.iter().enumerate().map(row).collect()
 }
 
 /// The first `count` lambda (1) of an Euler beam, where no beam is described.

@@ -60,8 +60,11 @@ fn median(values: &[f64]) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakSettings {
     /// Least prominence (dB): how far the level falls on both sides before it rises above the peak.
-    /// 8 dB: a resonance of 2 % damping next to an equal one still has it.
+    /// 2 dB, where noise allows it: two resonances one and a half half-power widths apart still have
+    /// it. The ripple that noise puts on a level comes on top.
     pub prominence_db: f64,
+    /// Least prominence where nothing is known of the noise (dB). 8 dB.
+    pub blind_prominence_db: f64,
     /// Least height above the noise (dB). 15 dB: noise alone passes it on one line in 10^13.
     pub above_noise_db: f64,
     /// Least distance of two peaks (lines). 3: two peaks nearer than that share their flanks.
@@ -73,7 +76,8 @@ pub struct PeakSettings {
 impl Default for PeakSettings {
     fn default() -> Self {
         PeakSettings {
-            prominence_db: 8.0,
+            prominence_db: 2.0,
+            blind_prominence_db: 8.0,
             above_noise_db: 15.0,
             separation: 3,
             most: 30,
@@ -109,7 +113,7 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
                 .as_ref()
                 .map(|noise| level.level_db[index] - noise[index]),
         })
-        .filter(|peak| peak.prominence_db >= settings.prominence_db)
+        .filter(|peak| peak.prominence_db >= needed_prominence(peak, settings))
         .filter(|peak| {
             let height = peak
                 .above_noise_db
@@ -131,6 +135,15 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
     kept
 }
 
+/// The least prominence of a peak. Noise s dB below a level makes it ripple by 8.7 10^(-s/20) dB;
+/// six times that is out of its reach on any line.
+fn needed_prominence(peak: &Peak, settings: &PeakSettings) -> f64 {
+    match peak.above_noise_db {
+        Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
+        None => settings.blind_prominence_db,
+    }
+}
+
 /// Interior local maxima; the first line of a plateau stands for it.
 fn local_maxima(level: &[f64]) -> Vec<usize> {
     (1..level.len().saturating_sub(1))
@@ -138,19 +151,32 @@ fn local_maxima(level: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// Height over the higher of the two lowest points between the peak and the next higher ground (or
-/// the end of the axis).
+/// Height over the higher of the two lowest points between the peak and the next higher ground. A
+/// side that meets the end of the axis before higher ground says nothing: the band just ends there,
+/// perhaps on the flank. The highest peak of all stands over the lower of its two sides.
 fn prominence(level: &[f64], index: usize) -> f64 {
     let height = level[index];
-    let valley = |values: &mut dyn Iterator<Item = &f64>| {
-        values
-            .take_while(|&&v| v <= height)
-            .copied()
-            .fold(height, f64::min)
-    };
-    let left = valley(&mut level[..index].iter().rev());
-    let right = valley(&mut level[index + 1..].iter());
-    height - left.max(right)
+    let (left, left_ends) = valley(level[..index].iter().rev(), height);
+    let (right, right_ends) = valley(level[index + 1..].iter(), height);
+    height
+        - match (left_ends, right_ends) {
+            (true, false) => right,
+            (false, true) => left,
+            (true, true) => left.min(right),
+            (false, false) => left.max(right),
+        }
+}
+
+/// Lowest point before higher ground, and whether the axis ended before there was any.
+fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
+    let mut lowest = height;
+    for &level in side {
+        if level > height {
+            return (lowest, false);
+        }
+        lowest = lowest.min(level);
+    }
+    (lowest, true)
 }
 
 /// Height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the

@@ -30,7 +30,8 @@ pub fn read_peaks(
                 Window::Rectangular | Window::Exponential { .. } => {
                     let room = room_around(&places, peak.index);
                     let decay = window.added_decay();
-                    interpolate_pole(&level.lines, spectra, peak.index, room, decay).filter(decays)
+                    interpolate_pole(&level.lines, spectra, peak.index, room, decay)
+                        .filter(|found| is_resonance(found, peak, level.lines.half_line()))
                 }
             };
             reading(level, peak, between)
@@ -38,11 +39,15 @@ pub fn read_peaks(
         .collect()
 }
 
+/// A peak that stands out by less than this (dB) must be read within its half line to count.
+const CLEAR_PROMINENCE: f64 = 8.0;
+
 /// Whether the fitted oscillation decays beyond doubt (two standard deviations).
-fn decays(found: &Interpolation) -> bool {
-    found
+fn is_resonance(found: &Interpolation, peak: &Peak, half_line: f64) -> bool {
+    let decays = found
         .damping_ratio
-        .is_some_and(|damping_ratio| damping_ratio > 2.0 * found.damping_std)
+        .is_some_and(|ratio| ratio > 2.0 * found.damping_std);
+    decays && (peak.prominence_db >= CLEAR_PROMINENCE || found.bound < half_line)
 }
 
 fn reading(level: &CompositeLevel, peak: &Peak, between: Option<Interpolation>) -> ModeReading {

@@ -2,6 +2,8 @@
 
 use std::io;
 
+use super::text::short;
+
 /// Why a recording cannot be opened, read or written.
 ///
 /// Every message begins with the file, and the line where there is one; then what was found, what
@@ -396,9 +398,4 @@ pub enum RecordingError {
         /// The system's reason.
         source: io::Error,
     },
-}
-
-/// A number with the digits that mean something: nine, so that roundings do not show.
-fn short(value: f64) -> f64 {
-    format!("{value:.8e}").parse().unwrap_or(value)
 }

@@ -240,8 +240,9 @@ impl<'a> Candidate<'a> {
         used.map_or(0, |last| last + 1)
     }
 
-    /// The time column: named t, time, t_* or time_*, and rising in most steps of the head. (That
-    /// it rises in all of them is checked when the rows are read, and is an error there.)
+    /// The time column: named t, time, t_* or time_*, and rising in at least half of the steps of
+    /// the head. (That it rises in all of them is checked when the rows are read, and is an error
+    /// there.)
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
         let names = |exact: bool| {
             let is_time = move |column: &Column| {
@@ -267,7 +268,7 @@ impl<'a> Candidate<'a> {
             .windows(2)
             .filter(|pair| pair.last() > pair.first())
             .count();
-        steps == 0 || 2 * rising > steps
+        2 * rising >= steps
     }
 
     /// The readable numbers of one column in the head.

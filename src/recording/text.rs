@@ -200,6 +200,11 @@ pub(super) fn shown(cell: &[u8]) -> String {
     short.replace(char::is_control, " ")
 }
 
+/// A number with the digits that mean something: nine, so that roundings do not show.
+pub(super) fn short(value: f64) -> f64 {
+    format!("{value:.8e}").parse().unwrap_or(value)
+}
+
 /// Whether a line is a comment, of a kind that recorders and numerical programs write.
 pub(super) fn is_comment(line: &[u8]) -> bool {
     let line = line.trim_ascii_start();

@@ -70,6 +70,17 @@ pub fn significant(value: f64, digits: i32) -> String {
     at_place(value, last_place(value, digits))
 }
 
+/// An exact setting such as a rate or a line spacing: at most `digits` significant digits, without
+/// zeros at the end.
+pub fn trimmed(value: f64, digits: i32) -> String {
+    let text = significant(value, digits);
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
 /// The same for a value that may not exist.
 pub fn optional(value: Option<f64>, digits: i32) -> String {
     value.map_or_else(|| MISSING.to_owned(), |value| significant(value, digits))
@@ -81,6 +92,12 @@ pub fn like(value: Option<f64>, uncertainty: Option<f64>) -> String {
         || MISSING.to_owned(),
         |value| rounded(value, uncertainty).value,
     )
+}
+
+/// A change that was set, with its sign: "+0.05".
+pub fn signed(value: f64) -> String {
+    let sign = if value > 0.0 { "+" } else { "" };
+    format!("{sign}{}", trimmed(value, 4))
 }
 
 /// A percentage with its sign and two significant digits, at most two decimals: "+0.31", "−12".
@@ -168,7 +185,8 @@ fn at_place_together(value: f64, other: f64, place: i32) -> (String, String) {
     let largest = value.abs().max(other.abs());
     let step = 10f64.powi(place);
     if largest >= PLAIN_LARGEST || step < PLAIN_SMALLEST {
-        let exponent = last_place(largest, 1);
+        // Of the rounded number, so that 9.9999e9 becomes 1.000e10 and 9.7e9 stays.
+        let exponent = last_place((largest / step).round() * step, 12) + 11;
         let decimals = (exponent - place).max(0) as usize;
         let write = |number: f64| {
             let mantissa = format!("{:.decimals$}", number / 10f64.powi(exponent));

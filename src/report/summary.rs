@@ -1,7 +1,7 @@
 //! What was found, in a few plain sentences.
 
 use super::document::{Document, PredictionSection, RecordingSection};
-use super::format::{signed_percent, significant};
+use super::format::{signed_percent, significant, trimmed};
 use super::tables::{estimated, reading_bound};
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -47,8 +47,7 @@ fn modes(document: &Document) -> Option<String> {
         .filter(|mode| mode.mode.is_some())
         .map(|mode| mode.frequency)
         .collect();
-    let others = modes.len() - numbered.len();
-    let given = modes.iter().all(|mode| mode.method == "given");
+    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == "given");
     let found = if given { "given" } else { "found" };
     let low = numbered.iter().copied().fold(f64::INFINITY, f64::min);
     let high = numbered.iter().copied().fold(0.0, f64::max);
@@ -61,17 +60,20 @@ fn modes(document: &Document) -> Option<String> {
             significant(high, 4)
         ),
     };
-    match others {
-        0 => {}
-        1 => sentence.push_str("; 1 more peak is no mode (mains hum or unpaired)"),
-        count => sentence.push_str(&format!(
-            "; {count} more peaks are no modes (mains hum or unpaired)"
-        )),
-    }
     let finest = finest(document.recordings.as_deref().unwrap_or_default());
     if let Some(half_line) = finest.filter(|_| !numbered.is_empty()) {
-        let half_line = significant(half_line, 3);
-        sentence.push_str(&format!(", read to \u{b1}{half_line} Hz at best"));
+        let half_line = trimmed(half_line, 3);
+        sentence.push_str(&format!(
+            "; a spectral line holds to \u{b1}{half_line} Hz at best"
+        ));
+    }
+    match modes.len() - numbered.len() {
+        0 => {}
+        1 => sentence.push_str("; 1 more peak is no mode (mains hum or unpaired)"),
+        count => {
+            let words = format!("; {count} more peaks are no modes (mains hum or unpaired)");
+            sentence.push_str(&words);
+        }
     }
     Some(sentence + ".")
 }

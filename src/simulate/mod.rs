@@ -12,6 +12,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::structure::ModeShape;
+
 /// One mode of the structure as the sensors see it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedMode {
@@ -172,5 +174,45 @@ fn add_noise(samples: &mut [f64], level: f64, random: &mut impl Rng) {
             let noise: f64 = StandardNormal.sample(random);
             *x += level * noise;
         }
+    }
+}
+
+/// The modes of a beam as a test with these positions sees them.
+///
+/// `shapes` are the structure's, `damping_ratios` one for each (the last one for all beyond);
+/// `tap` and `sensors` are positions along the beam (m). Modes beyond `highest` (Hz) are left out:
+/// nothing above half the sample rate may be simulated.
+pub fn seen_modes(
+    shapes: &[ModeShape],
+    damping_ratios: &[f64],
+    (tap, sensors): (f64, &[f64]),
+    highest: f64,
+) -> Vec<SimulatedMode> {
+    let last = damping_ratios.last().copied().unwrap_or(0.0);
+    shapes
+        .iter()
+        .enumerate()
+        .filter(|(_, shape)| shape.frequency < highest)
+        .map(|(index, shape)| SimulatedMode {
+            frequency: shape.frequency,
+            damping_ratio: damping_ratios.get(index).copied().unwrap_or(last),
+            shape_at_tap: shape.displacement(tap),
+            shape_at_sensors: sensors.iter().map(|&x| shape.displacement(x)).collect(),
+        })
+        .collect()
+}
+
+impl TapTest {
+    /// Force and responses as channels in file units: divided by these scales (N, and m/s2, per
+    /// unit of the file).
+    pub fn channels(&self, force_scale: f64, response_scale: f64) -> Vec<Vec<f64>> {
+        let scaled = |samples: &[f64], scale: f64| samples.iter().map(|x| x / scale).collect();
+        std::iter::once(scaled(&self.force, force_scale))
+            .chain(
+                self.responses
+                    .iter()
+                    .map(|response| scaled(response, response_scale)),
+            )
+            .collect()
     }
 }

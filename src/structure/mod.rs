@@ -25,6 +25,7 @@ pub mod roots;
 pub mod timoshenko;
 
 mod banded;
+mod element;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::JointStiffness;
@@ -79,6 +80,22 @@ pub enum StructureError {
         assembly: &'static str,
         /// The cross compliance given (non-dimensional).
         cross_compliance: f64,
+    },
+    /// A place that is not on the beam.
+    #[error("position {position} m is not on the structure, which reaches from 0 to {length} m")]
+    OffBeam {
+        /// The position given (m).
+        position: f64,
+        /// Where the structure ends (m).
+        length: f64,
+    },
+    /// More modes than a beam theory says anything about.
+    #[error("{count} modes were asked for; at most {limit} are computed")]
+    TooManyModes {
+        /// How many were asked for.
+        count: usize,
+        /// How many are allowed.
+        limit: usize,
     },
     /// A finite-element model that cannot be solved.
     #[error("the finite-element model cannot be solved: {reason}")]

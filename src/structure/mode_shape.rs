@@ -48,7 +48,8 @@ pub fn mode_shapes(
 
 impl ModeShape {
     /// Displacement (kg^-1/2) at `position` (m) from the joint, of a lap joint or a free beam from
-    /// the left end. Exactly at a lap joint the right half's end is meant.
+    /// the left end. Exactly at a lap joint the right half's end is meant. Off the beam the number
+    /// has no meaning.
     pub fn displacement(&self, position: f64) -> f64 {
         let (side, x) = self.place(position);
         side * self.piece.derivative(0, x)

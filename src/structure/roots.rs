@@ -8,6 +8,10 @@ use super::frequency_equation::RootedBeam;
 use super::{Beam, BeamTheory, JointStiffness, Slenderness, StructureError};
 use std::f64::consts::PI;
 
+/// No beam bends like a beam at its thousandth mode; the limit only keeps a slip of the hand from
+/// running for hours.
+pub const MODE_LIMIT: usize = 1000;
+
 /// What the joint joins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Assembly {
@@ -44,8 +48,8 @@ pub struct NaturalMode {
 /// makes a low mode that does count.
 ///
 /// # Errors
-/// [`StructureError`] where the joint cannot exist ([`JointStiffness::check`]) or a lap joint is
-/// given a cross coupling.
+/// [`StructureError`] where the joint cannot exist ([`JointStiffness::check`]), a lap joint is
+/// given a cross coupling, or more than [`MODE_LIMIT`] modes are asked for.
 pub fn natural_lambdas(
     assembly: Assembly,
     joint: &JointStiffness,
@@ -84,6 +88,12 @@ pub fn natural_modes(
     slenderness: &Slenderness,
     count: usize,
 ) -> Result<Vec<NaturalMode>, StructureError> {
+    if count > MODE_LIMIT {
+        return Err(StructureError::TooManyModes {
+            count,
+            limit: MODE_LIMIT,
+        });
+    }
     let single = |joint: &JointStiffness| {
         let lambdas = lowest_roots(&RootedBeam::new(joint, *slenderness), count);
         let plain = |lambda| NaturalMode {
@@ -118,7 +128,8 @@ pub fn natural_modes(
 /// oscillates.
 ///
 /// # Errors
-/// [`StructureError::Stiffness`] where a stiffness is not a number.
+/// [`StructureError::Stiffness`] where a stiffness is not a number,
+/// [`StructureError::TooManyModes`].
 pub fn natural_lambdas_of_any_joint(
     joint: &JointStiffness,
     count: usize,
@@ -133,10 +144,14 @@ pub fn natural_lambdas_of_any_joint(
             return Err(StructureError::Stiffness { quantity, value });
         }
     }
-    Ok(lowest_roots(
-        &RootedBeam::new(joint, Slenderness::EULER),
-        count,
-    ))
+    if count > MODE_LIMIT {
+        return Err(StructureError::TooManyModes {
+            count,
+            limit: MODE_LIMIT,
+        });
+    }
+    let beam = RootedBeam::new(joint, Slenderness::EULER);
+    Ok(lowest_roots(&beam, count))
 }
 
 /// By symmetry a lap joint is two beams of half the length. Symmetric motion bends the joint: the

@@ -1,1 +1,3 @@
-//! Studies that need measurement and theory together.
+//! Studies that need both sides: the published paper's tables beside ours.
+
+pub mod paper;

@@ -381,6 +381,34 @@ fn recover_modulus_of_a_free_beam() {
 }
 
 #[test]
+fn val_modulus_of_a_spruce_bar() {
+    // A spruce brace measured by the guitar_tap project (github.com/dwsdolce/guitar_tap):
+    // 556 x 20.4 x 29.4 mm, 383.8 kg/m3, first mode 512.69 Hz, E = 10.541 +- 0.05 GPa as an Euler
+    // beam.
+    let bar = Beam {
+        length: 0.556,
+        width: 0.0204,
+        thickness: 0.0294,
+        modulus: 10e9,
+        density: 383.8,
+        poisson: 0.3,
+    };
+    let mode = MeasuredMode {
+        mode: 1,
+        frequency: 512.69,
+        std: None,
+    };
+    let found = estimate_modulus(BeamTheory::Euler, &bar, &[mode]).unwrap();
+    assert!((found.modulus.value - 10.541e9).abs() < 0.05e9, "{found:?}");
+    // Shear makes a beam softer, so that the same frequency needs a higher modulus.
+    let shear = estimate_modulus(BeamTheory::Timoshenko, &bar, &[mode]).unwrap();
+    assert!(
+        shear.modulus.value > 1.02 * found.modulus.value,
+        "{shear:?}"
+    );
+}
+
+#[test]
 fn recover_prediction_of_withheld_modes() {
     let beam = steel_strip();
     let joint = JointStiffness::two_parameter(500.0, 100.0);

@@ -1,20 +1,202 @@
-//! Tests of report.
+//! Tests of the report: what is drawn, what is written, and that nothing missing breaks it.
 
 mod fixture;
+mod numbers;
+mod pictures;
+mod words;
 
-use tapjoint::report::render_run;
+use tapjoint::report::document::Document;
+use tapjoint::report::figures::RecordingFigure;
+use tapjoint::report::{ReportFile, render_run};
+
+/// Renders a whole report; a report that cannot be rendered fails the test with its error.
+fn rendered(document: &Document, figures: &[RecordingFigure]) -> Vec<ReportFile> {
+    match render_run(document, figures) {
+        Ok(files) => files,
+        Err(error) => panic!("the report was not rendered: {error}"),
+    }
+}
+
+/// Text of one file.
+fn text_of(files: &[ReportFile], name: &str) -> String {
+    let file = files.iter().find(|file| file.name == name);
+    let bytes = file.map(|file| file.bytes.clone()).unwrap_or_default();
+    assert!(!bytes.is_empty(), "{name} is missing or empty");
+    String::from_utf8(bytes).expect("the file is UTF-8")
+}
+
+/// Names of the files.
+fn names(files: &[ReportFile]) -> Vec<&str> {
+    files.iter().map(|file| file.name.as_str()).collect()
+}
+
+/// Documents and figures with parts missing, each with a name.
+fn incomplete() -> Vec<(&'static str, Document, Vec<RecordingFigure>)> {
+    let whole = fixture::document;
+    let figures = fixture::figures;
+    let without_hammer = figures()
+        .into_iter()
+        .map(|mut figure| {
+            if let Some(spectra) = &mut figure.spectra {
+                spectra.force = None;
+                spectra.frfs.clear();
+            }
+            figure
+        })
+        .collect();
+    let without_taps: Vec<RecordingFigure> = figures()
+        .into_iter()
+        .map(|mut figure| {
+            figure.spectra = None;
+            figure.overview.taps.clear();
+            figure
+        })
+        .collect();
+    let measured_only = Document {
+        recordings: None,
+        ..whole()
+    };
+    let no_modes = Document {
+        modes: Some(Vec::new()),
+        estimate: Some(None),
+        estimate_reason: Some("3 modes are needed, 0 were found".into()),
+        prediction: None,
+        perturbation: None,
+        resolution_span: None,
+        ..whole()
+    };
+    vec![
+        ("empty", Document::default(), Vec::new()),
+        ("without hammer", whole(), without_hammer),
+        ("without taps", no_modes.clone(), without_taps),
+        ("without modes", no_modes, figures()),
+        ("measured frequencies only", measured_only, Vec::new()),
+        ("not finite", broken(), broken_figures()),
+        ("no samples", whole(), empty_figures()),
+    ]
+}
+
+/// A document in which what can be infinite or undefined is.
+fn broken() -> Document {
+    let mut document = fixture::document();
+    if let Some(Some(estimate)) = &mut document.estimate {
+        if let Some(kx) = &mut estimate.kx {
+            kx.value = f64::INFINITY;
+            kx.std = Some(f64::NAN);
+            kx.low = None;
+            kx.high = None;
+        }
+        if let Some(kt) = &mut estimate.kt {
+            kt.value = f64::NAN;
+        }
+    }
+    for row in document.prediction.iter_mut().flatten() {
+        row.predicted = Some(f64::NAN);
+        row.error_percent = Some(f64::NAN);
+    }
+    for mode in document.modes.iter_mut().flatten() {
+        mode.half_line = Some(f64::NAN);
+        mode.interpolated_bound = Some(0.0);
+        mode.std = None;
+    }
+    if let Some(span) = &mut document.resolution_span {
+        span.kx = Some([0.0, f64::INFINITY]);
+        span.cloud = vec![[f64::NAN, 1.0], [f64::INFINITY, 2.0]];
+    }
+    document
+}
+
+fn broken_figures() -> Vec<RecordingFigure> {
+    let mut figures = fixture::figures();
+    for figure in &mut figures {
+        figure.overview.high[7] = f64::NAN;
+        figure.overview.taps[0].peak = f64::INFINITY;
+        if let Some(spectra) = &mut figure.spectra {
+            spectra.responses[0].values.fill(0.0);
+            spectra.responses[1].values[3] = f64::NAN;
+            spectra.frfs[0].magnitude.fill(f64::NAN);
+            spectra.force = Some(vec![0.0; spectra.lines.points()]);
+            spectra.peaks[0].half_line = f64::NAN;
+            spectra.peaks[1].frequency = f64::NAN;
+        }
+    }
+    figures
+}
+
+fn empty_figures() -> Vec<RecordingFigure> {
+    let mut figures = fixture::figures();
+    for figure in &mut figures {
+        figure.overview.low.clear();
+        figure.overview.high.clear();
+        if let Some(spectra) = &mut figure.spectra {
+            spectra.responses.clear();
+            spectra.frfs.clear();
+            spectra.force = Some(Vec::new());
+        }
+    }
+    figures
+}
 
 #[test]
-fn dump() {
-    let Ok(dir) = std::env::var("REPORT_DUMP") else {
-        return;
-    };
-    let start = std::time::Instant::now();
-    let files = render_run(&fixture::document(), &fixture::figures()).unwrap();
-    eprintln!("{:?}", start.elapsed());
-    for f in files {
-        println!("{} {}", f.name, f.bytes.len());
-        std::fs::write(format!("{dir}/{}", f.name), f.bytes).unwrap();
+fn limit_incomplete_analyses_are_reported() {
+    for (case, document, figures) in incomplete() {
+        let files = rendered(&document, &figures);
+        let names = names(&files);
+        for name in ["report.html", "report.json", "parameters.csv", "modes.csv"] {
+            assert!(names.contains(&name), "{case}: {name} is missing");
+        }
+        let html = text_of(&files, "report.html");
+        for word in ["NaN", ">inf<", "Infinity", "null"] {
+            assert!(!html.contains(word), "{case}: the page says {word}");
+        }
+        let text = tapjoint::report::render_text(&document);
+        assert!(!text.contains("NaN"), "{case}: the terminal says NaN");
     }
-    print!("{}", tapjoint::report::render_text(&fixture::document()));
+}
+
+#[test]
+fn limit_pictures_apply_only_where_there_are_data() {
+    let cases = incomplete();
+    let of = |wanted: &str| {
+        let (_, document, figures) = cases
+            .iter()
+            .find(|(case, _, _)| *case == wanted)
+            .expect("the case exists");
+        let files = rendered(document, figures);
+        files
+            .into_iter()
+            .map(|file| file.name)
+            .filter(|name| name.ends_with(".png"))
+            .collect::<Vec<_>>()
+    };
+    let none: Vec<String> = Vec::new();
+    assert_eq!(of("empty"), none);
+    assert_eq!(of("without taps"), ["taps-low.png", "taps-full.png"]);
+    assert_eq!(
+        of("without hammer"),
+        [
+            "spectrum-low.png",
+            "taps-low.png",
+            "spectrum-full.png",
+            "taps-full.png",
+            "frequencies.png",
+            "cloud.png"
+        ]
+    );
+    assert_eq!(
+        of("measured frequencies only"),
+        ["frequencies.png", "cloud.png"]
+    );
+}
+
+#[test]
+fn prop_files_of_equal_names_stay_apart() {
+    let mut figures = fixture::figures();
+    figures[0].file = "a/tap one.wav".into();
+    figures[1].file = "b/tap one.csv".into();
+    let files = rendered(&fixture::document(), &figures);
+    let names = names(&files);
+    for name in ["spectrum-tap-one.png", "spectrum-tap-one-2.png"] {
+        assert!(names.contains(&name), "{name} is missing among {names:?}");
+    }
 }

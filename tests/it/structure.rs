@@ -318,7 +318,7 @@ fn limit_timoshenko_functions_become_bishops() {
 }
 
 #[test]
-fn val_timoshenko_pinned_and_free_beams() {
+fn prop_timoshenko_free_beam_is_two_halves_pinned_or_guided() {
     // A beam pinned at one end and free at the other has every second frequency of the free beam
     // of twice the length, and a guided one the others: two evaluations of different functions.
     let beam = Beam {
@@ -343,6 +343,32 @@ fn val_timoshenko_pinned_and_free_beams() {
             "{} against {half}",
             free.lambda
         );
+    }
+}
+
+#[test]
+fn prop_stocky_beams_miss_no_root_of_the_second_spectrum() {
+    // Thickness a third of the length: the second spectrum starts near lambda = 7.5, amid the
+    // first twelve modes.
+    let stocky = Slenderness {
+        rotary: 0.01,
+        shear: 0.0312,
+    };
+    for kx in [0.0, 1e-3, 1.0, 300.0, 1e6, f64::INFINITY] {
+        for ky in [0.0, 1e-3, 1.0, 300.0, 1e6, f64::INFINITY] {
+            let joint = joint(kx, ky);
+            let found = natural_modes(Assembly::Cantilever, &joint, &stocky, 12).unwrap();
+            let beam = RootedBeam::new(&joint, stocky);
+            let end = found[11].lambda + 1e-3;
+            assert!(end > 7.5, "{end}");
+            let seen = scan(&beam, end, 20_000);
+            let above = found.iter().filter(|mode| mode.lambda > end / 20_000.0);
+            assert_eq!(
+                above.count(),
+                seen.len(),
+                "{joint:?}: {found:?} against {seen:?}"
+            );
+        }
     }
 }
 
@@ -404,6 +430,8 @@ fn limit_joints_that_cannot_exist_are_refused_with_their_limit() {
         let error = natural_lambdas(Assembly::Cantilever, &joint, 3).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
     }
+    let error = natural_lambdas(Assembly::Free, &JointStiffness::FREE, 1001).unwrap_err();
+    assert!(error.to_string().contains("1001"), "{error}");
     let coupled = JointStiffness::three_parameter(1.0, 1.0, 5.0);
     let error = natural_lambdas(Assembly::Lap, &coupled, 3).unwrap_err();
     assert!(
@@ -529,7 +557,8 @@ mod finite_elements {
             200,
         )
         .unwrap()
-        .with_point_mass(beam.length, ratio * beam.mass());
+        .with_point_mass(beam.length, ratio * beam.mass())
+        .unwrap();
         for frequency in tipped.natural_frequencies(4).unwrap() {
             let lambda = beam.lambda_of(frequency);
             let left = |lambda: f64| {
@@ -546,6 +575,25 @@ mod finite_elements {
     }
 
     #[test]
+    fn limit_masses_off_the_beam_or_negative_are_refused() {
+        let beam = steel_strip();
+        let model = || {
+            let rigid = JointStiffness::RIGID;
+            FiniteElementModel::new(BeamTheory::Euler, &beam, Assembly::Cantilever, &rigid, 10)
+        };
+        for (position, mass) in [(0.5, 0.1), (-0.1, 0.1), (f64::NAN, 0.1), (0.1, -1.0)] {
+            let refused = model().unwrap().with_point_mass(position, mass);
+            assert!(refused.is_err(), "{position} {mass}");
+        }
+        let rigid = JointStiffness::RIGID;
+        let theory = BeamTheory::Euler;
+        let none = FiniteElementModel::new(theory, &beam, Assembly::Cantilever, &rigid, 0);
+        assert!(none.is_err());
+        let error = model().unwrap().natural_frequencies(21).unwrap_err();
+        assert!(error.to_string().contains("finer"), "{error}");
+    }
+
+    #[test]
     fn prop_a_mass_counts_the_same_wherever_the_element_borders_lie() {
         let beam = steel_strip();
         let with_mass = |elements: usize| {
@@ -558,6 +606,7 @@ mod finite_elements {
             )
             .unwrap()
             .with_point_mass(0.317, 0.024)
+            .unwrap()
             .natural_frequencies(4)
             .unwrap()
         };

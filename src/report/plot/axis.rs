@@ -68,7 +68,7 @@ impl Axis {
         }
     }
 
-    /// Pixel of a value, kept inside the axis.
+    /// Pixel of a value, kept inside the axis; what is no number lies at its start.
     pub fn place(&self, value: f64) -> f64 {
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
@@ -76,6 +76,7 @@ impl Axis {
                 (value.max(self.low) / self.low).ln() / (self.high / self.low).ln()
             }
         };
+        let share = if share.is_nan() { 0.0 } else { share };
         self.from + share.clamp(0.0, 1.0) * (self.to - self.from)
     }
 

@@ -11,6 +11,8 @@ use super::spectrum::{INTERPOLATED, LEFT, RIGHT, over_lines};
 
 /// Most close-ups in one row; more would be too narrow to read.
 const MOST: usize = 6;
+/// Widest close-up (pixels).
+const WIDEST: f64 = 360.0;
 /// Lines shown on each side of the peak.
 const SIDE: f64 = 6.0;
 /// Depth shown below the peak (dB).
@@ -25,10 +27,10 @@ pub fn draw_closeups(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) {
         .collect();
     let shown = modes.len().min(MOST);
     draw_heading(drawing, modes.len(), top);
-    let width = (RIGHT - LEFT) / shown.max(1) as f64;
+    let width = ((RIGHT - LEFT) / shown.max(1) as f64).min(WIDEST);
     for (index, peak) in modes.into_iter().take(MOST).enumerate() {
         let left = LEFT + index as f64 * width;
-        let right = left + (width - 16.0).min(330.0);
+        let right = left + width - 16.0;
         draw_closeup(drawing, spectra, peak, (left, right, top + 54.0));
     }
 }
@@ -43,7 +45,7 @@ fn draw_heading(drawing: &mut Drawing, modes: usize, top: f64) {
     let after = LEFT + text.width() + 24.0;
     drawing.text(text);
     let entries = [
-        (Sample::Dot(curve(0)), "spectral line".to_owned()),
+        (Sample::Dot(SOFT), "spectral line".to_owned()),
         (Sample::Band(BLUE), "reading \u{b1} half line".to_owned()),
         (
             Sample::Dashed(INTERPOLATED),

@@ -1,7 +1,9 @@
 //! The picture of all estimates that the resolution of the readings allows: Kx against Ky.
 
+use std::collections::HashSet;
+
 use super::super::document::{Document, EstimateSection};
-use super::super::format::significant;
+use super::super::format::signed;
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Align, Drawing, Point, Stroke, Text};
 use super::palette::{BLUE, INK, ORANGE, SKY};
@@ -33,8 +35,8 @@ pub fn draw_cloud(document: &Document) -> Option<Drawing> {
         y: axis(points.iter().map(|point| point.1), (556.0, 98.0)),
     };
     panel.draw_axes(&mut drawing);
-    for (x, y) in &cloud {
-        drawing.dot(panel.place(*x, *y), 3.2, SKY);
+    for at in distinct(cloud.iter().map(|(x, y)| panel.place(*x, *y))) {
+        drawing.dot(at, 3.2, SKY);
     }
     draw_shifted(&mut drawing, &panel, &shifted);
     if let Some((x, y)) = estimate {
@@ -47,6 +49,14 @@ pub fn draw_cloud(document: &Document) -> Option<Drawing> {
     let entries = legend(&cloud, &shifted, estimate);
     draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &entries);
     Some(drawing)
+}
+
+/// Points without those that would be drawn over another one, two pixels apart at least.
+fn distinct(points: impl Iterator<Item = Point>) -> Vec<Point> {
+    let mut taken = HashSet::new();
+    points
+        .filter(|(x, y)| taken.insert(((x / 2.0) as i64, (y / 2.0) as i64)))
+        .collect()
 }
 
 /// Finite points of the cloud.
@@ -108,8 +118,7 @@ fn draw_shifted(drawing: &mut Drawing, panel: &Panel, shifted: &[(f64, Point)]) 
     for (percent, (x, y)) in shifted {
         let at = panel.place(*x, *y);
         drawing.cross(at, 6.0, Stroke::new(ORANGE, 2.5));
-        let sign = if *percent > 0.0 { "+" } else { "" };
-        let words = format!("{sign}{} %", significant(*percent, 2));
+        let words = format!("{} %", signed(*percent));
         // To the left where the right has no room.
         let (end, align) = if at.0 > panel.x.to - 90.0 {
             (at.0 - 11.0, Align::End)

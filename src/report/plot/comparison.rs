@@ -9,6 +9,11 @@ use super::palette::{BLUE, INK, SOFT, VERMILION};
 use super::panel::{Panel, Sample, TICK_SIZE, crisp, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
 
+/// Most modes whose frequencies fit under the picture side by side.
+const MOST_WITH_NUMBERS: usize = 10;
+/// Most modes whose errors fit beside each other.
+const MOST_WITH_WORDS: usize = 14;
+
 /// One mode's error and the bound of its reading (%).
 struct Error<'a> {
     prediction: &'a PredictionSection,
@@ -22,12 +27,17 @@ pub fn draw_frequencies(document: &Document) -> Option<Drawing> {
     if errors.is_empty() {
         return None;
     }
-    let mut drawing = Drawing::new("Errors of predicted frequencies", WIDTH, 480);
+    let height = if errors.len() > MOST_WITH_NUMBERS {
+        430
+    } else {
+        480
+    };
+    let mut drawing = Drawing::new("Errors of predicted frequencies", WIDTH, height);
     let title = "Predicted against measured frequencies";
     let below = "error = 100 (predicted \u{2212} measured) / measured; bar: bound of the reading";
     draw_title(&mut drawing, title, below);
     let panel = panel(&errors);
-    panel.draw_y_ticks(&mut drawing, &panel.y.ticks(46.0));
+    panel.draw_y_ticks(&mut drawing, &panel.y.ticks(36.0));
     let zero = Stroke::new(INK, 1.0);
     let y = crisp(panel.y.place(0.0));
     drawing.line(vec![(LEFT, y), (RIGHT, y)], zero);
@@ -92,9 +102,11 @@ fn draw_error(drawing: &mut Drawing, panel: &Panel, index: usize, error: &Error<
         drawing.ring((x, y), 6.0, color);
     }
     let words = format!("{} %", signed_percent(Some(error.percent)));
-    // With many modes the words stand on top of each other; the table has the numbers.
-    if count <= 14 {
-        drawing.text(Text::new(words, (x + 12.0, y), TICK_SIZE).colored(color));
+    // With more modes the words would touch; the table has the numbers.
+    if count <= MOST_WITH_WORDS {
+        let top = panel.y.place(error.percent + error.bound.unwrap_or(0.0));
+        let text = Text::new(words, (x, top.min(y - 4.0) - 13.0), TICK_SIZE);
+        drawing.text_on_paper(text.colored(color));
     }
     draw_mode_label(drawing, panel, x, error, count);
 }
@@ -102,14 +114,14 @@ fn draw_error(drawing: &mut Drawing, panel: &Panel, index: usize, error: &Error<
 fn draw_mode_label(drawing: &mut Drawing, panel: &Panel, x: f64, error: &Error<'_>, count: usize) {
     let below = panel.y.from;
     let mode = error.prediction.mode;
-    let name = if count <= 14 {
+    let name = if count <= MOST_WITH_WORDS {
         format!("mode {mode}")
     } else {
         mode.to_string()
     };
     let name = Text::new(name, (x, below + 17.0), TICK_SIZE).bold();
     drawing.text(name.aligned(Align::Middle));
-    if count > 10 {
+    if count > MOST_WITH_NUMBERS {
         return;
     }
     let rows = [

@@ -243,6 +243,14 @@ impl Drawing {
         self.shapes.push(Shape::Text(text));
     }
 
+    /// Adds text, aligned in the middle, on a patch of paper that hides the lines behind it.
+    pub fn text_on_paper(&mut self, text: Text) {
+        let (x, y) = text.at;
+        let (reach, rise) = (text.width() / 2.0 + 3.0, 0.6 * text.size);
+        self.rectangle((x - reach, y - rise), (x + reach, y + rise), WHITE, 0.9);
+        self.text(text.aligned(Align::Middle));
+    }
+
     /// All words of the picture, for tests.
     pub fn words(&self) -> Vec<&str> {
         self.shapes

@@ -5,7 +5,7 @@ use super::axis::{Axis, Tick};
 use super::drawing::{Drawing, Stroke};
 use super::marks::{STRIP, draw_marks};
 use super::palette::{BLUE, ORANGE, curve};
-use super::panel::{Frame, Panel, Sample, draw_legend, draw_title};
+use super::panel::{Panel, Sample, X_SPACING, draw_legend, draw_title};
 use super::spectrum::{
     LEFT, RIGHT, WIDTH, draw_x_grid, frequency_axis, magnitude_axis, over_lines, subtitle,
 };
@@ -70,16 +70,10 @@ fn draw_magnitude(
     group: &[(usize, &FrfCurve)],
     top: f64,
 ) -> Panel {
-    let frame = Frame {
-        left: LEFT,
-        top,
-        right: RIGHT,
-        bottom: top + MAGNITUDE,
-    };
     let curves = group.iter().map(|(_, frf)| frf.magnitude.as_slice());
     let panel = Panel {
         x: frequency_axis(spectra),
-        y: magnitude_axis(curves, frame.upwards()),
+        y: magnitude_axis(curves, (top + MAGNITUDE, top)),
     };
     panel.draw_y_ticks(drawing, &panel.y.ticks(40.0));
     draw_x_grid(drawing, &panel);
@@ -100,7 +94,7 @@ fn draw_phase(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) {
         label: Some(format!("{value:.0}").replace('-', "\u{2212}")),
     });
     panel.draw_y_ticks(drawing, &ticks);
-    panel.draw_x_ticks(drawing, &panel.x.ticks(110.0));
+    panel.draw_x_ticks(drawing, &panel.x.ticks(X_SPACING));
     panel.draw_frame(drawing);
     for (index, frf) in spectra.frfs.iter().enumerate() {
         for piece in unwrapped_pieces(spectra, &frf.phase) {

@@ -9,8 +9,10 @@ use super::panel::{Panel, TICK_SIZE, crisp};
 
 /// Height of the strip above a panel that labels and their leaders need (pixels).
 pub const STRIP: f64 = 62.0;
+/// Largest share of the row that labels fill: beyond it their leaders run almost flat.
+const FULLEST: f64 = 0.72;
 /// Least space between two labels (pixels).
-const GAP: f64 = 10.0;
+const GAP: f64 = 14.0;
 
 /// Colour of a mark: modes blue, everything else orange.
 pub fn color(peak: &PeakMark) -> Color {
@@ -25,12 +27,10 @@ pub fn draw_marks(drawing: &mut Drawing, panel: &Panel, peaks: &[PeakMark]) -> u
         draw_mark(drawing, panel, peak);
     }
     let mut labelled = visible.clone();
-    loop {
-        if draw_labels(drawing, panel, &labelled) {
-            return visible.len() - labelled.len();
-        }
+    while !draw_labels(drawing, panel, &labelled) {
         drop_least(&mut labelled);
     }
+    visible.len() - labelled.len()
 }
 
 /// Peaks on the axis in order of frequency.
@@ -72,9 +72,13 @@ fn words(peak: &PeakMark) -> [String; 2] {
 
 /// The frequency with one digit more than its half-line bound.
 pub fn frequency(peak: &PeakMark) -> String {
-    let bound = (peak.half_line / 5.0).max(1e-6);
-    let decimals = (1.0 - bound.log10().floor()).clamp(0.0, 6.0) as usize;
-    format!("{:.*} Hz", decimals.saturating_sub(1), peak.frequency)
+    let bound = peak.half_line / 5.0;
+    let decimals = if bound > 0.0 {
+        (-bound.log10().floor()).clamp(0.0, 5.0) as usize
+    } else {
+        2
+    };
+    format!("{:.decimals$} Hz", peak.frequency)
 }
 
 /// Draws all labels, or nothing and `false` where they do not fit.
@@ -85,6 +89,10 @@ fn draw_labels(drawing: &mut Drawing, panel: &Panel, peaks: &[&PeakMark]) -> boo
         .collect();
     let widths: Vec<f64> = peaks.iter().map(|peak| label_width(peak)).collect();
     let bounds = (panel.x.from - 40.0, panel.x.to + 14.0);
+    let filled: f64 = widths.iter().map(|width| width + GAP).sum();
+    if filled > FULLEST * (bounds.1 - bounds.0) {
+        return false;
+    }
     let Some(centers) = spread(&wishes, &widths, GAP, bounds) else {
         return false;
     };
@@ -117,11 +125,24 @@ fn label_width(peak: &PeakMark) -> f64 {
     ))
 }
 
-/// Takes away the label that is missed least: a peak that is no mode, else the highest mode.
+/// Takes away the label that is missed least: of the peaks that are no modes, else of the modes,
+/// the one closest to the peak before it.
 fn drop_least(peaks: &mut Vec<&PeakMark>) {
-    let no_mode = peaks.iter().rposition(|peak| peak.mode.is_none());
-    let least = no_mode.unwrap_or(peaks.len().saturating_sub(1));
-    if least < peaks.len() {
+    let any_other = peaks.iter().any(|peak| peak.mode.is_none());
+    let distance = |index: usize| {
+        let pair = index
+            .checked_sub(1)
+            .and_then(|before| peaks.get(before..=index));
+        match pair {
+            Some([before, peak]) => peak.frequency - before.frequency,
+            _ => f64::INFINITY,
+        }
+    };
+    let least = (0..peaks.len())
+        .rev()
+        .filter(|index| !any_other || peaks.get(*index).is_some_and(|peak| peak.mode.is_none()))
+        .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    if let Some(least) = least {
         peaks.remove(least);
     }
 }

@@ -7,6 +7,8 @@ use super::palette::{Color, GRID, INK, SOFT};
 
 /// Size of tick labels (pixels per em).
 pub const TICK_SIZE: f64 = 13.0;
+/// Least distance of labels on a horizontal axis (pixels).
+pub const X_SPACING: f64 = 90.0;
 /// Size of axis titles (pixels per em).
 pub const LABEL_SIZE: f64 = 14.0;
 
@@ -19,31 +21,6 @@ pub struct Panel {
     pub y: Axis,
 }
 
-/// Pixel edges of a panel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Left edge.
-    pub left: f64,
-    /// Upper edge.
-    pub top: f64,
-    /// Right edge.
-    pub right: f64,
-    /// Lower edge.
-    pub bottom: f64,
-}
-
-impl Frame {
-    /// Pixels of the horizontal axis.
-    pub fn across(&self) -> (f64, f64) {
-        (self.left, self.right)
-    }
-
-    /// Pixels of the vertical axis, from the lower edge up.
-    pub fn upwards(&self) -> (f64, f64) {
-        (self.bottom, self.top)
-    }
-}
-
 impl Panel {
     /// Pixel of a pair of values.
     pub fn place(&self, x: f64, y: f64) -> Point {
@@ -52,7 +29,7 @@ impl Panel {
 
     /// Grid lines, ticks with labels, and the frame.
     pub fn draw_axes(&self, drawing: &mut Drawing) {
-        self.draw_x_ticks(drawing, &self.x.ticks(110.0));
+        self.draw_x_ticks(drawing, &self.x.ticks(X_SPACING));
         self.draw_y_ticks(drawing, &self.y.ticks(46.0));
         self.draw_frame(drawing);
     }

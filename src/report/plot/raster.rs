@@ -31,7 +31,7 @@ fn encode(drawing: &Drawing, pixels: &[u8]) -> Result<Vec<u8>, png::EncodingErro
     encoder.set_depth(png::BitDepth::Eight);
     // Flat colours compress best unfiltered against the line above.
     encoder.set_filter(png::FilterType::Up);
-    encoder.set_compression(png::Compression::Fast);
+    encoder.set_compression(png::Compression::Default);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(pixels)?;
     writer.finish()?;

@@ -1,13 +1,13 @@
 //! The picture of a recording's averaged spectra with its resonances and how well they are read.
 
 use super::super::figures::{Curve, PeakMark, RecordingFigure, SpectraFigure};
-use super::super::format::significant;
+use super::super::format::{significant, trimmed};
 use super::axis::{Axis, extent};
 use super::closeup::draw_closeups;
 use super::drawing::{Drawing, Stroke, Text};
 use super::marks::{STRIP, draw_marks};
 use super::palette::{BLUE, ORANGE, SOFT, VERMILION, curve};
-use super::panel::{Frame, Panel, Sample, TICK_SIZE, draw_legend, draw_title};
+use super::panel::{Panel, Sample, TICK_SIZE, X_SPACING, draw_legend, draw_title};
 
 /// Width of every picture (pixels).
 pub const WIDTH: u32 = 1200;
@@ -22,7 +22,8 @@ const DEEPEST: f64 = 1e-7;
 pub fn draw_spectrum(figure: &RecordingFigure) -> Option<Drawing> {
     let spectra = figure.spectra.as_ref()?;
     let with_closeups = spectra.peaks.iter().any(|peak| peak.mode.is_some());
-    let force_height = if spectra.force.is_some() { 130.0 } else { 0.0 };
+    let force = spectra.force.as_deref().filter(|force| is_something(force));
+    let force_height = if force.is_some() { 130.0 } else { 0.0 };
     let main_bottom = 500.0;
     let force_bottom = main_bottom + force_height;
     let axis_bottom = force_bottom + 54.0;
@@ -31,16 +32,13 @@ pub fn draw_spectrum(figure: &RecordingFigure) -> Option<Drawing> {
     let mut drawing = Drawing::new(description, WIDTH, height as u32);
     draw_title(&mut drawing, &title(figure), &subtitle(spectra));
     let main = draw_responses(&mut drawing, spectra, main_bottom);
-    let lowest = match &spectra.force {
-        Some(force) => draw_force(
-            &mut drawing,
-            spectra,
-            force,
-            (main_bottom + 16.0, force_bottom),
-        ),
+    let lowest = match force {
+        Some(force) => {
+            let edges = (main_bottom + 16.0, force_bottom);
+            draw_force(&mut drawing, spectra, force, edges)
+        }
         None => main,
     };
-    lowest.draw_x_ticks(&mut drawing, &lowest.x.ticks(110.0));
     lowest.draw_x_title(&mut drawing, "frequency (Hz)");
     if with_closeups {
         draw_closeups(&mut drawing, spectra, axis_bottom + 10.0);
@@ -61,8 +59,8 @@ pub fn subtitle(spectra: &SpectraFigure) -> String {
         spectra.averages,
         lines.block,
         lines.displayed(),
-        significant(lines.spacing, 4),
-        significant(lines.resolution(), 4),
+        trimmed(lines.spacing, 4),
+        trimmed(lines.resolution(), 4),
     )
 }
 
@@ -97,20 +95,15 @@ pub fn magnitude_axis<'a>(curves: impl IntoIterator<Item = &'a [f64]>, pixels: (
 }
 
 fn draw_responses(drawing: &mut Drawing, spectra: &SpectraFigure, bottom: f64) -> Panel {
-    let frame = Frame {
-        left: LEFT,
-        top: 98.0 + STRIP,
-        right: RIGHT,
-        bottom,
-    };
     let (curves, unit) = comparable(&spectra.responses);
     let panel = Panel {
         x: frequency_axis(spectra),
-        y: magnitude_axis(curves.iter().map(Vec::as_slice), frame.upwards()),
+        y: magnitude_axis(curves.iter().map(Vec::as_slice), (bottom, 98.0 + STRIP)),
     };
     panel.draw_y_ticks(drawing, &panel.y.ticks(40.0));
-    if spectra.force.is_none() {
-        panel.draw_x_ticks(drawing, &panel.x.ticks(110.0));
+    let lowest = !spectra.force.as_deref().is_some_and(is_something);
+    if lowest {
+        panel.draw_x_ticks(drawing, &panel.x.ticks(X_SPACING));
     } else {
         draw_x_grid(drawing, &panel);
     }
@@ -127,7 +120,7 @@ fn draw_responses(drawing: &mut Drawing, spectra: &SpectraFigure, bottom: f64) -
 
 /// The grid of a panel whose tick labels stand under another one.
 pub fn draw_x_grid(drawing: &mut Drawing, panel: &Panel) {
-    for mut tick in panel.x.ticks(110.0) {
+    for mut tick in panel.x.ticks(X_SPACING) {
         tick.label = Some(String::new());
         panel.draw_x_ticks(drawing, &[tick]);
     }
@@ -174,6 +167,11 @@ fn has(spectra: &SpectraFigure, wanted: impl Fn(&PeakMark) -> bool) -> bool {
     spectra.peaks.iter().any(wanted)
 }
 
+/// Whether a spectrum has anything above zero.
+fn is_something(values: &[f64]) -> bool {
+    values.iter().any(|value| *value > 0.0)
+}
+
 /// The force spectrum in dB below its largest value: how far the hammer reaches.
 fn draw_force(
     drawing: &mut Drawing,
@@ -193,7 +191,7 @@ fn draw_force(
         y: Axis::linear((floor - 2.0, 4.0), (bottom, top)),
     };
     panel.draw_y_ticks(drawing, &panel.y.ticks(30.0));
-    draw_x_grid(drawing, &panel);
+    panel.draw_x_ticks(drawing, &panel.x.ticks(X_SPACING));
     panel.draw_frame(drawing);
     panel.draw_y_title(drawing, "force (dB)");
     panel.draw_curve(

@@ -1,7 +1,7 @@
 //! Tables of what was measured: recordings, taps, resonances.
 
 use super::super::document::{Document, ModeSection, RecordingSection, TapSection};
-use super::super::format::{MISSING, line_reading, optional, rounded, significant};
+use super::super::format::{MISSING, line_reading, optional, rounded, significant, trimmed};
 use super::{Column, Table, bound_of, mode_name, number, words};
 
 /// One row for each recording; `None` without recordings.
@@ -38,25 +38,30 @@ fn recording_row(recording: &RecordingSection) -> Vec<String> {
     let count = |value: Option<usize>| value.map_or(MISSING.to_owned(), |v| v.to_string());
     vec![
         recording.file.clone(),
-        significant(recording.sample_rate, 6),
-        significant(recording.seconds, 4),
+        trimmed(recording.sample_rate, 8),
+        trimmed(recording.seconds, 4),
         recording.channels.to_string(),
         format!("{used} of {}", recording.taps.len()),
         count(recording.block),
         count(recording.lines),
         band(recording.band),
-        optional(recording.line_spacing, 4),
-        optional(recording.resolution, 4),
-        optional(recording.half_line, 4),
+        exact(recording.line_spacing),
+        exact(recording.resolution),
+        exact(recording.half_line),
         recording.window.clone().unwrap_or_else(|| MISSING.into()),
         optional(recording.window_decay, 3),
         optional(recording.remaining_at_end.map(|level| 100.0 * level), 2),
     ]
 }
 
+/// A setting in Hz.
+fn exact(value: Option<f64>) -> String {
+    value.map_or(MISSING.to_owned(), |value| trimmed(value, 4))
+}
+
 fn band(band: Option<[f64; 2]>) -> String {
     band.map_or(MISSING.to_owned(), |[low, high]| {
-        format!("{} to {}", significant(low, 5), significant(high, 5))
+        format!("{} to {}", trimmed(low, 6), trimmed(high, 6))
     })
 }
 

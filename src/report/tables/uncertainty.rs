@@ -1,7 +1,7 @@
 //! Tables of how far the estimate moves when the frequencies do.
 
 use super::super::document::{Document, EstimateSection, SensitivitySection};
-use super::super::format::{MISSING, optional, signed_percent, significant};
+use super::super::format::{MISSING, optional, signed, signed_percent, significant};
 use super::{Column, Table, number, reading_bound, words};
 
 /// The non-dimensional values that changes are counted from.
@@ -37,7 +37,7 @@ pub fn perturbation(document: &Document) -> Option<Table> {
     let rows = rows
         .iter()
         .map(|row| {
-            let mut cells = vec![signed_percent(Some(row.percent)), row.method.clone()];
+            let mut cells = vec![signed(row.percent), row.method.clone()];
             let base = base(document, &row.method);
             for (value, base) in [row.kx, row.ky, row.kz].into_iter().zip(base) {
                 cells.push(optional(value, 5));

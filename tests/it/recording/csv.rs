@@ -509,21 +509,29 @@ fn uneven_sampling_is_named_where_it_happens() {
             &["the step elsewhere is 0.001", "0.1 %"],
         );
     }
+    let message = open_error("time,a\n0,1\n0.001,2\n0.001,3\n");
+    assert_message(&message, "tested.dat:4: uneven sampling", &[]);
+    // Every step off by 0.04 % to either side, beyond what rounding explains.
+    let jitter = |t: f64| format!("{:.12}", t + 4e-7 * (1e3 * t).round().rem_euclid(2.0));
+    assert_eq!(
+        read_all(timed(3000, 1000.0, jitter), "jitter")[0].len(),
+        3000
+    );
     // One unit of the last digit is 0.1 % here.
     assert_eq!(read_all(replace("2.000001"), "within")[0].len(), 3000);
 }
 
 #[test]
 fn lost_rows_are_counted() {
-    for (print, decimals) in [(3_usize, 3), (6, 6)] {
-        let even = timed(3000, 1000.0, |t| format!("{t:.print$}"));
+    // With three decimals the step is one unit of the last digit, which rounding must not excuse.
+    for decimals in [3, 6] {
+        let even = timed(3000, 1000.0, |t| format!("{t:.decimals$}"));
         let lines: Vec<&str> = even.lines().collect();
         for (lost, text) in [(1, "1 row were missing"), (64, "64 rows were missing")] {
             // Lines 2 to 1501 hold 1500 rows; then the gap.
             let kept = [&lines[..1501], &lines[1501 + lost..]].concat().join("\n");
             let message = open_error(kept);
             assert_message(&message, "tested.dat:1502: uneven sampling", &[text]);
-            assert!(decimals > 0);
         }
     }
     // A gap among the first rows does not spoil the reference.
@@ -548,11 +556,10 @@ fn long_table() -> (TestFile, Vec<Vec<f64>>) {
     let channel = |stride: u64| (0..20_000_u64).map(move |at| (at * stride % 100_003) as f64);
     let channels: Vec<Vec<f64>> = [7919, 104_729].map(|s| channel(s).collect()).to_vec();
     let mut text = "# a comment\ntime,a (mN),b\n".to_owned();
-    for at in 0..20_000 {
+    for (at, (a, b)) in channels[0].iter().zip(&channels[1]).enumerate() {
         if at % 1000 == 500 {
             text.push_str("# a mark set by the operator\n\n");
         }
-        let (a, b) = (channels[0][at], channels[1][at]);
         text.push_str(&format!("{:.4},{a},{b}\n", at as f64 / 5000.0));
     }
     (file("long.csv", text), channels)

@@ -18,7 +18,7 @@ fn record(samples: Vec<f64>) -> Recording {
         samples,
         ..Channel::default()
     };
-    Recording::from_samples("virtual", RATE, vec![channel]).unwrap()
+    Recording::from_samples("virtual", RATE, vec![channel]).expect("a valid recording")
 }
 
 fn health(samples: Vec<f64>) -> ChannelHealth {

@@ -18,9 +18,13 @@ fn open(name: &str) -> Option<Recording> {
 /// Checks that blocks join to the whole and that the largest sample is the health's peak.
 fn assert_readable(recording: &Recording) {
     for (channel, info) in recording.channels().iter().enumerate() {
-        let whole = recording.read(channel, 0..u64::MAX).unwrap();
+        let whole = recording
+            .read(channel, 0..u64::MAX)
+            .expect("a readable file");
         let blocks = recording.blocks(&[channel], 10_007);
-        let joined: Vec<f64> = blocks.flat_map(|b| b.unwrap().samples.remove(0)).collect();
+        let joined: Vec<f64> = blocks
+            .flat_map(|b| b.expect("a readable file").samples.remove(0))
+            .collect();
         assert_eq!(joined, whole, "{} {channel}", recording.name());
         let peak = whole.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));
         assert_eq!(peak, info.health.peak, "{} {channel}", recording.name());

@@ -444,7 +444,8 @@ fn long_file() -> (super::TestFile, Vec<Vec<f64>>) {
     };
     let channels: Vec<Vec<f64>> = [7919, 104_729, 1_299_709].map(channel).to_vec();
     let file = file("long.wav", b"");
-    let clipped = write_wav(&file.path, 51_200, &channels, WavFormat::Pcm24).unwrap();
+    let clipped =
+        write_wav(&file.path, 51_200, &channels, WavFormat::Pcm24).expect("a written file");
     assert_eq!(clipped, 0);
     (file, channels)
 }

@@ -16,6 +16,8 @@ const LAMBDAS: [f64; 5] = [1.6061, 4.2318, 7.1372, 9.7680, 12.2817];
 /// A whole run with two recordings.
 pub fn document() -> Document {
     Document {
+        monte_carlo: None,
+        perturbation_averages: None,
         version: VERSION,
         test: Some(test()),
         recordings: Some(vec![
@@ -69,6 +71,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        channel_details: Vec::new(),
         file: file.into(),
         sample_rate: 5120.0,
         channels: 3,

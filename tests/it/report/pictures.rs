@@ -1,0 +1,350 @@
+//! Pictures: that they are pictures, and that the data drawn are the data.
+
+use std::collections::HashMap;
+
+use proptest::prelude::*;
+use tapjoint::report::figures::PeakMark;
+use tapjoint::report::plot::axis::{Axis, nice_step};
+use tapjoint::report::plot::cloud::draw_cloud;
+use tapjoint::report::plot::comparison::draw_frequencies;
+use tapjoint::report::plot::decimate::decimate;
+use tapjoint::report::plot::drawing::{Point, Shape};
+use tapjoint::report::plot::frf::draw_frf;
+use tapjoint::report::plot::labels::spread;
+use tapjoint::report::plot::palette::{BLUE, Color, SKY, VERMILION};
+use tapjoint::report::plot::spectrum::draw_spectrum;
+use tapjoint::report::plot::time::draw_taps;
+use tapjoint::report::plot::{Drawing, render_png, render_svg};
+
+use super::fixture;
+
+/// All pictures of the fixture.
+fn drawings() -> Vec<Drawing> {
+    let document = fixture::document();
+    let mut drawings: Vec<Drawing> = fixture::figures()
+        .iter()
+        .flat_map(|figure| [draw_spectrum(figure), draw_frf(figure), draw_taps(figure)])
+        .flatten()
+        .collect();
+    drawings.extend(draw_frequencies(&document));
+    drawings.extend(draw_cloud(&document));
+    assert_eq!(drawings.len(), 8, "two recordings have three pictures each");
+    drawings
+}
+
+/// Width, height, and how often each colour occurs.
+fn decoded(png: &[u8]) -> (u32, u32, HashMap<[u8; 3], usize>) {
+    let mut reader = png::Decoder::new(png).read_info().expect("it is a PNG");
+    let mut pixels = vec![0; reader.output_buffer_size()];
+    let info = reader.next_frame(&mut pixels).expect("it has a picture");
+    let mut colors = HashMap::new();
+    for pixel in pixels.chunks_exact(3) {
+        *colors.entry([pixel[0], pixel[1], pixel[2]]).or_insert(0) += 1;
+    }
+    (info.width, info.height, colors)
+}
+
+fn count(colors: &HashMap<[u8; 3], usize>, color: Color) -> usize {
+    let key = [color.0, color.1, color.2];
+    colors.get(&key).copied().unwrap_or(0)
+}
+
+#[test]
+fn prop_pictures_are_not_blank() {
+    for drawing in drawings() {
+        let name = &drawing.description;
+        let png = render_png(&drawing).expect("the picture is drawn");
+        let (width, height, colors) = decoded(&png);
+        assert_eq!((width, height), (1200, drawing.height), "{name}");
+        let white = count(&colors, Color(255, 255, 255));
+        let total = (width * height) as usize;
+        assert!(white > total / 2, "{name}: paper is white");
+        // Frame, grid and words alone are more than a hundredth of a picture.
+        assert!(total - white > total / 100, "{name}: almost nothing drawn");
+        assert!(count(&colors, BLUE) > 20, "{name}: no data in blue");
+    }
+}
+
+#[test]
+fn prop_nothing_lies_outside_a_picture() {
+    for drawing in drawings() {
+        let (width, height) = (f64::from(drawing.width), f64::from(drawing.height));
+        let inside =
+            |point: &Point| (0.0..=width).contains(&point.0) && (0.0..=height).contains(&point.1);
+        for shape in &drawing.shapes {
+            let held = match shape {
+                Shape::Line { points, .. } => points.iter().all(inside),
+                Shape::Rectangle { from, to, .. } => inside(from) && inside(to),
+                Shape::Dot { center, .. } => inside(center),
+                Shape::Text(text) => text_inside(text, &drawing),
+            };
+            assert!(held, "{}: {shape:?} is cut off", drawing.description);
+        }
+    }
+}
+
+fn text_inside(text: &tapjoint::report::plot::drawing::Text, drawing: &Drawing) -> bool {
+    use tapjoint::report::plot::drawing::{Align, Direction};
+    let width = text.width();
+    let (before, after) = match text.align {
+        Align::Start => (0.0, width),
+        Align::Middle => (width / 2.0, width / 2.0),
+        Align::End => (width, 0.0),
+    };
+    let (along, across, length, breadth) = match text.direction {
+        Direction::Across => (text.at.0, text.at.1, drawing.width, drawing.height),
+        // Read upwards: the end of the words is higher up.
+        Direction::Upwards => (
+            f64::from(drawing.height) - text.at.1,
+            text.at.0,
+            drawing.height,
+            drawing.width,
+        ),
+    };
+    along - before >= 0.0
+        && along + after <= f64::from(length)
+        && across - text.size / 2.0 >= 0.0
+        && across + text.size / 2.0 <= f64::from(breadth)
+}
+
+#[test]
+fn prop_spectrum_says_what_it_shows() {
+    let figure = &fixture::figures()[0];
+    let drawing = draw_spectrum(figure).expect("there are spectra");
+    let words = drawing.words().join("\n");
+    for wanted in [
+        "low.wav",
+        "4 taps averaged",
+        "block 2048 samples, 800 lines",
+        "line spacing 0.25 Hz",
+        "resolution 1/T = 0.3125 Hz",
+        "frequency (Hz)",
+        "m/s² s",
+        "mode 1",
+        "118.04 Hz",
+        "mains 50 Hz",
+        "A, acceleration",
+        "B, acceleration",
+    ] {
+        assert!(words.contains(wanted), "the spectrum does not say {wanted}");
+    }
+}
+
+#[test]
+fn prop_frf_names_form_and_unit() {
+    let drawing = draw_frf(&fixture::figures()[1]).expect("there are functions");
+    let words = drawing.words();
+    for wanted in ["accelerance ((m/s²)/N)", "phase (°)", "frequency (Hz)"] {
+        assert!(words.contains(&wanted), "{wanted} is missing in {words:?}");
+    }
+}
+
+#[test]
+fn prop_responses_of_different_units_share_an_axis_only_relatively() {
+    let mut figure = fixture::figures().remove(0);
+    if let Some(spectra) = &mut figure.spectra {
+        spectra.responses[1].unit = "Pa s".into();
+    }
+    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let words = drawing.words();
+    let title = "magnitude relative to each curve's peak (1)";
+    assert!(words.contains(&title), "{words:?}");
+}
+
+#[test]
+fn prop_rejected_taps_carry_their_reason() {
+    let drawing = draw_taps(&fixture::figures()[0]).expect("there are samples");
+    let words = drawing.words();
+    let reason = "tap 2 at 3.71 s: double hit: second excursion of 31 % after 14 ms";
+    assert!(words.contains(&reason), "{words:?}");
+    let dots = dots(&drawing, BLUE);
+    // Four taps used and one in the legend.
+    assert_eq!(dots, 5, "blue dots");
+}
+
+fn dots(drawing: &Drawing, wanted: Color) -> usize {
+    let is_dot = |shape: &&Shape| matches!(shape, Shape::Dot { color, .. } if *color == wanted);
+    drawing.shapes.iter().filter(is_dot).count()
+}
+
+#[test]
+fn prop_used_and_unused_modes_differ() {
+    let drawing = draw_frequencies(&fixture::document()).expect("there is a prediction");
+    // Four used modes and the legend; one unused mode and the legend.
+    assert_eq!(dots(&drawing, BLUE), 5, "used modes");
+    assert_eq!(dots(&drawing, VERMILION), 2, "unused modes");
+}
+
+#[test]
+fn prop_cloud_shows_every_pattern() {
+    let document = fixture::document();
+    let drawing = draw_cloud(&document).expect("there is a cloud");
+    // The fixture's 16 patterns lie apart; one more in the legend.
+    assert_eq!(dots(&drawing, SKY), 17, "patterns");
+    assert!(
+        drawing.words().contains(&"−0.05 %"),
+        "{:?}",
+        drawing.words()
+    );
+}
+
+#[test]
+fn prop_many_marks_keep_their_labels_apart() {
+    let mut figure = fixture::figures().remove(1);
+    if let Some(spectra) = &mut figure.spectra {
+        spectra.peaks = (1..=40)
+            .map(|mode| PeakMark {
+                mode: Some(mode),
+                frequency: 600.0 + 2.5 * mode as f64,
+                line_frequency: 600.0 + 2.5 * mode as f64,
+                half_line: 1.25,
+                label: None,
+            })
+            .collect();
+    }
+    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let words = drawing.words().join("\n");
+    assert!(
+        words.contains("more without a label, see the table"),
+        "40 labels cannot stand in one row: {words}"
+    );
+    assert!(words.contains("mode 1\n"), "the first modes keep theirs");
+    assert!(
+        words.contains("Close-ups, the first 6 of 40 modes"),
+        "{words}"
+    );
+}
+
+#[test]
+fn prop_svg_holds_the_picture_and_escapes_names() {
+    let mut figure = fixture::figures().remove(0);
+    figure.file = "<script>&\"x\".wav".into();
+    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let svg = render_svg(&drawing).expect("the picture is drawn");
+    assert!(
+        svg.starts_with("<svg viewBox=\"0 0 4800 "),
+        "{}",
+        &svg[..80]
+    );
+    assert!(svg.trim_end().ends_with("</svg>"), "the element is closed");
+    assert!(!svg.contains("<script"), "a file name became an element");
+    assert!(svg.contains("&lt;script&gt;&amp;"), "the name is not shown");
+    assert!(!svg.contains("http") && !svg.contains("NaN"), "clean");
+    // Two responses, the force, frames, grid, leaders, dashes.
+    assert!(svg.matches("<polyline").count() > 40, "curves are missing");
+}
+
+#[test]
+fn val_ticks_are_one_two_five() {
+    for (least, wanted) in [
+        (0.3, 0.5),
+        (1.0, 1.0),
+        (1.1, 2.0),
+        (2.3, 5.0),
+        (70.0, 100.0),
+    ] {
+        let step = nice_step(least);
+        // One part in 10^12: the step is a product of two roundings.
+        assert!((step / wanted - 1.0).abs() < 1e-12, "{least}: {step}");
+    }
+    let labels = |low: f64, high: f64| -> Vec<String> {
+        let ticks = Axis::linear((low, high), (84.0, 1164.0)).ticks(110.0);
+        ticks.into_iter().filter_map(|tick| tick.label).collect()
+    };
+    assert_eq!(labels(0.0, 200.0), ["0", "50", "100", "150", "200"]);
+    assert_eq!(labels(-0.2, 0.2)[..2], ["−0.20", "−0.15"]);
+    let decades = Axis::logarithmic((2e-3, 40.0), (500.0, 160.0)).ticks(40.0);
+    let labels: Vec<String> = decades.into_iter().filter_map(|tick| tick.label).collect();
+    assert_eq!(labels, ["10⁻²", "10⁻¹", "10⁰", "10¹"]);
+}
+
+proptest! {
+    #[test]
+    fn prop_ticks_lie_on_the_axis_and_are_few(
+        low in -1e6f64..1e6,
+        exponent in -6.0f64..9.0,
+    ) {
+        let high = low + 10f64.powf(exponent);
+        // Shorter ranges are widened on purpose.
+        prop_assume!(high - low > 1e-6 * low.abs());
+        let axis = Axis::linear((low, high), (0.0, 1000.0));
+        let ticks = axis.ticks(100.0);
+        // Steps of 1, 2, 5 are at most 2.5 times the wish: at least 10/2.5 - 1 ticks.
+        prop_assert!((3..=11).contains(&ticks.len()), "{} ticks", ticks.len());
+        // Ticks a billionth of a step outside count as on the end.
+        let slack = 1e-8 * (high - low);
+        for tick in ticks {
+            let held = tick.value >= low - slack && tick.value <= high + slack;
+            prop_assert!(held, "{} on {low} to {high}", tick.value);
+        }
+    }
+
+    #[test]
+    fn prop_decimation_keeps_extremes(
+        values in prop::collection::vec(-1e3f64..1e3, 1..4000),
+        width in 1.0f64..300.0,
+    ) {
+        let count = values.len() as f64;
+        let points: Vec<Point> = values
+            .iter()
+            .enumerate()
+            .map(|(index, value)| (index as f64 / count * width, *value))
+            .collect();
+        let reduced = decimate(points.iter().copied());
+        prop_assert!(reduced.len() <= 4 * width.ceil() as usize, "{}", reduced.len());
+        prop_assert!(reduced.iter().all(|point| points.contains(point)), "an invented point");
+        prop_assert!(reduced.is_sorted_by(|a, b| a.0 <= b.0), "out of order");
+        prop_assert_eq!(columns(&points), columns(&reduced), "an extreme was lost");
+        prop_assert_eq!(reduced.first(), points.first());
+        prop_assert_eq!(reduced.last(), points.last());
+    }
+
+    #[test]
+    fn prop_labels_never_overlap(
+        mut centers in prop::collection::vec(0.0f64..1000.0, 0..15),
+        widths in prop::collection::vec(10.0f64..120.0, 15),
+    ) {
+        centers.sort_by(f64::total_cmp);
+        let widths = &widths[..centers.len()];
+        let total: f64 = widths.iter().sum::<f64>() + 5.0 * widths.len().saturating_sub(1) as f64;
+        let placed = spread(&centers, widths, 5.0, (0.0, 1000.0));
+        prop_assert_eq!(placed.is_some(), total <= 1000.0, "fits: {}", total);
+        let mut end = -5.0;
+        for (center, width) in placed.unwrap_or_default().iter().zip(widths) {
+            // A billionth of a pixel for rounding.
+            prop_assert!(center - width / 2.0 >= end + 5.0 - 1e-9, "overlap at {center}");
+            end = center + width / 2.0;
+            prop_assert!(end <= 1000.0 + 1e-9, "{center} is outside");
+        }
+    }
+}
+
+/// Lowest and highest value in each column of pixels.
+fn columns(points: &[Point]) -> Vec<(i64, f64, f64)> {
+    let mut columns: Vec<(i64, f64, f64)> = Vec::new();
+    for (x, y) in points {
+        let number = x.floor() as i64;
+        match columns.last_mut().filter(|column| column.0 == number) {
+            Some(column) => *column = (number, column.1.min(*y), column.2.max(*y)),
+            None => columns.push((number, *y, *y)),
+        }
+    }
+    columns
+}
+
+#[test]
+fn limit_labels_with_room_stay_where_they_are() {
+    let placed = spread(&[100.0, 500.0], &[50.0, 50.0], 5.0, (0.0, 1000.0));
+    assert_eq!(placed, Some(vec![100.0, 500.0]));
+}
+
+#[test]
+fn limit_decimation_leaves_out_what_is_not_finite() {
+    let points = [
+        (0.0, 1.0),
+        (0.5, f64::NAN),
+        (1.0, f64::INFINITY),
+        (2.0, 3.0),
+    ];
+    assert_eq!(decimate(points), [(0.0, 1.0), (2.0, 3.0)]);
+}

@@ -137,6 +137,7 @@ impl<'a> Stage<'a> {
         for tap in self.taps.accepted() {
             let mut samples = self.record(tap)?;
             if let (Some(end), Some(force)) = (tap.pulse_end, samples.first_mut()) {
+                remove_offset(force, rate);
                 // As long again as the pulse, then a taper of the same length.
                 let pulse = (end - tap.record.start) as usize;
                 apply_force_window(force, 2 * pulse, pulse);
@@ -253,6 +254,24 @@ impl<'a> Stage<'a> {
         )
         .map(PeakLabel::Mains)
     }
+}
+
+/// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
+/// median is the level at rest, and short beside the drift of its amplifier.
+const OFFSET_STRETCH: f64 = 0.2;
+
+/// Takes out the level at which the force rests about its pulse. The mean of the recording is not
+/// that level: the pulses are in it, and over the force window the difference amounts to a percent
+/// of a pulse's momentum.
+fn remove_offset(force: &mut [f64], sample_rate: f64) {
+    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
+    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
+    if about.is_empty() {
+        return;
+    }
+    let half = about.len() / 2;
+    let rest = *about.select_nth_unstable_by(half, f64::total_cmp).1;
+    force.iter_mut().for_each(|x| *x -= rest);
 }
 
 /// Bound on the transforms kept for a test without hammer (values; 16 bytes each).

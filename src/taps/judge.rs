@@ -178,12 +178,21 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
     found
 }
 
+/// Samples beside an excursion in which the downward half of a filter's ringing lies: half a period
+/// of any cut-off above a thirtieth of the sample rate.
+const RINGING_REACH: usize = 16;
+
 /// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
-/// pulls. An excursion with a comparable downward swing between it and the pulse is such ringing.
+/// pulls. An excursion with a comparable downward swing just beside it, towards the pulse, is such
+/// ringing; the pulse's own deep swing farther away says nothing about it.
 fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
-    let between = main.frame.min(other.frame)..main.frame.max(other.frame);
+    let beside = if other.frame > main.frame {
+        other.frame.saturating_sub(RINGING_REACH).max(main.frame)..other.frame
+    } else {
+        other.frame..(other.frame + RINGING_REACH).min(main.frame)
+    };
     let lowest = force
-        .get(between)
+        .get(beside)
         .into_iter()
         .flatten()
         .copied()

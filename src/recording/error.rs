@@ -309,7 +309,9 @@ pub enum RecordingError {
         hint: String,
     },
     /// A rate that is none.
-    #[error("{file}: sample rate {value} Hz; allowed: a finite number above 0")]
+    #[error(
+        "{file}: sample rate {value} Hz; allowed: 0.001 to 1e9 Hz; correct the time column or the rate given"
+    )]
     BadSampleRate {
         /// The file.
         file: String,

@@ -189,7 +189,8 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
 /// width, or three samples, on the side of the pulse.
 fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
     let above = |frame: &usize| force.get(*frame).is_some_and(|&x| x > 0.5 * other.peak);
-    let width = (other.frame..).take_while(above).count();
+    let width = (other.frame..).take_while(above).count()
+        + (0..other.frame).rev().take_while(above).count();
     let reach = (2 * width).max(3).min(main.frame.abs_diff(other.frame));
     let beside = if main.frame < other.frame {
         other.frame - reach..other.frame

@@ -1,7 +1,15 @@
 //! Tests of what is said about bad input: the file, the line, the key, what is allowed, what to do.
 
+use std::fs;
+use std::path::Path;
+
+use proptest::prelude::*;
 use tapjoint::description::*;
+use tapjoint::pipeline::run_recording;
 use tapjoint::quantity::{Dimension, QuantityError, STANDARD_GRAVITY, parse_quantity};
+use tapjoint::recording::{Channel, Recording};
+use tapjoint::report::{document_of, render_json};
+use tapjoint::simulate::{SimulatedMode, TapTestSettings, simulate_tap_test};
 
 /// A valid description. Every case changes one piece of it.
 const VALID: &str = r#"name = "Clamp"
@@ -885,6 +893,404 @@ fn regress_texts_that_are_no_quantities() {
         match parse_quantity(text, Dimension::Length) {
             Ok(value) => panic!("{text:?} was read as {value} m"),
             Err(error) => assert!(is_expected(&error), "{text:?}: {error:?}"),
+        }
+    }
+}
+
+// ---------------------------------------------------------------- recordings, through the program
+
+/// A test of the kind whose recording the cases below spoil.
+const SPOILED: &str = r#"name = "spoiled"
+[beam]
+length = 0.423
+width = 0.05
+thickness = 0.005
+modulus = 207e9
+density = 7850
+[joint]
+kind = "cantilever"
+[hammer]
+channel = "force"
+[[sensor]]
+name = "A"
+channel = "tip"
+position = 0.338
+[[recording]]
+file = "taps.csv"
+"#;
+
+/// A CSV recording of three taps, with a header and a time column; row n stands in line n + 2.
+fn good_csv() -> Vec<String> {
+    let modes = [(17.0, 0.03), (118.0, 0.01), (335.6, 0.005)].map(|(frequency, damping_ratio)| {
+        SimulatedMode {
+            frequency,
+            damping_ratio,
+            shape_at_tap: 1.0,
+            shape_at_sensors: vec![1.0],
+        }
+    });
+    let settings = TapTestSettings {
+        sample_rate: 1280.0,
+        taps: 3,
+        interval: 2.0,
+        pulse: 3e-3,
+        ..TapTestSettings::default()
+    };
+    let test = simulate_tap_test(&modes, &settings, 4);
+    let rows = test.force.iter().zip(&test.responses[0]).enumerate();
+    std::iter::once("time (s),force (N),tip (m/s2)".to_string())
+        .chain(rows.map(|(n, (force, tip))| {
+            format!("{:.9},{force:.6},{tip:.6}", n as f64 / test.sample_rate)
+        }))
+        .collect()
+}
+
+/// Puts `text` in the place of column `column` (0-based) of line `line` (1-based).
+fn with_cell(line: usize, column: usize, text: &str) -> String {
+    let mut lines = good_csv();
+    let mut cells: Vec<&str> = lines[line - 1].split(',').collect();
+    cells[column] = text;
+    lines[line - 1] = cells.join(",");
+    lines.join("\n")
+}
+
+fn tapjoint_in(folder: &Path) -> assert_cmd::Command {
+    let mut command = assert_cmd::Command::cargo_bin("tapjoint").expect("built for tests");
+    command.current_dir(folder);
+    command
+}
+
+/// Names of everything in a folder.
+fn names_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Runs a described test on a recording: exit code 2, one line on standard error that begins so
+/// and holds `says`, nothing on standard output, no file left.
+fn assert_refused(description: &str, csv: &[u8], arguments: &[&str], begins: &str, says: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("test.toml"), description).unwrap();
+    fs::write(folder.path().join("taps.csv"), csv).unwrap();
+    let run = tapjoint_in(folder.path())
+        .args(arguments)
+        .assert()
+        .code(2)
+        .stdout("");
+    let said = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+    assert!(
+        said.starts_with(&format!("error: {begins}")),
+        "{said:?} should begin with {begins:?}"
+    );
+    for part in says {
+        assert!(said.contains(part), "{said:?} should hold {part:?}");
+    }
+    assert_eq!(said.trim_end().lines().count(), 1, "{said:?}");
+    assert_eq!(names_in(folder.path()), ["taps.csv", "test.toml"], "{said}");
+    assert_eq!(fs::read(folder.path().join("taps.csv")).unwrap(), csv);
+}
+
+#[test]
+fn regress_the_recording_that_is_spoiled_below_is_good() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("test.toml"), SPOILED).unwrap();
+    fs::write(folder.path().join("taps.csv"), good_csv().join("\n")).unwrap();
+    tapjoint_in(folder.path())
+        .args(["run", "test.toml"])
+        .assert()
+        .code(0);
+    assert_eq!(
+        names_in(folder.path()),
+        ["spoiled-report", "taps.csv", "test.toml"]
+    );
+}
+
+#[test]
+fn regress_bad_recordings_each_have_their_own_message() {
+    let without = |line: usize| {
+        let mut lines = good_csv();
+        lines.remove(line - 1);
+        lines.join("\n")
+    };
+    let surplus = with_cell(400, 2, "0.1,0.2");
+    let missing = with_cell(500, 2, "");
+    let cases: [(String, &str, &[&str]); 9] = [
+        (
+            String::new(),
+            "taps.csv: the file is empty",
+            &["record or export it again"],
+        ),
+        (
+            with_cell(102, 1, "abc"),
+            "taps.csv:102: column 2 (\"force\") holds \"abc\", which is not a number",
+            &["correct or remove this line"],
+        ),
+        (
+            with_cell(300, 2, "NaN"),
+            "taps.csv:300: column 3 (\"tip\") holds \"NaN\"; allowed: finite numbers",
+            &[],
+        ),
+        (
+            with_cell(301, 1, "-inf"),
+            "taps.csv:301: column 2 (\"force\") holds \"-inf\"; allowed: finite numbers",
+            &[],
+        ),
+        (
+            with_cell(302, 1, "1e200"),
+            "taps.csv:302: column 2 (\"force\") holds \"1e200\"; allowed: finite numbers",
+            &[],
+        ),
+        (
+            // The line after the one lost is where the step is twice as long.
+            without(700),
+            "taps.csv:700: uneven sampling",
+            &["0.0015625 s after the row before", "0.1 % of the step"],
+        ),
+        (
+            // 0.3 ms late where the step is 0.78 ms.
+            with_cell(602, 0, "0.469050000"),
+            "taps.csv:602: uneven sampling",
+            &["resample evenly"],
+        ),
+        (
+            surplus,
+            "taps.csv:400: 4 cells where the rows have 3",
+            &["\"0.2\""],
+        ),
+        (
+            missing,
+            "taps.csv:500: column 3 (\"tip\") is missing",
+            &["3 numbers"],
+        ),
+    ];
+    for (csv, begins, says) in &cases {
+        for arguments in [
+            &["run", "test.toml"][..],
+            &["run", "test.toml", "--out", "deep/report"],
+            &["identify", "test.toml", "--json", "result.json"],
+            &["inspect", "taps.csv", "--json", "-"],
+            &["spectrum", "taps.csv", "--png", "spectrum.png"],
+        ] {
+            assert_refused(SPOILED, csv.as_bytes(), arguments, begins, says);
+        }
+    }
+    let only_header = "time (s),force (N),tip (m/s2)\n";
+    assert_refused(
+        SPOILED,
+        only_header.as_bytes(),
+        &["run", "test.toml"],
+        "taps.csv",
+        &["number"],
+    );
+    assert_refused(
+        SPOILED,
+        b"RIFF\x24\0\0\0WAVE",
+        &["run", "test.toml"],
+        "taps.csv: no \"fmt \" chunk",
+        &[],
+    );
+    assert_refused(
+        SPOILED,
+        b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0",
+        &["run", "test.toml"],
+        "taps.csv: neither a WAV file nor text",
+        &["export as WAV or CSV"],
+    );
+}
+
+#[test]
+fn regress_a_float_recording_with_nan_names_channel_and_sample() {
+    // RIFF header of a float file of two channels, then frames of which one holds a NaN.
+    let mut samples: Vec<f32> = (0..4000).map(|n| (n as f32 * 0.1).sin()).collect();
+    samples[2 * 1234 + 1] = f32::NAN;
+    let data: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let mut file = b"RIFF".to_vec();
+    file.extend((36 + data.len() as u32).to_le_bytes());
+    file.extend(b"WAVEfmt ");
+    for (value, bytes) in [
+        (16, 4),
+        (3, 2),
+        (2, 2),
+        (5120, 4),
+        (5120 * 8, 4),
+        (8, 2),
+        (32, 2),
+    ] {
+        file.extend(&u32::to_le_bytes(value)[..bytes]);
+    }
+    file.extend(b"data");
+    file.extend((data.len() as u32).to_le_bytes());
+    file.extend(data);
+    let numbered = SPOILED.replace("\"force\"", "1").replace("\"tip\"", "2");
+    assert_refused(
+        &numbered,
+        &file,
+        &["run", "test.toml"],
+        "taps.csv: channel 2, sample 1234 (",
+        &["NaN", "finite numbers"],
+    );
+}
+
+#[test]
+fn regress_channels_and_places_that_do_not_exist() {
+    let csv = good_csv().join("\n");
+    let cases: [(String, &str, &[&str]); 5] = [
+        (
+            SPOILED.replace("\"tip\"", "\"tpi\""),
+            "taps.csv: no channel named \"tpi\"",
+            &["\"tip\"", "\"force\""],
+        ),
+        (
+            SPOILED.replace("\"force\"", "7"),
+            "taps.csv: no channel 7",
+            &["there are: "],
+        ),
+        (
+            SPOILED.replace("0.338", "0.5"),
+            "test.toml:15: `sensor[1].position`",
+            &["0.423"],
+        ),
+        (
+            SPOILED.replace("0.338", "-1e-3"),
+            "test.toml:15: `sensor[1].position`",
+            &["0.423"],
+        ),
+        (
+            SPOILED.replace("taps.csv\"", "taps.csv\"\nband = [0, 900]"),
+            "taps.csv: the band 0 to 900 Hz does not fit",
+            &["640"],
+        ),
+    ];
+    for (description, begins, says) in &cases {
+        for arguments in [
+            &["run", "test.toml"][..],
+            &["run", "test.toml", "--out", "report"],
+            &["identify", "test.toml"],
+        ] {
+            assert_refused(description, csv.as_bytes(), arguments, begins, says);
+        }
+    }
+    assert_refused(
+        SPOILED,
+        csv.as_bytes(),
+        &["spectrum", "taps.csv", "--hammer", "hammer"],
+        "taps.csv: no channel named \"hammer\"",
+        &["\"force\""],
+    );
+}
+
+#[test]
+fn regress_outputs_that_cannot_be_written_are_found_out_before_any_work() {
+    let csv = good_csv().join("\n");
+    for (arguments, begins) in [
+        (
+            &["run", "test.toml", "--out", "taps.csv"][..],
+            "taps.csv: is a file",
+        ),
+        (
+            &["run", "test.toml", "--out", "taps.csv/report"],
+            "taps.csv: is a file",
+        ),
+        (&["run", "test.toml", "--json", "no/where.json"], ""),
+        (&["run", "test.toml", "--json", "taps.csv/x.json"], ""),
+        (&["identify", "test.toml", "--json", "no/where.json"], ""),
+        (&["spectrum", "taps.csv", "--png", "no/where.png"], ""),
+    ] {
+        assert_refused(
+            SPOILED,
+            csv.as_bytes(),
+            arguments,
+            begins,
+            &["choose another"],
+        );
+    }
+    // Where even the system's owner may make nothing.
+    if cfg!(target_os = "linux") {
+        let arguments = ["run", "test.toml", "--out", "/proc/tapjoint-report"];
+        let begins = "/proc/tapjoint-report: cannot be written";
+        assert_refused(SPOILED, csv.as_bytes(), &arguments, begins, &[]);
+    }
+    // A file that has the report folder's name keeps its content.
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("test.toml"), SPOILED).unwrap();
+    fs::write(folder.path().join("taps.csv"), &csv).unwrap();
+    fs::write(folder.path().join("spoiled-report"), "mine").unwrap();
+    let run = tapjoint_in(folder.path())
+        .args(["run", "test.toml"])
+        .assert()
+        .code(2)
+        .stdout("");
+    let said = String::from_utf8_lossy(&run.get_output().stderr).into_owned();
+    assert!(said.contains("spoiled-report: is a file"), "{said}");
+    let kept = fs::read_to_string(folder.path().join("spoiled-report")).unwrap();
+    assert_eq!(kept, "mine");
+    assert_eq!(
+        names_in(folder.path()),
+        ["spoiled-report", "taps.csv", "test.toml"]
+    );
+}
+
+#[test]
+fn regress_sample_rates_beyond_reason_end_in_words() {
+    // A time column may have any step; whatever rate follows, the program answers or refuses.
+    for step in ["1e-300", "1e-25", "1e-9", "1e3", "1e12", "1e200"] {
+        let folder = tempfile::tempdir().unwrap();
+        let rows: Vec<String> = (0..600)
+            .map(|n| format!("{n}{},{}", step.replacen('1', "", 1), (n * n) % 17))
+            .collect();
+        let csv = format!("time,x\n{}\n", rows.join("\n"));
+        fs::write(folder.path().join("odd.csv"), csv).unwrap();
+        for command in ["inspect", "spectrum", "run"] {
+            let run = tapjoint_in(folder.path())
+                .args([command, "odd.csv"])
+                .timeout(std::time::Duration::from_secs(120))
+                .assert();
+            let output = run.get_output();
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(
+                matches!(output.status.code(), Some(0..=2)) && !said.contains("panicked"),
+                "{command}, step {step} s: {:?} {said}",
+                output.status
+            );
+        }
+    }
+}
+
+/// Samples of any size, ties and silence more often.
+fn any_sample() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -1.0..1.0,
+        3 => Just(0.0),
+        1 => Just(1.0),
+        1 => -1e100..1e100,
+        1 => -1e-300..1e-300,
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(100) })]
+
+    #[test]
+    fn prop_no_samples_make_the_chain_panic(
+        samples in proptest::collection::vec((any_sample(), any_sample()), 1..500),
+        rate in 0.0..6.0f64,
+        hammer in proptest::option::of(1usize..3),
+    ) {
+        let (first, second): (Vec<f64>, Vec<f64>) = samples.into_iter().unzip();
+        let channels = [first, second]
+            .map(|samples| Channel { samples, ..Channel::default() })
+            .to_vec();
+        let recording = Recording::from_samples("any", 10f64.powf(rate), channels).unwrap();
+        let hammer = hammer.map(ChannelRef::Number);
+        if let Ok(analysis) = run_recording(recording, hammer.as_ref(), |_| {}) {
+            for mode in &analysis.modes {
+                prop_assert!(mode.frequency.is_finite(), "{mode:?}");
+            }
+            render_json(&document_of(&analysis)).unwrap();
         }
     }
 }

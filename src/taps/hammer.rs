@@ -194,10 +194,9 @@ pub(super) fn group(excursions: &[Excursion], distance: u64, hit: f64) -> Vec<Ev
     let mut events = Vec::new();
     let mut rest = excursions;
     while let Some(first) = rest.first() {
-        let count = rest
-            .iter()
-            .take_while(|e| e.start - first.start < distance)
-            .count();
+        // At least the first itself, however small the distance.
+        let near = |excursion: &&Excursion| excursion.start - first.start < distance;
+        let count = rest.iter().take_while(near).count().max(1);
         let (event, later) = rest.split_at(count);
         let peak = event
             .iter()

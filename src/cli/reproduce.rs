@@ -2,8 +2,9 @@
 
 use super::Outcome;
 use super::terminal::Terminal;
-use anyhow::bail;
 use clap::Args;
+use tapjoint::report::document::VERSION;
+use tapjoint::study::paper::{render, reproduce};
 
 /// Print every table of the paper (Ingole & Chatterjee) beside our numbers, and mark what does
 /// not reproduce and why.
@@ -11,6 +12,13 @@ use clap::Args;
 #[command(after_help = "Example:\n  tapjoint reproduce")]
 pub(super) struct ReproduceArguments {}
 
-pub(super) fn run(_arguments: &ReproduceArguments, _terminal: Terminal) -> anyhow::Result<Outcome> {
-    bail!("`reproduce` is not connected to the library yet")
+pub(super) fn run(_arguments: &ReproduceArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+    let reproduction = reproduce()?;
+    terminal.say(&render(&reproduction))?;
+    terminal.write_json(&serde_json::json!({
+        "version": VERSION,
+        "reproduction": reproduction,
+        "warnings": [],
+    }))?;
+    Ok(Outcome::Answered)
 }

@@ -140,12 +140,17 @@ fn places(level: &CompositeLevel, settings: &PeakSettings) -> Vec<usize> {
 #[test]
 fn prop_peaks_need_prominence_height_and_distance() {
     let settings = PeakSettings::default();
-    let plain = level_from(&[(20, 30.0), (40, 9.0), (60, 7.0)], Some(-20.0));
+    let plain = level_from(&[(20, 30.0), (40, 9.0), (60, 1.9)], Some(-60.0));
+    assert_eq!(places(&plain, &settings), [20, 40], "2 dB is the least");
+    let blind = level_from(&[(20, 30.0), (40, 19.0), (60, 7.0)], None);
     assert_eq!(
-        places(&plain, &settings),
+        places(&blind, &settings),
         [20, 40],
-        "7 dB is not prominent enough"
+        "without knowing the noise 8 dB is the least"
     );
+    // At 20 dB over the noise its ripple asks for 6 * 0.87 dB on top.
+    let rippled = level_from(&[(20, 7.5), (40, 6.5)], Some(-12.5));
+    assert_eq!(places(&rippled, &settings), [20]);
     let noisy = level_from(&[(20, 30.0), (40, 14.0)], Some(0.0));
     assert_eq!(
         places(&noisy, &settings),

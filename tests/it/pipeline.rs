@@ -1,1 +1,181 @@
-//! Tests of pipeline.
+//! The whole chain on virtual tests whose answer is known.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use tapjoint::description::ChannelRef;
+use tapjoint::identify::{PairsModel, Stiffnesses};
+use tapjoint::pipeline::{
+    Estimate, Identification, IdentifySettings, KnownJoint, ModeResult, TestedStructure, identify,
+    measure_bare, modes_of_recordings,
+};
+use tapjoint::recording::{Channel, Recording};
+use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
+use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
+
+const KX: f64 = 1400.0;
+const KY: f64 = 4.8;
+
+/// A virtual test of the sample cantilever: its own frequencies, and what the chain finds.
+struct VirtualTest {
+    truth: Vec<f64>,
+    modes: Vec<ModeResult>,
+    found: Identification,
+}
+
+/// The cantilever of the sample, a little longer or shorter by seed, so that its frequencies fall
+/// anywhere between two lines; two bands of 2048 samples, five taps each, 60 dB.
+fn virtual_test(seed: u64) -> VirtualTest {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
+    let beam = Beam {
+        length: 0.423 * (1.0 + random.random_range(-0.02..0.02)),
+        width: 0.05,
+        thickness: 0.005,
+        modulus: 207e9,
+        density: 7850.0,
+        poisson: 0.3,
+    };
+    let joint = JointStiffness::two_parameter(KX, KY);
+    let shapes = mode_shapes(&beam, Assembly::Cantilever, &joint, 8).unwrap();
+    let damping = [0.012, 0.009, 0.005, 0.004];
+    let positions = (0.385, [0.338, 0.205]);
+    let bands = [
+        (2560.0, 3e-3, (0.0, 200.0)),
+        (5120.0, 1e-3, (200.0, 1050.0)),
+    ];
+    let mut recordings: Vec<_> = bands
+        .iter()
+        .zip(0u64..)
+        .map(|(&(sample_rate, pulse, band), number)| {
+            let settings = TapTestSettings {
+                sample_rate,
+                pulse,
+                ..Default::default()
+            };
+            let seen = seen_modes(
+                &shapes,
+                &damping,
+                (positions.0, &positions.1),
+                0.45 * sample_rate,
+            );
+            let test = simulate_tap_test(&seen, &settings, 2 * seed + number);
+            let channels = test.channels(1.0, 1.0);
+            let channel = |samples| Channel {
+                samples,
+                ..Default::default()
+            };
+            let channels = channels.into_iter().map(channel).collect();
+            let recording = Recording::from_samples("virtual", sample_rate, channels).unwrap();
+            let hammer = ChannelRef::Number(1);
+            measure_bare(recording, Some(&hammer), |settings| {
+                settings.band = Some(band);
+                settings.block = Some(2048);
+            })
+            .unwrap()
+        })
+        .collect();
+    let structure = TestedStructure {
+        beam,
+        assembly: Assembly::Cantilever,
+        theory: BeamTheory::Euler,
+        regression: Some(PairsModel::TwoParameter),
+        known: KnownJoint::default(),
+    };
+    let (modes, _) = modes_of_recordings(&mut recordings, &[0, 1], &structure);
+    let (found, _) = identify(&structure, &modes, &IdentifySettings::default());
+    let truth = shapes.iter().map(|shape| shape.frequency).collect();
+    VirtualTest {
+        truth,
+        modes,
+        found,
+    }
+}
+
+fn share(flags: impl Iterator<Item = bool>) -> f64 {
+    let flags: Vec<bool> = flags.collect();
+    flags.iter().filter(|&&flag| flag).count() as f64 / flags.len() as f64
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[test]
+fn recover_frequencies_and_joint_over_200_virtual_tests() {
+    let tests: Vec<VirtualTest> = (0..200u64).into_par_iter().map(virtual_test).collect();
+    // (error on the line in half lines, error between the lines in bounds)
+    let mut readings = Vec::new();
+    for (seed, test) in tests.iter().enumerate() {
+        let numbered: Vec<&ModeResult> = test
+            .modes
+            .iter()
+            .filter(|mode| mode.mode.is_some())
+            .collect();
+        assert_eq!(numbered.len(), 5, "seed {seed}: modes found");
+        for (mode, truth) in numbered.iter().zip(&test.truth) {
+            let reading = mode.reading.as_ref().unwrap();
+            // The claim is for peaks at least 40 dB above the noise; here all are.
+            assert!(
+                reading.above_noise_db.unwrap() >= 40.0,
+                "seed {seed}: {truth} Hz"
+            );
+            let line = (reading.line_frequency - truth).abs() / reading.half_line;
+            let between = (reading.interpolated.unwrap() - truth).abs() / reading.bound.unwrap();
+            readings.push((line, between));
+        }
+    }
+    let within = share(readings.iter().map(|(line, _)| *line <= 1.0));
+    let worst = readings.iter().map(|(line, _)| *line).fold(0.0, f64::max);
+    assert!(
+        within >= 0.98,
+        "{:.1} % within the half line",
+        100.0 * within
+    );
+    assert!(
+        worst <= 1.5,
+        "the worst reading is off by {:.2} lines",
+        worst / 2.0
+    );
+    let covered = share(readings.iter().map(|(_, between)| *between <= 1.0));
+    let estimates: Vec<Stiffnesses> = tests.iter().map(stiffnesses).collect();
+    let error = |pick: fn(&Stiffnesses) -> f64, truth: f64| {
+        median(
+            estimates
+                .iter()
+                .map(|e| (pick(e) / truth - 1.0).abs())
+                .collect(),
+        )
+    };
+    let (kx, ky) = (error(|e| e.kx, KX), error(|e| e.ky, KY));
+    assert!(kx < 0.05 && ky < 0.05, "median errors: Kx {kx}, Ky {ky}");
+    let spanned = share(tests.iter().map(span_holds_the_truth));
+    assert!(
+        spanned >= 0.98,
+        "{:.1} % of the spans hold the truth",
+        100.0 * spanned
+    );
+    // A bound of about 95 %: of 1000 readings 93 % is three standard deviations below that.
+    assert!(covered >= 0.93, "{:.1} % within the bound", 100.0 * covered);
+}
+
+fn stiffnesses(test: &VirtualTest) -> Stiffnesses {
+    match &test.found.estimate {
+        Some(Estimate::Joint(joint)) => joint.pairs.stiffnesses().unwrap(),
+        other => panic!("no joint: {other:?}, {:?}", test.found.reason),
+    }
+}
+
+fn span_holds_the_truth(test: &VirtualTest) -> bool {
+    let bounds = test
+        .found
+        .perturbation
+        .as_ref()
+        .unwrap()
+        .bounds
+        .as_ref()
+        .unwrap();
+    let spans = bounds.spans.unwrap();
+    let (kx, ky) = (spans.kx.unwrap(), spans.ky.unwrap());
+    (kx.low..=kx.high).contains(&KX) && (ky.low..=ky.high).contains(&KY)
+}

@@ -44,7 +44,8 @@ pub enum PaperError {
 }
 
 /// How a printed number compares with ours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Equal within the row's tolerance.
     Reproduces,
@@ -57,7 +58,7 @@ pub enum Verdict {
 }
 
 /// One printed number beside ours.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Row {
     /// What the number is.
     pub label: String,
@@ -169,7 +170,7 @@ impl Row {
 }
 
 /// One table of the paper.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Table {
     /// Its number, "1a".
     pub number: &'static str,
@@ -180,7 +181,7 @@ pub struct Table {
 }
 
 /// All tables.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Reproduction {
     /// In the order of the paper.
     pub tables: Vec<Table>,

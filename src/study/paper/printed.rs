@@ -3,7 +3,7 @@
 use super::PaperError;
 
 /// A printed number.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Printed {
     /// As printed, "1.8066" or "-8.11e5".
     pub text: String,

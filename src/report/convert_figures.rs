@@ -58,16 +58,14 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
         lines: averages.lines,
         averages: averages.taps,
         force: averages.force.clone(),
+        force_unit: seconds_of(recording.tap_unit.as_deref()),
         responses: recording
             .responses
             .iter()
             .zip(&averages.responses)
             .map(|(response, values)| Curve {
                 name: named(response),
-                unit: match &response.unit {
-                    Some(unit) => format!("{} s", unit_words(unit)),
-                    None => "unit of the file \u{d7} s".to_string(),
-                },
+                unit: seconds_of(response.unit.as_deref()),
                 values: values.clone(),
             })
             .collect(),
@@ -88,6 +86,7 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
                 frequency: reading.frequency,
                 line_frequency: reading.line_frequency,
                 half_line: reading.half_line,
+                prominence_db: reading.prominence_db,
                 label: reading.label.map(|label| label.to_string()),
             })
             .collect(),
@@ -112,6 +111,14 @@ fn frf(response: &Response, force_unit: Option<&str>, h1: &[Complex64]) -> FrfCu
         },
         magnitude: h1.iter().map(|value| value.norm()).collect(),
         phase: h1.iter().map(|value| value.arg().to_degrees()).collect(),
+    }
+}
+
+/// Unit of a transform: that of the signal times seconds.
+fn seconds_of(unit: Option<&str>) -> String {
+    match unit {
+        Some(unit) => format!("{} s", unit_words(unit)),
+        None => "unit of the file \u{d7} s".to_string(),
     }
 }
 

@@ -48,6 +48,8 @@ pub struct SpectraFigure {
     pub averages: usize,
     /// Root mean square of the force's transforms (N s); `None` without a hammer.
     pub force: Option<Vec<f64>>,
+    /// Unit of the force's transforms: "N s".
+    pub force_unit: String,
     /// One curve for each response: its transform's root mean square (unit s).
     pub responses: Vec<Curve>,
     /// One curve for each frequency response function, complex parts kept; empty without a hammer.
@@ -93,6 +95,8 @@ pub struct PeakMark {
     pub line_frequency: f64,
     /// Bound of the line reading (Hz).
     pub half_line: f64,
+    /// How far it stands out (dB): the most prominent peaks get their labels first.
+    pub prominence_db: f64,
     /// "mains 50 Hz" and the like.
     pub label: Option<String>,
 }

@@ -163,8 +163,10 @@ fn estimate(document: &Document) -> Option<String> {
                 (None, None) => String::new(),
             };
             format!(
-                "{} {} = {value} {unit}{interval}",
-                parameter.meaning, parameter.symbol
+                "{} {}\u{a0}=\u{a0}{value}\u{a0}{}{interval}",
+                parameter.meaning,
+                parameter.symbol,
+                unit.replace(' ', "\u{a0}")
             )
         })
         .collect();

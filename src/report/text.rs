@@ -260,6 +260,7 @@ fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[Vec<String>]) 
                 .zip(shown.iter().zip(widths))
                 .map(|(column, (index, width))| {
                     let text = column.get(line).map_or("", String::as_str);
+                    let text = text.replace('\u{a0}', " ");
                     if is_words(table, *index) {
                         format!("{text:<width$}")
                     } else {
@@ -274,6 +275,8 @@ fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[Vec<String>]) 
 
 /// A text in lines of at most `width` characters, broken between words where that is possible.
 fn broken(text: &str, width: usize) -> Vec<String> {
+    // A number stays with its unit: "mains 50 Hz".
+    let text = text.replace(" Hz", "\u{a0}Hz");
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let mut rest: Vec<char> = word.chars().collect();
@@ -305,10 +308,15 @@ fn cut(text: &str, width: usize) -> String {
     kept + "\u{2026}"
 }
 
+/// Whether a line may be broken here.
+fn is_gap(c: char) -> bool {
+    c.is_whitespace() && c != '\u{a0}'
+}
+
 /// A text broken into lines of at most 80 characters; lines after the first are indented.
 fn wrapped(text: &str, indent: usize) -> String {
     let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split_whitespace() {
+    for word in text.split(is_gap).filter(|word| !word.is_empty()) {
         let word = cut(word, WIDTH - indent);
         let length = |line: &str| line.chars().count();
         match lines.last_mut() {
@@ -320,5 +328,6 @@ fn wrapped(text: &str, indent: usize) -> String {
             _ => lines.push(" ".repeat(indent) + &word),
         }
     }
-    lines.join("\n") + "\n"
+    // No-break spaces have kept words together; a terminal, and who searches it, wants plain ones.
+    lines.join("\n").replace('\u{a0}', " ") + "\n"
 }

@@ -6,6 +6,7 @@ use super::super::document::{Document, EstimateSection};
 use super::super::format::signed;
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Align, Drawing, Point, Stroke, Text};
+use super::font::{Weight, text_width};
 use super::palette::{BLUE, INK, ORANGE, SKY};
 use super::panel::{Panel, Sample, TICK_SIZE, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
@@ -35,10 +36,12 @@ pub fn draw_cloud(document: &Document) -> Option<Drawing> {
         y: axis(points.iter().map(|point| point.1), (556.0, 98.0)),
     };
     panel.draw_axes(&mut drawing);
-    for at in distinct(cloud.iter().map(|(x, y)| panel.place(*x, *y))) {
-        drawing.dot(at, 3.2, SKY);
+    let mut dots = distinct(cloud.iter().map(|(x, y)| panel.place(*x, *y)));
+    for at in &dots {
+        drawing.dot(*at, 3.2, SKY);
     }
-    draw_shifted(&mut drawing, &panel, &shifted);
+    dots.extend(estimate.map(|(x, y)| panel.place(x, y)));
+    draw_shifted(&mut drawing, &panel, &shifted, &dots);
     if let Some((x, y)) = estimate {
         let at = panel.place(x, y);
         drawing.dot(at, 7.0, super::palette::WHITE);
@@ -113,32 +116,85 @@ fn below(document: &Document, drawn: usize) -> String {
     )
 }
 
-fn draw_shifted(drawing: &mut Drawing, panel: &Panel, shifted: &[(f64, Point)]) {
-    let mut taken: Vec<Point> = Vec::new();
-    for (percent, (x, y)) in shifted {
-        let at = panel.place(*x, *y);
-        drawing.cross(at, 6.0, Stroke::new(ORANGE, 2.5));
-        let words = format!("{} %", signed(*percent));
-        // To the left where the right has no room.
-        let (end, align) = if at.0 > panel.x.to - 90.0 {
-            (at.0 - 11.0, Align::End)
-        } else {
-            (at.0 + 11.0, Align::Start)
+/// Crosses with their percentage, on the side where the words cover nothing; words without such a
+/// side are left out, the table has them.
+fn draw_shifted(drawing: &mut Drawing, panel: &Panel, shifted: &[(f64, Point)], dots: &[Point]) {
+    let crosses: Vec<Point> = shifted
+        .iter()
+        .map(|(_, (x, y))| panel.place(*x, *y))
+        .collect();
+    let mut boxes: Vec<Patch> = dots
+        .iter()
+        .chain(&crosses)
+        .map(|at| Patch::around(*at, (7.0, 7.0)))
+        .collect();
+    // The largest changes first: they say which way the estimate moves.
+    let mut order: Vec<usize> = (0..shifted.len()).collect();
+    order.sort_by(|a, b| {
+        let size = |index: &usize| {
+            shifted
+                .get(*index)
+                .map_or(0.0, |(percent, _)| percent.abs())
         };
-        // Labels of neighbouring crosses step aside instead of covering each other.
-        let mut place = (end, at.1);
-        while taken
-            .iter()
-            .any(|other| (other.1 - place.1).abs() < 15.0 && (other.0 - place.0).abs() < 75.0)
-        {
-            place.1 += 15.0;
+        size(b).total_cmp(&size(a))
+    });
+    for index in order {
+        let (Some((percent, _)), Some(at)) = (shifted.get(index), crosses.get(index)) else {
+            continue;
+        };
+        drawing.cross(*at, 6.0, Stroke::new(ORANGE, 2.5));
+        let words = format!("{} %", signed(*percent));
+        let half = text_width(&words, TICK_SIZE, Weight::Regular) / 2.0;
+        let free = SIDES.iter().find_map(|(across, down)| {
+            let middle = (at.0 + across * (half + 11.0), at.1 + down * 17.0);
+            let place = Patch::around(middle, (half + 1.0, 7.0));
+            let inside = place.left > panel.x.from && place.right < panel.x.to;
+            let clear = !boxes.iter().any(|taken| taken.overlaps(&place));
+            (inside && clear).then_some((middle, place))
+        });
+        if let Some((middle, place)) = free {
+            boxes.push(place);
+            let text = Text::new(words, middle, TICK_SIZE).colored(INK);
+            drawing.text(text.aligned(Align::Middle));
         }
-        taken.push(place);
-        drawing.text(
-            Text::new(words, place, TICK_SIZE)
-                .colored(INK)
-                .aligned(align),
-        );
+    }
+}
+
+/// Where words may stand beside a cross: shares of their half width across and of a line down.
+const SIDES: [Point; 8] = [
+    (1.0, 0.0),
+    (-1.0, 0.0),
+    (0.0, -1.0),
+    (0.0, 1.0),
+    (0.8, -1.0),
+    (-0.8, -1.0),
+    (0.8, 1.0),
+    (-0.8, 1.0),
+];
+
+/// A rectangle that is taken (pixels).
+struct Patch {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+impl Patch {
+    fn around(middle: Point, half: Point) -> Patch {
+        Patch {
+            left: middle.0 - half.0,
+            right: middle.0 + half.0,
+            top: middle.1 - half.1,
+            bottom: middle.1 + half.1,
+        }
+    }
+
+    fn overlaps(&self, other: &Patch) -> bool {
+        self.left < other.right
+            && other.left < self.right
+            && self.top < other.bottom
+            && other.top < self.bottom
     }
 }
 

@@ -14,6 +14,11 @@ const MOST_WITH_NUMBERS: usize = 10;
 /// Most modes whose errors fit beside each other.
 const MOST_WITH_WORDS: usize = 14;
 
+/// The axis reaches at least this far to either side of zero (%).
+const LEAST_SPAN: f64 = 0.02;
+/// Left edge of the panel (pixels): tick labels such as "\u{2212}0.02" need room beside the title.
+const INNER_LEFT: f64 = LEFT + 8.0;
+
 /// One mode's error and the bound of its reading (%).
 struct Error<'a> {
     prediction: &'a PredictionSection,
@@ -40,7 +45,7 @@ pub fn draw_frequencies(document: &Document) -> Option<Drawing> {
     panel.draw_y_ticks(&mut drawing, &panel.y.ticks(36.0));
     let zero = Stroke::new(INK, 1.0);
     let y = crisp(panel.y.place(0.0));
-    drawing.line(vec![(LEFT, y), (RIGHT, y)], zero);
+    drawing.line(vec![(INNER_LEFT, y), (RIGHT, y)], zero);
     panel.draw_frame(&mut drawing);
     for (index, error) in errors.iter().enumerate() {
         draw_error(&mut drawing, &panel, index, error, errors.len());
@@ -75,11 +80,11 @@ fn panel(errors: &[Error<'_>]) -> Panel {
         [error.percent - bound, error.percent + bound, 0.0]
     });
     let (low, high) = extent(ends).unwrap_or((-1.0, 1.0));
-    // Differences below a millionth of a percent are rounding; magnified they would mislead.
-    let low = low.min(-1e-6);
-    let high = high.max(1e-6);
+    // Differences of thousandths of a percent mean nothing in practice; magnified they would mislead.
+    let low = low.min(-LEAST_SPAN);
+    let high = high.max(LEAST_SPAN);
     Panel {
-        x: Axis::linear((-0.5, errors.len() as f64 - 0.5), (LEFT, RIGHT)),
+        x: Axis::linear((-0.5, errors.len() as f64 - 0.5), (INNER_LEFT, RIGHT)),
         y: Axis::linear(padded((low, high), 0.14), (396.0, 98.0)),
     }
 }

@@ -9,8 +9,8 @@ use super::panel::{Panel, TICK_SIZE, crisp};
 
 /// Height of the strip above a panel that labels and their leaders need (pixels).
 pub const STRIP: f64 = 62.0;
-/// Largest share of the row that labels fill: beyond it their leaders run almost flat.
-const FULLEST: f64 = 0.72;
+/// Farthest a label stands from its mark (pixels): beyond it the leaders run almost flat.
+const FARTHEST: f64 = 140.0;
 /// Least space between two labels (pixels).
 const GAP: f64 = 14.0;
 
@@ -26,9 +26,9 @@ pub fn draw_marks(drawing: &mut Drawing, panel: &Panel, peaks: &[PeakMark]) -> u
     for peak in &visible {
         draw_mark(drawing, panel, peak);
     }
-    let mut labelled = visible.clone();
-    while !draw_labels(drawing, panel, &labelled) {
-        drop_least(&mut labelled);
+    let (labelled, centers) = chosen_labels(panel, &visible);
+    for (peak, center) in labelled.iter().zip(centers) {
+        draw_label(drawing, panel, peak, center);
     }
     visible.len() - labelled.len()
 }
@@ -81,39 +81,58 @@ pub fn frequency(peak: &PeakMark) -> String {
     format!("{:.decimals$} Hz", peak.frequency)
 }
 
-/// Draws all labels, or nothing and `false` where they do not fit.
-fn draw_labels(drawing: &mut Drawing, panel: &Panel, peaks: &[&PeakMark]) -> bool {
+/// The peaks that get a label, and the labels' centres (pixels): modes before others, the most
+/// prominent first, each kept if all still have room near their marks.
+fn chosen_labels<'a>(panel: &Panel, visible: &[&'a PeakMark]) -> (Vec<&'a PeakMark>, Vec<f64>) {
+    let mut candidates = visible.to_vec();
+    candidates.sort_by(|a, b| {
+        let others_last = a.mode.is_none().cmp(&b.mode.is_none());
+        others_last.then(b.prominence_db.total_cmp(&a.prominence_db))
+    });
+    let mut best = (Vec::new(), Vec::new());
+    for candidate in candidates {
+        let mut labelled = best.0.clone();
+        let place =
+            labelled.partition_point(|peak: &&PeakMark| peak.frequency <= candidate.frequency);
+        labelled.insert(place, candidate);
+        if let Some(centers) = placed(panel, &labelled) {
+            best = (labelled, centers);
+        }
+    }
+    best
+}
+
+/// Centres of the labels (pixels), or `None` where one would stand too far from its mark.
+fn placed(panel: &Panel, peaks: &[&PeakMark]) -> Option<Vec<f64>> {
     let wishes: Vec<f64> = peaks
         .iter()
         .map(|peak| panel.x.place(peak.frequency))
         .collect();
     let widths: Vec<f64> = peaks.iter().map(|peak| label_width(peak)).collect();
     let bounds = (panel.x.from - 40.0, panel.x.to + 14.0);
-    let filled: f64 = widths.iter().map(|width| width + GAP).sum();
-    if filled > FULLEST * (bounds.1 - bounds.0) {
-        return false;
-    }
-    let Some(centers) = spread(&wishes, &widths, GAP, bounds) else {
-        return false;
+    let near = |centers: &Vec<f64>| {
+        let mut moves = centers.iter().zip(&wishes);
+        moves.all(|(center, wish)| (center - wish).abs() <= FARTHEST)
     };
+    spread(&wishes, &widths, GAP, bounds).filter(near)
+}
+
+fn draw_label(drawing: &mut Drawing, panel: &Panel, peak: &PeakMark, center: f64) {
+    let wish = crisp(panel.x.place(peak.frequency));
     let top = panel.y.to;
-    for ((peak, wish), center) in peaks.iter().zip(wishes).zip(centers) {
-        let [name, frequency] = words(peak);
-        let ink = if peak.mode.is_some() { INK } else { SOFT };
-        let first = Text::new(name, (center, top - 52.0), TICK_SIZE).colored(color(peak));
-        drawing.text(first.bold().aligned(Align::Middle));
-        let second = Text::new(frequency, (center, top - 36.0), TICK_SIZE).colored(ink);
-        drawing.text(second.aligned(Align::Middle));
-        let stroke = Stroke::new(color(peak), 1.0);
-        let leader = vec![
-            (center, top - 26.0),
-            (center, top - 22.0),
-            (crisp(wish), top - 4.0),
-            (crisp(wish), top),
-        ];
-        drawing.line(leader, stroke);
-    }
-    true
+    let [name, frequency] = words(peak);
+    let ink = if peak.mode.is_some() { INK } else { SOFT };
+    let first = Text::new(name, (center, top - 52.0), TICK_SIZE).colored(color(peak));
+    drawing.text(first.bold().aligned(Align::Middle));
+    let second = Text::new(frequency, (center, top - 36.0), TICK_SIZE).colored(ink);
+    drawing.text(second.aligned(Align::Middle));
+    let leader = vec![
+        (center, top - 26.0),
+        (center, top - 22.0),
+        (wish, top - 4.0),
+        (wish, top),
+    ];
+    drawing.line(leader, Stroke::new(color(peak), 1.0));
 }
 
 fn label_width(peak: &PeakMark) -> f64 {
@@ -123,26 +142,4 @@ fn label_width(peak: &PeakMark) -> f64 {
         TICK_SIZE,
         Weight::Regular,
     ))
-}
-
-/// Takes away the label that is missed least: of the peaks that are no modes, else of the modes,
-/// the one closest to the peak before it.
-fn drop_least(peaks: &mut Vec<&PeakMark>) {
-    let any_other = peaks.iter().any(|peak| peak.mode.is_none());
-    let distance = |index: usize| {
-        let pair = index
-            .checked_sub(1)
-            .and_then(|before| peaks.get(before..=index));
-        match pair {
-            Some([before, peak]) => peak.frequency - before.frequency,
-            _ => f64::INFINITY,
-        }
-    };
-    let least = (0..peaks.len())
-        .rev()
-        .filter(|index| !any_other || peaks.get(*index).is_some_and(|peak| peak.mode.is_none()))
-        .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
-    if let Some(least) = least {
-        peaks.remove(least);
-    }
 }

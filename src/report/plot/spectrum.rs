@@ -2,7 +2,7 @@
 
 use super::super::figures::{Curve, PeakMark, RecordingFigure, SpectraFigure};
 use super::super::format::{significant, trimmed};
-use super::axis::{Axis, extent};
+use super::axis::{Axis, extent, nice_step};
 use super::closeup::draw_closeups;
 use super::drawing::{Drawing, Stroke, Text};
 use super::marks::{STRIP, draw_marks};
@@ -17,6 +17,11 @@ pub const LEFT: f64 = 84.0;
 pub const RIGHT: f64 = 1164.0;
 /// Smallest magnitude shown, relative to the largest: 140 dB.
 const DEEPEST: f64 = 1e-7;
+
+/// How far beyond the highest peak a shortened axis goes, in shares of the peak's frequency.
+const PAST_HIGHEST: f64 = 1.25;
+/// An axis is shortened when that hides more than the rest of this share of the band.
+const MOST_SHOWN_PART: f64 = 0.6;
 
 /// The spectra of a recording; `None` when no tap was accepted.
 pub fn draw_spectrum(figure: &RecordingFigure) -> Option<Drawing> {
@@ -54,8 +59,15 @@ fn title(figure: &RecordingFigure) -> String {
 pub fn subtitle(spectra: &SpectraFigure) -> String {
     let lines = &spectra.lines;
     let taps = if spectra.averages == 1 { "tap" } else { "taps" };
+    let end = shown_to(spectra);
+    let shown = if end < lines.high {
+        let (end, all) = (trimmed(end, 6), trimmed(lines.high, 6));
+        format!(" \u{b7} shown to {end} of {all} Hz")
+    } else {
+        String::new()
+    };
     format!(
-        "{} {taps} averaged \u{b7} block {} samples, {} lines \u{b7} line spacing {} Hz \u{b7} resolution 1/T = {} Hz",
+        "{} {taps} averaged \u{b7} block {} samples, {} lines \u{b7} line spacing {} Hz \u{b7} resolution 1/T = {} Hz{shown}",
         spectra.averages,
         lines.block,
         lines.displayed(),
@@ -66,7 +78,26 @@ pub fn subtitle(spectra: &SpectraFigure) -> String {
 
 /// The horizontal axis of a recording's spectra.
 pub fn frequency_axis(spectra: &SpectraFigure) -> Axis {
-    Axis::linear((spectra.lines.low, spectra.lines.high), (LEFT, RIGHT))
+    Axis::linear((spectra.lines.low, shown_to(spectra)), (LEFT, RIGHT))
+}
+
+/// Upper end of the frequencies shown (Hz): the band's, or where nothing was found in its upper
+/// part, a round frequency above the highest peak. A kilohertz of modes under twenty kilohertz of
+/// noise cannot be read.
+fn shown_to(spectra: &SpectraFigure) -> f64 {
+    let (low, high) = (spectra.lines.low, spectra.lines.high);
+    let peaks = spectra.peaks.iter().map(|peak| peak.frequency);
+    let Some((_, highest)) = extent(peaks) else {
+        return high;
+    };
+    let wanted = PAST_HIGHEST * (highest - low);
+    let step = nice_step(wanted / 5.0);
+    let end = (low / step).floor() * step + (wanted / step).ceil() * step;
+    if end > low && end - low < MOST_SHOWN_PART * (high - low) {
+        end
+    } else {
+        high
+    }
 }
 
 /// A curve over the lines.
@@ -154,7 +185,7 @@ fn legend(spectra: &SpectraFigure, unlabelled: usize) -> Vec<(Sample, String)> {
         entries.push((Sample::Dashed(BLUE), words.to_owned()));
     }
     if has(spectra, |peak| peak.mode.is_none()) {
-        entries.push((Sample::Dashed(ORANGE), "mains or other, no mode".to_owned()));
+        entries.push((Sample::Dashed(ORANGE), "peak that is no mode".to_owned()));
     }
     if unlabelled > 0 {
         let words = format!("{unlabelled} more without a label, see the table");
@@ -200,8 +231,9 @@ fn draw_force(
         Stroke::new(SOFT, 1.5),
     );
     let words = format!(
-        "force: dB below its largest value, {} N s",
-        significant(largest, 3)
+        "force: dB below its largest value, {} {}",
+        significant(largest, 3),
+        spectra.force_unit
     );
     drawing.text(Text::new(words, (LEFT + 10.0, bottom - 13.0), TICK_SIZE).colored(SOFT));
     panel

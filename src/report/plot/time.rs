@@ -40,10 +40,9 @@ fn counts(overview: &TimeOverview) -> String {
     let rejected = overview.taps.iter().filter(|tap| tap.rejected.is_some());
     let rejected = rejected.count();
     let used = overview.taps.len() - rejected;
-    format!(
-        "{} taps found \u{b7} {used} used \u{b7} {rejected} rejected",
-        overview.taps.len()
-    )
+    let found = overview.taps.len();
+    let taps = if found == 1 { "tap" } else { "taps" };
+    format!("{found} {taps} found \u{b7} {used} used \u{b7} {rejected} rejected")
 }
 
 /// "tap 3 at 6.21 s: double hit", and how many more there are.
@@ -71,9 +70,10 @@ fn draw_signal(drawing: &mut Drawing, overview: &TimeOverview) -> Panel {
     let values = overview.low.iter().chain(&overview.high).copied();
     let range = extent(values.chain(marks)).unwrap_or((-1.0, 1.0));
     let panel = Panel {
-        x: Axis::linear((0.0, seconds), (LEFT, RIGHT)),
+        // Room at the start: a recording may begin with a tap, whose mark would lie on the frame.
+        x: Axis::linear((-0.015 * seconds, seconds), (LEFT, RIGHT)),
         // Room above the tallest tap for its number.
-        y: Axis::linear(padded(range, 0.12), (360.0, 98.0)),
+        y: Axis::linear(padded(range, 0.14), (360.0, 98.0)),
     };
     panel.draw_axes(drawing);
     // Through the extremes of every piece in turn: where pieces are narrower than a pixel this is

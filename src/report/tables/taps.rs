@@ -16,16 +16,8 @@ pub fn taps(document: &Document) -> Option<Table> {
 
 /// One row for each tap that was not used; `None` without any.
 pub fn rejected_taps(document: &Document) -> Option<Table> {
-    let mut table = chosen(document, "Rejected taps", |tap| !tap.accepted)?;
-    // All say "no" there.
-    for cell in table.rows.iter_mut().filter_map(|row| row.get_mut(USED)) {
-        cell.clear();
-    }
-    Some(table.without_empty_columns())
+    chosen(document, "Rejected taps", |tap| !tap.accepted)
 }
-
-/// Place of the column that says whether a tap was used.
-const USED: usize = 5;
 
 fn chosen(
     document: &Document,
@@ -44,6 +36,7 @@ fn chosen(
     if rows.is_empty() {
         return None;
     }
+    let rows = without_single_name(rows, recordings);
     let table = Table {
         caption: caption.to_owned(),
         columns: vec![
@@ -58,7 +51,20 @@ fn chosen(
         rows,
         note: peaks_note(recordings),
     };
-    Some(table)
+    Some(table.without_empty_columns())
+}
+
+/// Rows without the recording's name where there is only one: the table of recordings has it.
+fn without_single_name(
+    mut rows: Vec<Vec<String>>,
+    recordings: &[RecordingSection],
+) -> Vec<Vec<String>> {
+    if recordings.len() == 1 {
+        for name in rows.iter_mut().filter_map(|row| row.first_mut()) {
+            name.clear();
+        }
+    }
+    rows
 }
 
 fn row(recording: &RecordingSection, number: usize, tap: &TapSection) -> Vec<String> {
@@ -100,6 +106,7 @@ pub fn taps_used(document: &Document) -> Option<Table> {
     if rows.is_empty() {
         return None;
     }
+    let rows = without_single_name(rows, recordings);
     let table = Table {
         caption: "Taps used".to_owned(),
         columns: vec![

@@ -255,6 +255,7 @@ fn figure(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recordin
             frequency: FREQUENCIES[index],
             line_frequency: (FREQUENCIES[index] / lines.spacing).round() * lines.spacing,
             half_line: lines.half_line(),
+            prominence_db: 38.2,
             label: None,
         })
         .collect();
@@ -263,6 +264,7 @@ fn figure(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recordin
         frequency: 50.0,
         line_frequency: 50.0,
         half_line: lines.half_line(),
+        prominence_db: 12.0,
         label: Some("mains 50 Hz".into()),
     });
     RecordingFigure {
@@ -303,6 +305,7 @@ fn spectra(lines: Lines, peaks: Vec<PeakMark>) -> SpectraFigure {
         lines,
         averages: 4,
         force: Some(force),
+        force_unit: "N s".into(),
         responses,
         frfs,
         peaks,

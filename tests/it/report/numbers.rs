@@ -2,8 +2,43 @@
 
 use proptest::prelude::*;
 use tapjoint::report::format::{
-    line_reading, optional, prefix, rounded, signed, signed_percent, significant, trimmed,
+    bound_percent, frequency_reading, line_reading, optional, prefix, rounded, rounded_digits,
+    signed, signed_percent, significant, trimmed, unit_words, with_decimals_of,
 };
+
+#[test]
+fn val_digits_nobody_can_use_are_left_out() {
+    let cases = [
+        // Rounded up, so that the bound still holds.
+        (7.4867451, 0.0000036, Some(0.042), "7.4867 ± 0.0001"),
+        (117.08604, 0.00011, Some(0.125), "117.0860 ± 0.0002"),
+        (994.0132, 0.0025, Some(0.5), "994.0132 ± 0.0025"),
+        (80.466, 0.035, None, "80.466 ± 0.035"),
+        // Lines 0.0008 Hz apart need their digits.
+        (7.4867451, 0.0000036, Some(0.0004), "7.4867451 ± 0.0000036"),
+    ];
+    for (frequency, bound, half_line, wanted) in cases {
+        let written = frequency_reading(frequency, bound, half_line).joined();
+        assert_eq!(
+            written, wanted,
+            "{frequency} ± {bound}, half line {half_line:?}"
+        );
+    }
+    assert_eq!(
+        rounded_digits(0.508082, Some(0.000023), 4).joined(),
+        "0.5081 ± 0.0001"
+    );
+    assert_eq!(
+        rounded_digits(1.994203, Some(0.25), 5).joined(),
+        "1.99 ± 0.25"
+    );
+    assert_eq!(bound_percent(0.000048), "±0.001");
+    assert_eq!(bound_percent(0.0003), "±0.001");
+    assert_eq!(bound_percent(0.735), "±0.73");
+    assert_eq!(bound_percent(f64::NAN), "–");
+    assert_eq!(with_decimals_of(331.0618, "335.625"), "331.062");
+    assert_eq!(unit_words("(m/s2)/N"), "(m/s²)/N");
+}
 
 #[test]
 fn val_digits_follow_the_uncertainty() {
@@ -112,6 +147,19 @@ proptest! {
             decimals(&uncertainty),
             "{}", written.joined()
         );
+    }
+
+    #[test]
+    fn prop_capped_bounds_still_hold(
+        value in 1.0f64..1e4,
+        exponent in -9.0f64..1.0,
+    ) {
+        let bound = 10f64.powf(exponent);
+        let written = frequency_reading(value, bound, None);
+        let shown = parsed(written.uncertainty.as_deref().unwrap_or("nothing"));
+        // Two digits may round down by 5 %; a capped bound is rounded up.
+        prop_assert!(shown >= 0.9499 * bound, "{bound} was written {shown}");
+        prop_assert!(shown >= 1e-4 * (1.0 - 1e-9), "finer than four decimals: {shown}");
     }
 
     #[test]

@@ -198,6 +198,7 @@ fn prop_many_marks_keep_their_labels_apart() {
                 frequency: 600.0 + 2.5 * mode as f64,
                 line_frequency: 600.0 + 2.5 * mode as f64,
                 half_line: 1.25,
+                prominence_db: 40.0 - mode as f64,
                 label: None,
             })
             .collect();
@@ -347,4 +348,71 @@ fn limit_decimation_leaves_out_what_is_not_finite() {
         (2.0, 3.0),
     ];
     assert_eq!(decimate(points), [(0.0, 1.0), (2.0, 3.0)]);
+}
+
+#[test]
+fn prop_the_most_prominent_modes_keep_their_labels() {
+    let mut figure = fixture::figures().remove(1);
+    if let Some(spectra) = &mut figure.spectra {
+        spectra.peaks = (1..=30)
+            .map(|mode| PeakMark {
+                mode: Some(mode),
+                frequency: 600.0 + 2.5 * mode as f64,
+                line_frequency: 600.0 + 2.5 * mode as f64,
+                half_line: 1.25,
+                prominence_db: if mode == 17 { 90.0 } else { 10.0 },
+                label: None,
+            })
+            .collect();
+    }
+    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    assert!(
+        drawing.words().contains(&"mode 17"),
+        "{:?}",
+        drawing.words()
+    );
+}
+
+#[test]
+fn prop_an_empty_upper_part_is_not_shown_and_said_so() {
+    let mut figure = fixture::figures().remove(1);
+    let whole = draw_spectrum(&figure).expect("there are spectra");
+    assert!(
+        !whole.words().join(" ").contains("shown to"),
+        "modes to 994 of 2000 Hz"
+    );
+    if let Some(spectra) = &mut figure.spectra {
+        spectra.peaks.retain(|peak| peak.frequency < 400.0);
+    }
+    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let words = drawing.words().join(" ");
+    assert!(words.contains("shown to 500 of 2000 Hz"), "{words}");
+}
+
+#[test]
+fn prop_labels_in_the_cloud_cover_nothing() {
+    let mut document = fixture::document();
+    // Crosses as close as one part in a thousand of the span.
+    for row in document.perturbation.iter_mut().flatten() {
+        row.kx = Some(970.5 * (1.0 + 0.02 * row.percent));
+        row.ky = Some(1.251);
+    }
+    let drawing = draw_cloud(&document).expect("there is a cloud");
+    let labels: Vec<(f64, f64, f64)> = drawing
+        .shapes
+        .iter()
+        .filter_map(|shape| match shape {
+            Shape::Text(text) if text.text.ends_with(" %") => {
+                Some((text.at.0, text.at.1, text.width() / 2.0))
+            }
+            _ => None,
+        })
+        .collect();
+    assert!(!labels.is_empty(), "no cross has a label");
+    for (index, a) in labels.iter().enumerate() {
+        for b in labels.iter().skip(index + 1) {
+            let apart = (a.0 - b.0).abs() >= a.2 + b.2 || (a.1 - b.1).abs() >= 13.0;
+            assert!(apart, "labels at {a:?} and {b:?} overlap");
+        }
+    }
 }

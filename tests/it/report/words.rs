@@ -1,7 +1,10 @@
 //! Page, JSON, CSV and terminal.
 
 use serde_json::Value;
-use tapjoint::report::document::{Document, TapSection, WarningSection};
+use tapjoint::report::document::{
+    AverageSection, ChannelSection, Document, ModeSection, MonteCarloSection, PredictionSection,
+    TapSection, ValueSection, WarningSection,
+};
 use tapjoint::report::{
     render_json, render_modes_csv, render_parameters_csv, render_text, summary,
 };
@@ -259,4 +262,339 @@ fn val_summary_counts() {
     );
     let reason = "No stiffness was estimated: 3 modes are needed, 0 were found.";
     assert!(sentences.contains(&reason.to_owned()), "{sentences:?}");
+}
+
+/// The fixture without what only a description gives, as of a bare recording.
+fn bare() -> Document {
+    let mut document = fixture::document();
+    if let Some(test) = &mut document.test {
+        test.kind = None;
+        test.model = None;
+    }
+    for mode in document.modes.iter_mut().flatten() {
+        mode.lambda = None;
+    }
+    document
+        .recordings
+        .iter_mut()
+        .for_each(|list| list.truncate(1));
+    Document {
+        estimate: None,
+        prediction: None,
+        perturbation: None,
+        resolution_span: None,
+        warnings: Vec::new(),
+        ..document
+    }
+}
+
+/// The fixture as of recordings that were only looked at.
+fn inspected() -> Document {
+    let channel = ChannelSection {
+        channel: 2,
+        name: Some("ch2_response_of_the_left_beam".into()),
+        unit: Some("m/s2".into()),
+        mean: -0.0154,
+        peak: 7.47,
+        rms: 1.4,
+        full_scale_samples: 12,
+        flat_tops: 3,
+        dropped_samples: 40,
+        scale: 1.0,
+    };
+    let mut document = bare();
+    for recording in document.recordings.iter_mut().flatten() {
+        recording.channel_details = vec![channel.clone()];
+        recording.line_spacing = None;
+        recording.resolution = None;
+        recording.window = None;
+        recording.window_decay = None;
+        recording.modes.clear();
+    }
+    Document {
+        modes: None,
+        ..document
+    }
+}
+
+#[test]
+fn prop_terminal_cuts_nothing_off() {
+    let mut long = fixture::document();
+    for recording in long.recordings.iter_mut().flatten() {
+        recording.file = "full_2026-03-14_second_visit_evening.wav".into();
+    }
+    for mode in long.modes.iter_mut().flatten() {
+        mode.recording = Some("full_2026-03-14_second_visit_evening.wav".into());
+        mode.frequency *= 1.0 + 1e-7;
+        mode.interpolated_bound = Some(3.6e-6);
+        mode.damping_std = Some(2.3e-8);
+    }
+    if let Some(mode) = long.modes.iter_mut().flatten().last() {
+        mode.recording = Some("low.wav".into());
+        mode.label = Some("no clear resonance".into());
+    }
+    let cases = [
+        ("whole", fixture::document()),
+        ("long", long),
+        ("bare", bare()),
+        ("inspected", inspected()),
+    ];
+    for (case, document) in cases {
+        let text = render_text(&document);
+        assert!(
+            !text.contains('…'),
+            "{case}: something was cut off:\n{text}"
+        );
+    }
+}
+
+#[test]
+fn regress_modes_show_no_absurd_digits() {
+    let mut document = fixture::document();
+    let modes = document.modes.iter_mut().flatten();
+    for mode in modes.filter(|mode| mode.mode == Some(1)) {
+        mode.frequency = 7.4867451;
+        mode.interpolated_bound = Some(3.6e-6);
+        mode.lambda = Some(1.630_513_58);
+        mode.damping = Some(0.005_080_82);
+        mode.damping_std = Some(2.3e-7);
+    }
+    for (place, text) in [
+        ("terminal", render_text(&document)),
+        ("page", page(&document)),
+    ] {
+        for wanted in ["7.4867 ± 0.0001", "1.63051", "0.5081 ± 0.0001"] {
+            assert!(text.contains(wanted), "the {place} lacks {wanted}");
+        }
+        assert!(!text.contains("7.48674"), "the {place} has more digits");
+    }
+    let json = render_json(&document).expect("the document is written");
+    assert!(json.contains("7.4867451"), "JSON keeps every digit");
+}
+
+#[test]
+fn val_many_taps_are_summarised_in_the_terminal_only() {
+    let document = fixture::document();
+    let text = render_text(&document);
+    // The reason goes on below where the line is full.
+    let reason = ["double hit: second excursion", "14 ms\n"];
+    for wanted in [
+        "Taps used\n",
+        "4 of 6",
+        "Rejected taps\n",
+        reason[0],
+        reason[1],
+    ] {
+        assert!(text.contains(wanted), "{wanted} is missing in\n{text}");
+    }
+    assert!(
+        !text.contains("10.510"),
+        "an accepted tap is listed:\n{text}"
+    );
+    assert!(page(&document).contains("10.510"), "the page has all taps");
+    let few = render_text(&bare());
+    assert!(
+        few.contains("10.510"),
+        "six taps are listed one by one:\n{few}"
+    );
+}
+
+#[test]
+fn val_inspection_shows_channels() {
+    let text = render_text(&inspected());
+    for wanted in [
+        "WAV, 24-bit integer",
+        "ch2_response",
+        "m/s²",
+        "−0.0154",
+        "7.47",
+        "12",
+        "Dropped",
+        "can be used",
+    ] {
+        assert!(text.contains(wanted), "{wanted} is missing in\n{text}");
+    }
+    assert!(
+        !render_text(&fixture::document()).contains("Dropped"),
+        "not of a run"
+    );
+}
+
+#[test]
+fn val_peaks_carry_their_unit() {
+    let mut document = bare();
+    assert!(
+        render_text(&document).contains("  N  "),
+        "{}",
+        render_text(&document)
+    );
+    for recording in document.recordings.iter_mut().flatten() {
+        recording.has_hammer = false;
+        recording.tap_unit = None;
+        for tap in &mut recording.taps {
+            tap.peak_response = tap.peak_force.take();
+        }
+    }
+    let text = render_text(&document);
+    assert!(text.contains("unit of the file"), "{text}");
+    assert!(
+        text.contains("taps were looked for on A and B"),
+        "the channels are named:\n{text}"
+    );
+}
+
+#[test]
+fn val_averages_and_monte_carlo_are_shown() {
+    let value = |value: f64| ValueSection {
+        value,
+        std: None,
+        low: Some(0.9 * value),
+        high: Some(1.2 * value),
+    };
+    let document = Document {
+        perturbation_averages: Some(vec![AverageSection {
+            percent: 0.05,
+            kx_percent: 0.5811,
+            ky_percent: 0.1333,
+            kz_percent: None,
+        }]),
+        monte_carlo: Some(MonteCarloSection {
+            samples: 2000,
+            failed: 3,
+            kx: Some(value(970.5)),
+            ky: Some(value(1.251)),
+            kz: None,
+        }),
+        ..fixture::document()
+    };
+    for (place, text) in [
+        ("terminal", render_text(&document)),
+        ("page", page(&document)),
+    ] {
+        for wanted in [
+            "±0.05",
+            "0.581",
+            "0.133",
+            "Median",
+            "873.45",
+            "1164.6",
+            "2000 draws",
+            "3 of them leave no estimate",
+        ] {
+            let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(text.contains(wanted), "the {place} lacks {wanted}");
+        }
+        assert!(
+            !text.contains("Kz off by"),
+            "the {place} has an empty column"
+        );
+    }
+}
+
+#[test]
+fn val_predictions_show_only_what_there_is() {
+    let rows = |predicted: Option<f64>| Document {
+        prediction: Some(vec![PredictionSection {
+            mode: 1,
+            predicted,
+            lambda: Some(1.849_96),
+            ..PredictionSection::default()
+        }]),
+        ..Document::default()
+    };
+    let text = render_text(&rows(None));
+    assert!(text.contains("1.84996"), "{text}");
+    for unwanted in ["Hz", "Measured", "Used", "–"] {
+        assert!(!text.contains(unwanted), "{unwanted} in\n{text}");
+    }
+    let text = render_text(&rows(Some(22.5628)));
+    assert!(
+        text.contains("22.5628") && text.contains("Predicted (Hz)"),
+        "{text}"
+    );
+    assert!(!text.contains("Measured"), "{text}");
+}
+
+#[test]
+fn val_summary_sentences_are_grammatical() {
+    let first = |accepted: &[bool]| {
+        let mut document = bare();
+        for recording in document.recordings.iter_mut().flatten() {
+            let tap = |accepted: &bool| TapSection {
+                accepted: *accepted,
+                ..TapSection::default()
+            };
+            recording.taps = accepted.iter().map(tap).collect();
+        }
+        summary::sentences(&document).remove(0)
+    };
+    let cases: [(&[bool], &str); 6] = [
+        (&[], "No taps were found in 1 recording."),
+        (&[true], "1 tap was found in 1 recording, and it was used."),
+        (
+            &[false],
+            "1 tap was found in 1 recording, and it was rejected.",
+        ),
+        (
+            &[true; 3],
+            "3 taps were found in 1 recording, and all were used.",
+        ),
+        (
+            &[false; 3],
+            "3 taps were found in 1 recording, and all were rejected.",
+        ),
+        (
+            &[true, false],
+            "1 of 2 taps in 1 recording were used, 1 was rejected.",
+        ),
+    ];
+    for (taps, wanted) in cases {
+        assert_eq!(first(taps), wanted, "{taps:?}");
+    }
+}
+
+#[test]
+fn val_peaks_that_are_no_modes_are_named_and_not_counted() {
+    let mut document = bare();
+    let unclear = ModeSection {
+        label: Some("no clear resonance".into()),
+        frequency: 77.0,
+        ..ModeSection::default()
+    };
+    document
+        .modes
+        .iter_mut()
+        .for_each(|modes| modes.push(unclear.clone()));
+    let sentences = summary::sentences(&document).join(" ");
+    assert!(
+        sentences.contains("5 resonances were found")
+            && sentences
+                .contains("2 more peaks are not counted (1 mains 50 Hz, 1 no clear resonance)"),
+        "{sentences}"
+    );
+    let text = render_text(&document);
+    assert!(text.contains("no clear resonance  "), "{text}");
+}
+
+#[test]
+fn regress_pages_leave_out_what_was_not_asked_for() {
+    let html = text_of(&rendered(&bare(), &[]), "report.html");
+    for unwanted in ["id=\"joint\"", "id=\"uncertainty\"", "stiffness", "λ"] {
+        assert!(
+            !html.contains(unwanted),
+            "a bare recording's page has {unwanted}"
+        );
+    }
+    assert!(html.contains("WAV, 24-bit integer"), "what the file says");
+    let measured = Document {
+        recordings: None,
+        ..fixture::document()
+    };
+    let html = text_of(&rendered(&measured, &[]), "report.html");
+    for unwanted in ["id=\"recordings\"", "<strong>Taps.", "No recordings"] {
+        assert!(
+            !html.contains(unwanted),
+            "a page without recordings has {unwanted}"
+        );
+    }
 }

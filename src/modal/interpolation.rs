@@ -1,7 +1,9 @@
 //! Reading a resonance between the lines.
 //!
 //! The discrete spectrum of one decaying oscillation, cut off anywhere, is exactly rational in the
-//! frequency on its lines: the truncation factor 1 - e^{(p - j omega) T} is the same on every line.
+//! frequency on lines that are 1/T apart: the truncation factor 1 - e^{(p - j omega) T} is the same
+//! on every one of them. (Lines denser than that, of a block longer than its signal, show the
+//! truncation as a ripple of the size of what the record still has at its end.)
 //! Near a resonance a single pole on a slowly varying background therefore reads the frequency far
 //! below the line spacing, truncated record or not.
 
@@ -25,13 +27,24 @@ pub struct Interpolation {
     pub damping_ratio: Option<f64>,
     /// Standard deviation of the damping ratio.
     pub damping_std: f64,
+    /// Decay over the length of the signal, sigma T, the window's own included.
+    pub decay_in_record: f64,
+}
+
+/// Why a peak could not be read between the lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unfit {
+    /// Fewer lines than unknowns, or lines without any level: nothing is said about the peak.
+    TooFewLines,
+    /// The pole lies elsewhere: the peak is not that of a resonance.
+    PoleElsewhere,
 }
 
 /// Lines to each side of the peak: at least two, so that five complex values stand against three
 /// unknowns.
 const LEAST_REACH: usize = 2;
-/// At most so many: a bound on the work for very long blocks.
-const MOST_REACH: usize = 500;
+/// So many lines to either side take part at most; of a wider resonance every second, third, ... one.
+const MOST_LINES: usize = 100;
 /// From this reach on the background may slope: nine complex values against four unknowns.
 const SLOPING_REACH: usize = 4;
 /// Iterations of the weights; they settle in two.
@@ -45,36 +58,38 @@ const REWEIGHTINGS: usize = 3;
 /// 1/|u - q|^2 of the previous pass (Sanathanan & Koerner).
 /// The lines within the half-power width, at least two to either side, take part.
 /// `added_decay` is the exponential window's (1/s); `room` how many lines to either side belong to
-/// this peak alone. `None` when there are too few lines, or the pole lies farther from the peak than
-/// a line and the half-power reach: the background of other modes pulls a weak peak that far.
+/// this peak alone.
+///
+/// # Errors
+/// [`Unfit`] when there are too few lines, or the pole lies farther from the peak than a line and the
+/// half-power reach: the background of other modes pulls a weak peak that far, but not farther.
 pub fn interpolate_pole(
     lines: &Lines,
     spectra: &[&[Complex64]],
     peak: usize,
     room: usize,
     added_decay: f64,
-) -> Option<Interpolation> {
-    let half_width = half_power_reach(spectra, peak)?;
-    let reach = (half_width + 1)
-        .clamp(LEAST_REACH, MOST_REACH)
-        .min(room.max(LEAST_REACH));
-    let fit = fit_pole(spectra, peak, reach)?;
+) -> Result<Interpolation, Unfit> {
+    let half_width = half_power_reach(spectra, peak).ok_or(Unfit::TooFewLines)?;
+    let reach = (half_width + 1).max(LEAST_REACH).min(room.max(LEAST_REACH));
+    let fit = fit_pole(spectra, peak, reach).ok_or(Unfit::TooFewLines)?;
     let narrower = fit_pole(spectra, peak, (reach / 2).max(1)).unwrap_or(fit);
     // Resolution, not line spacing, is the measure of "near": zero padding must not tighten it.
     let line = lines.resolution().max(lines.spacing) / lines.spacing;
     if !fit.pole.is_finite() || fit.pole.re.abs() > line + half_width as f64 {
-        return None;
+        return Err(Unfit::PoleElsewhere);
     }
     let damped = lines.frequency(peak) + fit.pole.re * lines.spacing;
     let decay = fit.pole.im * lines.spacing - added_decay / TAU;
     let frequency = damped.hypot(decay.max(0.0));
     let std = fit.std * lines.spacing;
-    Some(Interpolation {
+    Ok(Interpolation {
         frequency,
         bound: (fit.pole.re - narrower.pole.re).abs() * lines.spacing + 2.0 * std,
         std,
         damping_ratio: (decay > 0.0).then(|| decay / frequency),
         damping_std: std / frequency,
+        decay_in_record: TAU * fit.pole.im * lines.spacing * lines.duration,
     })
 }
 
@@ -89,8 +104,8 @@ fn half_power_reach(spectra: &[&[Complex64]], peak: usize) -> Option<usize> {
     };
     let half = 0.5 * power(peak)?;
     let above = |line: Option<usize>| line.and_then(power).is_some_and(|p| p > half);
-    let right = (1..MOST_REACH).find(|&k| !above(Some(peak + k)))?;
-    let left = (1..MOST_REACH).find(|&k| !above(peak.checked_sub(k)))?;
+    let right = (1..).find(|&k| !above(Some(peak + k)))?;
+    let left = (1..).find(|&k| !above(peak.checked_sub(k)))?;
     Some(left.min(right))
 }
 
@@ -110,11 +125,13 @@ fn fit_pole(spectra: &[&[Complex64]], peak: usize, reach: usize) -> Option<PoleF
     if last < first + 2 * LEAST_REACH.min(reach) {
         return None;
     }
-    let offsets: Vec<f64> = (first..=last).map(|k| k as f64 - peak as f64).collect();
+    let stride = reach.div_ceil(MOST_LINES);
+    let lines: Vec<usize> = (first..=last).step_by(stride).collect();
+    let offsets: Vec<f64> = lines.iter().map(|&k| k as f64 - peak as f64).collect();
     let mut weights = vec![1.0; offsets.len()];
     let mut fit = None;
     for _ in 0..REWEIGHTINGS {
-        let next = solve_pole(spectra, first, &offsets, &weights)?;
+        let next = solve_pole(spectra, &lines, &offsets, &weights)?;
         for (weight, offset) in weights.iter_mut().zip(&offsets) {
             // A pole on a line must not take all the weight: a tenth of a line is near enough.
             *weight = 1.0 / ((Complex64::from(*offset) - next.pole).norm_sqr() + 0.01);
@@ -128,7 +145,7 @@ fn fit_pole(spectra: &[&[Complex64]], peak: usize, reach: usize) -> Option<PoleF
 /// leaves a single complex unknown: q = sum conj(H') (u H)' / sum |H'|^2.
 fn solve_pole(
     spectra: &[&[Complex64]],
-    first: usize,
+    lines: &[usize],
     offsets: &[f64],
     weights: &[f64],
 ) -> Option<PoleFit> {
@@ -136,8 +153,10 @@ fn solve_pole(
     let (mut numerator, mut denominator) = (Complex64::ZERO, 0.0);
     let mut parts = Vec::with_capacity(spectra.len());
     for spectrum in spectra {
-        let values: Vec<Complex64> = (0..offsets.len())
-            .map(|i| spectrum[first + i] * weights[i].sqrt())
+        let values: Vec<Complex64> = lines
+            .iter()
+            .zip(weights)
+            .map(|(&line, weight)| spectrum[line] * weight.sqrt())
             .collect();
         let sloped: Vec<Complex64> = values.iter().zip(offsets).map(|(h, u)| h * u).collect();
         let (h, uh) = (project(values, &basis), project(sloped, &basis));
@@ -234,5 +253,6 @@ pub fn interpolate_parabola(lines: &Lines, level_db: &[f64], peak: usize) -> Opt
         std: bound / 2.0,
         damping_ratio: None,
         damping_std: 0.0,
+        decay_in_record: 0.0,
     })
 }

@@ -40,6 +40,11 @@ pub fn mains_harmonic(
     if amplitudes.before < settings.share_before * amplitudes.within {
         return None;
     }
+    near_mains(frequency, half_line, settings)
+}
+
+/// The multiple of 50 or 60 Hz (Hz) near which `frequency` lies, hum or not.
+pub fn near_mains(frequency: f64, half_line: f64, settings: &MainsSettings) -> Option<f64> {
     [50.0, 60.0].into_iter().find_map(|mains| {
         let harmonic = mains * (frequency / mains).round();
         let near = (frequency - harmonic).abs() <= half_line + settings.tolerance * harmonic;

@@ -102,6 +102,9 @@ fn same_resonance(a: &ModeReading, b: &ModeReading) -> bool {
 }
 
 fn resolves_better(a: &ModeReading, b: &ModeReading) -> bool {
+    if a.label.is_some() != b.label.is_some() {
+        return a.label.is_none();
+    }
     // Half lines that differ by less than 1 % come from blocks of nearly the same length.
     if (a.half_line - b.half_line).abs() > 0.01 * a.half_line.max(b.half_line) {
         a.half_line < b.half_line

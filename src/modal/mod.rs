@@ -1,8 +1,9 @@
 //! From spectra to natural frequencies, each with the bound of its reading.
 //!
-//! Peaks are found on a composite level over all sensors ([`find_peaks`]), read on their line with
-//! the half-line bound and, independently, interpolated between lines ([`interpolate_pole`]), mains
-//! lines are recognised, and the readings of several recordings are merged ([`merge_modes`]).
+//! Peaks are found on a composite level over all sensors ([`find_peaks`]), read between the lines by
+//! a pole ([`interpolate_pole`]) and on the line nearest to that, with the half-line bound
+//! ([`read_peaks`]); mains lines are recognised, and the readings of several recordings are merged
+//! ([`merge_modes`]).
 
 mod interpolation;
 mod mains;
@@ -10,8 +11,8 @@ mod merge;
 mod peaks;
 mod reading;
 
-pub use interpolation::{Interpolation, interpolate_parabola, interpolate_pole};
-pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic};
+pub use interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};
+pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic, near_mains};
 pub use merge::{MergedMode, ModeReading, PeakLabel, merge_modes};
 pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};
 pub use reading::read_peaks;

@@ -67,9 +67,10 @@ pub struct PeakSettings {
     pub blind_prominence_db: f64,
     /// Least height above the noise (dB). 15 dB: noise alone passes it on one line in 10^13.
     pub above_noise_db: f64,
-    /// Least distance of two peaks (lines). 3: two peaks nearer than that share their flanks.
+    /// Least distance of two peaks (lines, or resolution widths 1/T where those are wider). 3: two
+    /// peaks nearer than that share their flanks.
     pub separation: usize,
-    /// At most so many peaks, the most prominent ones. 30.
+    /// At most so many peaks, the most prominent ones. 60.
     pub most: usize,
 }
 
@@ -80,7 +81,7 @@ impl Default for PeakSettings {
             blind_prominence_db: 8.0,
             above_noise_db: 15.0,
             separation: 3,
-            most: 30,
+            most: 60,
         }
     }
 }
@@ -122,11 +123,13 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
         })
         .collect();
     peaks.sort_by(|a, b| b.prominence_db.total_cmp(&a.prominence_db));
+    let width = (lines.resolution() / lines.spacing).ceil().max(1.0) as usize;
+    let separation = settings.separation * width;
     let mut kept: Vec<Peak> = Vec::new();
     for peak in peaks {
         let clear = kept
             .iter()
-            .all(|other| peak.index.abs_diff(other.index) >= settings.separation);
+            .all(|other| peak.index.abs_diff(other.index) >= separation);
         if clear && kept.len() < settings.most {
             kept.push(peak);
         }

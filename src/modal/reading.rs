@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::interpolation::{Interpolation, interpolate_parabola, interpolate_pole};
+use super::interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};
 use super::merge::{ModeReading, PeakLabel};
 use super::peaks::{CompositeLevel, Peak};
 use crate::spectral::Window;
@@ -22,39 +22,72 @@ pub fn read_peaks(
     window: Window,
 ) -> Vec<ModeReading> {
     let places: Vec<usize> = peaks.iter().map(|peak| peak.index).collect();
-    peaks
-        .iter()
-        .map(|peak| {
-            let between = match window {
-                Window::Hann => interpolate_parabola(&level.lines, &level.level_db, peak.index),
-                Window::Rectangular | Window::Exponential { .. } => {
-                    let room = room_around(&places, peak.index);
-                    let decay = window.added_decay();
-                    interpolate_pole(&level.lines, spectra, peak.index, room, decay)
-                        .filter(|found| is_resonance(found, peak, level.lines.half_line()))
+    let one = |peak: &Peak| match window {
+        Window::Hann => {
+            let between = interpolate_parabola(&level.lines, &level.level_db, peak.index);
+            reading(level, peak, between, None)
+        }
+        Window::Rectangular | Window::Exponential { .. } => {
+            let room = room_around(&places, peak.index);
+            let decay = window.added_decay();
+            match interpolate_pole(&level.lines, spectra, peak.index, room, decay) {
+                Ok(found) if is_resonance(&found, peak, level.lines.half_line()) => {
+                    reading(level, peak, Some(found), None)
                 }
-            };
-            reading(level, peak, between)
-        })
-        .collect()
+                Err(Unfit::TooFewLines) => reading(level, peak, None, None),
+                Ok(_) | Err(Unfit::PoleElsewhere) => {
+                    reading(level, peak, None, Some(PeakLabel::NoResonance))
+                }
+            }
+        }
+    };
+    peaks.iter().map(one).collect()
 }
 
 /// A peak that stands out by less than this (dB) must be read within its half line to count.
 const CLEAR_PROMINENCE: f64 = 8.0;
+/// From this height over the noise on (dB), noise does not make peaks any more.
+const CLEAR_OF_NOISE: f64 = 30.0;
+/// Least prominence (dB) for the same where nothing is known of the noise.
+const CLEAR_WHEN_BLIND: f64 = 20.0;
 
-/// Whether the fitted oscillation decays beyond doubt (two standard deviations).
+/// Least decay over the record (sigma T) of a peak that is not clear of the noise. 2: a peak of noise
+/// is as narrow as the record allows, and scatters about no decay at all.
+const LEAST_DECAY: f64 = 2.0;
+
+/// Whether the fitted oscillation decays beyond doubt: by two standard deviations where the peak is
+/// clear of the noise; by five, and visibly over the record, where it is not.
 fn is_resonance(found: &Interpolation, peak: &Peak, half_line: f64) -> bool {
-    let decays = found
-        .damping_ratio
-        .is_some_and(|ratio| ratio > 2.0 * found.damping_std);
+    let clear = match peak.above_noise_db {
+        Some(above) => above >= CLEAR_OF_NOISE,
+        None => peak.prominence_db >= CLEAR_WHEN_BLIND,
+    };
+    let decays_by = |deviations: f64| {
+        found
+            .damping_ratio
+            .is_some_and(|ratio| ratio > deviations * found.damping_std)
+    };
+    let decays = if clear {
+        decays_by(2.0)
+    } else {
+        decays_by(5.0) && found.decay_in_record >= LEAST_DECAY
+    };
     decays && (peak.prominence_db >= CLEAR_PROMINENCE || found.bound < half_line)
 }
 
-fn reading(level: &CompositeLevel, peak: &Peak, between: Option<Interpolation>) -> ModeReading {
+/// Puts a reading together. The reading between the lines counts where its bound is below the half
+/// line or below half the half-power width: over a wide resonance in noise the highest line is no
+/// better than that.
+fn reading(
+    level: &CompositeLevel,
+    peak: &Peak,
+    between: Option<Interpolation>,
+    label: Option<PeakLabel>,
+) -> ModeReading {
     let lines = &level.lines;
     let half_line = lines.half_line();
-    let label = between.is_none().then_some(PeakLabel::NoResonance);
-    let sharp = between.filter(|found| found.bound < half_line);
+    let half_width = |found: &Interpolation| found.damping_ratio.unwrap_or(0.0) * found.frequency;
+    let sharp = between.filter(|found| found.bound < half_line.max(half_width(found)));
     let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
     ModeReading {
         frequency: sharp.map_or(lines.frequency(line), |found| found.frequency),

@@ -58,13 +58,8 @@ pub fn identify(
     if let Some(Estimate::Joint(joint)) = &estimate {
         warnings.extend(joint.doubts.iter().map(of_doubt));
     }
-    let prediction =
-        prediction(structure, estimate.as_ref(), &measured, &used).unwrap_or_else(|error| {
-            warnings.push(Warning::UnphysicalEstimate {
-                what: error.to_string(),
-            });
-            Vec::new()
-        });
+    // An estimate that no joint can have has its warning already; it predicts nothing.
+    let prediction = prediction(structure, estimate.as_ref(), &measured, &used).unwrap_or_default();
     warnings.extend(misfit(&prediction, &measured));
     let perturbation = structure
         .regression

@@ -14,6 +14,7 @@ mod identification;
 mod measure;
 mod model;
 mod modes;
+mod quiet;
 mod recordings;
 mod stage;
 mod warning;

@@ -4,7 +4,7 @@ use super::analysis::{ModeResult, RecordingResult};
 use super::model::TestedStructure;
 use super::warning::Warning;
 use crate::description::{MeasuredFrequencies, TestDescription};
-use crate::identify::pair_by_frequency;
+use crate::identify::{WeightedPeak, pair_by_ratio};
 use crate::modal::{ModeReading, merge_modes};
 use crate::structure::{Assembly, JointStiffness, natural_frequencies};
 
@@ -12,9 +12,13 @@ use crate::structure::{Assembly, JointStiffness, natural_frequencies};
 /// this factor.
 const SAME_LEVEL: f64 = 2.0;
 
-/// A free beam's modes are told by their nominal frequencies within this relative distance: a
-/// modulus wrong by 40 % is still recognised, the next mode is not mistaken for it.
-const FREE_BEAM_TOLERANCE: f64 = 0.2;
+/// A free beam's frequencies may all differ from the nominal ones by this common factor: a modulus
+/// wrong by 40 % is still recognised.
+const FREE_BEAM_RANGE: f64 = 0.2;
+
+/// Beside that factor a mode may be off by this much: what the lack of shear does to the fourth mode
+/// of a usual bar.
+const FREE_BEAM_TOLERANCE: f64 = 0.04;
 
 /// So many modes of a free beam are looked for.
 const FREE_BEAM_MODES: usize = 30;
@@ -187,7 +191,7 @@ fn number(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning>
         let free: Vec<usize> = (0..modes.len())
             .filter(|&i| modes[i].label.is_none())
             .collect();
-        let measured: Vec<f64> = free.iter().map(|&i| modes[i].frequency).collect();
+        let peaks: Vec<WeightedPeak> = free.iter().map(|&i| weighted(&modes[i])).collect();
         let nominal = natural_frequencies(
             structure.theory,
             &structure.beam,
@@ -196,13 +200,24 @@ fn number(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning>
             FREE_BEAM_MODES,
         )
         .unwrap_or_default();
-        let numbers = pair_by_frequency(&measured, &nominal, FREE_BEAM_TOLERANCE);
+        let numbers = pair_by_ratio(&peaks, &nominal, (FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE));
         if numbers.iter().any(Option::is_some) {
             return apply_numbers(modes, &free, &numbers);
         }
     }
     number_in_order(modes);
     Vec::new()
+}
+
+/// A mode with its height over the noise, or its prominence, as weight.
+fn weighted(mode: &ModeResult) -> WeightedPeak {
+    let weight = mode.reading.as_ref().map_or(1.0, |reading| {
+        reading.above_noise_db.unwrap_or(reading.prominence_db)
+    });
+    WeightedPeak {
+        frequency: mode.frequency,
+        weight,
+    }
 }
 
 fn apply_numbers(

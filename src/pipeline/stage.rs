@@ -3,14 +3,13 @@
 use num_complex::Complex64;
 
 use super::measure::{MeasureSettings, MeasuredSpectra};
+use super::quiet::Quiet;
 use crate::description::WindowKind;
-use crate::modal::{
-    CompositeLevel, LineAmplitudes, ModeReading, PeakLabel, find_peaks, mains_harmonic, read_peaks,
-};
+use crate::modal::{CompositeLevel, ModeReading, PeakLabel, find_peaks, read_peaks};
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
     AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, apply_force_window, band_limited,
-    choose_window, exponential_to, line_amplitude, measure_decay, noise_power, transform_block,
+    choose_window, exponential_to, measure_decay, transform_block,
 };
 use crate::taps::{Tap, TapSource, Taps};
 
@@ -60,27 +59,33 @@ impl<'a> Stage<'a> {
     }
 
     /// The quiet stretch before the first tap, at most a block.
-    fn quiet(&self) -> Result<Vec<Vec<f64>>, RecordingError> {
+    fn quiet(&self) -> Result<Quiet, RecordingError> {
         let quiet = self.taps.quiet();
         let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
-        Ok(self
-            .read(start..quiet.end)?
-            .split_off(usize::from(self.has_force)))
+        let mut force = self.read(start..quiet.end)?;
+        let responses = force.split_off(usize::from(self.has_force));
+        let windows = self
+            .taps
+            .accepted()
+            .filter_map(force_window_of)
+            .map(|(unity, taper)| {
+                // A half-cosine taper has 3/8 of its length in energy.
+                unity as f64 + 0.375 * taper as f64
+            });
+        let count = self.taps.accepted().count().max(1) as f64;
+        Ok(Quiet {
+            force: force.pop(),
+            responses,
+            sample_rate: self.recording.sample_rate(),
+            block: self.gate as usize,
+            force_window: windows.sum::<f64>() / count,
+        })
     }
 
     pub(super) fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
         let quiet = self.quiet()?;
         let checks = self.decay_checks(&quiet)?;
-        let slowest = |checks: &[DecayCheck]| {
-            checks
-                .iter()
-                .copied()
-                .max_by(|a, b| a.remaining.total_cmp(&b.remaining))
-        };
-        let decay = slowest(&checks).unwrap_or(DecayCheck {
-            remaining: 0.0,
-            noise: 1.0,
-        });
+        let decay = slowest_decay(&checks);
         let window = match self.settings.window {
             None => choose_window(&checks, self.lines.duration),
             Some(WindowKind::Rectangular) => Window::Rectangular,
@@ -98,10 +103,11 @@ impl<'a> Stage<'a> {
     }
 
     /// The decay of each response inside the band, the largest over the accepted taps.
-    fn decay_checks(&self, quiet: &[Vec<f64>]) -> Result<Vec<DecayCheck>, RecordingError> {
+    fn decay_checks(&self, quiet: &Quiet) -> Result<Vec<DecayCheck>, RecordingError> {
         let rate = self.recording.sample_rate();
         let band = (self.lines.low, self.lines.high);
         let noise: Vec<f64> = quiet
+            .responses
             .iter()
             .map(|x| rms(&band_limited(x, rate, band)))
             .collect();
@@ -136,11 +142,10 @@ impl<'a> Stage<'a> {
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
         for tap in self.taps.accepted() {
             let mut samples = self.record(tap)?;
-            if let (Some(end), Some(force)) = (tap.pulse_end, samples.first_mut()) {
-                remove_offset(force, rate);
-                // As long again as the pulse, then a taper of the same length.
-                let pulse = (end - tap.record.start) as usize;
-                apply_force_window(force, 2 * pulse, pulse);
+            if let (Some((unity, taper)), Some(force)) = (force_window_of(tap), samples.first_mut())
+            {
+                take_out_median(force);
+                apply_force_window(force, unity, taper);
             }
             let mut transforms: Vec<Vec<Complex64>> = samples
                 .iter_mut()
@@ -167,7 +172,7 @@ impl<'a> Stage<'a> {
         &self,
         averages: &AveragedSpectra,
         transforms: &[Vec<Complex64>],
-        quiet: &[Vec<f64>],
+        quiet: &Quiet,
         window: Window,
     ) -> Vec<ModeReading> {
         let powers: Vec<Vec<f64>> = match &averages.h1 {
@@ -181,7 +186,7 @@ impl<'a> Stage<'a> {
                 .map(|x| x.iter().map(|x| x * x).collect())
                 .collect(),
         };
-        let noise = self.noise_powers(averages, quiet, window);
+        let noise = quiet.noise_powers(averages, window);
         let level = CompositeLevel::new(self.lines, &powers, noise.as_deref());
         let peaks = find_peaks(&level, &self.settings.peaks);
         let spectra: Vec<&[Complex64]> = averages
@@ -193,85 +198,52 @@ impl<'a> Stage<'a> {
             .collect();
         let mut readings = read_peaks(&level, &spectra, &peaks, window);
         for (reading, peak) in readings.iter_mut().zip(&peaks) {
-            if let Some(label) = self.mains_label(peak.index, averages, quiet, window) {
+            if let Some(label) =
+                quiet.mains_label(peak.index, averages, window, &self.settings.mains)
+            {
                 *reading = as_mains(reading, self.lines.frequency(peak.index), label);
             }
         }
         readings
     }
-
-    /// Power that noise alone would leave in the averages, per response.
-    fn noise_powers(
-        &self,
-        averages: &AveragedSpectra,
-        quiet: &[Vec<f64>],
-        window: Window,
-    ) -> Option<Vec<Vec<f64>>> {
-        let rate = self.recording.sample_rate();
-        let mut weights = vec![1.0; self.gate as usize];
-        window.apply(&mut weights, rate);
-        let energy: f64 = weights.iter().map(|w| w * w).sum();
-        quiet
-            .iter()
-            .map(|samples| {
-                let mut power = noise_power(samples.clone(), rate, &self.lines)?;
-                for (index, value) in power.iter_mut().enumerate() {
-                    let force = averages.force.as_ref().map_or(1.0, |force| {
-                        averages.taps as f64 * force[index] * force[index]
-                    });
-                    *value *= energy / force.max(f64::MIN_POSITIVE);
-                }
-                Some(power)
-            })
-            .collect()
-    }
-
-    /// The label of a peak that is hum, judged on the response in which it is strongest.
-    fn mains_label(
-        &self,
-        index: usize,
-        averages: &AveragedSpectra,
-        quiet: &[Vec<f64>],
-        window: Window,
-    ) -> Option<PeakLabel> {
-        let rate = self.recording.sample_rate();
-        let frequency = self.lines.frequency(index);
-        let strength =
-            |s: &usize| averages.responses[*s][index] / averages.responses[*s].iter().sum::<f64>();
-        let strongest =
-            (0..averages.responses.len()).max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
-        let mut weights = vec![1.0; self.gate as usize];
-        window.apply(&mut weights, rate);
-        let within =
-            2.0 * averages.responses[strongest][index] * rate / weights.iter().sum::<f64>();
-        let before = line_amplitude(quiet.get(strongest)?, rate, frequency)?;
-        let amplitudes = LineAmplitudes { before, within };
-        mains_harmonic(
-            frequency,
-            self.lines.half_line(),
-            amplitudes,
-            &self.settings.mains,
-        )
-        .map(PeakLabel::Mains)
-    }
 }
 
-/// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
-/// median is the level at rest, and short beside the drift of its amplifier.
-const OFFSET_STRETCH: f64 = 0.2;
+/// The slowest of the decays that stand above their noise; of none, the slowest of all.
+fn slowest_decay(checks: &[DecayCheck]) -> DecayCheck {
+    let nothing = DecayCheck {
+        remaining: 0.0,
+        noise: 1.0,
+    };
+    let above = |check: &DecayCheck| check.remaining > check.noise;
+    checks
+        .iter()
+        .copied()
+        .max_by(|a, b| {
+            above(a)
+                .cmp(&above(b))
+                .then(a.remaining.total_cmp(&b.remaining))
+        })
+        .unwrap_or(nothing)
+}
 
-/// Takes out the level at which the force rests about its pulse. The mean of the recording is not
-/// that level: the pulses are in it, and over the force window the difference amounts to a percent
-/// of a pulse's momentum.
-fn remove_offset(force: &mut [f64], sample_rate: f64) {
-    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
-    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
-    if about.is_empty() {
+/// Force window of a tap (samples of unity, of taper): pre-trigger and pulse, that length again for
+/// what the pulse's search for calm may have missed, and a taper as long as pre-trigger and pulse.
+/// `None` without a hammer.
+fn force_window_of(tap: &Tap) -> Option<(usize, usize)> {
+    let length = tap.pulse_end?.saturating_sub(tap.record.start) as usize;
+    Some((2 * length, length))
+}
+
+/// Takes the median out of a force record: the hammer's offset where it drifts, for a pulse of a few
+/// milliseconds does not move the median.
+fn take_out_median(force: &mut [f64]) {
+    let mut sorted = force.to_vec();
+    if sorted.is_empty() {
         return;
     }
-    let half = about.len() / 2;
-    let rest = *about.select_nth_unstable_by(half, f64::total_cmp).1;
-    force.iter_mut().for_each(|x| *x -= rest);
+    let half = sorted.len() / 2;
+    let median = *sorted.select_nth_unstable_by(half, f64::total_cmp).1;
+    force.iter_mut().for_each(|x| *x -= median);
 }
 
 /// Bound on the transforms kept for a test without hammer (values; 16 bytes each).

@@ -202,6 +202,19 @@ impl Recording {
         self
     }
 
+    /// Step between two neighbouring values of a channel (its unit): of integer samples the last bit,
+    /// of others 0.
+    pub fn quantum(&self, channel: usize) -> f64 {
+        let scale = self
+            .channels
+            .get(channel)
+            .map_or(0.0, |info| info.scale.abs());
+        match self.format {
+            Format::WavInteger { bits } => scale * 2f64.powi(1 - i32::from(bits)),
+            Format::WavFloat { .. } | Format::Csv { .. } | Format::Memory => 0.0,
+        }
+    }
+
     /// Mean of a channel (its unit): the offset that spectra leave out; 0 for an unknown channel.
     pub fn mean(&self, channel: usize) -> f64 {
         self.channels

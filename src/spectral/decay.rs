@@ -52,12 +52,14 @@ pub fn choose_window(checks: &[DecayCheck], duration: f64) -> Window {
     if remaining <= RUNG_DOWN {
         Window::Rectangular
     } else {
-        exponential_to(remaining, duration)
+        Window::Exponential {
+            decay: (remaining / RUNG_DOWN).ln() / duration,
+        }
     }
 }
 
-/// The exponential window that brings a response which keeps `remaining` of its level down to 1 %.
-/// A record already down there gets one that falls to 10 %: asked for, but gentle.
+/// The exponential window for one who asks for it: it brings a response that keeps `remaining` of its
+/// level down to 1 %, and falls to 10 % at least.
 pub fn exponential_to(remaining: f64, duration: f64) -> Window {
     let fall = (RUNG_DOWN / remaining.max(f64::MIN_POSITIVE)).clamp(RUNG_DOWN, 0.1);
     Window::Exponential {

@@ -1,5 +1,9 @@
 //! Noise of a channel, line by line, from a quiet stretch before the taps.
 
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
 use super::lines::Lines;
 use super::transform::transform_block;
 use super::window::Window;
@@ -51,11 +55,12 @@ pub fn line_amplitude(samples: &[f64], sample_rate: f64, frequency: f64) -> Opti
     if (samples.len() as f64) < 3.0 * sample_rate / frequency {
         return None;
     }
-    let cycles = frequency / sample_rate;
-    let record: Vec<_> = samples
-        .iter()
-        .map(|&x| num_complex::Complex64::from(x))
-        .collect();
-    let value = super::zoom::chirp_z(&record, cycles, 0.0, 1);
-    Some(2.0 * value.first()?.norm() / samples.len() as f64)
+    let step = Complex64::from_polar(1.0, -TAU * frequency / sample_rate);
+    let mut turn = Complex64::ONE;
+    let mut sum = Complex64::ZERO;
+    for &x in samples {
+        sum += turn * x;
+        turn *= step;
+    }
+    Some(2.0 * sum.norm() / samples.len() as f64)
 }

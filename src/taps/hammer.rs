@@ -13,6 +13,7 @@ const LONGEST_PULSE: f64 = 0.05;
 struct Piece {
     median: f64,
     deviation: f64,
+    rms: f64,
     low: f64,
     high: f64,
 }
@@ -58,8 +59,13 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
         }
     }
     let mut deviations: Vec<f64> = pieces.iter().map(|piece| piece.deviation).collect();
-    // 1.4826 turns a median deviation into a standard deviation of normal noise.
-    let noise = 1.4826 * middle(&mut deviations);
+    let mut roots: Vec<f64> = pieces.iter().map(|piece| piece.rms).collect();
+    // 1.4826 turns a median deviation into a standard deviation of normal noise. Coarsely quantised
+    // noise has a median deviation of zero: the rms of a usual piece and a third of a quantum (what
+    // rounding alone leaves) hold it up.
+    let noise = (1.4826 * middle(&mut deviations))
+        .max(middle(&mut roots))
+        .max(0.3 * recording.quantum(channel));
     let up = pieces.iter().map(|p| p.high - p.median).fold(0.0, f64::max);
     let down = pieces.iter().map(|p| p.median - p.low).fold(0.0, f64::max);
     // A filter's ringing swings to the other side by up to a quarter: only a clear excess inverts.
@@ -86,9 +92,11 @@ fn piece(mut samples: Vec<f64>) -> Option<Piece> {
     for x in &mut samples {
         *x = (*x - median).abs();
     }
+    let rms = (samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64).sqrt();
     Some(Piece {
         median,
         deviation: middle(&mut samples),
+        rms,
         low,
         high,
     })
@@ -115,69 +123,92 @@ pub(super) fn find(
     if survey.polarity < 0.0 {
         remarks.push(TapRemark::InvertedForce);
     }
-    let excursions = if survey.largest > settings.over_noise * survey.noise {
-        excursions(recording, channel, &survey, threshold)?
-    } else {
-        Vec::new()
-    };
-    if excursions.first().is_some_and(|first| first.trigger == 0) {
+    let mut excursions = Vec::new();
+    if survey.largest > settings.over_noise * survey.noise {
+        excursions = find_excursions(recording, channel, &survey, threshold)?;
+    }
+    if excursions.first().is_some_and(|first| first.start == 0) {
         remarks.push(TapRemark::StartsWithinTap);
+    }
+    let longest = (LONGEST_PULSE * recording.sample_rate()).max(8.0) as u64;
+    let all = excursions.len();
+    excursions.retain(|excursion| excursion.end - excursion.start <= longest);
+    if excursions.len() < all {
+        remarks.push(TapRemark::LongExcursion {
+            count: all - excursions.len(),
+        });
     }
     let distance = (settings.least_distance * recording.sample_rate()) as u64;
     Ok(Found {
-        events: group(excursions, distance),
+        events: group(&excursions, distance, settings.double_hit),
         noise: survey.noise,
         survey: Some(survey),
         remarks,
     })
 }
 
+/// A stretch of force above the threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Excursion {
+    pub start: u64,
+    pub end: u64,
+    pub peak: f64,
+}
+
 /// Excursions above the threshold, each until the force falls below half of it.
-fn excursions(
+fn find_excursions(
     recording: &Recording,
     channel: usize,
     survey: &Survey,
     threshold: f64,
-) -> Result<Vec<Event>, RecordingError> {
-    let longest = (LONGEST_PULSE * recording.sample_rate()).max(8.0) as u64;
-    let mut found = Vec::new();
-    let mut open: Option<Event> = None;
+) -> Result<Vec<Excursion>, RecordingError> {
+    let mut found: Vec<Excursion> = Vec::new();
+    let mut open = false;
     for block in recording.blocks(&[channel], 1 << 16) {
         let block = block?;
         for (index, x) in block.samples.iter().flatten().enumerate() {
             let frame = block.start + index as u64;
             let force = survey.polarity * (x - survey.baseline.at(frame));
-            match &mut open {
-                None if force > threshold => {
-                    open = Some(Event {
-                        trigger: frame,
-                        peak: force,
-                    })
-                }
-                Some(event) if force < 0.5 * threshold => {
-                    if frame - event.trigger <= longest {
-                        found.push(event.clone());
-                    }
-                    open = None;
-                }
-                Some(event) => event.peak = event.peak.max(force),
-                None => {}
+            if !open && force > threshold {
+                open = true;
+                found.push(Excursion {
+                    start: frame,
+                    end: frame,
+                    peak: force,
+                });
+            }
+            if let Some(last) = found.last_mut().filter(|_| open) {
+                last.peak = last.peak.max(force);
+                last.end = frame;
+                open = force >= 0.5 * threshold;
             }
         }
     }
     Ok(found)
 }
 
-/// Excursions nearer than `distance` frames belong to one event.
-pub(super) fn group(excursions: Vec<Event>, distance: u64) -> Vec<Event> {
-    let mut events: Vec<Event> = Vec::new();
-    for excursion in excursions {
-        match events.last_mut() {
-            Some(event) if excursion.trigger - event.trigger < distance => {
-                event.peak = event.peak.max(excursion.peak);
-            }
-            _ => events.push(excursion),
-        }
+/// Excursions nearer than `distance` frames to the first of them make one event. It triggers at the
+/// first excursion that is a hit: one of at least `hit` times the event's peak. What comes before
+/// that is the hammer being moved.
+pub(super) fn group(excursions: &[Excursion], distance: u64, hit: f64) -> Vec<Event> {
+    let mut events = Vec::new();
+    let mut rest = excursions;
+    while let Some(first) = rest.first() {
+        let count = rest
+            .iter()
+            .take_while(|e| e.start - first.start < distance)
+            .count();
+        let (event, later) = rest.split_at(count);
+        let peak = event
+            .iter()
+            .map(|excursion| excursion.peak)
+            .fold(0.0, f64::max);
+        let trigger = event.iter().find(|excursion| excursion.peak >= hit * peak);
+        events.push(Event {
+            trigger: trigger.unwrap_or(first).start,
+            peak,
+        });
+        rest = later;
     }
     events
 }

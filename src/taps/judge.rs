@@ -18,7 +18,8 @@ pub(super) fn judge(
     found: Found,
     settings: &TapSettings,
 ) -> Result<Taps, RecordingError> {
-    let records = records(recording, &found.events, settings);
+    let weakest = settings.weak * median(found.events.iter().map(|event| event.peak));
+    let records = records(recording, &found.events, (settings, weakest));
     let hammer = match (source, &found.survey) {
         (TapSource::Hammer { channel, .. }, Some(survey)) => Some(Hammer {
             recording,
@@ -27,7 +28,6 @@ pub(super) fn judge(
         }),
         _ => None,
     };
-    let weakest = settings.weak * median(found.events.iter().map(|event| event.peak));
     let mut taps = Vec::with_capacity(found.events.len());
     for (event, record) in found.events.iter().zip(records) {
         let force = hammer
@@ -61,18 +61,24 @@ pub(super) fn judge(
     })
 }
 
-/// Each event's record: from the pre-trigger to the next event's pre-trigger or the file's end.
-fn records(recording: &Recording, events: &[Event], settings: &TapSettings) -> Vec<Range<u64>> {
+/// Each event's record: from the pre-trigger to that of the next event worth the name, or the file's
+/// end. What stays below a tenth of the usual tap disturbs a record no more than is tolerated of a
+/// second excursion, and does not end it.
+fn records(
+    recording: &Recording,
+    events: &[Event],
+    (settings, weakest): (&TapSettings, f64),
+) -> Vec<Range<u64>> {
     let before = ((settings.pre_trigger * recording.sample_rate()) as u64).max(16);
-    let starts: Vec<u64> = events
+    let start = |event: &Event| event.trigger.saturating_sub(before);
+    events
         .iter()
-        .map(|event| event.trigger.saturating_sub(before))
-        .collect();
-    let ends = starts.iter().skip(1).copied().chain([recording.frames()]);
-    starts
-        .iter()
-        .zip(ends)
-        .map(|(&start, end)| start..end.max(start))
+        .enumerate()
+        .map(|(index, event)| {
+            let next = events[index + 1..].iter().find(|next| next.peak >= weakest);
+            let end = next.map_or(recording.frames(), start);
+            start(event)..end.max(start(event))
+        })
         .collect()
 }
 
@@ -178,18 +184,17 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
     found
 }
 
-/// Samples beside an excursion in which the downward half of a filter's ringing lies: half a period
-/// of any cut-off above a thirtieth of the sample rate.
-const RINGING_REACH: usize = 16;
-
 /// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
-/// pulls. An excursion with a comparable downward swing just beside it, towards the pulse, is such
-/// ringing; the pulse's own deep swing farther away says nothing about it.
+/// pulls. An excursion right beside a comparable downward swing is such ringing: within twice its own
+/// width, or three samples, on the side of the pulse.
 fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
-    let beside = if other.frame > main.frame {
-        other.frame.saturating_sub(RINGING_REACH).max(main.frame)..other.frame
+    let above = |frame: &usize| force.get(*frame).is_some_and(|&x| x > 0.5 * other.peak);
+    let width = (other.frame..).take_while(above).count();
+    let reach = (2 * width).max(3).min(main.frame.abs_diff(other.frame));
+    let beside = if main.frame < other.frame {
+        other.frame - reach..other.frame
     } else {
-        other.frame..(other.frame + RINGING_REACH).min(main.frame)
+        other.frame..other.frame + reach
     };
     let lowest = force
         .get(beside)
@@ -226,19 +231,21 @@ fn overload(
 /// The levels at which a channel is cut off; `None` where it never was.
 fn limits(recording: &Recording, channel: usize) -> Option<(f64, f64)> {
     let health = &recording.channels().get(channel)?.health;
-    let tops = health.flat_tops.iter().map(|top| top.value);
-    let full = (health.full_scale_samples > 0).then_some(health.peak);
-    let high = tops
-        .clone()
-        .chain(full)
-        .filter(|&x| x > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    let low = tops
-        .chain(full.map(|x| -x))
-        .filter(|&x| x < 0.0)
-        .fold(f64::NEG_INFINITY, f64::max);
-    // The flat top itself is exact; a hair below it keeps a rescaled level from slipping through.
-    (high.is_finite() || low.is_finite()).then_some((low * 0.9999, high * 0.9999))
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    for top in &health.flat_tops {
+        if top.value > health.mean {
+            high = high.min(top.value);
+        } else {
+            low = low.max(top.value);
+        }
+    }
+    if health.full_scale_samples > 0 {
+        high = high.min(health.peak);
+        low = low.max(-health.peak);
+    }
+    // A hair inside, so that rescaling by a unit cannot make a flat top slip through.
+    let hair = 1e-9 * health.peak;
+    (high.is_finite() || low.is_finite()).then_some((low + hair, high - hair))
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest

@@ -196,21 +196,31 @@ pub enum TapRemark {
     InvertedForce,
     /// The recording begins after the tap, or in its pulse.
     StartsWithinTap,
+    /// The force stayed up for longer than any hammer pulse.
+    LongExcursion {
+        /// How often.
+        count: usize,
+    },
 }
 
 impl fmt::Display for TapRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            TapRemark::InvertedForce => {
+        match self {
+            TapRemark::InvertedForce => f.write_str(
                 "the force pulses point downwards; they were taken as taps all the same, but the phase \
-                 of every frequency response is turned by 180 degrees: give the hammer a negative scale"
-            }
-            TapRemark::StartsWithinTap => {
+                 of every frequency response is turned by 180 degrees: give the hammer a negative scale",
+            ),
+            TapRemark::StartsWithinTap => f.write_str(
                 "the recording begins within a tap: the start of its pulse is lost, so that its \
                  frequency response is doubtful (its frequencies are not); start the recorder earlier \
-                 or use its pre-trigger"
-            }
-        })
+                 or use its pre-trigger",
+            ),
+            TapRemark::LongExcursion { count } => write!(
+                f,
+                "the force stayed up for more than 50 ms {count} time(s), longer than any hammer pulse; \
+                 that was left out: a moved cable, a hand on the hammer, or the wrong channel"
+            ),
+        }
     }
 }
 

@@ -542,3 +542,25 @@ mod perturbed {
         assert!(spans.kz.is_none() && spans.kx.is_some(), "{spans:?}");
     }
 }
+
+#[test]
+fn prop_a_common_factor_and_strangers_do_not_confuse_the_numbers() {
+    use tapjoint::identify::{WeightedPeak, pair_by_ratio};
+    let nominal = [100.0, 275.7, 540.4, 893.3];
+    for factor in [0.85, 0.97, 1.0, 1.1, 1.18] {
+        let peak = |frequency: f64, weight| WeightedPeak { frequency, weight };
+        let peaks = [
+            peak(50.0 * factor, 40.0),
+            peak(100.0 * factor, 50.0),
+            peak(275.0 * factor, 45.0),
+            peak(420.0 * factor, 60.0),
+            peak(545.0 * factor, 40.0),
+        ];
+        let numbers = pair_by_ratio(&peaks, &nominal, (0.2, 0.04));
+        assert_eq!(
+            numbers,
+            [None, Some(1), Some(2), None, Some(3)],
+            "factor {factor}"
+        );
+    }
+}

@@ -1,0 +1,132 @@
+//! From joint to frequencies and back: each beside what one would write instead.
+
+#![allow(clippy::unwrap_used, reason = "in a bench a panic is the message")]
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use tapjoint::identify::pairs::{ModeLambda, estimate_three_parameter, estimate_two_parameter};
+use tapjoint::structure::frequency_equation::RootedBeam;
+use tapjoint::structure::{Assembly, JointStiffness, Slenderness, natural_lambdas};
+
+const MODES: usize = 5;
+/// The first joint of Ingole & Chatterjee's table 1a.
+const KX: f64 = 500.0;
+const KY: f64 = 100.0;
+
+fn exact(kx: f64, ky: f64) -> Vec<f64> {
+    let joint = JointStiffness::two_parameter(kx, ky);
+    natural_lambdas(Assembly::Cantilever, &joint, MODES).unwrap()
+}
+
+/// What one writes first: walk along lambda, bisect where the sign changes. Finds nothing that lies
+/// between two steps, and does not know it.
+fn scan_and_bisect(beam: &RootedBeam, step: f64) -> Vec<f64> {
+    let mut found = Vec::new();
+    let (mut low, mut below) = (step, beam.frequency_equation(step));
+    while found.len() < MODES && low < 100.0 {
+        let high = low + step;
+        let above = beam.frequency_equation(high);
+        if below * above < 0.0 {
+            let (mut a, mut b) = (low, high);
+            for _ in 0..50 {
+                let middle = 0.5 * (a + b);
+                if below * beam.frequency_equation(middle) < 0.0 {
+                    b = middle;
+                } else {
+                    a = middle;
+                }
+            }
+            found.push(0.5 * (a + b));
+        }
+        (low, below) = (high, above);
+    }
+    found
+}
+
+/// What one would use instead of the regression: Gauss and Newton on the frequencies themselves, in
+/// the logarithms of both stiffnesses, from a guess.
+fn gauss_newton(measured: &[f64], guess: (f64, f64)) -> (f64, f64) {
+    let (mut x, mut y) = (guess.0.ln(), guess.1.ln());
+    let misses = |x: f64, y: f64| -> Vec<f64> {
+        exact(x.exp(), y.exp())
+            .iter()
+            .zip(measured)
+            .map(|(found, wanted)| (found / wanted).ln())
+            .collect()
+    };
+    for _ in 0..20 {
+        let h = 1e-6;
+        let at = misses(x, y);
+        let slope = |moved: Vec<f64>| -> Vec<f64> {
+            moved.iter().zip(&at).map(|(m, a)| (m - a) / h).collect()
+        };
+        let (by_x, by_y) = (slope(misses(x + h, y)), slope(misses(x, y + h)));
+        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let (xx, xy, yy) = (dot(&by_x, &by_x), dot(&by_x, &by_y), dot(&by_y, &by_y));
+        let (rx, ry) = (dot(&by_x, &at), dot(&by_y, &at));
+        let determinant = xx * yy - xy * xy;
+        let step = (
+            (yy * rx - xy * ry) / determinant,
+            (xx * ry - xy * rx) / determinant,
+        );
+        x -= step.0.clamp(-1.0, 1.0);
+        y -= step.1.clamp(-1.0, 1.0);
+        if step.0.abs() + step.1.abs() < 1e-10 {
+            break;
+        }
+    }
+    (x.exp(), y.exp())
+}
+
+fn forward(criterion: &mut Criterion) {
+    let joint = JointStiffness::two_parameter(KX, KY);
+    let beam = RootedBeam::new(&joint, Slenderness::EULER);
+    let found = exact(KX, KY);
+    for (a, b) in found.iter().zip(scan_and_bisect(&beam, 1e-3)) {
+        // Bisection ends at 1e-3/2^50; the rest is rounding of the frequency equation.
+        assert!((a - b).abs() < 1e-9, "the two searches differ: {a} and {b}");
+    }
+    let mut group = criterion.benchmark_group("five natural frequencies");
+    group.bench_function("tapjoint: natural_lambdas, counted", |b| {
+        b.iter(|| natural_lambdas(Assembly::Cantilever, black_box(&joint), MODES).unwrap());
+    });
+    for step in [1e-3, 1e-2] {
+        group.bench_function(format!("scan in steps of {step}, bisect"), |b| {
+            b.iter(|| scan_and_bisect(black_box(&beam), step));
+        });
+    }
+    group.finish();
+}
+
+fn backward(criterion: &mut Criterion) {
+    let lambdas = exact(KX, KY);
+    let modes = ModeLambda::numbered(&lambdas);
+    let (kx, ky) = gauss_newton(&lambdas, (200.0, 20.0));
+    // Forward differences of 1e-6 leave the solution itself untouched; only rounding remains.
+    assert!(
+        (kx / KX - 1.0).abs() < 1e-6 && (ky / KY - 1.0).abs() < 1e-6,
+        "the fit ends at {kx}, {ky}"
+    );
+    let mut group = criterion.benchmark_group("joint from five frequencies");
+    group.bench_function("tapjoint: pair regression, 2 parameters", |b| {
+        b.iter(|| estimate_two_parameter(black_box(&modes)).unwrap());
+    });
+    group.bench_function("tapjoint: pair regression, 3 parameters", |b| {
+        b.iter(|| estimate_three_parameter(black_box(&modes)).unwrap());
+    });
+    group.bench_function("Gauss-Newton on the frequencies, 2 parameters", |b| {
+        b.iter(|| gauss_newton(black_box(&lambdas), (200.0, 20.0)));
+    });
+    group.finish();
+}
+
+criterion_group! {
+    name = identify;
+    config = Criterion::default()
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = forward, backward
+}
+criterion_main!(identify);

@@ -6,7 +6,7 @@ use super::warning::Warning;
 use crate::identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
 use crate::identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
 use crate::modal::ModeReading;
-use crate::recording::ChannelInfo;
+use crate::recording::{ChannelInfo, Format};
 
 /// A finished analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +31,8 @@ pub struct Analysis {
 pub struct RecordingResult {
     /// File as the description names it.
     pub file: String,
+    /// What kind of file it is.
+    pub format: Format,
     /// Sample rate (Hz).
     pub sample_rate: f64,
     /// Length (s).
@@ -39,6 +41,9 @@ pub struct RecordingResult {
     pub channels: Vec<ChannelInfo>,
     /// Whether there is a hammer channel.
     pub has_hammer: bool,
+    /// Unit of the taps' peaks: the hammer's, or without one that of all responses; `None` where
+    /// nobody said or they differ.
+    pub tap_unit: Option<String>,
     /// The responses analysed.
     pub responses: Vec<Response>,
     /// The analysed zoom band (Hz), where one was asked for.
@@ -58,6 +63,8 @@ pub struct Response {
     pub name: String,
     /// What it senses; `None` where nobody said.
     pub kind: Option<crate::description::SensorKind>,
+    /// The unit of its values; `None` where nobody said.
+    pub unit: Option<String>,
 }
 
 /// Smallest and largest value in equal pieces of a channel.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::analysis::{Overview, RecordingResult, Response};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
-use crate::description::{ChannelRef, RecordingDescription, TestDescription};
+use crate::description::{ChannelRef, RecordingDescription, SensorKind, TestDescription};
 use crate::recording::{ReadSettings, Recording, RecordingError};
 use crate::taps::{TapSettings, TapSource, find_taps};
 
@@ -86,9 +86,31 @@ pub(super) fn measure_described(
         .map(|sensor| Response {
             name: sensor.name.clone(),
             kind: Some(sensor.kind),
+            unit: Some(si_unit(sensor.kind).to_string()),
         })
         .collect();
-    finish(recording.renamed(file), settings, responses)
+    let hammer_unit = hammer.map(|_| "N".to_string());
+    let units = described_units(test, &settings.source);
+    let mut result = finish(recording.renamed(file), settings, (hammer_unit, responses))?;
+    for (channel, unit) in units {
+        if let Some(info) = result.channels.get_mut(channel) {
+            info.unit.get_or_insert_with(|| unit.to_string());
+        }
+    }
+    Ok(result)
+}
+
+/// The unit that the description gives to each channel's values.
+fn described_units(test: &TestDescription, source: &TapSource) -> Vec<(usize, &'static str)> {
+    let (hammer, responses) = match source {
+        TapSource::Hammer { channel, responses } => (Some((*channel, "N")), responses),
+        TapSource::Responses(responses) => (None, responses),
+    };
+    let sensors = test.sensors.iter().map(|sensor| si_unit(sensor.kind));
+    hammer
+        .into_iter()
+        .chain(responses.iter().copied().zip(sensors))
+        .collect()
 }
 
 /// Measures a recording about which nothing is described: all channels but the hammer's are
@@ -107,19 +129,28 @@ pub fn measure_bare(
     let channels: Vec<usize> = (0..recording.channels().len())
         .filter(|&c| Some(c) != hammer)
         .collect();
-    let responses = channels
-        .iter()
-        .map(|&c| {
-            let named = recording.channels()[c].name.clone();
-            Response {
-                name: named.unwrap_or_else(|| format!("channel {}", c + 1)),
-                kind: None,
-            }
-        })
-        .collect();
+    let named = bare_channels(&recording, hammer, &channels);
     let mut settings = MeasureSettings::new(source(hammer, channels));
     adjust(&mut settings);
-    finish(recording, settings, responses)
+    finish(recording, settings, named)
+}
+
+/// Unit of the hammer channel, and the responses with what the file says of them.
+fn bare_channels(
+    recording: &Recording,
+    hammer: Option<usize>,
+    channels: &[usize],
+) -> (Option<String>, Vec<Response>) {
+    let info = |channel: usize| recording.channels().get(channel);
+    let responses = channels.iter().map(|&channel| Response {
+        name: info(channel)
+            .and_then(|info| info.name.clone())
+            .unwrap_or_else(|| format!("channel {}", channel + 1)),
+        kind: None,
+        unit: info(channel).and_then(|info| info.unit.clone()),
+    });
+    let hammer = hammer.and_then(info).and_then(|info| info.unit.clone());
+    (hammer, responses.collect())
 }
 
 /// Finds the taps of a recording and goes no further: what is in it and what is wrong with it.
@@ -133,9 +164,10 @@ pub fn inspect_bare(
     let hammer = hammer
         .map(|reference| channel_index(&recording, reference))
         .transpose()?;
-    let channels = (0..recording.channels().len())
+    let channels: Vec<usize> = (0..recording.channels().len())
         .filter(|&c| Some(c) != hammer)
         .collect();
+    let named = bare_channels(&recording, hammer, &channels);
     let source = source(hammer, channels);
     let taps = find_taps(&recording, &source, &TapSettings::default())?;
     let warnings = super::warning::of_recording(&recording, &source, &taps);
@@ -147,7 +179,7 @@ pub fn inspect_bare(
     result(
         &recording,
         &MeasureSettings::new(source),
-        Vec::new(),
+        named,
         measurement,
     )
 }
@@ -181,16 +213,16 @@ fn channel(
 fn finish(
     recording: Recording,
     settings: MeasureSettings,
-    responses: Vec<Response>,
+    named: (Option<String>, Vec<Response>),
 ) -> Result<RecordingResult, PipelineError> {
     let measurement = measure(&recording, &settings)?;
-    result(&recording, &settings, responses, measurement)
+    result(&recording, &settings, named, measurement)
 }
 
 fn result(
     recording: &Recording,
     settings: &MeasureSettings,
-    responses: Vec<Response>,
+    (hammer_unit, responses): (Option<String>, Vec<Response>),
     measurement: Measurement,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
@@ -198,18 +230,42 @@ fn result(
         .spectra
         .as_ref()
         .map_or(0, |spectra| spectra.readings.len());
+    let has_hammer = matches!(settings.source, TapSource::Hammer { .. });
     Ok(RecordingResult {
         file: recording.name().to_string(),
+        format: recording.format(),
         sample_rate: recording.sample_rate(),
         seconds: recording.duration(),
         channels: recording.channels().to_vec(),
-        has_hammer: matches!(settings.source, TapSource::Hammer { .. }),
+        has_hammer,
+        tap_unit: if has_hammer {
+            hammer_unit
+        } else {
+            common_unit(&responses)
+        },
         responses,
         band: settings.band,
         overview: overview(recording, shown)?,
         measurement,
         mode_numbers: vec![None; readings],
     })
+}
+
+/// The unit that all responses have.
+fn common_unit(responses: &[Response]) -> Option<String> {
+    let first = responses.first()?;
+    let same = responses.iter().all(|other| other.unit == first.unit);
+    first.unit.clone().filter(|_| same)
+}
+
+/// The SI unit of what a sensor senses.
+fn si_unit(kind: SensorKind) -> &'static str {
+    match kind {
+        SensorKind::Acceleration => "m/s2",
+        SensorKind::Velocity => "m/s",
+        SensorKind::Displacement => "m",
+        SensorKind::Sound => "Pa",
+    }
 }
 
 /// Smallest and largest value of each piece of a channel, its mean taken out.

@@ -132,7 +132,8 @@ impl fmt::Display for Warning {
                 total,
             } => write!(
                 f,
-                "{file}: {rejected} of {total} taps were rejected; the list of taps says why"
+                "{file}: {rejected} of {total} taps {} rejected and left out; the list of taps says why",
+                if *rejected == 1 { "was" } else { "were" }
             ),
             Warning::SingleTap { file } => write!(
                 f,
@@ -146,9 +147,9 @@ impl fmt::Display for Warning {
             } => {
                 write!(
                     f,
-                    "{file}: at the end of the block the response still has {:.0} % of its level \
-                     (1 % is wanted); ",
-                    100.0 * remaining
+                    "{file}: at the end of the block the response still has {} % of its level \
+                     (1.0 % is wanted); ",
+                    two_digits(100.0 * remaining)
                 )?;
                 match window {
                     Window::Exponential { decay } => write!(
@@ -188,7 +189,8 @@ impl fmt::Display for Warning {
                 "the interval of the cross coupling contains zero: these frequencies do not show one, \
                  and Kz has no interval; the two-parameter model may do",
             ),
-            Warning::Unpaired { count, text } => write!(f, "{count} peak(s) belong to no mode: {text}"),
+            Warning::Unpaired { count: 1, text } => write!(f, "1 peak belongs to no mode: {text}"),
+            Warning::Unpaired { count, text } => write!(f, "{count} peaks belong to no mode: {text}"),
             Warning::UnphysicalEstimate { what } => write!(
                 f,
                 "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
@@ -217,6 +219,16 @@ impl fmt::Display for Warning {
             }
         }
     }
+}
+
+/// A number with two significant digits, as many decimals as that takes.
+fn two_digits(value: f64) -> String {
+    let exponent = if value > 0.0 && value.is_finite() {
+        value.log10().floor() as i32
+    } else {
+        0
+    };
+    format!("{value:.*}", (1 - exponent).clamp(0, 6) as usize)
 }
 
 /// Doubts about a recording and its taps.

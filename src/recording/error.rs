@@ -4,10 +4,8 @@ use std::io;
 
 use super::text::short;
 
-/// Why a recording cannot be opened, read or written.
-///
-/// Every message begins with the file, and the line where there is one; then what was found, what
-/// is allowed and what to do. Data that are merely poor are [`super::RecordingWarning`]s instead.
+/// Why a recording cannot be opened, read or written: the file, and the line where there is one;
+/// what was found, what is allowed, what to do. Poor data are [`super::RecordingWarning`]s instead.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// The operating system refused.

@@ -14,6 +14,7 @@ use crate::pipeline::{
     Analysis, BoundPerturbation, Estimate, Identification, ModeResult, RecordingResult,
     TestedStructure, Warning,
 };
+use crate::recording::{Format, Separator};
 use crate::spectral::Window;
 use crate::structure::{Assembly, BeamTheory, NaturalMode};
 
@@ -131,10 +132,14 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
     });
     RecordingSection {
         file: recording.file.clone(),
+        format: format_words(recording.format),
         sample_rate: recording.sample_rate,
         channels: recording.channels.len(),
         channel_details: channel_sections(recording),
         seconds: recording.seconds,
+        has_hammer: recording.has_hammer,
+        responses: recording.responses.iter().map(|r| r.name.clone()).collect(),
+        tap_unit: recording.tap_unit.clone(),
         taps: tap_sections(recording),
         line_spacing: lines.map(|lines| lines.spacing),
         resolution: lines.map(|lines| lines.resolution()),
@@ -149,6 +154,30 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
             .and(decay),
         remaining_at_end: spectra.map(|spectra| spectra.decay.remaining),
         modes,
+    }
+}
+
+fn format_words(format: Format) -> String {
+    match format {
+        Format::WavInteger { bits } => format!("WAV, {bits}-bit integer"),
+        Format::WavFloat { bits } => format!("WAV, {bits}-bit float"),
+        Format::Csv {
+            separator, decimal, ..
+        } => {
+            let separator = match separator {
+                Separator::Tab => "tab",
+                Separator::Semicolon => "semicolon",
+                Separator::Comma => "comma",
+                Separator::Blanks => "blanks",
+            };
+            let decimal = if decimal == ',' {
+                ", decimal comma"
+            } else {
+                ""
+            };
+            format!("CSV, {separator}{decimal}")
+        }
+        Format::Memory => "samples in memory".to_owned(),
     }
 }
 

@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::figures::{
     Curve, FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TapMark, TimeOverview,
 };
+use super::format::unit_words;
 use crate::description::SensorKind;
 use crate::pipeline::{Analysis, MeasuredSpectra, RecordingResult, Response};
 
@@ -26,8 +27,8 @@ fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
         })
         .collect();
     let label = match recording.responses.first() {
-        _ if recording.has_hammer => "force (N)".to_string(),
-        Some(first) => format!("response {} ({})", first.name, unit(first.kind)),
+        _ if recording.has_hammer => format!("force ({})", words_of(&recording.tap_unit)),
+        Some(first) => format!("response {} ({})", first.name, words_of(&first.unit)),
         None => "response".to_string(),
     };
     RecordingFigure {
@@ -63,7 +64,10 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
             .zip(&averages.responses)
             .map(|(response, values)| Curve {
                 name: named(response),
-                unit: format!("{} s", unit(response.kind)),
+                unit: match &response.unit {
+                    Some(unit) => format!("{} s", unit_words(unit)),
+                    None => "unit of the file \u{d7} s".to_string(),
+                },
                 values: values.clone(),
             })
             .collect(),
@@ -72,7 +76,7 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
                 .responses
                 .iter()
                 .zip(h1)
-                .map(|(response, h1)| frf(response, h1))
+                .map(|(response, h1)| frf(response, recording.tap_unit.as_deref(), h1))
                 .collect()
         }),
         peaks: spectra
@@ -90,7 +94,7 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
     }
 }
 
-fn frf(response: &Response, h1: &[Complex64]) -> FrfCurve {
+fn frf(response: &Response, force_unit: Option<&str>, h1: &[Complex64]) -> FrfCurve {
     let form = match response.kind {
         Some(SensorKind::Acceleration) => "accelerance",
         Some(SensorKind::Velocity) => "mobility",
@@ -101,23 +105,19 @@ fn frf(response: &Response, h1: &[Complex64]) -> FrfCurve {
     FrfCurve {
         name: response.name.clone(),
         form: form.to_string(),
-        unit: match response.kind {
-            Some(_) => format!("({})/N", unit(response.kind)),
-            None => "units of the file".to_string(),
+        unit: match (response.unit.as_deref().map(unit_words), force_unit) {
+            (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
+            (Some(unit), Some(force)) => format!("{unit}/{force}"),
+            _ => "units of the file".to_string(),
         },
         magnitude: h1.iter().map(|value| value.norm()).collect(),
         phase: h1.iter().map(|value| value.arg().to_degrees()).collect(),
     }
 }
 
-fn unit(kind: Option<SensorKind>) -> &'static str {
-    match kind {
-        Some(SensorKind::Acceleration) => "m/s2",
-        Some(SensorKind::Velocity) => "m/s",
-        Some(SensorKind::Displacement) => "m",
-        Some(SensorKind::Sound) => "Pa",
-        None => "unit of the file",
-    }
+/// A unit in words, also where nobody said.
+fn words_of(unit: &Option<String>) -> String {
+    unit_words(unit.as_deref().unwrap_or("unit of the file"))
 }
 
 fn words(kind: SensorKind) -> &'static str {

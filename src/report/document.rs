@@ -72,6 +72,8 @@ pub struct TestSection {
 pub struct RecordingSection {
     /// File as the description names it.
     pub file: String,
+    /// Format in words: "WAV, 24-bit integer".
+    pub format: String,
     /// Sample rate (Hz).
     pub sample_rate: f64,
     /// Number of channels.
@@ -80,6 +82,12 @@ pub struct RecordingSection {
     pub channel_details: Vec<ChannelSection>,
     /// Length (s).
     pub seconds: f64,
+    /// Whether there is a hammer channel.
+    pub has_hammer: bool,
+    /// Names of the responses: sensors, or channels.
+    pub responses: Vec<String>,
+    /// Unit of the taps' peaks; null where nobody said.
+    pub tap_unit: Option<String>,
     /// Taps in order of time.
     pub taps: Vec<TapSection>,
     /// Distance of the spectral lines (Hz).
@@ -136,9 +144,9 @@ pub struct ChannelSection {
 pub struct TapSection {
     /// When it begins (s from the start of the recording).
     pub time: f64,
-    /// Peak force (N); null without a hammer.
+    /// Peak force (`tap_unit`: N in a described test); null without a hammer.
     pub peak_force: Option<f64>,
-    /// Peak of the response on which it was found (SI); null with a hammer.
+    /// Peak of the response on which it stands out most (`tap_unit`); null with a hammer.
     pub peak_response: Option<f64>,
     /// Whether it enters the averages.
     pub accepted: bool,

@@ -51,6 +51,50 @@ pub fn rounded(value: f64, uncertainty: Option<f64>) -> Rounded {
     }
 }
 
+/// Like [`rounded`], but nothing finer than the digit 10^`finest`: more digits than a reader can
+/// use hide the ones that count.
+///
+/// An uncertainty that would need finer digits is rounded up, so that it stays a bound.
+pub fn rounded_to(value: f64, uncertainty: Option<f64>, finest: i32) -> Rounded {
+    let known = uncertainty.filter(|u| u.is_finite() && *u > 0.0);
+    match known {
+        Some(uncertainty) if value.is_finite() && last_place(uncertainty, 2) < finest => {
+            let step = 10f64.powi(finest);
+            // A hair less than the quotient, so that 0.0003 does not become 0.0004 by rounding.
+            let up = (uncertainty / step * (1.0 - 1e-12)).ceil() * step;
+            let (value, uncertainty) = at_place_together(value, up, finest);
+            Rounded {
+                value,
+                uncertainty: Some(uncertainty),
+            }
+        }
+        _ => rounded(value, uncertainty),
+    }
+}
+
+/// [`rounded_to`] with at most `digits` significant digits of the value.
+pub fn rounded_digits(value: f64, uncertainty: Option<f64>, digits: i32) -> Rounded {
+    let finest = if value == 0.0 || !value.is_finite() {
+        i32::MIN
+    } else {
+        last_place(value, digits)
+    };
+    rounded_to(value, uncertainty, finest)
+}
+
+/// A frequency and its bound (Hz): at most four decimals, seven where the spectral lines (`half_line`
+/// their half distance, Hz) lie closer than 0.001 Hz.
+pub fn frequency_reading(frequency: f64, bound: f64, half_line: Option<f64>) -> Rounded {
+    let fine = half_line.is_some_and(|half| 2.0 * half < 0.001);
+    rounded_to(frequency, Some(bound), if fine { -7 } else { -4 })
+}
+
+/// A bound in percent with its sign and at most three decimals: "±0.11".
+pub fn bound_percent(percent: f64) -> String {
+    let written = rounded_to(0.0, Some(percent), -3).uncertainty;
+    written.map_or_else(|| MISSING.to_owned(), |bound| format!("\u{b1}{bound}"))
+}
+
 /// A value with the given number of significant digits; "–" for NaN, "∞" beyond all bounds.
 pub fn significant(value: f64, digits: i32) -> String {
     if value.is_nan() {
@@ -84,14 +128,6 @@ pub fn trimmed(value: f64, digits: i32) -> String {
 /// The same for a value that may not exist.
 pub fn optional(value: Option<f64>, digits: i32) -> String {
     value.map_or_else(|| MISSING.to_owned(), |value| significant(value, digits))
-}
-
-/// A value rounded to the digit that [`rounded`] would give it beside `uncertainty`.
-pub fn like(value: Option<f64>, uncertainty: Option<f64>) -> String {
-    value.map_or_else(
-        || MISSING.to_owned(),
-        |value| rounded(value, uncertainty).value,
-    )
 }
 
 /// A change that was set, with its sign: "+0.05".
@@ -137,6 +173,15 @@ pub fn line_reading(line: f64, half_line: f64) -> Rounded {
     }
 }
 
+/// A value with as many decimals as another number was written with.
+pub fn with_decimals_of(value: f64, written: &str) -> String {
+    if !value.is_finite() || value.abs() >= PLAIN_LARGEST || written.contains('e') {
+        return significant(value, DIGITS);
+    }
+    let decimals = written.split_once('.').map_or(0, |(_, tail)| tail.len());
+    typographic(&format!("{value:.decimals$}"))
+}
+
 /// Decimals, at most four, that hold a value exactly; 0 where four do not suffice.
 fn needed_decimals(value: f64) -> usize {
     (0..=4)
@@ -145,6 +190,12 @@ fn needed_decimals(value: f64) -> usize {
             (scaled - scaled.round()).abs() < 1e-6
         })
         .unwrap_or(0)
+}
+
+/// A unit as print has it: "m/s²" for "m/s2".
+pub fn unit_words(unit: &str) -> String {
+    unit.replace("m/s2", "m/s\u{b2}")
+        .replace("kg/m3", "kg/m\u{b3}")
 }
 
 /// A value in the unit with the decimal prefix that leaves one to three digits before the point.
@@ -163,7 +214,7 @@ pub fn prefix(value: f64) -> (f64, &'static str) {
 
 /// Power of ten of the last of `digits` significant digits, after rounding: 0.0996 with two digits
 /// rounds to 0.10, so its last place is -2.
-fn last_place(value: f64, digits: i32) -> i32 {
+pub fn last_place(value: f64, digits: i32) -> i32 {
     if value == 0.0 || !value.is_finite() {
         return 0;
     }

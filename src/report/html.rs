@@ -3,8 +3,8 @@
 use askama::Template;
 
 use super::ReportError;
-use super::document::{Document, WarningSection};
-use super::format::significant;
+use super::document::{Document, RecordingSection, TestSection, WarningSection};
+use super::format::{significant, trimmed};
 use super::summary::sentences;
 use super::tables::{self, Table};
 
@@ -38,7 +38,14 @@ struct Page<'a> {
     warnings: &'a [WarningSection],
     findings: Vec<String>,
     sections: Vec<Section<'a>>,
+    method: Method,
     version: &'static str,
+}
+
+/// Which parts of the method were applied.
+struct Method {
+    recordings: bool,
+    joint: bool,
 }
 
 /// A part of the page.
@@ -61,6 +68,10 @@ pub fn render_html(document: &Document, figures: &PageFigures) -> Result<String,
         warnings: &document.warnings,
         findings: sentences(document),
         sections: sections(document, figures),
+        method: Method {
+            recordings: document.recordings.is_some(),
+            joint: document.estimate.is_some() || document.prediction.is_some(),
+        },
         version: env!("CARGO_PKG_VERSION"),
     };
     page.render().map_err(ReportError::Html)
@@ -72,23 +83,42 @@ fn title(document: &Document) -> String {
         .unwrap_or_else(|| "Unnamed test".to_owned())
 }
 
-/// What was tested, in pairs of name and value.
+/// What was tested, in pairs of name and value; of a bare recording what the file says.
 fn facts(document: &Document) -> Vec<(&'static str, String)> {
-    let Some(test) = &document.test else {
-        return Vec::new();
+    let described = document.test.as_ref().filter(|test| test.kind.is_some());
+    let all = match (described, document.recordings.as_deref()) {
+        (Some(test), _) => test_facts(test),
+        (None, Some([recording])) => recording_facts(recording),
+        _ => Vec::new(),
     };
+    all.into_iter()
+        .filter_map(|(name, value)| Some((name, value?)))
+        .collect()
+}
+
+fn test_facts(test: &TestSection) -> Vec<(&'static str, Option<String>)> {
     let quantity = |value: Option<f64>, unit: &str| {
         value.map(|value| format!("{} {unit}", significant(value, 4)))
     };
-    let model = test.model.as_deref().map(|model| match model {
-        "2p" => "two stiffnesses (2p)".to_owned(),
-        "3p" => "three stiffnesses (3p)".to_owned(),
-        other => other.to_owned(),
+    let kind = test.kind.as_deref().map(|kind| match kind {
+        "lap" => "lap joint",
+        "free" => "none: free beam",
+        other => other,
     });
-    let all = [
-        ("Joint", test.kind.clone()),
-        ("Joint model", model),
-        ("Beam theory", test.beam_theory.clone()),
+    let model = test.model.as_deref().map(|model| match model {
+        "2p" => "two stiffnesses (2p)",
+        "3p" => "three stiffnesses (3p)",
+        other => other,
+    });
+    let theory = test.beam_theory.as_deref().map(|theory| match theory {
+        "timoshenko" => "Timoshenko",
+        "euler" => "Euler",
+        other => other,
+    });
+    vec![
+        ("Joint", kind.map(str::to_owned)),
+        ("Joint model", model.map(str::to_owned)),
+        ("Beam theory", theory.map(str::to_owned)),
         ("Length L", quantity(test.length, "m")),
         (
             "Bending stiffness EI",
@@ -98,60 +128,113 @@ fn facts(document: &Document) -> Vec<(&'static str, String)> {
             "Mass per length \u{3c1}A",
             quantity(test.mass_per_length, "kg/m"),
         ),
-    ];
-    all.into_iter()
-        .filter_map(|(name, value)| Some((name, value?)))
-        .collect()
+    ]
 }
 
+fn recording_facts(recording: &RecordingSection) -> Vec<(&'static str, Option<String>)> {
+    vec![
+        ("Format", Some(recording.format.clone())),
+        (
+            "Rate",
+            Some(format!("{} Hz", trimmed(recording.sample_rate, 8))),
+        ),
+        (
+            "Length",
+            Some(format!("{} s", trimmed(recording.seconds, 4))),
+        ),
+        ("Channels", Some(recording.channels.to_string())),
+    ]
+}
+
+/// The page's parts; what was not asked for has none.
 fn sections<'a>(document: &Document, figures: &'a PageFigures) -> Vec<Section<'a>> {
-    let found = |tables: Vec<Option<Table>>| tables.into_iter().flatten().collect::<Vec<_>>();
-    let all = vec![
-        Section {
-            id: "joint",
-            title: "The joint",
-            missing: no_estimate(document),
-            tables: found(vec![
-                tables::parameters(document),
-                tables::prediction(document),
-                tables::pairs(document),
-            ]),
-            figures: &figures.comparison,
-        },
-        Section {
-            id: "uncertainty",
-            title: "How sure is the stiffness",
-            missing: "Nothing to perturb: there is no estimate.".to_owned(),
-            tables: found(vec![
-                tables::spans(document),
-                tables::sensitivity(document),
-                tables::perturbation(document),
-            ]),
-            figures: &figures.cloud,
-        },
-        Section {
-            id: "modes",
-            title: "Modes and spectra",
-            missing: "No modes were found.".to_owned(),
-            tables: found(vec![tables::modes(document), tables::readings(document)]),
-            figures: &figures.spectra,
-        },
-        Section {
-            id: "recordings",
-            title: "Recordings and taps",
-            missing: "No recordings: the frequencies were read elsewhere.".to_owned(),
-            tables: found(vec![tables::recordings(document), tables::taps(document)]),
-            figures: &figures.taps,
-        },
+    let all = [
+        joint_section(document, figures),
+        uncertainty_section(document, figures),
+        Some(modes_section(document, figures)),
+        recordings_section(document, figures),
     ];
-    all
+    all.into_iter().flatten().collect()
+}
+
+fn found(tables: Vec<Option<Table>>) -> Vec<Table> {
+    tables.into_iter().flatten().collect()
+}
+
+fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Section<'a>> {
+    if document.estimate.is_none() && document.prediction.is_none() {
+        return None;
+    }
+    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
+    Some(Section {
+        id: "joint",
+        title: if kind == Some("free") {
+            "The beam"
+        } else {
+            "The joint"
+        },
+        missing: no_estimate(document),
+        tables: found(vec![
+            tables::parameters(document),
+            tables::prediction(document),
+            tables::pairs(document),
+        ]),
+        figures: &figures.comparison,
+    })
+}
+
+fn uncertainty_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Section<'a>> {
+    let tables = found(vec![
+        tables::spans(document),
+        tables::sensitivity(document),
+        tables::perturbation(document),
+        tables::averages(document),
+        tables::monte_carlo(document),
+    ]);
+    let section = Section {
+        id: "uncertainty",
+        title: "How sure is the stiffness",
+        missing: String::new(),
+        tables,
+        figures: &figures.cloud,
+    };
+    (!section.is_empty()).then_some(section)
+}
+
+fn modes_section<'a>(document: &Document, figures: &'a PageFigures) -> Section<'a> {
+    Section {
+        id: "modes",
+        title: match (&document.recordings, &document.test) {
+            (None, _) => "Modes",
+            (_, Some(test)) if test.kind.is_some() => "Modes and spectra",
+            _ => "Resonances and spectra",
+        },
+        missing: "No resonances were found.".to_owned(),
+        tables: found(vec![tables::modes(document), tables::readings(document)]),
+        figures: &figures.spectra,
+    }
+}
+
+fn recordings_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Section<'a>> {
+    document.recordings.as_ref()?;
+    Some(Section {
+        id: "recordings",
+        title: "Recordings and taps",
+        missing: "There is no recording.".to_owned(),
+        tables: found(vec![
+            tables::recordings(document),
+            tables::channels(document),
+            tables::taps(document),
+        ]),
+        figures: &figures.taps,
+    })
 }
 
 fn no_estimate(document: &Document) -> String {
     match (&document.estimate, &document.estimate_reason) {
         (Some(None), Some(reason)) => format!("There is no estimate: {reason}."),
         (Some(None), None) => "There is no estimate.".to_owned(),
-        _ => "No joint was asked for.".to_owned(),
+        _ => "No estimate was asked for.".to_owned(),
     }
 }
 

@@ -1,13 +1,14 @@
 //! What was found, in a few plain sentences.
 
-use super::document::{Document, PredictionSection, RecordingSection};
-use super::format::{signed_percent, significant, trimmed};
+use super::document::{Document, ModeSection, PredictionSection, RecordingSection};
+use super::format::{bound_percent, signed_percent, significant, trimmed};
 use super::tables::{estimated, reading_bound};
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
     [
         taps(document),
+        channels(document),
         modes(document),
         estimate(document),
         misfit(document),
@@ -22,21 +23,58 @@ fn taps(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref()?;
     let all: Vec<_> = recordings.iter().flat_map(|r| &r.taps).collect();
     let used = all.iter().filter(|tap| tap.accepted).count();
-    let files = match recordings.len() {
-        1 => "1 recording".to_owned(),
-        count => format!("{count} recordings"),
+    let files = counted(recordings.len(), "recording");
+    let total = all.len();
+    let found = match total {
+        1 => format!("1 tap was found in {files}"),
+        count => format!("{count} taps were found in {files}"),
     };
-    if all.is_empty() {
-        return Some(format!("No taps were found in {files}."));
+    // Of recordings that were only looked at, nothing was used yet.
+    let were_used = if document.modes.is_none() {
+        ["can be used"; 2]
+    } else {
+        ["was used", "were used"]
+    };
+    let [was_used, were_used] = were_used;
+    Some(match (total, used) {
+        (0, _) => format!("No taps were found in {files}."),
+        (1, 1) => format!("{found}, and it {was_used}."),
+        (1, _) => format!("{found}, and it was rejected."),
+        (_, 0) => format!("{found}, and all were rejected."),
+        _ if used == total => format!("{found}, and all {were_used}."),
+        _ => {
+            let rejected = total - used;
+            let were = if rejected == 1 { "was" } else { "were" };
+            format!("{used} of {total} taps in {files} {were_used}, {rejected} {were} rejected.")
+        }
+    })
+}
+
+/// "1 recording", "3 recordings".
+fn counted(count: usize, word: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {word}{ending}")
+}
+
+/// On what taps were looked for where there is no hammer.
+fn channels(document: &Document) -> Option<String> {
+    let recordings = document.recordings.as_deref()?;
+    let mut names: Vec<&str> = Vec::new();
+    for recording in recordings.iter().filter(|recording| !recording.has_hammer) {
+        for name in &recording.responses {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
     }
-    let rejected = match all.len() - used {
-        0 => "none was rejected".to_owned(),
-        1 => "1 was rejected".to_owned(),
-        count => format!("{count} were rejected"),
+    let names = match names.as_slice() {
+        [] => return None,
+        [one] => (*one).to_owned(),
+        [all @ .., last] => format!("{} and {last}", all.join(", ")),
     };
     Some(format!(
-        "{used} of {} taps in {files} were used, {rejected}.",
-        all.len()
+        "There is no hammer channel: taps were looked for on {names}, and without the force there is \
+         no frequency response function."
     ))
 }
 
@@ -49,13 +87,15 @@ fn modes(document: &Document) -> Option<String> {
         .collect();
     let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == "given");
     let found = if given { "given" } else { "found" };
+    let described = document.test.iter().any(|test| test.kind.is_some());
+    let word = if described { "mode" } else { "resonance" };
     let low = numbered.iter().copied().fold(f64::INFINITY, f64::min);
     let high = numbered.iter().copied().fold(0.0, f64::max);
     let mut sentence = match numbered.len() {
-        0 => format!("No modes were {found}"),
-        1 => format!("1 mode was {found}, at {} Hz", significant(low, 4)),
+        0 => format!("No {word}s were {found}"),
+        1 => format!("1 {word} was {found}, at {} Hz", significant(low, 4)),
         count => format!(
-            "{count} modes were {found}, from {} to {} Hz",
+            "{count} {word}s were {found}, from {} to {} Hz",
             significant(low, 4),
             significant(high, 4)
         ),
@@ -64,18 +104,37 @@ fn modes(document: &Document) -> Option<String> {
     if let Some(half_line) = finest.filter(|_| !numbered.is_empty()) {
         let half_line = trimmed(half_line, 3);
         sentence.push_str(&format!(
-            "; a spectral line holds to \u{b1}{half_line} Hz at best"
+            "; a reading on a spectral line is good to \u{b1}{half_line} Hz at best"
         ));
     }
-    match modes.len() - numbered.len() {
-        0 => {}
-        1 => sentence.push_str("; 1 more peak is no mode (mains hum or unpaired)"),
-        count => {
-            let words = format!("; {count} more peaks are no modes (mains hum or unpaired)");
-            sentence.push_str(&words);
+    sentence.push_str(&others(modes));
+    Some(sentence + ".")
+}
+
+/// How many peaks were left out, and as what: "; 3 more peaks are not counted (2 no clear
+/// resonance, 1 mains 50 Hz)".
+fn others(modes: &[ModeSection]) -> String {
+    let mut kinds: Vec<(&str, usize)> = Vec::new();
+    for mode in modes.iter().filter(|mode| mode.mode.is_none()) {
+        let name = mode.label.as_deref().unwrap_or("unpaired");
+        match kinds.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((name, 1)),
         }
     }
-    Some(sentence + ".")
+    let total: usize = kinds.iter().map(|(_, count)| count).sum();
+    let list: Vec<String> = kinds
+        .iter()
+        .map(|(name, count)| match kinds.len() {
+            1 => (*name).to_owned(),
+            _ => format!("{count} {name}"),
+        })
+        .collect();
+    match total {
+        0 => String::new(),
+        1 => format!("; 1 more peak is not counted ({})", list.join(", ")),
+        count => format!("; {count} more peaks are not counted ({})", list.join(", ")),
+    }
 }
 
 /// The smallest half-line bound of all recordings (Hz).
@@ -137,8 +196,8 @@ fn misfit(document: &Document) -> Option<String> {
         .map(|(bound, hz)| 100.0 * bound / hz);
     let reading = bound.map_or(String::new(), |percent| {
         format!(
-            "; the reading itself is good to \u{b1}{} %",
-            significant(percent, 2)
+            "; the reading itself is good to {} %",
+            bound_percent(percent)
         )
     });
     Some(format!(
@@ -169,7 +228,20 @@ fn resolution(document: &Document) -> Option<String> {
         return None;
     }
     Some(format!(
-        "With every frequency anywhere within its reading's bound, the non-dimensional stiffness is {}{failed}.",
+        "With every frequency anywhere within its {}, the non-dimensional stiffness is {}{failed}.",
+        bound_name(document),
         ranges.join(", ")
     ))
+}
+
+/// What the spans were computed from: beside a frequency read between the lines, "bound" alone would
+/// be taken for that one's.
+fn bound_name(document: &Document) -> &'static str {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let between = modes.iter().any(|mode| mode.method == "interpolated");
+    if between {
+        "half line (as if it had been read on a line only)"
+    } else {
+        "bound"
+    }
 }

@@ -1,6 +1,7 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
 use super::document::Document;
+use super::format::signed_percent;
 use super::summary::sentences;
 use super::tables::{self, Kind, Place, Table};
 
@@ -10,6 +11,8 @@ pub const WIDTH: usize = 80;
 const GAP: usize = 2;
 /// Narrowest a column of words is cut to (characters).
 const NARROWEST: usize = 8;
+/// Most taps listed one by one.
+const MOST_TAPS: usize = 10;
 /// Most rows printed: a terminal is no place for a thousand taps.
 const MOST_ROWS: usize = 40;
 
@@ -35,14 +38,25 @@ pub fn render_text(document: &Document) -> String {
     text
 }
 
-/// The recordings; empty without any.
+/// The recordings, and of recordings that were only looked at their channels; empty without any.
 pub fn recordings(document: &Document) -> String {
-    table_or_nothing(tables::recordings(document))
+    let inspected = document.modes.is_none();
+    let channels = tables::channels(document).filter(|_| inspected);
+    joined(&[tables::recordings(document), channels])
 }
 
-/// The taps; empty without any.
+/// The taps; empty without any. Of many taps the rejected ones, and how many were used.
 pub fn taps(document: &Document) -> String {
-    table_or_nothing(tables::taps(document))
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let count: usize = recordings
+        .iter()
+        .map(|recording| recording.taps.len())
+        .sum();
+    if count > MOST_TAPS {
+        joined(&[tables::taps_used(document), tables::rejected_taps(document)])
+    } else {
+        table_or_nothing(tables::taps(document))
+    }
 }
 
 /// The modes; empty without any.
@@ -50,7 +64,8 @@ pub fn modes(document: &Document) -> String {
     table_or_nothing(tables::modes(document))
 }
 
-/// The estimate and the pair regression, or why there is none; empty where it was not asked for.
+/// The estimate and how far its regression closes, or why there is none; empty where it was not
+/// asked for.
 pub fn estimate(document: &Document) -> String {
     match &document.estimate {
         None => String::new(),
@@ -59,8 +74,25 @@ pub fn estimate(document: &Document) -> String {
             let reason = reason.unwrap_or("no reason was recorded");
             wrapped(&format!("No estimate: {reason}."), 0)
         }
-        Some(Some(_)) => joined(&[tables::parameters(document), tables::pairs(document)]),
+        Some(Some(found)) => {
+            let mut text = table_or_nothing(tables::parameters(document));
+            let closure = found.pairs.as_ref().and_then(|pairs| pairs.closure);
+            if let Some(closure) = closure {
+                let percent = signed_percent(Some(100.0 * closure));
+                let words = format!(
+                    "From modes {}. The pair regression closes to {percent} % (0: no contradiction).",
+                    listed(&found.modes_used)
+                );
+                text.push_str(&wrapped(&words, 0));
+            }
+            text
+        }
     }
+}
+
+fn listed(modes: &[usize]) -> String {
+    let modes: Vec<String> = modes.iter().map(usize::to_string).collect();
+    modes.join(", ")
 }
 
 /// Measured beside predicted frequencies; empty without a prediction.
@@ -70,11 +102,20 @@ pub fn prediction(document: &Document) -> String {
 
 /// What changed frequencies do to the estimate; empty where it was not computed.
 pub fn perturbation(document: &Document) -> String {
-    joined(&[
-        tables::perturbation(document),
-        tables::spans(document),
-        tables::sensitivity(document),
-    ])
+    let noted = |table: Option<Table>| {
+        table.map_or(String::new(), |table| {
+            render_table(&table) + &wrapped(&table.note, 0)
+        })
+    };
+    let texts = [
+        table_or_nothing(tables::perturbation(document)),
+        table_or_nothing(tables::averages(document)),
+        noted(tables::spans(document)),
+        noted(tables::sensitivity(document)),
+        noted(tables::monte_carlo(document)),
+    ];
+    let texts: Vec<String> = texts.into_iter().filter(|text| !text.is_empty()).collect();
+    texts.join("\n")
 }
 
 /// The warnings; empty without any.
@@ -105,7 +146,8 @@ fn joined(tables: &[Option<Table>]) -> String {
     texts.join("\n")
 }
 
-/// A table with its caption, cut to 80 columns.
+/// A table with its caption, in 80 columns: words that do not fit go on below, and heads go to two
+/// lines where one has no room.
 pub fn render_table(table: &Table) -> String {
     let shown: Vec<usize> = (0..table.columns.len())
         .filter(|index| {
@@ -113,15 +155,23 @@ pub fn render_table(table: &Table) -> String {
             column.is_some_and(|column| column.place == Place::Everywhere)
         })
         .collect();
-    let widths = widths(table, &shown);
+    let single: Vec<Vec<String>> = table.columns.iter().map(|c| vec![c.name.clone()]).collect();
+    let double: Vec<Vec<String>> = table.columns.iter().map(|c| two_lines(&c.name)).collect();
+    let wide = natural_widths(table, &shown, &single);
+    let (heads, natural) = if wide.iter().sum::<usize>() <= room(wide.len()) {
+        (single, wide)
+    } else {
+        let narrow = natural_widths(table, &shown, &double);
+        (double, narrow)
+    };
+    let widths = fitted_widths(table, &shown, natural);
     let mut text = wrapped(&table.caption, 0);
-    let heads: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
     text.push_str(&row(table, &shown, &widths, &heads));
     let total = widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1);
     text.push_str(&"-".repeat(total.min(WIDTH)));
     text.push('\n');
     for cells in table.rows.iter().take(MOST_ROWS) {
-        let cells: Vec<&str> = cells.iter().map(String::as_str).collect();
+        let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
         text.push_str(&row(table, &shown, &widths, &cells));
     }
     let more = table.rows.len().saturating_sub(MOST_ROWS);
@@ -131,19 +181,42 @@ pub fn render_table(table: &Table) -> String {
     text
 }
 
+/// A head on two lines: its unit below its name, or its last word.
+fn two_lines(name: &str) -> Vec<String> {
+    let place = name.rfind(" (").or_else(|| name.rfind(' '));
+    match place.map(|place| name.split_at(place)) {
+        Some((first, second)) => vec![first.to_owned(), second.trim_start().to_owned()],
+        None => vec![String::new(), name.to_owned()],
+    }
+}
+
+/// Characters that columns share.
+fn room(columns: usize) -> usize {
+    WIDTH.saturating_sub(GAP * columns.saturating_sub(1))
+}
+
+fn length(text: &str) -> usize {
+    text.chars().count()
+}
+
+/// Widths that hold every head and cell on one line.
+fn natural_widths(table: &Table, shown: &[usize], heads: &[Vec<String>]) -> Vec<usize> {
+    let width = |index: &usize| {
+        let head = heads.get(*index).into_iter().flatten();
+        let rows = table.rows.iter().take(MOST_ROWS);
+        let cells = rows.filter_map(|row| row.get(*index));
+        head.chain(cells)
+            .map(|text| length(text))
+            .max()
+            .unwrap_or(0)
+    };
+    shown.iter().map(width).collect()
+}
+
 /// Widths of the shown columns; where they pass the terminal's, columns of words shrink.
-fn widths(table: &Table, shown: &[usize]) -> Vec<usize> {
-    let length = |text: &str| text.chars().count();
-    let mut widths: Vec<usize> = shown
-        .iter()
-        .map(|index| {
-            let head = table.columns.get(*index).map_or(0, |c| length(&c.name));
-            let rows = table.rows.iter().take(MOST_ROWS);
-            let cells = rows.filter_map(|row| row.get(*index)).map(|c| length(c));
-            cells.max().unwrap_or(0).max(head)
-        })
-        .collect();
-    let room = WIDTH.saturating_sub(GAP * widths.len().saturating_sub(1));
+fn fitted_widths(table: &Table, shown: &[usize], natural: Vec<usize>) -> Vec<usize> {
+    let mut widths = natural;
+    let room = room(widths.len());
     while widths.iter().sum::<usize>() > room {
         let widest_words = shown
             .iter()
@@ -165,21 +238,62 @@ fn is_words(table: &Table, index: usize) -> bool {
     column.is_some_and(|column| column.kind == Kind::Words)
 }
 
-fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[&str]) -> String {
-    let padded: Vec<String> = shown
+/// One row, on as many lines as its longest cell of words needs.
+fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[Vec<String>]) -> String {
+    let columns: Vec<Vec<String>> = shown
         .iter()
         .zip(widths)
         .map(|(index, width)| {
-            let cell = cut(cells.get(*index).copied().unwrap_or(""), *width);
+            let cell = cells.get(*index).into_iter().flatten();
             if is_words(table, *index) {
-                format!("{cell:<width$}")
+                cell.flat_map(|text| broken(text, *width)).collect()
             } else {
-                format!("{cell:>width$}")
+                cell.map(|text| cut(text, *width)).collect()
             }
         })
         .collect();
-    let line = cut(padded.join("  ").trim_end(), WIDTH);
-    line + "\n"
+    let lines = columns.iter().map(Vec::len).max().unwrap_or(0);
+    (0..lines)
+        .map(|line| {
+            let padded: Vec<String> = columns
+                .iter()
+                .zip(shown.iter().zip(widths))
+                .map(|(column, (index, width))| {
+                    let text = column.get(line).map_or("", String::as_str);
+                    if is_words(table, *index) {
+                        format!("{text:<width$}")
+                    } else {
+                        format!("{text:>width$}")
+                    }
+                })
+                .collect();
+            cut(padded.join("  ").trim_end(), WIDTH) + "\n"
+        })
+        .collect()
+}
+
+/// A text in lines of at most `width` characters, broken between words where that is possible.
+fn broken(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let mut rest: Vec<char> = word.chars().collect();
+        let used = lines.last().map_or(0, |line| length(line));
+        if used > 0 && used + 1 + rest.len() <= width {
+            if let Some(line) = lines.last_mut() {
+                line.push(' ');
+                line.extend(rest);
+            }
+            continue;
+        }
+        while !rest.is_empty() {
+            let piece: String = rest.drain(..rest.len().min(width.max(1))).collect();
+            match lines.last_mut() {
+                Some(line) if line.is_empty() => line.push_str(&piece),
+                _ => lines.push(piece),
+            }
+        }
+    }
+    lines
 }
 
 /// A text of at most `width` characters; "…" stands for what is missing.

@@ -6,7 +6,6 @@
 
 use super::banded::{BandedSymmetric, lowest_eigenvectors};
 use super::element::Element;
-use super::joint::StiffnessUnits;
 use super::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
@@ -396,15 +395,4 @@ fn joint_matrix(joint: &JointStiffness) -> [[f64; 2]; 2] {
     let rest = 1.0 - c * c * kx * ky;
     let cross = kx * c * ky / rest;
     [[kx / rest, cross], [cross, ky / rest]]
-}
-
-/// Non-dimensional stiffness of a joint between two unequal halves, from SI units: by the total
-/// length (m) and the left half's bending stiffness.
-pub fn lap_joint_stiffness(left: &Beam, total_length: f64, kt: f64, kr: f64) -> JointStiffness {
-    let whole = Beam {
-        length: total_length,
-        ..*left
-    };
-    let unit = StiffnessUnits::of(&whole);
-    JointStiffness::two_parameter(kt / unit.kt, kr / unit.kr)
 }

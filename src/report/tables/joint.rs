@@ -1,10 +1,15 @@
 //! Tables of the joint: parameters, the pair regression, predicted frequencies.
 
-use super::super::document::{Document, EstimateSection, ValueSection};
+use super::super::document::{Document, EstimateSection, PredictionSection, ValueSection};
 use super::super::format::{
-    MISSING, RIGID, like, optional, prefix, rounded, signed_percent, significant,
+    MISSING, RIGID, bound_percent, last_place, optional, prefix, rounded_to, signed_percent,
+    with_decimals_of,
 };
-use super::{Table, number, reading_bound, words};
+use super::modes::reading;
+use super::{Table, bound_of, mode_of, number, words};
+
+/// Most significant digits of an estimate.
+const MOST_DIGITS: i32 = 5;
 
 /// One estimated quantity: symbol, meaning, unit, value.
 pub struct Parameter<'a> {
@@ -54,22 +59,34 @@ impl Parameter<'_> {
             .low
             .zip(self.value.high)
             .map(|(low, high)| factor * (high - low) / 4.0);
-        let uncertainty = std.or(spread);
-        let value = if self.value.value.is_infinite() {
+        let value = scaled(self.value.value);
+        let finest = self.finest_place(value);
+        let written = |number: f64| rounded_to(number, std.or(spread), finest);
+        let limit = |limit: Option<f64>| {
+            limit.map_or_else(|| MISSING.to_owned(), |limit| written(scaled(limit)).value)
+        };
+        let shown = if value.is_infinite() {
             RIGID.to_owned()
         } else {
-            rounded(scaled(self.value.value), uncertainty).value
+            written(value).value
         };
-        let std = std
-            .and_then(|std| rounded(scaled(self.value.value), Some(std)).uncertainty)
-            .unwrap_or_else(|| MISSING.into());
         [
-            value,
-            std,
-            like(self.value.low.map(scaled), uncertainty),
-            like(self.value.high.map(scaled), uncertainty),
+            shown,
+            std.and_then(|std| rounded_to(value, Some(std), finest).uncertainty)
+                .unwrap_or_else(|| MISSING.into()),
+            limit(self.value.low),
+            limit(self.value.high),
             format!("{letter}{}", self.unit),
         ]
+    }
+
+    /// Place of the last digit that is shown: no stiffness is known to more than five digits.
+    fn finest_place(&self, value: f64) -> i32 {
+        if value.is_finite() {
+            last_place(value, MOST_DIGITS)
+        } else {
+            i32::MIN
+        }
     }
 
     /// Factor and prefix that suit the value; numbers without unit stay as they are.
@@ -149,30 +166,42 @@ pub fn pairs(document: &Document) -> Option<Table> {
 /// Measured beside predicted frequencies; `None` where nothing was predicted.
 pub fn prediction(document: &Document) -> Option<Table> {
     let rows = document.prediction.as_deref().filter(|p| !p.is_empty())?;
-    let rows = rows
+    let compared = rows.iter().any(|row| row.measured.is_some());
+    let used = |used: bool| if used { "yes" } else { "no" }.to_owned();
+    let cells = rows
         .iter()
         .map(|row| {
-            let bound = reading_bound(document, row.mode);
-            let percent = bound
-                .zip(row.measured)
-                .map(|(bound, hz)| 100.0 * bound / hz);
-            let hertz = |value: Option<f64>| match bound {
-                Some(_) => like(value, bound),
-                None => optional(value, 6),
-            };
+            let [measured, predicted, reading] = compared_frequencies(document, row);
             vec![
                 row.mode.to_string(),
-                hertz(row.measured),
-                hertz(row.predicted),
+                measured,
+                predicted,
                 signed_percent(row.error_percent),
-                percent.map_or(MISSING.into(), |p| format!("\u{b1}{}", significant(p, 2))),
-                optional(row.lambda, 5),
-                if row.used { "yes" } else { "no" }.to_owned(),
+                reading,
+                optional(row.lambda, 6),
+                if compared {
+                    used(row.used)
+                } else {
+                    String::new()
+                },
             ]
         })
         .collect();
-    Some(Table {
-        caption: "Measured and predicted frequencies".to_owned(),
+    let (caption, note) = if compared {
+        (
+            "Measured and predicted frequencies",
+            "Error = 100 (predicted \u{2212} measured)/measured. Reading: bound of the measured \
+             frequency. Used: the mode entered the estimate; the others are true predictions.",
+        )
+    } else {
+        (
+            "Predicted frequencies",
+            "\u{3bb}: non-dimensional frequency, \u{3bb}\u{2074} = (2\u{3c0}f)\u{b2} \u{3c1}A \
+             L\u{2074}/(EI).",
+        )
+    };
+    let table = Table {
+        caption: caption.to_owned(),
         columns: vec![
             number("Mode"),
             number("Measured (Hz)"),
@@ -182,9 +211,30 @@ pub fn prediction(document: &Document) -> Option<Table> {
             number("\u{3bb} (1)"),
             words("Used"),
         ],
-        rows,
-        note: "Error = 100 (predicted \u{2212} measured)/measured. Reading: bound of the measured \
-               frequency. Used: the mode entered the estimate; the others are true predictions."
-            .to_owned(),
-    })
+        rows: cells,
+        note: note.to_owned(),
+    };
+    Some(table.without_empty_columns())
+}
+
+/// Measured and predicted frequency to the same digit, and the bound of the reading in percent.
+fn compared_frequencies(document: &Document, row: &PredictionSection) -> [String; 3] {
+    let mode = mode_of(document, row.mode);
+    let bound = mode.and_then(bound_of);
+    // The digits of the list of modes, so that the same frequency reads the same.
+    let listed = mode
+        .filter(|_| bound.is_some())
+        .map(|mode| reading(mode).value);
+    let hertz = |value: Option<f64>| match (value, &listed) {
+        (Some(value), Some(listed)) => with_decimals_of(value, listed),
+        _ => optional(value, 6),
+    };
+    let percent = bound
+        .zip(row.measured)
+        .map(|(bound, hz)| 100.0 * bound / hz);
+    [
+        hertz(row.measured),
+        hertz(row.predicted),
+        percent.map_or(MISSING.into(), bound_percent),
+    ]
 }

@@ -1,19 +1,26 @@
-//! Tables of what was measured: recordings, taps, resonances.
+//! Tables of what was recorded: recordings and their channels.
 
-use super::super::document::{Document, ModeSection, RecordingSection, TapSection};
-use super::super::format::{MISSING, line_reading, optional, rounded, significant, trimmed};
-use super::{Column, Table, bound_of, mode_name, number, words};
+use super::super::document::{ChannelSection, Document, RecordingSection};
+use super::super::format::{MISSING, optional, significant, trimmed, unit_words};
+use super::{Table, number, words};
 
 /// One row for each recording; `None` without recordings.
 pub fn recordings(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
-    Some(Table {
-        caption: "Recordings and their spectra".to_owned(),
+    let transformed = recordings.iter().any(|r| r.line_spacing.is_some());
+    let table = Table {
+        caption: if transformed {
+            "Recordings and their spectra"
+        } else {
+            "Recordings"
+        }
+        .to_owned(),
         columns: vec![
             words("Recording"),
+            words("Format").on_page_if(transformed),
             number("Rate (Hz)"),
             number("Length (s)"),
-            number("Channels").on_page(),
+            number("Channels").on_page_if(transformed),
             number("Taps used"),
             number("Block (samples)").on_page(),
             number("Lines").on_page(),
@@ -26,11 +33,16 @@ pub fn recordings(document: &Document) -> Option<Table> {
             number("Left at end (%)").on_page(),
         ],
         rows: recordings.iter().map(recording_row).collect(),
-        note: "Spacing: distance of the spectral lines. 1/T: resolution, T the length of signal \
-               used. Block: samples at the rate of the zoomed band. Left at end: level at the \
-               record's end relative to its start."
-            .to_owned(),
-    })
+        note: if transformed {
+            "Spacing: distance of the spectral lines. 1/T: resolution, T the length of signal \
+             used. Block: samples at the rate of the zoomed band. Left at end: level at the \
+             record's end relative to its start."
+        } else {
+            ""
+        }
+        .to_owned(),
+    };
+    Some(table.without_empty_columns())
 }
 
 fn recording_row(recording: &RecordingSection) -> Vec<String> {
@@ -38,6 +50,7 @@ fn recording_row(recording: &RecordingSection) -> Vec<String> {
     let count = |value: Option<usize>| value.map_or(MISSING.to_owned(), |v| v.to_string());
     vec![
         recording.file.clone(),
+        recording.format.clone(),
         trimmed(recording.sample_rate, 8),
         trimmed(recording.seconds, 4),
         recording.channels.to_string(),
@@ -65,153 +78,56 @@ fn band(band: Option<[f64; 2]>) -> String {
     })
 }
 
-/// One row for each tap; `None` where none was looked for or found.
-pub fn taps(document: &Document) -> Option<Table> {
+/// One row for each channel; `None` without recordings.
+pub fn channels(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
+    let several = recordings.len() > 1;
     let rows: Vec<Vec<String>> = recordings
         .iter()
         .flat_map(|recording| {
-            let taps = recording.taps.iter().enumerate();
-            taps.map(|(index, tap)| tap_row(&recording.file, index + 1, tap))
+            let name = if several { recording.file.as_str() } else { "" };
+            let details = recording.channel_details.iter();
+            details.map(|channel| channel_row(name, channel))
         })
         .collect();
     if rows.is_empty() {
         return None;
     }
-    Some(Table {
-        caption: "Taps".to_owned(),
+    let table = Table {
+        caption: "Channels".to_owned(),
         columns: vec![
             words("Recording"),
-            number("Tap"),
-            number("Time (s)"),
+            number("Channel"),
+            words("Name"),
+            words("Unit"),
+            number("DC"),
+            number("RMS"),
             number("Peak"),
-            words("Used"),
-            words("Reason"),
+            number("Full scale"),
+            number("Flat tops"),
+            number("Dropped samples"),
         ],
         rows,
-        note: "Peak: force (N), or the response's peak where no hammer was recorded (SI)."
+        note: "DC: mean. RMS: about the mean. Peak: largest magnitude. Full scale: samples at the \
+               end of the number range. Flat tops: crests that are cut off. Dropped samples: in \
+               runs that repeat one value."
             .to_owned(),
-    })
+    };
+    Some(table.without_empty_columns())
 }
 
-fn tap_row(file: &str, number: usize, tap: &TapSection) -> Vec<String> {
-    let peak = match (tap.peak_force, tap.peak_response) {
-        (Some(force), _) => format!("{} N", significant(force, 3)),
-        (None, response) => optional(response, 3),
-    };
+fn channel_row(file: &str, channel: &ChannelSection) -> Vec<String> {
+    let unit = channel.unit.as_deref().unwrap_or("not given");
     vec![
         file.to_owned(),
-        number.to_string(),
-        format!("{:.3}", tap.time),
-        peak,
-        if tap.accepted { "yes" } else { "no" }.to_owned(),
-        tap.reason.clone().unwrap_or_default(),
+        channel.channel.to_string(),
+        channel.name.clone().unwrap_or_default(),
+        unit_words(unit),
+        significant(channel.mean, 3),
+        significant(channel.rms, 3),
+        significant(channel.peak, 3),
+        channel.full_scale_samples.to_string(),
+        channel.flat_tops.to_string(),
+        channel.dropped_samples.to_string(),
     ]
-}
-
-/// One row for each resonance of the merged list; `None` without any.
-pub fn modes(document: &Document) -> Option<Table> {
-    let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
-    Some(Table {
-        caption: "Modes".to_owned(),
-        columns: mode_columns(),
-        rows: modes.iter().map(mode_row).collect(),
-        note:
-            "Frequency: the best reading with its bound (about 95 %). Line: the highest spectral \
-               line \u{b1} half of the larger of line spacing and 1/T. \u{3bb}: non-dimensional \
-               frequency of the Euler beam."
-                .to_owned(),
-    })
-}
-
-/// Each recording's own readings; `None` where there is at most one recording.
-pub fn readings(document: &Document) -> Option<Table> {
-    let recordings = document.recordings.as_deref().filter(|r| r.len() > 1)?;
-    let rows: Vec<Vec<String>> = recordings
-        .iter()
-        .flat_map(|recording| {
-            recording.modes.iter().map(|mode| {
-                let mut mode = mode.clone();
-                mode.recording.get_or_insert_with(|| recording.file.clone());
-                mode_row(&mode)
-            })
-        })
-        .collect();
-    if rows.is_empty() {
-        return None;
-    }
-    Some(Table {
-        caption: "Readings of each recording".to_owned(),
-        columns: mode_columns(),
-        rows,
-        note: "The list of modes takes each from the recording that resolves it best.".to_owned(),
-    })
-}
-
-fn mode_columns() -> Vec<Column> {
-    vec![
-        words("Mode"),
-        number("Frequency (Hz)"),
-        words("Method").on_page(),
-        number("Line (Hz)"),
-        number("Between lines (Hz)").on_page(),
-        number("Damping ratio (%)"),
-        number("\u{3bb} (1)"),
-        number("Prominence (dB)").on_page(),
-        number("Above noise (dB)").on_page(),
-        words("Recording"),
-    ]
-}
-
-fn mode_row(mode: &ModeSection) -> Vec<String> {
-    let line = mode.line_frequency.map(|line| match mode.half_line {
-        Some(half) => line_reading(line, half).joined(),
-        None => significant(line, 6),
-    });
-    let interpolated = mode
-        .interpolated_frequency
-        .map(|frequency| rounded(frequency, mode.interpolated_bound).joined());
-    let damping = mode.damping.map(|damping| {
-        let std = mode.damping_std.map(|std| 100.0 * std);
-        match std {
-            Some(_) => rounded(100.0 * damping, std).joined(),
-            None => significant(100.0 * damping, 2),
-        }
-    });
-    vec![
-        mode_name(mode),
-        best(mode),
-        mode.method.clone(),
-        line.unwrap_or_else(|| MISSING.into()),
-        interpolated.unwrap_or_else(|| MISSING.into()),
-        damping.unwrap_or_else(|| MISSING.into()),
-        lambda(mode),
-        optional(mode.prominence_db, 2),
-        optional(mode.above_noise_db, 2),
-        mode.recording.clone().unwrap_or_else(|| MISSING.into()),
-    ]
-}
-
-/// The best frequency with its bound.
-pub fn best(mode: &ModeSection) -> String {
-    match (mode.method.as_str(), mode.half_line) {
-        ("line" | "given", Some(half_line)) => line_reading(mode.frequency, half_line).joined(),
-        _ => match bound_of(mode) {
-            Some(bound) => rounded(mode.frequency, Some(bound)).joined(),
-            None => significant(mode.frequency, 6),
-        },
-    }
-}
-
-/// Lambda with the digits that the frequency supports: it grows with the frequency's square root.
-fn lambda(mode: &ModeSection) -> String {
-    let Some(lambda) = mode.lambda else {
-        return MISSING.to_owned();
-    };
-    match bound_of(mode) {
-        Some(bound) if mode.frequency > 0.0 => {
-            rounded(lambda, Some(0.5 * lambda * bound / mode.frequency)).value
-        }
-        _ => significant(lambda, 5),
-    }
 }

@@ -2,13 +2,18 @@
 
 mod joint;
 mod measured;
+mod modes;
+mod taps;
 mod uncertainty;
 
 pub use joint::{Parameter, estimated, pairs, parameters, prediction};
-pub use measured::{modes, readings, recordings, taps};
-pub use uncertainty::{perturbation, sensitivity, spans};
+pub use measured::{channels, recordings};
+pub use modes::{modes, readings};
+pub use taps::{peak_unit, rejected_taps, taps, taps_used};
+pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 
 use super::document::{Document, ModeSection};
+use super::format::MISSING;
 
 /// A table of words.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -28,7 +33,7 @@ pub struct Table {
 pub struct Column {
     /// Name, with the unit in round brackets.
     pub name: String,
-    /// Numbers stand to the right, words to the left.
+    /// Numbers are aligned right, words left.
     pub kind: Kind,
     /// Whether a narrow terminal shows it.
     pub place: Place,
@@ -77,20 +82,46 @@ fn words(name: &str) -> Column {
     }
 }
 
+impl Table {
+    /// The same table without the columns in which nothing stands.
+    fn without_empty_columns(mut self) -> Table {
+        let says = |cell: Option<&String>| cell.is_some_and(|c| !c.is_empty() && c != MISSING);
+        let kept: Vec<bool> = (0..self.columns.len())
+            .map(|index| self.rows.iter().any(|row| says(row.get(index))))
+            .collect();
+        let mut flags = kept.iter();
+        self.columns.retain(|_| flags.next() == Some(&true));
+        for row in &mut self.rows {
+            let mut flags = kept.iter();
+            row.retain(|_| flags.next() == Some(&true));
+        }
+        self
+    }
+}
+
 impl Column {
     /// The same column, on the page only.
     fn on_page(mut self) -> Column {
         self.place = Place::Page;
         self
     }
+
+    /// The same column, on the page only where a condition holds.
+    fn on_page_if(self, crowded: bool) -> Column {
+        if crowded { self.on_page() } else { self }
+    }
 }
 
 /// Bound of the best reading of a mode (Hz): the interpolated frequency's own bound, else the half
 /// line, else two standard deviations.
 pub fn reading_bound(document: &Document, mode: usize) -> Option<f64> {
+    bound_of(mode_of(document, mode)?)
+}
+
+/// The resonance that carries a mode number.
+fn mode_of(document: &Document, mode: usize) -> Option<&ModeSection> {
     let modes = document.modes.as_deref().unwrap_or_default();
-    let mode = modes.iter().find(|entry| entry.mode == Some(mode))?;
-    bound_of(mode)
+    modes.iter().find(|entry| entry.mode == Some(mode))
 }
 
 /// Bound of a resonance's best frequency (Hz).

@@ -1,8 +1,10 @@
 //! Tables of how far the estimate moves when the frequencies do.
 
 use super::super::document::{Document, EstimateSection, SensitivitySection};
-use super::super::format::{MISSING, optional, signed, signed_percent, significant};
-use super::{Column, Table, number, reading_bound, words};
+use super::super::format::{
+    MISSING, bound_percent, optional, signed, signed_percent, significant, trimmed,
+};
+use super::{Column, Table, mode_of, number, words};
 
 /// The non-dimensional values that changes are counted from.
 fn base(document: &Document, method: &str) -> [Option<f64>; 3] {
@@ -51,7 +53,8 @@ pub fn perturbation(document: &Document) -> Option<Table> {
         caption: "All frequencies changed by the same percentage".to_owned(),
         columns,
         rows,
-        note: "\u{2013}: the changed frequencies leave no estimate.".to_owned(),
+        note: "Change: against the estimate. \u{2013}: the changed frequencies leave no estimate."
+            .to_owned(),
     })
 }
 
@@ -61,6 +64,78 @@ fn names(with_kz: bool) -> &'static [&'static str] {
     } else {
         &["Kx", "Ky"]
     }
+}
+
+/// Average errors under changed frequencies, as the paper's tables state them; `None` where not
+/// computed.
+pub fn averages(document: &Document) -> Option<Table> {
+    let averages = document.perturbation_averages.as_deref();
+    let list = averages.filter(|list| !list.is_empty())?;
+    let rows = list.iter().map(|row| {
+        let cell = |percent: Option<f64>| optional(percent, 3);
+        vec![
+            format!("\u{b1}{}", trimmed(row.percent, 4)),
+            cell(Some(row.kx_percent)),
+            cell(Some(row.ky_percent)),
+            cell(row.kz_percent),
+        ]
+    });
+    let table = Table {
+        caption: "Average errors of the stiffnesses".to_owned(),
+        columns: vec![
+            number("Frequencies (%)"),
+            number("Kx off by (%)"),
+            number("Ky off by (%)"),
+            number("Kz off by (%)"),
+        ],
+        rows: rows.collect(),
+        note: "Mean size of the changes of the table above, up and down.".to_owned(),
+    };
+    Some(table.without_empty_columns())
+}
+
+/// Median and 95 % interval under random errors of the frequencies; `None` where not computed.
+pub fn monte_carlo(document: &Document) -> Option<Table> {
+    let found = document.monte_carlo.as_ref()?;
+    let parameters = [("Kx", found.kx), ("Ky", found.ky), ("Kz", found.kz)];
+    let rows: Vec<Vec<String>> = parameters
+        .into_iter()
+        .zip(base(document, "pairs"))
+        .filter_map(|((name, value), base)| {
+            let value = value?;
+            Some(vec![
+                name.to_owned(),
+                optional(base, 5),
+                significant(value.value, 5),
+                optional(value.low, 5),
+                optional(value.high, 5),
+                signed_percent(change(value.low, base)),
+                signed_percent(change(value.high, base)),
+            ])
+        })
+        .collect();
+    let failed = match found.failed {
+        0 => String::new(),
+        failed => format!(" {failed} of them leave no estimate and are left out."),
+    };
+    let table = Table {
+        caption: "Random errors of the frequencies (Monte Carlo)".to_owned(),
+        columns: vec![
+            words("Parameter (1)"),
+            number("Estimate"),
+            number("Median"),
+            number("95 % low"),
+            number("95 % high"),
+            number("down (%)"),
+            number("up (%)"),
+        ],
+        rows,
+        note: format!(
+            "{} draws, each frequency with its own standard deviation.{failed}",
+            found.samples
+        ),
+    };
+    Some(table.without_empty_columns())
 }
 
 /// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
@@ -139,18 +214,13 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
 
 /// The bound in percent of the mode's frequency.
 fn reading_percent(document: &Document, row: &SensitivitySection) -> String {
-    let modes = document.modes.as_deref().unwrap_or_default();
-    let mode = modes.iter().find(|mode| mode.mode == Some(row.mode));
-    let known = mode.filter(|_| reading_bound(document, row.mode).is_some());
-    known.map_or(MISSING.to_owned(), |mode| {
-        format!(
-            "\u{b1}{}",
-            significant(100.0 * row.half_line / mode.frequency, 2)
-        )
+    let mode = mode_of(document, row.mode).filter(|mode| mode.frequency > 0.0);
+    mode.map_or(MISSING.to_owned(), |mode| {
+        bound_percent(100.0 * row.half_line / mode.frequency)
     })
 }
 
-/// "Kx hangs on mode 4, Ky on mode 1."
+/// "Kx depends most on mode 4, Ky on mode 1."
 pub fn drivers(list: &[SensitivitySection], with_kz: bool) -> String {
     let pick: [fn(&SensitivitySection) -> Option<f64>; 3] = [
         |row| row.kx_percent,
@@ -166,11 +236,12 @@ pub fn drivers(list: &[SensitivitySection], with_kz: bool) -> String {
                 .iter()
                 .filter(|row| strength(row) > 0.0)
                 .max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
-            Some(format!("{name} hangs most on mode {}", strongest.mode))
+            Some(format!("{name} on mode {}", strongest.mode))
         })
         .collect();
     if sentences.is_empty() {
         return String::new();
     }
-    format!("{}.", sentences.join(", "))
+    let list = sentences.join(", ");
+    format!("{}.", list.replacen(" on mode", " depends most on mode", 1))
 }

@@ -73,6 +73,10 @@ fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recor
     RecordingSection {
         channel_details: Vec::new(),
         file: file.into(),
+        format: "WAV, 24-bit integer".into(),
+        has_hammer: true,
+        responses: vec!["A".into(), "B".into()],
+        tap_unit: Some("N".into()),
         sample_rate: 5120.0,
         channels: 3,
         seconds: 20.5,

@@ -124,7 +124,7 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
         .collect();
     peaks.sort_by(|a, b| b.prominence_db.total_cmp(&a.prominence_db));
     let width = (lines.resolution() / lines.spacing).ceil().max(1.0) as usize;
-    let separation = settings.separation * width;
+    let separation = settings.separation.saturating_mul(width);
     let mut kept: Vec<Peak> = Vec::new();
     for peak in peaks {
         let clear = kept

@@ -307,9 +307,7 @@ pub enum RecordingError {
         hint: String,
     },
     /// A rate that is none.
-    #[error(
-        "{file}: sample rate {value} Hz; allowed: 0.001 to 1e9 Hz; correct the time column or the rate given"
-    )]
+    #[error("{file}: sample rate {value} Hz; allowed: 0.001 to 1e9 Hz; correct it")]
     BadSampleRate {
         /// The file.
         file: String,

@@ -197,7 +197,9 @@ pub(super) fn group(excursions: &[Excursion], distance: u64, hit: f64) -> Vec<Ev
         let count = rest
             .iter()
             .take_while(|e| e.start - first.start < distance)
-            .count();
+            .count()
+            // Below five samples per second the distance is no sample long.
+            .max(1);
         let (event, later) = rest.split_at(count);
         let peak = event
             .iter()

@@ -185,12 +185,12 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
 }
 
 /// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
-/// pulls. An excursion right beside a comparable downward swing is such ringing: within twice its own
-/// width, or three samples, on the side of the pulse.
+/// pulls. An excursion right beside a comparable downward swing is such ringing: within four times the
+/// half of its width, where crest and trough of a sine are three apart, on the side of the pulse.
 fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
     let above = |frame: &usize| force.get(*frame).is_some_and(|&x| x > 0.5 * other.peak);
     let width = (other.frame..).take_while(above).count();
-    let reach = (2 * width).max(3).min(main.frame.abs_diff(other.frame));
+    let reach = (4 * width).max(4).min(main.frame.abs_diff(other.frame));
     let beside = if main.frame < other.frame {
         other.frame - reach..other.frame
     } else {
@@ -265,7 +265,8 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
         .filter(|(_, tap)| tap.rejection.is_none())
     {
         let available = tap.frames() as f64 / rate;
-        if available < SHORT_OF_MEDIAN * needed {
+        // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
+        if available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if index == last {
                 Rejection::CutOff { available, needed }
             } else {

@@ -15,10 +15,11 @@ const FORMS: [(&str, FrfForm); 3] = [
     ("mobility", FrfForm::Mobility),
     ("receptance", FrfForm::Receptance),
 ];
-/// Below 16 samples there are six lines; 10 million samples are three minutes at 51.2 kHz.
+/// Below 16 samples there are six lines; 2^22 samples are 80 s at 51.2 kHz, and as much as fits into
+/// the memory of a small machine.
 const BLOCK: Limits = Limits::between(
     16.0,
-    1e7,
+    4_194_304.0,
     "a block of 2048 samples shows 800 lines; leave it out to have it chosen",
 );
 const SAMPLE_RATE: Limits = Limits::between(

@@ -144,7 +144,7 @@ impl<'a> Stage<'a> {
             let mut samples = self.record(tap)?;
             if let (Some((unity, taper)), Some(force)) = (force_window_of(tap), samples.first_mut())
             {
-                take_out_median(force);
+                remove_offset(force, rate);
                 apply_force_window(force, unity, taper);
             }
             let mut transforms: Vec<Vec<Complex64>> = samples
@@ -234,16 +234,22 @@ fn force_window_of(tap: &Tap) -> Option<(usize, usize)> {
     Some((2 * length, length))
 }
 
-/// Takes the median out of a force record: the hammer's offset where it drifts, for a pulse of a few
-/// milliseconds does not move the median.
-fn take_out_median(force: &mut [f64]) {
-    let mut sorted = force.to_vec();
-    if sorted.is_empty() {
+/// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
+/// median is the level at rest, and short beside the drift of its amplifier.
+const OFFSET_STRETCH: f64 = 0.2;
+
+/// Takes out the level at which the force rests about its pulse. The mean of the recording is not
+/// that level: the pulses are in it, and over the force window the difference amounts to a percent
+/// of a pulse's momentum.
+fn remove_offset(force: &mut [f64], sample_rate: f64) {
+    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
+    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
+    if about.is_empty() {
         return;
     }
-    let half = sorted.len() / 2;
-    let median = *sorted.select_nth_unstable_by(half, f64::total_cmp).1;
-    force.iter_mut().for_each(|x| *x -= median);
+    let half = about.len() / 2;
+    let rest = *about.select_nth_unstable_by(half, f64::total_cmp).1;
+    force.iter_mut().for_each(|x| *x -= rest);
 }
 
 /// Bound on the transforms kept for a test without hammer (values; 16 bytes each).

@@ -1,8 +1,7 @@
 //! What can go wrong so badly that a recording cannot be used.
 
-use std::io;
-
 use super::text::short;
+use std::io;
 
 /// Why a recording cannot be opened, read or written: the file, and the line where there is one;
 /// what was found, what is allowed, what to do. Poor data are [`super::RecordingWarning`]s instead.
@@ -307,7 +306,9 @@ pub enum RecordingError {
         hint: String,
     },
     /// A rate that is none.
-    #[error("{file}: sample rate {value} Hz; allowed: 0.001 to 1e9 Hz; correct it")]
+    #[error(
+        "{file}: sample rate {value} Hz; allowed: 0.001 to 1e9 Hz; correct it or the time column"
+    )]
     BadSampleRate {
         /// The file.
         file: String,

@@ -53,5 +53,5 @@ pub enum SpectralError {
 
 /// Smallest block (samples): fewer displayed lines than six show no resonance.
 pub const LEAST_BLOCK: usize = 16;
-/// Largest block (samples): a bound on memory, 3 h at 12 kHz.
-pub const MOST_BLOCK: usize = 1 << 27;
+/// Largest block (samples): a bound on memory (67 MB a channel), 80 s at 51.2 kHz.
+pub const MOST_BLOCK: usize = 1 << 22;

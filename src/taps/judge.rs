@@ -185,12 +185,13 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
 }
 
 /// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
-/// pulls. An excursion right beside a comparable downward swing is such ringing: within four times the
-/// half of its width, where crest and trough of a sine are three apart, on the side of the pulse.
+/// pulls. An excursion right beside a comparable downward swing is such ringing: within twice its own
+/// width, or three samples, on the side of the pulse.
 fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
     let above = |frame: &usize| force.get(*frame).is_some_and(|&x| x > 0.5 * other.peak);
-    let width = (other.frame..).take_while(above).count();
-    let reach = (4 * width).max(4).min(main.frame.abs_diff(other.frame));
+    let width = (other.frame..).take_while(above).count()
+        + (0..other.frame).rev().take_while(above).count();
+    let reach = (2 * width).max(3).min(main.frame.abs_diff(other.frame));
     let beside = if main.frame < other.frame {
         other.frame - reach..other.frame
     } else {

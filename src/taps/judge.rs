@@ -266,7 +266,8 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
         .filter(|(_, tap)| tap.rejection.is_none())
     {
         let available = tap.frames() as f64 / rate;
-        if available < SHORT_OF_MEDIAN * needed {
+        // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
+        if available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if index == last {
                 Rejection::CutOff { available, needed }
             } else {

@@ -63,6 +63,8 @@ pub(super) fn find(
         channels,
         frames,
     )?;
+    // At a few samples per piece two rises may begin with the same sample.
+    events.dedup_by(|later, earlier| later.trigger <= earlier.trigger);
     Ok(Found {
         events,
         noise: floors.first().copied().unwrap_or(0.0) / 2.0,

@@ -34,6 +34,8 @@ pub struct ModeReading {
 pub enum PeakLabel {
     /// Mains hum at this multiple (Hz) of 50 or 60 Hz.
     Mains(f64),
+    /// The force has a gap there, and the quotient a peak.
+    ForceGap,
     /// No decaying oscillation explains it: speckle of noise or reverberation.
     NoResonance,
 }
@@ -42,6 +44,7 @@ impl fmt::Display for PeakLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
+            PeakLabel::ForceGap => f.write_str("gap of the force"),
             PeakLabel::NoResonance => f.write_str("no clear resonance"),
         }
     }

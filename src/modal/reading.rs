@@ -44,7 +44,8 @@ pub fn read_peaks(
     peaks.iter().map(one).collect()
 }
 
-/// A peak that stands out by less than this (dB) must be read within its half line to count.
+/// A peak that stands out by less than this (dB) must be read within its half line, or a quarter of its
+/// half-power width, to count.
 const CLEAR_PROMINENCE: f64 = 8.0;
 /// From this height over the noise on (dB), noise does not make peaks any more.
 const CLEAR_OF_NOISE: f64 = 30.0;
@@ -72,7 +73,13 @@ fn is_resonance(found: &Interpolation, peak: &Peak, half_line: f64) -> bool {
     } else {
         decays_by(5.0) && found.decay_in_record >= LEAST_DECAY
     };
-    decays && (peak.prominence_db >= CLEAR_PROMINENCE || found.bound < half_line)
+    let readable = found.bound < half_line.max(0.5 * half_width(found));
+    decays && (peak.prominence_db >= CLEAR_PROMINENCE || readable)
+}
+
+/// Half of the half-power width, zeta f (Hz); 0 without damping.
+fn half_width(found: &Interpolation) -> f64 {
+    found.damping_ratio.unwrap_or(0.0) * found.frequency
 }
 
 /// Puts a reading together. The reading between the lines counts where its bound is below the half
@@ -86,7 +93,6 @@ fn reading(
 ) -> ModeReading {
     let lines = &level.lines;
     let half_line = lines.half_line();
-    let half_width = |found: &Interpolation| found.damping_ratio.unwrap_or(0.0) * found.frequency;
     let sharp = between.filter(|found| found.bound < half_line.max(half_width(found)));
     let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
     ModeReading {

@@ -1,5 +1,7 @@
 //! The steps of one recording's measurement that read samples.
 
+use std::f64::consts::TAU;
+
 use num_complex::Complex64;
 
 use super::measure::{MeasureSettings, MeasuredSpectra};
@@ -64,21 +66,19 @@ impl<'a> Stage<'a> {
         let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
         let mut force = self.read(start..quiet.end)?;
         let responses = force.split_off(usize::from(self.has_force));
+        let rate = self.recording.sample_rate();
         let windows = self
             .taps
             .accepted()
-            .filter_map(force_window_of)
-            .map(|(unity, taper)| {
-                // A half-cosine taper has 3/8 of its length in energy.
-                unity as f64 + 0.375 * taper as f64
-            });
+            .filter_map(|tap| pulse_window(tap, rate));
+        let energy: f64 = windows.map(PulseWindow::energy).sum();
         let count = self.taps.accepted().count().max(1) as f64;
         Ok(Quiet {
             force: force.pop(),
             responses,
             sample_rate: self.recording.sample_rate(),
             block: self.gate as usize,
-            force_window: windows.sum::<f64>() / count,
+            force_window: energy / count,
         })
     }
 
@@ -142,10 +142,9 @@ impl<'a> Stage<'a> {
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
         for tap in self.taps.accepted() {
             let mut samples = self.record(tap)?;
-            if let (Some((unity, taper)), Some(force)) = (force_window_of(tap), samples.first_mut())
-            {
+            if let (Some(window), Some(force)) = (pulse_window(tap, rate), samples.first_mut()) {
                 remove_offset(force, rate);
-                apply_force_window(force, unity, taper);
+                window.apply(force);
             }
             let mut transforms: Vec<Vec<Complex64>> = samples
                 .iter_mut()
@@ -157,7 +156,12 @@ impl<'a> Stage<'a> {
             let responses = transforms.split_off(usize::from(self.has_force));
             averager.add(transforms.first().map(Vec::as_slice), &responses);
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
-                kept.extend(responses);
+                let delay = tap.time - tap.record.start as f64 / rate;
+                kept.extend(
+                    responses
+                        .into_iter()
+                        .map(|x| self.timed_from_trigger(x, delay)),
+                );
             }
         }
         // At least one tap was accepted, or there would be no axis.
@@ -165,6 +169,16 @@ impl<'a> Stage<'a> {
             .finish()
             .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
         Ok((averages, kept))
+    }
+
+    /// A transform with its time zero at the trigger, `delay` (s) into the record: the slope that the
+    /// quiet before it puts on the phase is no background that a fit of few lines could follow.
+    fn timed_from_trigger(&self, mut transform: Vec<Complex64>, delay: f64) -> Vec<Complex64> {
+        for (line, value) in transform.iter_mut().enumerate() {
+            let turn = TAU * self.lines.frequency(line) * delay;
+            *value *= Complex64::from_polar(1.0, turn);
+        }
+        transform
     }
 
     /// Peaks of the composite level over all sensors, read and labelled.
@@ -198,6 +212,10 @@ impl<'a> Stage<'a> {
             .collect();
         let mut readings = read_peaks(&level, &spectra, &peaks, window);
         for (reading, peak) in readings.iter_mut().zip(&peaks) {
+            let gap = |force: &Vec<f64>| is_force_gap(force, &level, peak.index);
+            if averages.force.as_ref().is_some_and(gap) {
+                reading.label = Some(PeakLabel::ForceGap);
+            }
             if let Some(label) =
                 quiet.mains_label(peak.index, averages, window, &self.settings.mains)
             {
@@ -226,12 +244,44 @@ fn slowest_decay(checks: &[DecayCheck]) -> DecayCheck {
         .unwrap_or(nothing)
 }
 
-/// Force window of a tap (samples of unity, of taper): pre-trigger and pulse, that length again for
-/// what the pulse's search for calm may have missed, and a taper as long as pre-trigger and pulse.
-/// `None` without a hammer.
-fn force_window_of(tap: &Tap) -> Option<(usize, usize)> {
-    let length = tap.pulse_end?.saturating_sub(tap.record.start) as usize;
-    Some((2 * length, length))
+/// Where the pulse of a tap lies in its record (samples): zero before `start`, unity for `length`
+/// from there, a taper of the pulse's own length after it.
+#[derive(Clone, Copy)]
+struct PulseWindow {
+    start: usize,
+    length: usize,
+    taper: usize,
+}
+
+/// The ringing of a filter ahead of a pulse lasts no longer than this (s), or eight samples.
+const AHEAD_OF_PULSE: f64 = 2e-3;
+
+/// The force window of a tap: from just before the trigger to the end of the pulse, and as long again
+/// for what the search for its end may have missed. Noise and offset of the hammer before and after
+/// would ripple through every quotient. `None` without a hammer.
+fn pulse_window(tap: &Tap, sample_rate: f64) -> Option<PulseWindow> {
+    let trigger = (tap.time * sample_rate).round() as u64;
+    let pulse = tap.pulse_end?.saturating_sub(trigger).max(1) as usize;
+    let into = trigger.saturating_sub(tap.record.start) as usize;
+    let ahead = ((AHEAD_OF_PULSE * sample_rate) as usize).max(8).min(into);
+    Some(PulseWindow {
+        start: into - ahead,
+        length: ahead + 2 * pulse,
+        taper: pulse,
+    })
+}
+
+impl PulseWindow {
+    fn apply(self, force: &mut [f64]) {
+        let start = self.start.min(force.len());
+        force[..start].fill(0.0);
+        apply_force_window(&mut force[start..], self.length, self.taper);
+    }
+
+    /// Energy of the window (samples): a half-cosine taper has 3/8 of its length.
+    fn energy(self) -> f64 {
+        self.length as f64 + 0.375 * self.taper as f64
+    }
 }
 
 /// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
@@ -254,6 +304,23 @@ fn remove_offset(force: &mut [f64], sample_rate: f64) {
 
 /// Bound on the transforms kept for a test without hammer (values; 16 bytes each).
 const MOST_KEPT: usize = 1 << 24;
+
+/// Whether a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
+/// resonates, so the quotient's peak is the force's doing. The force on the peak is compared with that
+/// on its flanks, where the level has fallen by 6 dB.
+fn is_force_gap(force: &[f64], level: &CompositeLevel, peak: usize) -> bool {
+    let foot = level.level_db[peak] - 6.0;
+    let fallen = |line: &usize| level.level_db.get(*line).is_some_and(|&l| l < foot);
+    let left = (0..peak).rev().find(fallen);
+    let right = (peak..level.level_db.len()).find(fallen);
+    let flanks = [left, right]
+        .into_iter()
+        .flatten()
+        .filter_map(|line| force.get(line))
+        .copied()
+        .fold(0.0, f64::max);
+    force[peak] < 0.6 * flanks
+}
 
 /// A mains line keeps its line reading and loses what only a resonance has.
 fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> ModeReading {

@@ -112,7 +112,22 @@ fn recover_frequencies_and_joint_over_200_virtual_tests() {
             .iter()
             .filter(|mode| mode.mode.is_some())
             .collect();
-        assert_eq!(numbered.len(), 5, "seed {seed}: modes found");
+        assert_eq!(
+            numbered.len(),
+            5,
+            "seed {seed}: modes found {:?} {:?}",
+            test.modes
+                .iter()
+                .map(|m| (
+                    m.frequency,
+                    m.label.clone(),
+                    m.reading
+                        .as_ref()
+                        .map(|r| (r.prominence_db, r.above_noise_db))
+                ))
+                .collect::<Vec<_>>(),
+            test.truth
+        );
         for (mode, truth) in numbered.iter().zip(&test.truth) {
             let reading = mode.reading.as_ref().unwrap();
             // The claim is for peaks at least 40 dB above the noise; here all are.

@@ -583,13 +583,13 @@ fn regress_recordings_and_settings_that_cannot_be() {
                 ("block = 2048", "block = 15"),
                 34,
                 "recording[1].block",
-                &["15 is impossible; allowed: 16 to 1e7"],
+                &["15 is impossible; allowed: 16 to 4.194304e6"],
             ),
             case(
                 ("block = 2048", "block = -2048"),
                 34,
                 "recording[1].block",
-                &["allowed: 16 to 1e7"],
+                &["allowed: 16 to 4.194304e6"],
             ),
             case(
                 ("block = 2048", "block = 2048.5"),

@@ -102,7 +102,7 @@ fn sample_rate(text: &str) -> Result<f64, String> {
 
 /// Parser of block sizes, with the limits of the test description's `block`.
 pub(super) fn block_size() -> RangedU64ValueParser<usize> {
-    RangedU64ValueParser::new().range(16..=10_000_000)
+    RangedU64ValueParser::new().range(16..=4_000_000)
 }
 
 /// A frequency band, `LO:HI` (Hz).

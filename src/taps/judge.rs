@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::answer::is_answered;
 use super::hammer::Survey;
 use super::{Event, Found, Rejection, Tap, TapSettings, TapSource, Taps};
 use crate::recording::{Recording, RecordingError};
@@ -18,8 +19,22 @@ pub(super) fn judge(
     found: Found,
     settings: &TapSettings,
 ) -> Result<Taps, RecordingError> {
-    let weakest = settings.weak * median(found.events.iter().map(|event| event.peak));
-    let records = records(recording, &found.events, (settings, weakest));
+    let mut answered = Vec::with_capacity(found.events.len());
+    for event in &found.events {
+        answered.push(match source {
+            TapSource::Hammer { responses, .. } => is_answered(recording, responses, event)?,
+            TapSource::Responses(_) => true,
+        });
+    }
+    let real = |(event, answered): (&Event, &bool)| answered.then_some(event.peak);
+    let weakest = settings.weak * median(found.events.iter().zip(&answered).filter_map(real));
+    let counts: Vec<bool> = found
+        .events
+        .iter()
+        .zip(&answered)
+        .map(|(event, &answered)| answered && event.peak >= weakest)
+        .collect();
+    let records = records(recording, (&found.events, &counts), settings);
     let hammer = match (source, &found.survey) {
         (TapSource::Hammer { channel, .. }, Some(survey)) => Some(Hammer {
             recording,
@@ -29,7 +44,7 @@ pub(super) fn judge(
         _ => None,
     };
     let mut taps = Vec::with_capacity(found.events.len());
-    for (event, record) in found.events.iter().zip(records) {
+    for ((event, record), answered) in found.events.iter().zip(records).zip(answered) {
         let force = hammer
             .as_ref()
             .map(|hammer| hammer.force(event, settings))
@@ -41,7 +56,9 @@ pub(super) fn judge(
             record,
             rejection: None,
         };
-        tap.rejection = if event.peak < weakest {
+        tap.rejection = if !answered {
+            Some(Rejection::NoResponse)
+        } else if event.peak < weakest {
             Some(Rejection::TooWeak {
                 peak: event.peak,
                 limit: weakest,
@@ -61,25 +78,23 @@ pub(super) fn judge(
     })
 }
 
-/// Each event's record: from the pre-trigger to that of the next event worth the name, or the file's
-/// end. What stays below a tenth of the usual tap disturbs a record no more than is tolerated of a
-/// second excursion, and does not end it.
+/// Each event's record: from the pre-trigger to that of the next event that `counts`, or the file's
+/// end. What moves no sensor, or stays below a tenth of the usual tap, disturbs a record no more than
+/// is tolerated of a second excursion, and does not end it.
 fn records(
     recording: &Recording,
-    events: &[Event],
-    (settings, weakest): (&TapSettings, f64),
+    (events, counts): (&[Event], &[bool]),
+    settings: &TapSettings,
 ) -> Vec<Range<u64>> {
     let before = ((settings.pre_trigger * recording.sample_rate()) as u64).max(16);
     let start = |event: &Event| event.trigger.saturating_sub(before);
-    events
-        .iter()
-        .enumerate()
-        .map(|(index, event)| {
-            let next = events[index + 1..].iter().find(|next| next.peak >= weakest);
-            let end = next.map_or(recording.frames(), start);
-            start(event)..end.max(start(event))
-        })
-        .collect()
+    let record = |(index, event): (usize, &Event)| {
+        let mut later = events.iter().zip(counts).skip(index + 1);
+        let next = later.find(|(_, counts)| **counts);
+        let end = next.map_or(recording.frames(), |(next, _)| start(next));
+        start(event)..end.max(start(event))
+    };
+    events.iter().enumerate().map(record).collect()
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {

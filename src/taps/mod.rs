@@ -5,6 +5,7 @@
 //! recording block by block. A tap's record begins a little before the trigger and ends where the
 //! next tap comes.
 
+mod answer;
 mod hammer;
 mod judge;
 mod response;
@@ -126,6 +127,8 @@ pub enum Rejection {
         /// Samples at the limit.
         samples: usize,
     },
+    /// No sensor moved.
+    NoResponse,
     /// Too weak beside the others.
     TooWeak {
         /// Its peak.
@@ -169,6 +172,9 @@ impl fmt::Display for Rejection {
                     "overload: channel {channel} is at its limit for {samples} samples"
                 )
             }
+            Rejection::NoResponse => f.write_str(
+                "no sensor answers it: the hammer was moved or laid down, or a disturbance",
+            ),
             Rejection::TooWeak { peak, limit } => {
                 write!(
                     f,

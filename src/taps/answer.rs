@@ -1,0 +1,44 @@
+//! Whether the structure answers a pulse of the force channel.
+
+use super::Event;
+use crate::recording::{Recording, RecordingError};
+
+/// Stretch before and after the trigger that is compared (s): several periods of the lowest modes'
+/// higher companions, short beside the time between taps.
+const STRETCH: f64 = 0.05;
+/// A tap raises the rms of some response by this factor at least; a weaker one rings on top of what
+/// is still ringing and is of no use.
+const RISE: f64 = 1.5;
+
+/// Whether any response rises when the force does. A hammer laid down, a swinging hammer and an
+/// electrical spike move no sensor. Without responses, or at the very start of the recording, the
+/// benefit of the doubt is given.
+pub(super) fn is_answered(
+    recording: &Recording,
+    responses: &[usize],
+    event: &Event,
+) -> Result<bool, RecordingError> {
+    let stretch = (STRETCH * recording.sample_rate()) as u64;
+    // The filter's ringing ahead of the pulse belongs to neither side.
+    let gap = stretch / 10;
+    if responses.is_empty() || stretch < 8 || event.trigger < 2 * stretch {
+        return Ok(true);
+    }
+    let before = event.trigger - gap - stretch..event.trigger - gap;
+    let after = event.trigger..event.trigger + stretch;
+    for &response in responses {
+        let quiet = rms(&recording.read(response, before.clone())?);
+        let loud = rms(&recording.read(response, after.clone())?);
+        if loud > RISE * quiet {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Root mean square about the mean; 0 of nothing.
+fn rms(samples: &[f64]) -> f64 {
+    let count = samples.len().max(1) as f64;
+    let mean = samples.iter().sum::<f64>() / count;
+    (samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
+}

@@ -31,3 +31,8 @@ pub mod pipeline;
 pub mod report;
 pub mod simulate;
 pub mod study;
+
+/// The README's code, compiled so that it stays true.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -18,10 +18,10 @@ use crate::spectral::Lines;
 pub struct Interpolation {
     /// Natural frequency (Hz), undamped: the modulus of the pole over 2 pi.
     pub frequency: f64,
-    /// Bound of the reading (Hz), about 95 %: the change between two sets of lines plus two standard
-    /// deviations.
+    /// Bound of the reading (Hz), about 95 %: the change between two sets of lines, two standard
+    /// deviations of the lines' scatter about the fitted curve, and what a single pole leaves.
     pub bound: f64,
-    /// Standard deviation from the scatter of the lines about the fitted curve (Hz).
+    /// Standard deviation (Hz), half the bound.
     pub std: f64,
     /// Damping ratio, the window's own decay taken out; `None` when nothing is left of it.
     pub damping_ratio: Option<f64>,
@@ -47,6 +47,9 @@ const LEAST_REACH: usize = 2;
 const MOST_LINES: usize = 100;
 /// From this reach on the background may slope: nine complex values against four unknowns.
 const SLOPING_REACH: usize = 4;
+/// What a fit of one pole leaves even without noise (lines): the image at the negative frequency and
+/// the curvature of the background, as seen on noise-free virtual tests.
+const MODEL_ERROR: f64 = 5e-4;
 /// Iterations of the weights; they settle in two.
 const REWEIGHTINGS: usize = 3;
 
@@ -82,10 +85,14 @@ pub fn interpolate_pole(
     let damped = lines.frequency(peak) + fit.pole.re * lines.spacing;
     let decay = fit.pole.im * lines.spacing - added_decay / TAU;
     let frequency = damped.hypot(decay.max(0.0));
-    let std = fit.std * lines.spacing;
+    let change = (fit.pole.re - narrower.pole.re).abs();
+    let bound = (change + 2.0 * fit.std + MODEL_ERROR) * lines.spacing;
+    // The bound is two standard deviations, what the model misses included; it goes for both parts
+    // of the pole.
+    let std = 0.5 * bound;
     Ok(Interpolation {
         frequency,
-        bound: (fit.pole.re - narrower.pole.re).abs() * lines.spacing + 2.0 * std,
+        bound,
         std,
         damping_ratio: (decay > 0.0).then(|| decay / frequency),
         damping_std: std / frequency,

@@ -102,9 +102,7 @@ fn reading(
         interpolated: sharp.map(|found| found.frequency),
         bound: sharp.map(|found| found.bound),
         // Without interpolation the truth lies anywhere within the half line.
-        std: Some(sharp.map_or(half_line / 3f64.sqrt(), |found| {
-            (found.bound / 2.0).max(found.std)
-        })),
+        std: Some(sharp.map_or(half_line / 3f64.sqrt(), |found| found.std)),
         damping_ratio: sharp.and_then(|found| found.damping_ratio),
         damping_std: sharp.and_then(|found| found.damping_ratio.map(|_| found.damping_std)),
         prominence_db: peak.prominence_db,

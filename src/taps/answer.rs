@@ -27,13 +27,24 @@ pub(super) fn is_answered(
     let before = event.trigger - gap - stretch..event.trigger - gap;
     let after = event.trigger..event.trigger + stretch;
     for &response in responses {
-        let quiet = rms(&recording.read(response, before.clone())?);
-        let loud = rms(&recording.read(response, after.clone())?);
-        if loud > RISE * quiet {
+        let quiet = recording.read(response, before.clone())?;
+        let loud = recording.read(response, after.clone())?;
+        let rises = |measure: fn(&[f64]) -> f64| measure(&loud) > RISE * measure(&quiet);
+        if rises(rms) || rises(rms_of_change) {
             return Ok(true);
         }
     }
     Ok(false)
+}
+
+/// rms of the second differences: it weighs high modes, which die first and which a new hit wakes
+/// even while the low ones still ring loudly.
+fn rms_of_change(samples: &[f64]) -> f64 {
+    let change: Vec<f64> = samples
+        .windows(3)
+        .map(|x| x[2] - 2.0 * x[1] + x[0])
+        .collect();
+    rms(&change)
 }
 
 /// Root mean square about the mean; 0 of nothing.

@@ -165,7 +165,7 @@ fn regress_bad_usage_is_explained() {
             &["spectrum", "a.wav", "--zoom", "200"],
             &["there is no colon"],
         ),
-        (&["spectrum", "a.wav", "--block", "8"], &["16..=10000000"]),
+        (&["spectrum", "a.wav", "--block", "8"], &["16..=4000000"]),
         (&["spectrum", "a.wav"], &["a.wav: cannot be read"]),
         (&["inspect", "a.wav", "--hammer", "0"], &["count from 1"]),
         (&["predict"], &["required"]),

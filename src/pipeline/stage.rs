@@ -311,15 +311,18 @@ const MOST_KEPT: usize = 1 << 24;
 fn is_force_gap(force: &[f64], level: &CompositeLevel, peak: usize) -> bool {
     let foot = level.level_db[peak] - 6.0;
     let fallen = |line: &usize| level.level_db.get(*line).is_some_and(|&l| l < foot);
-    let left = (0..peak).rev().find(fallen);
-    let right = (peak..level.level_db.len()).find(fallen);
-    let flanks = [left, right]
-        .into_iter()
-        .flatten()
-        .filter_map(|line| force.get(line))
-        .copied()
-        .fold(0.0, f64::max);
-    force[peak] < 0.6 * flanks
+    let left = (0..peak)
+        .rev()
+        .find(fallen)
+        .and_then(|line| force.get(line));
+    let right = (peak..level.level_db.len())
+        .find(fallen)
+        .and_then(|line| force.get(line));
+    // A gap is lower than either flank; a force that merely falls off is lower than one.
+    match (left, right) {
+        (Some(&left), Some(&right)) => force[peak] < 0.6 * left.min(right),
+        _ => false,
+    }
 }
 
 /// A mains line keeps its line reading and loses what only a resonance has.

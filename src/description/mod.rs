@@ -175,6 +175,15 @@ pub enum ChannelRef {
     Name(String),
 }
 
+/// What a channel's signal is multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// SI units per unit of the file, whatever unit a header names.
+    PerUnit(f64),
+    /// SI units per volt, from a sensitivity: a header's mV still count as millivolts.
+    PerVolt(f64),
+}
+
 /// The impact hammer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HammerDescription {
@@ -182,7 +191,7 @@ pub struct HammerDescription {
     pub channel: ChannelRef,
     /// Newtons per unit of the file (integer WAV: full scale = 1); `None` when the file does not
     /// say, so that a unit in a CSV header may decide (else 1).
-    pub scale: Option<f64>,
+    pub scale: Option<Scale>,
 }
 
 /// What a sensor senses.
@@ -206,7 +215,7 @@ pub struct SensorDescription {
     /// Where its signal is; when the file is silent, the column of the sensor's name.
     pub channel: ChannelRef,
     /// SI units per unit of the file, negative when mounted the other way; `None` when not given.
-    pub scale: Option<f64>,
+    pub scale: Option<Scale>,
     /// Where it sits (m); `None` for a microphone, or when unknown (it then has no mass either).
     pub position: Option<f64>,
     /// Its mass (kg), where the data sheet is known.

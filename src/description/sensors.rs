@@ -5,7 +5,7 @@ use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Dou
 use super::keys;
 use super::limits::Limits;
 use super::reader::{Entry, Table};
-use super::{BeamDescription, ChannelRef, HammerDescription, SensorDescription, SensorKind};
+use super::{BeamDescription, ChannelRef, HammerDescription, Scale, SensorDescription, SensorKind};
 use crate::quantity::Dimension;
 
 const KINDS: [(&str, SensorKind); 4] = [
@@ -208,13 +208,13 @@ fn read_scale(
     table: &Table<'_>,
     signal: Dimension,
     sensitivity: Dimension,
-) -> Result<Option<f64>, DescriptionError> {
+) -> Result<Option<Scale>, DescriptionError> {
     match (table.get("scale"), table.get("sensitivity")) {
         (Some(_), Some(entry)) => Err(entry.error(DescriptionProblem::Conflict {
             reason: "`scale` and `sensitivity` say the same thing twice".into(),
             remedy: "keep `scale` (SI units per unit of the file) or `sensitivity` (files in volts)",
         })),
-        (Some(entry), None) => nonzero(&entry, signal).map(Some),
+        (Some(entry), None) => Ok(Some(Scale::PerUnit(nonzero(&entry, signal)?))),
         (None, Some(entry)) => {
             let volts = nonzero(&entry, sensitivity)?;
             let scale = volts.recip();
@@ -222,7 +222,7 @@ fn read_scale(
                 let allowed = Limits::between(-1e15, 1e15, "check the sensitivity's exponent");
                 return Err(entry.out_of_range(volts, sensitivity.si_unit(), &allowed));
             }
-            Ok(Some(scale))
+            Ok(Some(Scale::PerVolt(scale)))
         }
         (None, None) => Ok(None),
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::analysis::{Overview, RecordingResult, Response};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
-use crate::description::{ChannelRef, RecordingDescription, SensorKind, TestDescription};
+use crate::description::{ChannelRef, RecordingDescription, Scale, SensorKind, TestDescription};
 use crate::recording::{ReadSettings, Recording, RecordingError};
 use crate::taps::{TapSettings, TapSource, find_taps};
 
@@ -201,10 +201,17 @@ fn channel_index(recording: &Recording, reference: &ChannelRef) -> Result<usize,
 fn channel(
     recording: &mut Recording,
     reference: &ChannelRef,
-    scale: Option<f64>,
+    scale: Option<Scale>,
 ) -> Result<usize, RecordingError> {
     let index = channel_index(recording, reference)?;
     if let Some(scale) = scale {
+        let info = &recording.channels()[index];
+        let scale = match scale {
+            Scale::PerUnit(scale) => scale,
+            // What the header's unit made of the file is volts already, mV included.
+            Scale::PerVolt(scale) if info.unit.as_deref() == Some("V") => scale * info.scale,
+            Scale::PerVolt(scale) => scale,
+        };
         recording.set_scale(index, scale)?;
     }
     Ok(index)

@@ -107,7 +107,7 @@ fn regress_a_full_description_is_read_in_si_units() {
     let hammer = test.hammer.clone().unwrap();
     assert_eq!(
         (hammer.channel, hammer.scale),
-        (ChannelRef::Number(1), Some(500.0))
+        (ChannelRef::Number(1), Some(Scale::PerUnit(500.0)))
     );
     assert!(test.warnings.is_empty(), "{:?}", test.warnings);
     assert!(test.check_has_data("test.toml").is_ok());
@@ -120,11 +120,10 @@ fn regress_sensors_recordings_and_analysis_of_the_full_description() {
         panic!("two sensors expected, found {:?}", test.sensors);
     };
     // 100 mV for 9.80665 m/s2, mounted the other way: -98.0665 m/s2 for one volt.
-    assert_near(
-        accelerometer.scale.unwrap(),
-        -98.0665,
-        "scale from a sensitivity",
-    );
+    let Some(Scale::PerVolt(scale)) = accelerometer.scale else {
+        panic!("a sensitivity is per volt: {:?}", accelerometer.scale);
+    };
+    assert_near(scale, -98.0665, "scale from a sensitivity");
     assert_near(accelerometer.mass.unwrap(), 0.024, "mass");
     assert_eq!(accelerometer.kind, SensorKind::Acceleration);
     assert_eq!(microphone.channel, ChannelRef::Name("sound level".into()));

@@ -3,11 +3,11 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use tapjoint::description::ChannelRef;
+use tapjoint::description::{ChannelRef, TestDescription};
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
     Estimate, Identification, IdentifySettings, KnownJoint, ModeResult, TestedStructure, identify,
-    measure_bare, modes_of_recordings,
+    measure_bare, modes_of_recordings, run_test,
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
@@ -193,4 +193,69 @@ fn span_holds_the_truth(test: &VirtualTest) -> bool {
     let spans = bounds.spans.unwrap();
     let (kx, ky) = (spans.kx.unwrap(), spans.ky.unwrap());
     (kx.low..=kx.high).contains(&KX) && (ky.low..=ky.high).contains(&KY)
+}
+
+#[test]
+fn prop_a_sensitivity_is_per_volt_whatever_the_header_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let shapes = mode_shapes(
+        &Beam {
+            length: 0.423,
+            width: 0.05,
+            thickness: 0.005,
+            modulus: 207e9,
+            density: 7850.0,
+            poisson: 0.3,
+        },
+        Assembly::Cantilever,
+        &JointStiffness::two_parameter(KX, KY),
+        4,
+    )
+    .unwrap();
+    let seen = seen_modes(&shapes, &[0.02], (0.385, &[0.338]), 900.0);
+    let settings = TapTestSettings {
+        sample_rate: 2048.0,
+        taps: 2,
+        interval: 2.0,
+        pulse: 3e-3,
+        ..Default::default()
+    };
+    let test = simulate_tap_test(&seen, &settings, 5);
+    // 100 mV/g: one m/s2 is 10.197 mV.
+    let level = |header: &str, factor: f64| {
+        let mut text = format!("time (s),force (N),a ({header})\n");
+        for (n, (force, a)) in test.force.iter().zip(&test.responses[0]).enumerate() {
+            let volts = a * 0.1 / 9.80665;
+            text += &format!(
+                "{:.9},{force:.9},{:.9}\n",
+                n as f64 / 2048.0,
+                volts * factor
+            );
+        }
+        std::fs::write(folder.path().join("taps.csv"), text).unwrap();
+        let description = "
+            [beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850
+            [joint]\nkind = \"cantilever\"
+            [hammer]\nchannel = \"force\"
+            [[sensor]]\nname = \"A\"\nchannel = \"a\"\nsensitivity = \"100 mV/g\"\nposition = 0.338
+            [[recording]]\nfile = \"taps.csv\"";
+        let test = TestDescription::parse(description, "test.toml").unwrap();
+        let found = run_test(&test, (folder.path(), "test.toml"), &Default::default()).unwrap();
+        let spectra = found.recordings[0].measurement.spectra.clone().unwrap();
+        let h1 = spectra.averages.h1.unwrap();
+        h1[0].iter().map(|h| h.norm()).fold(0.0, f64::max)
+    };
+    let (volts, millivolts) = (level("V", 1.0), level("mV", 1000.0));
+    // The same signal, printed to nine decimals of volts.
+    assert!(
+        (volts / millivolts - 1.0).abs() < 1e-4,
+        "{volts} and {millivolts}"
+    );
+    let mode = &seen[1];
+    let expected = mode.shape_at_tap * mode.shape_at_sensors[0] / (2.0 * mode.damping_ratio);
+    // The highest peak stands near a single mode's phi phi/(2 zeta), give or take its neighbours.
+    assert!(
+        volts > 0.3 * expected.abs() && volts < 10.0 * expected.abs(),
+        "{volts}, {expected}"
+    );
 }

@@ -23,71 +23,67 @@ struct Recipe {
     seed: u64,
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let steel = |length, width, thickness| Beam {
+/// A steel beam (m).
+fn steel(length: f64, width: f64, thickness: f64) -> Beam {
+    Beam {
         length,
         width,
         thickness,
         modulus: 207e9,
         density: 7850.0,
         poisson: 0.3,
-    };
-    let cantilever = mode_shapes(
-        &steel(0.423, 0.05, 0.005),
-        Assembly::Cantilever,
-        &JointStiffness::two_parameter(1400.0, 4.8),
-        20,
-    )?;
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    make_cantilever()?;
+    make_lap_joint()
+}
+
+fn make_cantilever() -> Result<(), Box<dyn std::error::Error>> {
+    let joint = JointStiffness::two_parameter(1400.0, 4.8);
+    let shapes = mode_shapes(&steel(0.423, 0.05, 0.005), Assembly::Cantilever, &joint, 20)?;
     let damping = [0.012, 0.009, 0.005, 0.004];
+    let positions: (f64, &[f64]) = (0.385, &[0.338, 0.205]);
     let usual = TapTestSettings::default();
-    make(
-        &cantilever,
-        &damping,
-        &Recipe {
-            file: "recordings/cantilever/low.wav",
-            positions: (0.385, &[0.338, 0.205]),
-            settings: TapTestSettings {
-                sample_rate: 2560.0,
-                pulse: 3e-3,
-                ..usual.clone()
-            },
-            seed: 17,
+    let low = Recipe {
+        file: "recordings/cantilever/low.wav",
+        positions,
+        settings: TapTestSettings {
+            sample_rate: 2560.0,
+            pulse: 3e-3,
+            ..usual.clone()
         },
-    )?;
-    make(
-        &cantilever,
-        &damping,
-        &Recipe {
-            file: "recordings/cantilever/high.wav",
-            positions: (0.385, &[0.338, 0.205]),
-            settings: TapTestSettings {
-                interval: 4.0,
-                pulse: 1e-3,
-                ..usual.clone()
-            },
-            seed: 18,
+        seed: 17,
+    };
+    let high = Recipe {
+        file: "recordings/cantilever/high.wav",
+        positions,
+        settings: TapTestSettings {
+            interval: 4.0,
+            pulse: 1e-3,
+            ..usual
         },
-    )?;
-    let lap = mode_shapes(
-        &steel(0.6, 0.044, 0.0057),
-        Assembly::Lap,
-        &JointStiffness::two_parameter(824.0, 15.4),
-        20,
-    )?;
-    make(
-        &lap,
-        &[0.006, 0.004, 0.003],
-        &Recipe {
-            file: "recordings/lap-joint/taps.wav",
-            positions: (0.01, &[0.59, 0.21]),
-            settings: TapTestSettings {
-                interval: 3.0,
-                pulse: 1e-3,
-                ..usual
-            },
-            seed: 19,
+        seed: 18,
+    };
+    make(&shapes, &damping, &low)?;
+    make(&shapes, &damping, &high)
+}
+
+fn make_lap_joint() -> Result<(), Box<dyn std::error::Error>> {
+    let joint = JointStiffness::two_parameter(824.0, 15.4);
+    let shapes = mode_shapes(&steel(0.6, 0.044, 0.0057), Assembly::Lap, &joint, 20)?;
+    let recipe = Recipe {
+        file: "recordings/lap-joint/taps.wav",
+        positions: (0.01, &[0.59, 0.21]),
+        settings: TapTestSettings {
+            interval: 3.0,
+            pulse: 1e-3,
+            ..TapTestSettings::default()
         },
-    )
+        seed: 19,
+    };
+    make(&shapes, &[0.006, 0.004, 0.003], &recipe)
 }
 
 fn make(

@@ -116,11 +116,13 @@ pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Resul
     Ok(outcome(&analysis))
 }
 
-/// A test is answered when there is an estimate (or known stiffnesses to predict with), a bare
-/// recording when there is a mode.
+/// A test is answered when there is an estimate, or a prediction (from known stiffnesses) beside a
+/// measured mode; a bare recording when there is a mode.
 pub(super) fn outcome(analysis: &Analysis) -> Outcome {
     let answered = match &analysis.identification {
-        Some(found) => found.estimate.is_some() || !found.prediction.is_empty(),
+        Some(found) => {
+            found.estimate.is_some() || found.prediction.iter().any(|mode| mode.measured.is_some())
+        }
         None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
     };
     if answered {

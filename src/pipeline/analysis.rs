@@ -1,5 +1,7 @@
 //! What the chain leaves: plain data, for the report and for callers.
 
+use std::collections::BTreeMap;
+
 use super::measure::Measurement;
 use super::model::TestedStructure;
 use super::warning::Warning;
@@ -48,12 +50,29 @@ pub struct RecordingResult {
     pub responses: Vec<Response>,
     /// The analysed zoom band (Hz), where one was asked for.
     pub band: Option<(f64, f64)>,
+    /// What the description says of this recording; empty for a bare one.
+    pub conditions: Conditions,
     /// Taps, spectra, readings.
     pub measurement: Measurement,
     /// Numbers of the modes that this recording's readings belong to, one for each reading.
     pub mode_numbers: Vec<Option<usize>>,
     /// The channel on which taps were found, over time.
     pub overview: Overview,
+}
+
+/// Circumstances of a recording that are carried to the outputs as described.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Conditions {
+    /// Where the hammer strikes (m).
+    pub tap: Option<f64>,
+    /// Where each sensor sits (m), moved ones at their place in this recording.
+    pub sensor_positions: BTreeMap<String, f64>,
+    /// Tightening torque (N m).
+    pub torque: Option<f64>,
+    /// Temperature (degrees Celsius).
+    pub temperature: Option<f64>,
+    /// Date.
+    pub date: Option<String>,
 }
 
 /// A response channel.

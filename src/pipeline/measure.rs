@@ -6,8 +6,8 @@ use crate::description::WindowKind;
 use crate::modal::{MainsSettings, ModeReading, PeakSettings};
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
-    AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, SpectralError, Window,
-    largest_smooth_block,
+    AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, SpectralError,
+    Window, largest_smooth_block,
 };
 use crate::taps::{TapSettings, TapSource, Taps, find_taps};
 
@@ -99,7 +99,7 @@ pub fn measure(
         file: recording.name().to_string(),
         problem,
     };
-    let trial = lines_for(settings, recording.sample_rate(), 1.0).map_err(fits)?;
+    let trial = lines_for(settings, recording.sample_rate(), recording.duration()).map_err(fits)?;
     let mut tap_settings = settings.taps;
     tap_settings.wanted = settings
         .block
@@ -114,7 +114,19 @@ pub fn measure(
         });
     };
     let available = shortest as f64 / recording.sample_rate();
-    let lines = lines_for(settings, recording.sample_rate(), available).map_err(fits)?;
+    let lines = match lines_for(settings, recording.sample_rate(), available) {
+        Ok(lines) => lines,
+        // The file would do, but its taps come too soon: data, not typing.
+        Err(problem) => {
+            let file = recording.name().to_string();
+            warnings.push(Warning::TapsTooShort { file, problem });
+            return Ok(Measurement {
+                taps,
+                spectra: None,
+                warnings,
+            });
+        }
+    };
     let stage = Stage::new(recording, settings, &taps, lines);
     let spectra = stage.spectra()?;
     warnings.extend(super::warning::of_spectra(recording.name(), &spectra));
@@ -137,7 +149,7 @@ fn lines_for(
     let fitting = (available * zoomed_rate * (1.0 + 1e-12)) as usize;
     let block = settings
         .block
-        .or_else(|| largest_smooth_block(fitting))
+        .or_else(|| largest_smooth_block(fitting.min(MOST_BLOCK)))
         .unwrap_or(fitting)
         .max(LEAST_BLOCK);
     Lines::zoom(band, rate, block, available)

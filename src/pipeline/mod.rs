@@ -24,8 +24,8 @@ use std::path::Path;
 use rayon::prelude::*;
 
 pub use analysis::{
-    Analysis, BoundPerturbation, Estimate, Identification, ModeResult, Overview, Perturbation,
-    RecordingResult, Response,
+    Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
+    Perturbation, RecordingResult, Response,
 };
 pub use identification::{IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};

@@ -86,10 +86,7 @@ pub fn modes_of_recordings(
         .collect();
     let warnings = number(&mut modes, structure);
     for recording in recordings.iter_mut() {
-        recording.mode_numbers = own_readings(recording)
-            .iter()
-            .map(|reading| nearest_number(&modes, reading))
-            .collect();
+        recording.mode_numbers = own_numbers(&modes, &own_readings(recording));
     }
     (modes, warnings)
 }
@@ -204,6 +201,12 @@ fn number(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning>
         if numbers.iter().any(Option::is_some) {
             return apply_numbers(modes, &free, &numbers);
         }
+        number_in_order(modes);
+        return if free.is_empty() {
+            Vec::new()
+        } else {
+            vec![Warning::NumberedInOrder]
+        };
     }
     number_in_order(modes);
     Vec::new()
@@ -256,20 +259,23 @@ fn number_in_order(modes: &mut [ModeResult]) {
     }
 }
 
-/// The number of the mode that a reading belongs to: the nearest within their half lines together
-/// and 1 % (what another sensor position or tap level moves a frequency).
-fn nearest_number(modes: &[ModeResult], reading: &ModeReading) -> Option<usize> {
-    if reading.label.is_some() {
-        return None;
+/// The numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
+/// to it, within their half lines together and 1 % (what another sensor position or tap level moves a
+/// frequency), and no reading serves two modes.
+fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
+    let mut numbers = vec![None; readings.len()];
+    for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
+        let distance = |index: &usize| (mode.frequency - readings[*index].frequency).abs();
+        let nearest = (0..readings.len())
+            .filter(|&index| readings[index].label.is_none() && numbers[index].is_none())
+            .filter(|index| {
+                let half_lines = mode.half_line.unwrap_or(0.0) + readings[*index].half_line;
+                distance(index) <= half_lines + 0.01 * mode.frequency
+            })
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(nearest) = nearest {
+            numbers[nearest] = mode.mode;
+        }
     }
-    let distance = |mode: &ModeResult| (mode.frequency - reading.frequency).abs();
-    modes
-        .iter()
-        .filter(|mode| mode.mode.is_some())
-        .filter(|mode| {
-            let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
-            distance(mode) <= half_lines + 0.01 * mode.frequency
-        })
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .and_then(|mode| mode.mode)
+    numbers
 }

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use super::analysis::{Overview, RecordingResult, Response};
+use super::analysis::{Conditions, Overview, RecordingResult, Response};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
-use crate::description::{ChannelRef, RecordingDescription, Scale, SensorKind, TestDescription};
+use crate::description::{
+    ChannelRef, RecordingDescription, Scale, SensorDescription, SensorKind, TestDescription,
+};
 use crate::recording::{ReadSettings, Recording, RecordingError};
 use crate::taps::{TapSettings, TapSource, find_taps};
 
@@ -92,6 +94,7 @@ pub(super) fn measure_described(
     let hammer_unit = hammer.map(|_| "N".to_string());
     let units = described_units(test, &settings.source);
     let mut result = finish(recording.renamed(file), settings, (hammer_unit, responses))?;
+    result.conditions = conditions(test, description);
     for (channel, unit) in units {
         if let Some(info) = result.channels.get_mut(channel) {
             info.unit.get_or_insert_with(|| unit.to_string());
@@ -113,6 +116,21 @@ fn described_units(test: &TestDescription, source: &TapSource) -> Vec<(usize, &'
         .collect()
 }
 
+/// What the description says of the circumstances of a recording.
+fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
+    let place = |sensor: &SensorDescription| {
+        let moved = description.at.get(&sensor.name).copied();
+        Some((sensor.name.clone(), moved.or(sensor.position)?))
+    };
+    Conditions {
+        tap: description.tap,
+        sensor_positions: test.sensors.iter().filter_map(place).collect(),
+        torque: description.torque,
+        temperature: description.temperature,
+        date: description.date.clone(),
+    }
+}
+
 /// Measures a recording about which nothing is described: all channels but the hammer's are
 /// responses.
 ///
@@ -123,24 +141,32 @@ pub fn measure_bare(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<RecordingResult, PipelineError> {
-    let hammer = hammer
-        .map(|reference| channel_index(&recording, reference))
-        .transpose()?;
-    let channels: Vec<usize> = (0..recording.channels().len())
-        .filter(|&c| Some(c) != hammer)
-        .collect();
-    let named = bare_channels(&recording, hammer, &channels);
-    let mut settings = MeasureSettings::new(source(hammer, channels));
+    let (source, named) = bare_source(&recording, hammer)?;
+    let mut settings = MeasureSettings::new(source);
     adjust(&mut settings);
     finish(recording, settings, named)
 }
 
-/// Unit of the hammer channel, and the responses with what the file says of them.
-fn bare_channels(
+/// Unit of the hammer channel, where there is one, and the responses.
+type Named = (Option<String>, Vec<Response>);
+
+/// Where taps are looked for in a bare recording, and what the file says of its channels.
+fn bare_source(
     recording: &Recording,
-    hammer: Option<usize>,
-    channels: &[usize],
-) -> (Option<String>, Vec<Response>) {
+    hammer: Option<&ChannelRef>,
+) -> Result<(TapSource, Named), RecordingError> {
+    let hammer = hammer
+        .map(|reference| channel_index(recording, reference))
+        .transpose()?;
+    let channels: Vec<usize> = (0..recording.channels().len())
+        .filter(|&c| Some(c) != hammer)
+        .collect();
+    let named = bare_channels(recording, hammer, &channels);
+    Ok((source(hammer, channels), named))
+}
+
+/// Unit of the hammer channel, and the responses with what the file says of them.
+fn bare_channels(recording: &Recording, hammer: Option<usize>, channels: &[usize]) -> Named {
     let info = |channel: usize| recording.channels().get(channel);
     let responses = channels.iter().map(|&channel| Response {
         name: info(channel)
@@ -161,14 +187,7 @@ pub fn inspect_bare(
     recording: Recording,
     hammer: Option<&ChannelRef>,
 ) -> Result<RecordingResult, PipelineError> {
-    let hammer = hammer
-        .map(|reference| channel_index(&recording, reference))
-        .transpose()?;
-    let channels: Vec<usize> = (0..recording.channels().len())
-        .filter(|&c| Some(c) != hammer)
-        .collect();
-    let named = bare_channels(&recording, hammer, &channels);
-    let source = source(hammer, channels);
+    let (source, named) = bare_source(&recording, hammer)?;
     let taps = find_taps(&recording, &source, &TapSettings::default())?;
     let warnings = super::warning::of_recording(&recording, &source, &taps);
     let measurement = Measurement {
@@ -220,7 +239,7 @@ fn channel(
 fn finish(
     recording: Recording,
     settings: MeasureSettings,
-    named: (Option<String>, Vec<Response>),
+    named: Named,
 ) -> Result<RecordingResult, PipelineError> {
     let measurement = measure(&recording, &settings)?;
     result(&recording, &settings, named, measurement)
@@ -229,7 +248,7 @@ fn finish(
 fn result(
     recording: &Recording,
     settings: &MeasureSettings,
-    (hammer_unit, responses): (Option<String>, Vec<Response>),
+    (hammer_unit, responses): Named,
     measurement: Measurement,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
@@ -245,6 +264,7 @@ fn result(
         seconds: recording.duration(),
         channels: recording.channels().to_vec(),
         has_hammer,
+        conditions: Conditions::default(),
         tap_unit: if has_hammer {
             hammer_unit
         } else {

@@ -4,10 +4,10 @@ use std::fmt;
 
 use super::measure::MeasuredSpectra;
 use super::model::TestedStructure;
-use crate::description::TestDescription;
+use crate::description::{SensorKind, TestDescription};
 use crate::modal::PeakLabel;
 use crate::recording::Recording;
-use crate::spectral::{RUNG_DOWN, Window};
+use crate::spectral::{RUNG_DOWN, SpectralError, Window};
 use crate::structure::BeamTheory;
 use crate::taps::{TapSource, Taps};
 
@@ -36,6 +36,13 @@ pub enum Warning {
         rejected: usize,
         /// Of how many.
         total: usize,
+    },
+    /// The accepted taps are too short for any spectrum.
+    TapsTooShort {
+        /// The recording.
+        file: String,
+        /// What does not fit.
+        problem: SpectralError,
     },
     /// Only one tap was averaged.
     SingleTap {
@@ -72,6 +79,8 @@ pub enum Warning {
     },
     /// The frequencies do not show a cross coupling.
     CouplingNotEstablished,
+    /// No peak of a free beam lies near where the description puts its modes.
+    NumberedInOrder,
     /// Peaks were left without a mode.
     Unpaired {
         /// How many.
@@ -107,15 +116,17 @@ impl Warning {
             Warning::Recording { code, .. } => code,
             Warning::Description { .. } => "description",
             Warning::RejectedTaps { .. } => "rejected-taps",
+            Warning::TapsTooShort { .. } => "taps-too-short",
             Warning::SingleTap { .. } => "single-tap",
             Warning::NotRungDown { .. } => "not-rung-down",
             Warning::HannOnTaps { .. } => "hann-on-taps",
             Warning::Mains { .. } => "mains",
             Warning::Closure { .. } => "closure",
             Warning::CouplingNotEstablished => "coupling-not-established",
+            Warning::NumberedInOrder => "numbered-in-order",
             Warning::Unpaired { .. } => "unpaired",
             Warning::UnphysicalEstimate { .. } => "unphysical",
-            Warning::Misfit { .. } => "misfit",
+            Warning::Misfit { .. } => "prediction-error",
             Warning::Neglected { .. } => "neglected",
         }
     }
@@ -132,9 +143,11 @@ impl fmt::Display for Warning {
                 total,
             } => write!(
                 f,
-                "{file}: {rejected} of {total} taps {} rejected and left out; the list of taps says why",
-                if *rejected == 1 { "was" } else { "were" }
+                "{file}: {rejected} of {total} taps were rejected; the list of taps says why"
             ),
+            Warning::TapsTooShort { file, problem } => {
+                write!(f, "{file}: the taps leave no spectrum: {problem}")
+            }
             Warning::SingleTap { file } => write!(
                 f,
                 "{file}: only one tap was averaged, so nothing shows how well it repeats and a \
@@ -144,25 +157,7 @@ impl fmt::Display for Warning {
                 file,
                 remaining,
                 window,
-            } => {
-                write!(
-                    f,
-                    "{file}: at the end of the block the response still has {} % of its level \
-                     (1.0 % is wanted); ",
-                    two_digits(100.0 * remaining)
-                )?;
-                match window {
-                    Window::Exponential { decay } => write!(
-                        f,
-                        "an exponential window with a decay of {decay:.3} 1/s was applied to force and \
-                         response, and taken out of every damping; taps farther apart need none"
-                    ),
-                    _ => f.write_str(
-                        "readings on lines suffer from it; leave the window to the program, or set the \
-                         taps farther apart",
-                    ),
-                }
-            }
+            } => write_not_rung_down(f, file, *remaining, *window),
             Warning::HannOnTaps { file } => write!(
                 f,
                 "{file}: a Hann window suppresses the start of every record, where a tap has its \
@@ -177,6 +172,25 @@ impl fmt::Display for Warning {
                 "{file}: the peak at {frequency:.2} Hz was there before the tap and is taken for \
                  {label}, not for a mode; check the grounding of the sensor cables"
             ),
+            Warning::Unpaired { count, text } => {
+                write!(f, "{count} peak(s) belong to no mode: {text}")
+            }
+            Warning::Misfit {
+                mode,
+                error_percent,
+                deviations,
+            } => write_misfit(f, *mode, *error_percent, *deviations),
+            Warning::Closure { .. }
+            | Warning::CouplingNotEstablished
+            | Warning::UnphysicalEstimate { .. }
+            | Warning::NumberedInOrder => self.write_estimate_doubt(f),
+        }
+    }
+}
+
+impl Warning {
+    fn write_estimate_doubt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Warning::Closure { closure } => write!(
                 f,
                 "the pair regression does not satisfy its own frequency equation: the product it \
@@ -189,46 +203,64 @@ impl fmt::Display for Warning {
                 "the interval of the cross coupling contains zero: these frequencies do not show one, \
                  and Kz has no interval; the two-parameter model may do",
             ),
-            Warning::Unpaired { count: 1, text } => write!(f, "1 peak belongs to no mode: {text}"),
-            Warning::Unpaired { count, text } => write!(f, "{count} peaks belong to no mode: {text}"),
             Warning::UnphysicalEstimate { what } => write!(
                 f,
                 "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
                  mode, a wrong model or readings too coarse for it are the usual causes"
             ),
-            Warning::Misfit {
-                mode,
-                error_percent,
-                deviations,
-            } => {
-                write!(
-                    f,
-                    "with the estimated joint the model misses mode {mode} by {error_percent:+.2} %"
-                )?;
-                if let Some(deviations) = deviations {
-                    write!(
-                        f,
-                        " ({:.0} standard deviations of its reading)",
-                        deviations.abs()
-                    )?;
-                }
-                f.write_str(
-                    "; the estimator, a mode numbered wrongly, or something the model lacks may be the \
-                     cause",
-                )
-            }
+            _ => f.write_str(
+                "no peak lies near a natural frequency of the described free beam, so the peaks were \
+                 numbered in ascending order; check the beam's dimensions and modulus",
+            ),
         }
     }
 }
 
-/// A number with two significant digits, as many decimals as that takes.
-fn two_digits(value: f64) -> String {
-    let exponent = if value > 0.0 && value.is_finite() {
-        value.log10().floor() as i32
-    } else {
-        0
-    };
-    format!("{value:.*}", (1 - exponent).clamp(0, 6) as usize)
+fn write_not_rung_down(
+    f: &mut fmt::Formatter<'_>,
+    file: &str,
+    remaining: f64,
+    window: Window,
+) -> fmt::Result {
+    write!(
+        f,
+        "{file}: at the end of the block the response still has {:.1} % of its level (1.0 % is \
+         wanted); ",
+        100.0 * remaining
+    )?;
+    match window {
+        Window::Exponential { decay } => write!(
+            f,
+            "an exponential window with a decay of {decay:.3} 1/s was applied to force and response, \
+             and taken out of every damping; taps farther apart need none"
+        ),
+        _ => f.write_str(
+            "readings on lines suffer from it; leave the window to the program, or set the taps farther \
+             apart",
+        ),
+    }
+}
+
+fn write_misfit(
+    f: &mut fmt::Formatter<'_>,
+    mode: usize,
+    error_percent: f64,
+    deviations: Option<f64>,
+) -> fmt::Result {
+    write!(
+        f,
+        "with the estimated joint the model misses mode {mode} by {error_percent:+.2} %"
+    )?;
+    if let Some(deviations) = deviations {
+        write!(
+            f,
+            " ({:.0} standard deviations of its reading)",
+            deviations.abs()
+        )?;
+    }
+    f.write_str(
+        "; the estimator, a mode numbered wrongly, or something the model lacks may be the cause",
+    )
 }
 
 /// Doubts about a recording and its taps.
@@ -291,33 +323,23 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
     warnings
 }
 
-/// What the pair regression leaves out of the described structure.
+/// What estimate and prediction leave out of the described test.
 pub(super) fn of_neglect(test: &TestDescription, structure: &TestedStructure) -> Vec<Warning> {
     let mut texts = Vec::new();
-    if structure.regression.is_some() {
-        let mass: f64 = test.sensors.iter().filter_map(|sensor| sensor.mass).sum();
-        if mass > 0.0 {
-            texts.push(format!(
-                "the pair regression neglects the mass of the sensors, {:.3} g or {:.1} % of the beam, \
-                 which lowers the frequencies and thereby the stiffnesses it finds",
-                1e3 * mass,
-                100.0 * mass / structure.beam.mass()
-            ));
-        }
-        if structure.theory == BeamTheory::Timoshenko {
-            texts.push(
-                "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
-                 includes both, so that its errors show what that neglects"
-                    .to_string(),
-            );
-        }
-        if structure.known.any() {
-            texts.push(
-                "the pair regression cannot hold a stiffness at its known value: it estimates all of \
-                 them, and the prediction uses the known ones"
-                    .to_string(),
-            );
-        }
+    texts.extend(neglected_masses(test, structure));
+    if structure.regression.is_some() && structure.theory == BeamTheory::Timoshenko {
+        texts.push(
+            "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
+             includes both, so that its errors show what that neglects"
+                .to_string(),
+        );
+    }
+    if structure.regression.is_some() && structure.known.any() {
+        texts.push(
+            "the pair regression cannot hold a stiffness at its known value: it estimates all of \
+             them, and the prediction uses the known ones"
+                .to_string(),
+        );
     }
     let joint = &test.joint;
     if joint.overlap.is_some() || joint.right.is_some() || off_centre(test) {
@@ -327,10 +349,41 @@ pub(super) fn of_neglect(test: &TestDescription, structure: &TestedStructure) ->
                 .to_string(),
         );
     }
+    let analysis = &test.analysis;
+    if analysis.fit.is_some() {
+        texts.push(
+            "`fit` is not used by this version: all stiffnesses of the joint's model are estimated, of a \
+             free beam the modulus"
+                .to_string(),
+        );
+    }
+    if analysis.weights.is_some() && structure.regression.is_some() {
+        texts.push(
+            "`weights` is not used by this version: the pair regression weighs all pairs alike"
+                .to_string(),
+        );
+    }
     texts
         .into_iter()
         .map(|text| Warning::Neglected { text })
         .collect()
+}
+
+/// The sensors' masses, which neither estimate nor prediction knows. A microphone loads nothing.
+fn neglected_masses(test: &TestDescription, structure: &TestedStructure) -> Option<String> {
+    let loading = test
+        .sensors
+        .iter()
+        .filter(|sensor| sensor.kind != SensorKind::Sound);
+    let mass: f64 = loading.filter_map(|sensor| sensor.mass).sum();
+    (mass > 0.0).then(|| {
+        format!(
+            "the mass of the sensors, {:.3} g or {:.1} % of the beam, is in neither the estimate nor the \
+             prediction; it lowers the measured frequencies and thereby what is estimated from them",
+            1e3 * mass,
+            100.0 * mass / structure.beam.mass()
+        )
+    })
 }
 
 /// Whether a lap joint sits off the middle by more than a thousandth of the length.

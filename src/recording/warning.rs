@@ -105,7 +105,7 @@ pub enum RecordingWarning {
     },
     /// A channel that never moves.
     #[error(
-        "{channel}: every sample is {level}; nothing was probably connected; check the cable and the channel numbers"
+        "{channel}: every sample is {level}; probably nothing was connected; check the cable and the channel numbers"
     )]
     Constant {
         /// The channel.

@@ -1,19 +1,16 @@
 //! From a finished analysis to the document and the data of the pictures.
 
+use super::convert_estimate::{
+    average_section, estimate_section, monte_carlo_section, perturbation_section,
+    prediction_section, span_section,
+};
 use super::document::{
-    AverageSection, ChannelSection, Document, EstimateSection, ModeSection, MonteCarloSection,
-    PairsSection, PerturbationSection, PredictionSection, RecordingSection, ResolutionSpanSection,
-    SensitivitySection, TapSection, TestSection, VERSION, ValueSection, WarningSection,
+    ChannelSection, Document, ModeSection, PredictionSection, RecordingSection, TapSection,
+    TestSection, VERSION, WarningSection,
 };
-use crate::identify::perturbation::{AverageError, Span, UniformPerturbation};
-use crate::identify::{
-    FreeBeamEstimate, JointEstimate, MonteCarlo, PairsModel, PredictedMode, Spread, Uncertain,
-};
+use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::ModeReading;
-use crate::pipeline::{
-    Analysis, BoundPerturbation, Estimate, Identification, ModeResult, RecordingResult,
-    TestedStructure, Warning,
-};
+use crate::pipeline::{Analysis, ModeResult, RecordingResult, TestedStructure, Warning};
 use crate::recording::{Format, Separator};
 use crate::spectral::Window;
 use crate::structure::{Assembly, BeamTheory, NaturalMode};
@@ -147,6 +144,11 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
         block: lines.map(|lines| lines.block),
         lines: lines.map(|lines| lines.displayed()),
         averages: spectra.map_or(0, |spectra| spectra.averages.taps),
+        tap: recording.conditions.tap,
+        sensor_positions: recording.conditions.sensor_positions.clone(),
+        torque: recording.conditions.torque,
+        temperature: recording.conditions.temperature,
+        date: recording.conditions.date.clone(),
         band: lines.map(|lines| [lines.low, lines.high]),
         window: spectra.map(|spectra| spectra.window.name().to_string()),
         window_decay: spectra
@@ -261,134 +263,6 @@ fn mode_section(mode: &ModeResult) -> ModeSection {
         recording: mode.recording.clone(),
         label: mode.label.clone(),
         ..reading
-    }
-}
-
-fn estimate_section(found: &Identification) -> Option<EstimateSection> {
-    match found.estimate.as_ref()? {
-        Estimate::Joint(joint) => Some(joint_section(joint)),
-        Estimate::FreeBeam(free) => Some(free_section(free)),
-    }
-}
-
-fn joint_section(joint: &JointEstimate) -> EstimateSection {
-    let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
-    EstimateSection {
-        method: "pairs".to_string(),
-        modes_used: joint.modes_used.clone(),
-        reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
-        kx: value(joint.kx),
-        ky: value(joint.ky),
-        kz: value(joint.kz),
-        coupling: value(joint.coupling),
-        kt: value(joint.kt),
-        kr: value(joint.kr),
-        ktr: value(joint.ktr),
-        pairs: Some(PairsSection {
-            kx: joint.pairs.kx,
-            ky: joint.pairs.ky,
-            kz: joint.pairs.kz,
-            closure: joint.pairs.closure,
-        }),
-        ..Default::default()
-    }
-}
-
-fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
-    EstimateSection {
-        method: "free-beam".to_string(),
-        modes_used: free.modes_used.clone(),
-        modulus: value(Some(free.modulus)),
-        density: value(Some(free.density)),
-        ..Default::default()
-    }
-}
-
-fn value(found: Option<Uncertain>) -> Option<ValueSection> {
-    found.map(|found| ValueSection {
-        value: found.value,
-        std: found.std,
-        low: found.low,
-        high: found.high,
-    })
-}
-
-fn prediction_section(mode: &PredictedMode) -> PredictionSection {
-    PredictionSection {
-        mode: mode.mode,
-        measured: mode.measured,
-        predicted: Some(mode.predicted),
-        lambda: Some(mode.lambda),
-        error_percent: mode.error_percent,
-        used: mode.used,
-    }
-}
-
-fn perturbation_section(row: &UniformPerturbation) -> PerturbationSection {
-    PerturbationSection {
-        percent: row.percent,
-        method: "pairs".to_string(),
-        kx: row.estimate.map(|estimate| estimate.kx),
-        ky: row.estimate.map(|estimate| estimate.ky),
-        kz: row.estimate.and_then(|estimate| estimate.kz),
-    }
-}
-
-fn average_section(row: &AverageError) -> AverageSection {
-    AverageSection {
-        percent: row.percent,
-        kx_percent: row.mean_magnitude.kx,
-        ky_percent: row.mean_magnitude.ky,
-        kz_percent: row.mean_magnitude.kz,
-    }
-}
-
-fn monte_carlo_section(found: &MonteCarlo) -> MonteCarloSection {
-    let ends = |spread: Option<Spread>| {
-        spread.map(|spread| ValueSection {
-            value: spread.median,
-            std: None,
-            low: Some(spread.low),
-            high: Some(spread.high),
-        })
-    };
-    MonteCarloSection {
-        samples: found.samples,
-        failed: found.failed,
-        kx: ends(found.kx),
-        ky: ends(found.ky),
-        kz: ends(found.kz),
-    }
-}
-
-fn span_section(found: &BoundPerturbation) -> ResolutionSpanSection {
-    let ends = |span: Option<Span>| span.map(|span| [span.low, span.high]);
-    let spans = found.spans.as_ref();
-    ResolutionSpanSection {
-        patterns: spans.map_or(0, |spans| spans.patterns),
-        failed: spans.map_or(0, |spans| spans.failed),
-        kx: ends(spans.and_then(|spans| spans.kx)),
-        ky: ends(spans.and_then(|spans| spans.ky)),
-        kz: ends(spans.and_then(|spans| spans.kz)),
-        cloud: found
-            .cloud
-            .iter()
-            .map(|estimate| [estimate.kx, estimate.ky])
-            .collect(),
-        sensitivity: found
-            .sensitivities
-            .iter()
-            .map(|row| {
-                let change = row.percent_per_bound;
-                SensitivitySection {
-                    mode: found.modes.get(row.index).copied().unwrap_or(0),
-                    half_line: found.bounds.get(row.index).copied().unwrap_or(0.0),
-                    kx_percent: change.map(|change| change.kx),
-                    ky_percent: change.map(|change| change.ky),
-                    kz_percent: change.and_then(|change| change.kz),
-                }
-            })
-            .collect(),
     }
 }
 

@@ -3,6 +3,8 @@
 //! Units are SI, frequencies Hz. A value that does not exist is `null`, never 0. `low` and `high`
 //! are 95 % limits, `null` where unbounded or unknown.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 /// Version of the document's layout.
@@ -102,6 +104,16 @@ pub struct RecordingSection {
     pub lines: Option<usize>,
     /// Taps averaged.
     pub averages: usize,
+    /// Where the hammer strikes (m), where the description says.
+    pub tap: Option<f64>,
+    /// Where each sensor sits (m), moved ones at their place in this recording.
+    pub sensor_positions: BTreeMap<String, f64>,
+    /// Tightening torque (N m), as described.
+    pub torque: Option<f64>,
+    /// Temperature (degrees Celsius), as described.
+    pub temperature: Option<f64>,
+    /// Date, as described.
+    pub date: Option<String>,
     /// Band (Hz).
     pub band: Option<[f64; 2]>,
     /// "rectangular", "hann" or "exponential".
@@ -280,7 +292,8 @@ pub struct PerturbationSection {
     pub kz: Option<f64>,
 }
 
-/// Mean magnitude of the errors (%) of +percent and -percent.
+/// Average errors of +percent and -percent: the mean of their magnitudes, as in table 9 of Ingole &
+/// Chatterjee, and the error of their mean, as in table 14.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct AverageSection {
     /// Change of all frequencies (%), its size.
@@ -291,6 +304,13 @@ pub struct AverageSection {
     pub ky_percent: f64,
     /// Of Kz (%).
     pub kz_percent: Option<f64>,
+    /// Magnitude of the error of the two estimates' mean (%), as in table 14: smaller, because
+    /// opposite errors cancel. Of Kx.
+    pub kx_of_mean_percent: f64,
+    /// The same of Ky (%).
+    pub ky_of_mean_percent: f64,
+    /// The same of Kz (%).
+    pub kz_of_mean_percent: Option<f64>,
 }
 
 /// Estimates under random errors of the frequencies: median and 95 % interval.

@@ -3,6 +3,7 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 mod convert;
+mod convert_estimate;
 mod convert_figures;
 pub mod document;
 pub mod figures;
@@ -25,7 +26,7 @@ pub use convert_figures::figures as figures_of;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use html::render_html;
 pub use json::render_json;
-pub use run::{render_frf_png, render_run, render_spectrum_png};
+pub use run::{render_run, render_spectrum_png};
 pub use text::render_text;
 
 /// A finished file.

@@ -77,14 +77,6 @@ pub fn render_spectrum_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, 
     draw_spectrum(figure).as_ref().map(render_png).transpose()
 }
 
-/// The frequency response functions of a recording as PNG; `None` without hammer or taps.
-///
-/// # Errors
-/// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_frf_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_frf(figure).as_ref().map(render_png).transpose()
-}
-
 fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), ReportError> {
     let file = ReportFile {
         name: format!("{}.png", picture.name),

@@ -58,10 +58,14 @@ pub fn choose_window(checks: &[DecayCheck], duration: f64) -> Window {
     }
 }
 
+/// End of an exponential window on a record that has rung down already: 10 %, so that what was asked for
+/// is there, and the decay it adds stays below that of the record.
+const GENTLE: f64 = 0.1;
+
 /// The exponential window for one who asks for it: it brings a response that keeps `remaining` of its
 /// level down to 1 %, and falls to 10 % at least.
 pub fn exponential_to(remaining: f64, duration: f64) -> Window {
-    let fall = (RUNG_DOWN / remaining.max(f64::MIN_POSITIVE)).clamp(RUNG_DOWN, 0.1);
+    let fall = (RUNG_DOWN / remaining.max(f64::MIN_POSITIVE)).clamp(RUNG_DOWN, GENTLE);
     Window::Exponential {
         decay: -fall.ln() / duration,
     }

@@ -26,7 +26,8 @@ impl Lines {
     /// `available` is the length of signal at hand (s).
     ///
     /// # Errors
-    /// [`SpectralError::Block`] for a block outside 16 to 2^27 samples.
+    /// [`SpectralError::Block`] for a block outside [`LEAST_BLOCK`] to [`MOST_BLOCK`] samples,
+    /// [`SpectralError::TooNarrow`] where the signal resolves fewer than six lines of the band.
     pub fn baseband(
         sample_rate: f64,
         block: usize,
@@ -44,7 +45,8 @@ impl Lines {
     ///
     /// # Errors
     /// [`SpectralError::Band`] where the band is empty or passes half the sample rate,
-    /// [`SpectralError::Block`] for a block outside 16 to 2^27 samples.
+    /// [`SpectralError::Block`] for a block outside [`LEAST_BLOCK`] to [`MOST_BLOCK`] samples,
+    /// [`SpectralError::TooNarrow`] where the signal resolves fewer than six lines of the band.
     pub fn zoom(
         (low, high): (f64, f64),
         sample_rate: f64,
@@ -68,6 +70,17 @@ impl Lines {
             });
         }
         let zoomed_rate = DISPLAY_RATIO * (high - low);
+        // The zoom's filter grows as the band narrows; below a few resolution widths it would be
+        // longer than the signal, and show nothing.
+        if zoomed_rate * available < LEAST_BLOCK as f64 {
+            return Err(SpectralError::TooNarrow {
+                low,
+                high,
+                seconds: available,
+                resolution: 1.0 / available,
+                least_width: LEAST_BLOCK as f64 / (DISPLAY_RATIO * available),
+            });
+        }
         Ok(Lines {
             low,
             high,

@@ -39,6 +39,22 @@ pub enum SpectralError {
         /// Highest possible upper end (Hz).
         limit: f64,
     },
+    /// The band holds fewer resolution widths than a spectrum needs lines.
+    #[error(
+        "the band {low} to {high} Hz is too narrow for {seconds:.3} s of signal: what that resolves are lines {resolution:.3} Hz apart; give a band of at least {least_width:.3} Hz, or set the taps farther apart"
+    )]
+    TooNarrow {
+        /// Lower end (Hz).
+        low: f64,
+        /// Upper end (Hz).
+        high: f64,
+        /// Length of signal (s).
+        seconds: f64,
+        /// 1/seconds (Hz).
+        resolution: f64,
+        /// Least width of a band (Hz).
+        least_width: f64,
+    },
     /// The block size is unusable.
     #[error("a block of {block} samples is not usable: give {least} to {most} samples")]
     Block {

@@ -19,13 +19,7 @@ pub(super) fn judge(
     found: Found,
     settings: &TapSettings,
 ) -> Result<Taps, RecordingError> {
-    let mut answered = Vec::with_capacity(found.events.len());
-    for event in &found.events {
-        answered.push(match source {
-            TapSource::Hammer { responses, .. } => is_answered(recording, responses, event)?,
-            TapSource::Responses(_) => true,
-        });
-    }
+    let answered = answers(recording, source, &found.events)?;
     let real = |(event, answered): (&Event, &bool)| answered.then_some(event.peak);
     let weakest = settings.weak * median(found.events.iter().zip(&answered).filter_map(real));
     let counts: Vec<bool> = found
@@ -35,40 +29,29 @@ pub(super) fn judge(
         .map(|(event, &answered)| answered && event.peak >= weakest)
         .collect();
     let records = records(recording, (&found.events, &counts), settings);
-    let hammer = match (source, &found.survey) {
-        (TapSource::Hammer { channel, .. }, Some(survey)) => Some(Hammer {
-            recording,
-            channel: *channel,
-            survey,
-        }),
-        _ => None,
-    };
     let mut taps = Vec::with_capacity(found.events.len());
     for ((event, record), answered) in found.events.iter().zip(records).zip(answered) {
-        let force = hammer
-            .as_ref()
-            .map(|hammer| hammer.force(event, settings))
-            .transpose()?;
-        let mut tap = Tap {
-            time: event.trigger as f64 / recording.sample_rate(),
+        let force = force_about(recording, source, &found, event, settings)?;
+        let weak = Rejection::TooWeak {
             peak: event.peak,
-            pulse_end: force.as_ref().map(|force| force.pulse_end(event)),
-            record,
-            rejection: None,
+            limit: weakest,
         };
-        tap.rejection = if !answered {
+        let rejection = if !answered {
             Some(Rejection::NoResponse)
         } else if event.peak < weakest {
-            Some(Rejection::TooWeak {
-                peak: event.peak,
-                limit: weakest,
-            })
-        } else if let Some(double) = force.and_then(|force| force.double_hit(event, settings)) {
+            Some(weak)
+        } else if let Some(double) = force.as_ref().and_then(|f| f.double_hit(event, settings)) {
             Some(double)
         } else {
-            overload(recording, source, &tap.record)?
+            overload(recording, source, &record)?
         };
-        taps.push(tap);
+        taps.push(Tap {
+            time: event.trigger as f64 / recording.sample_rate(),
+            peak: event.peak,
+            pulse_end: force.map(|force| force.pulse_end(event)),
+            record,
+            rejection,
+        });
     }
     reject_short(&mut taps, recording.sample_rate(), settings.wanted);
     Ok(Taps {
@@ -76,6 +59,40 @@ pub(super) fn judge(
         noise: found.noise,
         remarks: found.remarks,
     })
+}
+
+/// Whether a sensor answers each event; without a hammer the answer is the event.
+fn answers(
+    recording: &Recording,
+    source: &TapSource,
+    events: &[Event],
+) -> Result<Vec<bool>, RecordingError> {
+    match source {
+        TapSource::Hammer { responses, .. } => events
+            .iter()
+            .map(|event| is_answered(recording, responses, event))
+            .collect(),
+        TapSource::Responses(_) => Ok(vec![true; events.len()]),
+    }
+}
+
+/// The force about an event; `None` without a hammer.
+fn force_about(
+    recording: &Recording,
+    source: &TapSource,
+    found: &Found,
+    event: &Event,
+    settings: &TapSettings,
+) -> Result<Option<Force>, RecordingError> {
+    let (TapSource::Hammer { channel, .. }, Some(survey)) = (source, &found.survey) else {
+        return Ok(None);
+    };
+    let hammer = Hammer {
+        recording,
+        channel: *channel,
+        survey,
+    };
+    hammer.force(event, settings).map(Some)
 }
 
 /// Each event's record: from the pre-trigger to that of the next event that `counts`, or the file's

@@ -253,7 +253,7 @@ impl Taps {
         self.accepted().map(Tap::frames).min()
     }
 
-    /// Frames before the first tap, where only noise is.
+    /// Frames before the first tap: noise, hum, and perhaps the hammer being picked up.
     pub fn quiet(&self) -> Range<u64> {
         0..self.taps.first().map_or(0, |tap| tap.record.start)
     }

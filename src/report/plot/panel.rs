@@ -116,14 +116,6 @@ impl Panel {
         drawing.line(decimate(visible), stroke);
     }
 
-    /// A line over the whole height at a value.
-    pub fn draw_vertical(&self, drawing: &mut Drawing, x: f64, stroke: Stroke) {
-        if self.x.holds(x) {
-            let x = crisp(self.x.place(x));
-            drawing.line(vec![(x, self.y.from), (x, self.y.to)], stroke);
-        }
-    }
-
     /// A translucent band between two values, at least one pixel wide.
     pub fn draw_band(&self, drawing: &mut Drawing, (low, high): (f64, f64), color: Color) {
         if high < self.x.low || low > self.x.high {

@@ -31,6 +31,11 @@ pub fn recordings(document: &Document) -> Option<Table> {
             words("Window"),
             number("Window's decay (1/s)").on_page(),
             number("Left at end (%)").on_page(),
+            number("Tap at (m)").on_page(),
+            words("Sensors at (m)").on_page(),
+            number("Torque (N m)").on_page(),
+            number("Temperature (°C)").on_page(),
+            words("Date").on_page(),
         ],
         rows: recordings.iter().map(recording_row).collect(),
         note: if transformed {
@@ -64,10 +69,29 @@ fn recording_row(recording: &RecordingSection) -> Vec<String> {
         recording.window.clone().unwrap_or_else(|| MISSING.into()),
         optional(recording.window_decay, 3),
         optional(recording.remaining_at_end.map(|level| 100.0 * level), 2),
+        exact(recording.tap),
+        places(recording),
+        exact(recording.torque),
+        exact(recording.temperature),
+        recording.date.clone().unwrap_or_else(|| MISSING.into()),
     ]
 }
 
-/// A setting in Hz.
+/// "A 0.338, B 0.205".
+fn places(recording: &RecordingSection) -> String {
+    let places: Vec<String> = recording
+        .sensor_positions
+        .iter()
+        .map(|(name, position)| format!("{name} {}", trimmed(*position, 4)))
+        .collect();
+    if places.is_empty() {
+        MISSING.to_owned()
+    } else {
+        places.join(", ")
+    }
+}
+
+/// A setting.
 fn exact(value: Option<f64>) -> String {
     value.map_or(MISSING.to_owned(), |value| trimmed(value, 4))
 }

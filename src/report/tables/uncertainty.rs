@@ -78,6 +78,9 @@ pub fn averages(document: &Document) -> Option<Table> {
             cell(Some(row.kx_percent)),
             cell(Some(row.ky_percent)),
             cell(row.kz_percent),
+            cell(Some(row.kx_of_mean_percent)),
+            cell(Some(row.ky_of_mean_percent)),
+            cell(row.kz_of_mean_percent),
         ]
     });
     let table = Table {
@@ -87,9 +90,14 @@ pub fn averages(document: &Document) -> Option<Table> {
             number("Kx off by (%)"),
             number("Ky off by (%)"),
             number("Kz off by (%)"),
+            number("mean of Kx (%)"),
+            number("mean of Ky (%)"),
+            number("mean of Kz (%)"),
         ],
         rows: rows.collect(),
-        note: "Mean size of the changes of the table above, up and down.".to_owned(),
+        note: "Off by: mean size of the changes of the table above, up and down. Mean of: how far the \
+               mean of the two estimates is off, which is less, because opposite changes cancel."
+            .to_owned(),
     };
     Some(table.without_empty_columns())
 }

@@ -71,6 +71,11 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        tap: Some(0.04),
+        sensor_positions: [("A".to_owned(), 0.338)].into(),
+        torque: Some(12.0),
+        temperature: None,
+        date: None,
         channel_details: Vec::new(),
         file: file.into(),
         format: "WAV, 24-bit integer".into(),

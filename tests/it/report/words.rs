@@ -453,6 +453,9 @@ fn val_averages_and_monte_carlo_are_shown() {
     };
     let document = Document {
         perturbation_averages: Some(vec![AverageSection {
+            kx_of_mean_percent: 0.011,
+            ky_of_mean_percent: 0.012,
+            kz_of_mean_percent: None,
             percent: 0.05,
             kx_percent: 0.5811,
             ky_percent: 0.1333,

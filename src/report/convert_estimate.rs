@@ -1,0 +1,142 @@
+//! The parts of the document that say something about the joint.
+
+use super::document::{
+    AverageSection, EstimateSection, MonteCarloSection, PairsSection, PerturbationSection,
+    PredictionSection, ResolutionSpanSection, SensitivitySection, ValueSection,
+};
+use crate::identify::perturbation::{AverageError, Span, UniformPerturbation};
+use crate::identify::{
+    FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Spread, Uncertain,
+};
+use crate::pipeline::{BoundPerturbation, Estimate, Identification};
+
+pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection> {
+    match found.estimate.as_ref()? {
+        Estimate::Joint(joint) => Some(joint_section(joint)),
+        Estimate::FreeBeam(free) => Some(free_section(free)),
+    }
+}
+
+fn joint_section(joint: &JointEstimate) -> EstimateSection {
+    let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
+    EstimateSection {
+        method: "pairs".to_string(),
+        modes_used: joint.modes_used.clone(),
+        reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
+        kx: value(joint.kx),
+        ky: value(joint.ky),
+        kz: value(joint.kz),
+        coupling: value(joint.coupling),
+        kt: value(joint.kt),
+        kr: value(joint.kr),
+        ktr: value(joint.ktr),
+        pairs: Some(PairsSection {
+            kx: joint.pairs.kx,
+            ky: joint.pairs.ky,
+            kz: joint.pairs.kz,
+            closure: joint.pairs.closure,
+        }),
+        ..Default::default()
+    }
+}
+
+fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
+    EstimateSection {
+        method: "free-beam".to_string(),
+        modes_used: free.modes_used.clone(),
+        modulus: value(Some(free.modulus)),
+        density: value(Some(free.density)),
+        ..Default::default()
+    }
+}
+
+fn value(found: Option<Uncertain>) -> Option<ValueSection> {
+    found.map(|found| ValueSection {
+        value: found.value,
+        std: found.std,
+        low: found.low,
+        high: found.high,
+    })
+}
+
+pub(super) fn prediction_section(mode: &PredictedMode) -> PredictionSection {
+    PredictionSection {
+        mode: mode.mode,
+        measured: mode.measured,
+        predicted: Some(mode.predicted),
+        lambda: Some(mode.lambda),
+        error_percent: mode.error_percent,
+        used: mode.used,
+    }
+}
+
+pub(super) fn perturbation_section(row: &UniformPerturbation) -> PerturbationSection {
+    PerturbationSection {
+        percent: row.percent,
+        method: "pairs".to_string(),
+        kx: row.estimate.map(|estimate| estimate.kx),
+        ky: row.estimate.map(|estimate| estimate.ky),
+        kz: row.estimate.and_then(|estimate| estimate.kz),
+    }
+}
+
+pub(super) fn average_section(row: &AverageError) -> AverageSection {
+    AverageSection {
+        percent: row.percent,
+        kx_percent: row.mean_magnitude.kx,
+        ky_percent: row.mean_magnitude.ky,
+        kz_percent: row.mean_magnitude.kz,
+        kx_of_mean_percent: row.of_mean.kx,
+        ky_of_mean_percent: row.of_mean.ky,
+        kz_of_mean_percent: row.of_mean.kz,
+    }
+}
+
+pub(super) fn monte_carlo_section(found: &MonteCarlo) -> MonteCarloSection {
+    let ends = |spread: Option<Spread>| {
+        spread.map(|spread| ValueSection {
+            value: spread.median,
+            std: None,
+            low: Some(spread.low),
+            high: Some(spread.high),
+        })
+    };
+    MonteCarloSection {
+        samples: found.samples,
+        failed: found.failed,
+        kx: ends(found.kx),
+        ky: ends(found.ky),
+        kz: ends(found.kz),
+    }
+}
+
+pub(super) fn span_section(found: &BoundPerturbation) -> ResolutionSpanSection {
+    let ends = |span: Option<Span>| span.map(|span| [span.low, span.high]);
+    let spans = found.spans.as_ref();
+    ResolutionSpanSection {
+        patterns: spans.map_or(0, |spans| spans.patterns),
+        failed: spans.map_or(0, |spans| spans.failed),
+        kx: ends(spans.and_then(|spans| spans.kx)),
+        ky: ends(spans.and_then(|spans| spans.ky)),
+        kz: ends(spans.and_then(|spans| spans.kz)),
+        cloud: found
+            .cloud
+            .iter()
+            .map(|estimate| [estimate.kx, estimate.ky])
+            .collect(),
+        sensitivity: found
+            .sensitivities
+            .iter()
+            .map(|row| {
+                let change = row.percent_per_bound;
+                SensitivitySection {
+                    mode: found.modes.get(row.index).copied().unwrap_or(0),
+                    half_line: found.bounds.get(row.index).copied().unwrap_or(0.0),
+                    kx_percent: change.map(|change| change.kx),
+                    ky_percent: change.map(|change| change.ky),
+                    kz_percent: change.and_then(|change| change.kz),
+                }
+            })
+            .collect(),
+    }
+}

@@ -8,6 +8,7 @@ use crate::description::{
     ChannelRef, RecordingDescription, Scale, SensorDescription, SensorKind, TestDescription,
 };
 use crate::recording::{ReadSettings, Recording, RecordingError};
+use crate::spectral::SpectralError;
 use crate::taps::{TapSettings, TapSource, find_taps};
 
 /// Pieces of the overview of a recording over time: two for each pixel of a usual picture.
@@ -34,6 +35,18 @@ pub enum PipelineError {
         line: usize,
         /// The recording.
         recording: String,
+    },
+    /// A band or block of the description that does not fit its recording.
+    #[error("{file}:{line}: {recording}: {problem}")]
+    Setting {
+        /// The description.
+        file: String,
+        /// Its line.
+        line: usize,
+        /// The recording.
+        recording: String,
+        /// What does not fit.
+        problem: SpectralError,
     },
     /// A description without sensors.
     #[error(
@@ -93,7 +106,19 @@ pub(super) fn measure_described(
         .collect();
     let hammer_unit = hammer.map(|_| "N".to_string());
     let units = described_units(test, &settings.source);
-    let mut result = finish(recording.renamed(file), settings, (hammer_unit, responses))?;
+    let placed = |error| match error {
+        PipelineError::Measure(MeasureError::Spectral { file, problem }) => {
+            PipelineError::Setting {
+                file: test_file.to_string(),
+                line: description.line,
+                recording: file,
+                problem,
+            }
+        }
+        other => other,
+    };
+    let mut result =
+        finish(recording.renamed(file), settings, (hammer_unit, responses)).map_err(placed)?;
     result.conditions = conditions(test, description);
     for (channel, unit) in units {
         if let Some(info) = result.channels.get_mut(channel) {

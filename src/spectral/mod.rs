@@ -27,7 +27,7 @@ pub use zoom::{band_limited, chirp_z};
 pub enum SpectralError {
     /// The band does not fit the sample rate.
     #[error(
-        "the band {low} to {high} Hz does not fit a sample rate of {sample_rate} Hz: its upper end must lie above its lower end and not above {limit:.6} Hz (half the sample rate)"
+        "the band {low} to {high} Hz does not fit a sample rate of {sample_rate} Hz: its upper end must lie above its lower end and not above {limit} Hz (half the sample rate)"
     )]
     Band {
         /// Lower end (Hz).

@@ -970,3 +970,63 @@ fn regress_spectrum_and_inspect_look_at_one_file() {
         );
     }
 }
+
+#[test]
+fn regress_known_stiffnesses_without_a_measured_mode_are_no_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let quiet: Vec<Vec<f64>> = vec![
+        vec![0.0; 8000],
+        (0..8000).map(|n| 1e-6 * (n % 7) as f64).collect(),
+    ];
+    tapjoint::recording::write_wav(
+        &folder.path().join("quiet.wav"),
+        2000,
+        &quiet,
+        tapjoint::recording::WavFormat::Float32,
+    )
+    .unwrap();
+    let text = "
+        [beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850
+        [joint]\nkind = \"cantilever\"\nkt = 1.4e6\nkr = 320
+        [hammer]\nchannel = 1
+        [[sensor]]\nname = \"A\"\nchannel = 2\nposition = 0.3
+        [[recording]]\nfile = \"quiet.wav\"\ntorque = \"12 N m\"\ndate = \"2020-05-17\"";
+    std::fs::write(folder.path().join("test.toml"), text).unwrap();
+    let output = tapjoint(folder.path())
+        .args(["run", "test.toml", "--json", "-"])
+        .assert()
+        .code(1)
+        .get_output()
+        .stdout
+        .clone();
+    let document: Value = serde_json::from_slice(&output).unwrap();
+    // What the description says of a recording is carried along.
+    assert_eq!(document["recordings"][0]["torque"], 12.0);
+    assert_eq!(document["recordings"][0]["date"], "2020-05-17");
+}
+
+#[test]
+fn regress_a_band_that_does_not_fit_names_the_line_of_its_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let noise: Vec<Vec<f64>> = vec![(0..4000).map(|n| 1e-3 * (n % 5) as f64).collect(); 2];
+    tapjoint::recording::write_wav(
+        &folder.path().join("a.wav"),
+        1000,
+        &noise,
+        tapjoint::recording::WavFormat::Float32,
+    )
+    .unwrap();
+    let text = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\n\
+                density = 7850\n[joint]\nkind = \"cantilever\"\n[hammer]\nchannel = 1\n[[sensor]]\n\
+                name = \"A\"\nchannel = 2\nposition = 0.3\n[[recording]]\nfile = \"a.wav\"\n\
+                band = [0, 2000]\n";
+    std::fs::write(folder.path().join("test.toml"), text).unwrap();
+    tapjoint(folder.path())
+        .args(["run", "test.toml"])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains(
+            "error: test.toml:16: a.wav: the band 0 to 2000 Hz",
+        ));
+    assert!(!folder.path().join("test-report").exists());
+}

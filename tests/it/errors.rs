@@ -1161,7 +1161,7 @@ fn regress_channels_and_places_that_do_not_exist() {
         ),
         (
             SPOILED.replace("taps.csv\"", "taps.csv\"\nband = [0, 900]"),
-            "taps.csv: the band 0 to 900 Hz does not fit",
+            "test.toml:17: taps.csv: the band 0 to 900 Hz does not fit",
             &["640"],
         ),
     ];

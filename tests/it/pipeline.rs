@@ -259,3 +259,58 @@ fn prop_a_sensitivity_is_per_volt_whatever_the_header_says() {
         "{volts}, {expected}"
     );
 }
+
+/// One tap of a 40 Hz structure at 2 kHz with so many seconds of ringing after it.
+fn one_tap(seconds: f64) -> Recording {
+    let mode = tapjoint::simulate::SimulatedMode {
+        frequency: 40.0,
+        damping_ratio: 0.01,
+        shape_at_tap: 1.0,
+        shape_at_sensors: vec![1.0],
+    };
+    let settings = TapTestSettings {
+        sample_rate: 2000.0,
+        taps: 1,
+        interval: seconds,
+        pulse: 4e-3,
+        ..Default::default()
+    };
+    let test = simulate_tap_test(&[mode], &settings, 3);
+    let channel = |samples| Channel {
+        samples,
+        ..Default::default()
+    };
+    let channels = test.channels(1.0, 1.0).into_iter().map(channel).collect();
+    Recording::from_samples("one tap", 2000.0, channels).unwrap()
+}
+
+#[test]
+fn limit_a_band_too_narrow_for_the_signal_is_refused() {
+    let hammer = ChannelRef::Number(1);
+    for width in [1e-6, 1e-3, 0.5] {
+        let error = measure_bare(one_tap(5.0), Some(&hammer), |settings| {
+            settings.band = Some((0.0, width));
+        })
+        .unwrap_err()
+        .to_string();
+        assert!(error.contains("too narrow"), "{width} Hz: {error}");
+    }
+    // Sixteen samples at the zoomed rate of 2.56 widths: 5 s resolve a band of 1.3 Hz.
+    let found = measure_bare(one_tap(5.0), Some(&hammer), |settings| {
+        settings.band = Some((39.0, 41.0));
+    });
+    assert!(found.unwrap().measurement.spectra.is_some());
+}
+
+#[test]
+fn limit_one_tap_in_a_long_recording_takes_the_largest_block() {
+    // 2100 s at 2 kHz are 4.2 million samples, more than a block may have.
+    let hammer = ChannelRef::Number(1);
+    let found = measure_bare(one_tap(2100.0), Some(&hammer), |_| {}).unwrap();
+    let lines = found.measurement.spectra.unwrap().averages.lines;
+    assert!(
+        lines.block <= 4_000_000 && lines.block > 3_000_000,
+        "{}",
+        lines.block
+    );
+}

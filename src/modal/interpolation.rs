@@ -49,7 +49,7 @@ const MOST_LINES: usize = 100;
 const SLOPING_REACH: usize = 4;
 /// What a fit of one pole leaves even without noise (lines): the image at the negative frequency and
 /// the curvature of the background, as seen on noise-free virtual tests.
-const MODEL_ERROR: f64 = 5e-4;
+const MODEL_ERROR: f64 = 1e-4;
 /// Iterations of the weights; they settle in two.
 const REWEIGHTINGS: usize = 3;
 

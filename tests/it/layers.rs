@@ -787,7 +787,7 @@ fn prop_the_path_checker_finds_what_is_planted() {
     }
     for text in [
         "https://example.org/home/page",
-        "src/work/mod.rs and/or ./work",
+        "src/home/mod.rs and/or ./home",
         "https://example.org/~me/root",
         "the frame/work ratio",
         "/workload /rooted",

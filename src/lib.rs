@@ -18,6 +18,7 @@ pub mod references;
 
 pub mod description;
 pub mod quantity;
+pub mod stats;
 
 pub mod modal;
 pub mod recording;

@@ -1,6 +1,7 @@
 //! Finding resonances: prominence, height over the noise, separation, number.
 
 use crate::spectral::Lines;
+use crate::stats::median;
 
 /// Level of a spectrum over all sensors, and of its noise, line by line.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +22,9 @@ impl CompositeLevel {
     pub fn new(lines: Lines, powers: &[Vec<f64>], noise: Option<&[Vec<f64>]>) -> Self {
         let weights: Vec<f64> = powers
             .iter()
-            .map(|power| 1.0 / median(power).max(f64::MIN_POSITIVE) / powers.len() as f64)
+            .map(|power| {
+                1.0 / median_of_positive(power).max(f64::MIN_POSITIVE) / powers.len() as f64
+            })
             .collect();
         CompositeLevel {
             lines,
@@ -49,19 +52,23 @@ fn weighted_db(powers: &[Vec<f64>], weights: &[f64], points: usize) -> Vec<f64> 
         .collect()
 }
 
-/// Middle value of the positive entries; 0 when there are none.
-fn median(values: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|&v| v > 0.0).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+/// Median of the positive entries; 0 when there are none.
+fn median_of_positive(values: &[f64]) -> f64 {
+    median(
+        &mut values
+            .iter()
+            .copied()
+            .filter(|&v| v > 0.0)
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// What counts as a resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakSettings {
     /// Least prominence (dB): how far the level falls on both sides before it rises above the peak.
-    /// 2 dB, where noise allows it: two resonances one and a half half-power widths apart still have
-    /// it. The ripple that noise puts on a level comes on top.
+    /// 2 dB, where noise allows it: two equal resonances two half-power widths apart still have it; of
+    /// nearer or unequal ones only the higher is seen. The ripple that noise puts on a level comes on top.
     pub prominence_db: f64,
     /// Least prominence where nothing is known of the noise (dB). 8 dB.
     pub blind_prominence_db: f64,

@@ -79,19 +79,8 @@ pub(super) fn measure_described(
             file: test_file.to_string(),
         });
     }
-    let settings = ReadSettings {
-        sample_rate: description.sample_rate,
-    };
-    let mut recording = Recording::open(&folder.join(&description.file), &settings)?;
-    let hammer = match &test.hammer {
-        Some(hammer) => Some(channel(&mut recording, &hammer.channel, hammer.scale)?),
-        None => None,
-    };
-    let mut channels = Vec::with_capacity(test.sensors.len());
-    for sensor in &test.sensors {
-        channels.push(channel(&mut recording, &sensor.channel, sensor.scale)?);
-    }
-    let mut settings = MeasureSettings::new(source(hammer, channels));
+    let (recording, source) = open_described(test, description, folder)?;
+    let mut settings = MeasureSettings::new(source);
     settings.band = description.band;
     settings.block = description.block;
     settings.window = test.analysis.window;
@@ -104,7 +93,7 @@ pub(super) fn measure_described(
             unit: Some(si_unit(sensor.kind).to_string()),
         })
         .collect();
-    let hammer_unit = hammer.map(|_| "N".to_string());
+    let hammer_unit = test.hammer.as_ref().map(|_| "N".to_string());
     let units = described_units(test, &settings.source);
     let placed = |error| match error {
         PipelineError::Measure(MeasureError::Spectral { file, problem }) => {
@@ -139,6 +128,27 @@ fn described_units(test: &TestDescription, source: &TapSource) -> Vec<(usize, &'
         .into_iter()
         .chain(responses.iter().copied().zip(sensors))
         .collect()
+}
+
+/// Opens a described recording, scales its channels, and says which of them are what.
+fn open_described(
+    test: &TestDescription,
+    description: &RecordingDescription,
+    folder: &Path,
+) -> Result<(Recording, TapSource), RecordingError> {
+    let settings = ReadSettings {
+        sample_rate: description.sample_rate,
+    };
+    let mut recording = Recording::open(&folder.join(&description.file), &settings)?;
+    let hammer = match &test.hammer {
+        Some(hammer) => Some(channel(&mut recording, &hammer.channel, hammer.scale)?),
+        None => None,
+    };
+    let mut channels = Vec::with_capacity(test.sensors.len());
+    for sensor in &test.sensors {
+        channels.push(channel(&mut recording, &sensor.channel, sensor.scale)?);
+    }
+    Ok((recording, source(hammer, channels)))
 }
 
 /// What the description says of the circumstances of a recording.

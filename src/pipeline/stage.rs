@@ -13,6 +13,7 @@ use crate::spectral::{
     AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, apply_force_window, band_limited,
     choose_window, exponential_to, measure_decay, transform_block,
 };
+use crate::stats::{median, root_mean_square};
 use crate::taps::{Tap, TapSource, Taps};
 
 /// What every step of one recording's measurement needs.
@@ -109,7 +110,7 @@ impl<'a> Stage<'a> {
         let noise: Vec<f64> = quiet
             .responses
             .iter()
-            .map(|x| rms(&band_limited(x, rate, band)))
+            .map(|x| root_mean_square(&band_limited(x, rate, band)))
             .collect();
         let mut checks = vec![
             DecayCheck {
@@ -294,11 +295,7 @@ const OFFSET_STRETCH: f64 = 0.2;
 fn remove_offset(force: &mut [f64], sample_rate: f64) {
     let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
     let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
-    if about.is_empty() {
-        return;
-    }
-    let half = about.len() / 2;
-    let rest = *about.select_nth_unstable_by(half, f64::total_cmp).1;
+    let rest = median(&mut about);
     force.iter_mut().for_each(|x| *x -= rest);
 }
 
@@ -338,8 +335,4 @@ fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> Mod
         label: Some(label),
         ..reading.clone()
     }
-}
-
-fn rms(samples: &[f64]) -> f64 {
-    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
 }

@@ -2,7 +2,7 @@
 
 use super::document::{
     AverageSection, EstimateSection, MonteCarloSection, PairsSection, PerturbationSection,
-    PredictionSection, ResolutionSpanSection, SensitivitySection, ValueSection,
+    PredictionSection, ResolutionSpanSection, SensitivitySection, SingleModeSection, ValueSection,
 };
 use crate::identify::perturbation::{AverageError, Span, UniformPerturbation};
 use crate::identify::{
@@ -35,7 +35,18 @@ fn joint_section(joint: &JointEstimate) -> EstimateSection {
             ky: joint.pairs.ky,
             kz: joint.pairs.kz,
             closure: joint.pairs.closure,
+            condition: Some(joint.pairs.condition),
         }),
+        single_modes: joint
+            .single_modes
+            .iter()
+            .map(|single| SingleModeSection {
+                mode: single.mode,
+                kx: single.kx,
+                ky: single.ky,
+                modulus: None,
+            })
+            .collect(),
         ..Default::default()
     }
 }
@@ -46,6 +57,15 @@ fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
         modes_used: free.modes_used.clone(),
         modulus: value(Some(free.modulus)),
         density: value(Some(free.density)),
+        single_modes: free
+            .per_mode
+            .iter()
+            .map(|&(mode, modulus)| SingleModeSection {
+                mode,
+                modulus: Some(modulus),
+                ..Default::default()
+            })
+            .collect(),
         ..Default::default()
     }
 }
@@ -129,12 +149,16 @@ pub(super) fn span_section(found: &BoundPerturbation) -> ResolutionSpanSection {
             .iter()
             .map(|row| {
                 let change = row.percent_per_bound;
+                let slope = row.percent_per_percent;
                 SensitivitySection {
                     mode: found.modes.get(row.index).copied().unwrap_or(0),
                     half_line: found.bounds.get(row.index).copied().unwrap_or(0.0),
                     kx_percent: change.map(|change| change.kx),
                     ky_percent: change.map(|change| change.ky),
                     kz_percent: change.and_then(|change| change.kz),
+                    kx_percent_per_percent: slope.map(|slope| slope.kx),
+                    ky_percent_per_percent: slope.map(|slope| slope.ky),
+                    kz_percent_per_percent: slope.and_then(|slope| slope.kz),
                 }
             })
             .collect(),

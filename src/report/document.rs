@@ -245,6 +245,22 @@ pub struct EstimateSection {
     pub correlations: Vec<f64>,
     /// The pair regression.
     pub pairs: Option<PairsSection>,
+    /// What each mode says alone: of a lap joint its Kx if antisymmetric or Ky if symmetric, of a free
+    /// beam its modulus; else empty.
+    pub single_modes: Vec<SingleModeSection>,
+}
+
+/// What one mode says alone; a value that it cannot give is null.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SingleModeSection {
+    /// Mode number.
+    pub mode: usize,
+    /// Kx, if the mode is antisymmetric.
+    pub kx: Option<f64>,
+    /// Ky, if the mode is symmetric.
+    pub ky: Option<f64>,
+    /// Young's modulus (Pa).
+    pub modulus: Option<f64>,
 }
 
 /// The pair regression's values.
@@ -258,6 +274,8 @@ pub struct PairsSection {
     pub kz: Option<f64>,
     /// Product implied by the regression over the product of its own estimates, minus 1.
     pub closure: Option<f64>,
+    /// Largest over smallest singular value of the regression, its columns scaled to 1.
+    pub condition: Option<f64>,
 }
 
 /// One measured mode beside its prediction. error_percent = 100 (predicted - measured)/measured.
@@ -361,6 +379,12 @@ pub struct SensitivitySection {
     pub ky_percent: Option<f64>,
     /// Change of Kz (%).
     pub kz_percent: Option<f64>,
+    /// Change of Kx (%) per change of this frequency (%), for small changes.
+    pub kx_percent_per_percent: Option<f64>,
+    /// The same of Ky.
+    pub ky_percent_per_percent: Option<f64>,
+    /// The same of Kz.
+    pub kz_percent_per_percent: Option<f64>,
 }
 
 /// A warning.

@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use super::lines::{DISPLAY_RATIO, Lines};
-use super::zoom::{chirp_z, mix_and_decimate};
+use super::lines::Lines;
+use super::zoom::{chirp_z, decimation_factor, mix_and_decimate};
 
 /// Fourier transform X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate} of a windowed record (unit of the
 /// samples times s), on `lines`; time zero is the record's first sample.
@@ -38,8 +38,7 @@ fn full_transform(samples: &[f64], lines: &Lines) -> Vec<Complex64> {
 fn zoom_transform(samples: &[f64], sample_rate: f64, lines: &Lines) -> Vec<Complex64> {
     let width = lines.high - lines.low;
     let centre = 0.5 * (lines.low + lines.high);
-    // The complex rate an analyser would use is 1.28 bandwidths; the next whole divisor above it.
-    let factor = (sample_rate / (DISPLAY_RATIO / 2.0 * width)).floor() as usize;
+    let factor = decimation_factor(sample_rate, width);
     if factor < 2 {
         let record: Vec<Complex64> = samples.iter().map(|&x| Complex64::from(x)).collect();
         let start = lines.low / sample_rate;

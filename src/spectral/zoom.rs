@@ -6,6 +6,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::block::smallest_smooth_block;
+use super::lines::DISPLAY_RATIO;
 
 /// Stop-band attenuation of the zoom's low-pass filter (dB): below the 24-bit noise of good
 /// recorders once the decimated lines add up.
@@ -52,6 +53,12 @@ fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
     taps.iter().map(|tap| tap / sum).collect()
 }
 
+/// By how much a band of this width (Hz) can be decimated: to the next whole divisor above the complex
+/// rate of 1.28 widths that an analyser would use.
+pub(super) fn decimation_factor(sample_rate: f64, width: f64) -> usize {
+    (sample_rate / (DISPLAY_RATIO / 2.0 * width)).floor() as usize
+}
+
 /// A record mixed down by `centre`, filtered and decimated; sample m is at time
 /// (m * factor - delay)/sample_rate from the record's start.
 pub(super) struct Decimated {
@@ -96,7 +103,7 @@ pub(super) fn mix_and_decimate(
 /// decimated, the filter's tails cut off; the samples themselves where the band is most of what
 /// there is.
 pub fn band_limited(samples: &[f64], sample_rate: f64, (low, high): (f64, f64)) -> Vec<f64> {
-    let factor = (sample_rate / (1.28 * (high - low))).floor() as usize;
+    let factor = decimation_factor(sample_rate, high - low);
     if factor < 3 {
         return samples.to_vec();
     }

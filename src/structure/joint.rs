@@ -42,17 +42,6 @@ impl JointStiffness {
         }
     }
 
-    /// From stiffnesses in SI units: kt (N/m), kr (N m/rad), ktr (N/rad), the last `None` without
-    /// coupling.
-    pub fn from_dimensional(beam: &Beam, kt: f64, kr: f64, ktr: Option<f64>) -> Self {
-        let unit = StiffnessUnits::of(beam);
-        Self {
-            kx: kt / unit.kt,
-            ky: kr / unit.kr,
-            cross_compliance: ktr.map_or(0.0, |ktr| unit.ktr / ktr),
-        }
-    }
-
     /// Cross-coupling stiffness Kz (1); `None` without coupling.
     pub fn kz(&self) -> Option<f64> {
         (self.cross_compliance != 0.0).then(|| 1.0 / self.cross_compliance)

@@ -2,6 +2,7 @@
 
 use super::Event;
 use crate::recording::{Recording, RecordingError};
+use crate::stats::root_mean_square;
 
 /// Stretch before and after the trigger that is compared (s): several periods of the lowest modes'
 /// higher companions, short beside the time between taps.
@@ -30,7 +31,7 @@ pub(super) fn is_answered(
         let quiet = recording.read(response, before.clone())?;
         let loud = recording.read(response, after.clone())?;
         let rises = |measure: fn(&[f64]) -> f64| measure(&loud) > RISE * measure(&quiet);
-        if rises(rms) || rises(rms_of_change) {
+        if rises(rms_about_mean) || rises(rms_of_change) {
             return Ok(true);
         }
     }
@@ -44,12 +45,12 @@ fn rms_of_change(samples: &[f64]) -> f64 {
         .windows(3)
         .map(|x| x[2] - 2.0 * x[1] + x[0])
         .collect();
-    rms(&change)
+    root_mean_square(&change)
 }
 
 /// Root mean square about the mean; 0 of nothing.
-fn rms(samples: &[f64]) -> f64 {
-    let count = samples.len().max(1) as f64;
-    let mean = samples.iter().sum::<f64>() / count;
-    (samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt()
+fn rms_about_mean(samples: &[f64]) -> f64 {
+    let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+    let about: Vec<f64> = samples.iter().map(|x| x - mean).collect();
+    root_mean_square(&about)
 }

@@ -2,6 +2,7 @@
 
 use super::{Event, Found, TapRemark, TapSettings};
 use crate::recording::{Recording, RecordingError};
+use crate::stats::{median, root_mean_square};
 
 /// Length of the pieces in which drift and noise are surveyed (s). A pulse of a few milliseconds
 /// does not move the median of 0.1 s.
@@ -65,8 +66,8 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
     // 1.4826 turns a median deviation into a standard deviation of normal noise. Coarsely quantised
     // noise has a median deviation of zero: the rms of a usual piece and a third of a quantum (what
     // rounding alone leaves) hold it up.
-    let noise = (1.4826 * middle(&mut deviations))
-        .max(middle(&mut roots))
+    let noise = (1.4826 * median(&mut deviations))
+        .max(median(&mut roots))
         .max(0.3 * recording.quantum(channel));
     let up = pieces.iter().map(|p| p.high - p.median).fold(0.0, f64::max);
     let down = pieces.iter().map(|p| p.median - p.low).fold(0.0, f64::max);
@@ -83,7 +84,7 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
             frames: frames as f64,
         },
         noise,
-        usual: middle(&mut reached),
+        usual: median(&mut reached),
         polarity,
         largest: if polarity > 0.0 { up } else { down },
     })
@@ -95,27 +96,18 @@ fn piece(mut samples: Vec<f64>) -> Option<Piece> {
     if samples.is_empty() {
         return None;
     }
-    let median = middle(&mut samples);
+    let centre = median(&mut samples);
     for x in &mut samples {
-        *x = (*x - median).abs();
+        *x = (*x - centre).abs();
     }
-    let rms = (samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64).sqrt();
+    let rms = root_mean_square(&samples);
     Some(Piece {
-        median,
-        deviation: middle(&mut samples),
+        median: centre,
+        deviation: median(&mut samples),
         rms,
         low,
         high,
     })
-}
-
-/// Median (the upper one of an even count); 0 of nothing.
-fn middle(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
 }
 
 /// Finds the pulses of force.

@@ -6,6 +6,7 @@ use super::answer::is_answered;
 use super::hammer::Survey;
 use super::{Event, Found, Rejection, Tap, TapSettings, TapSource, Taps};
 use crate::recording::{Recording, RecordingError};
+use crate::stats::median;
 
 /// A record shorter than this share of the median one is not worth shortening all others for.
 const SHORT_OF_MEDIAN: f64 = 0.5;
@@ -21,7 +22,13 @@ pub(super) fn judge(
 ) -> Result<Taps, RecordingError> {
     let answered = answers(recording, source, &found.events)?;
     let real = |(event, answered): (&Event, &bool)| answered.then_some(event.peak);
-    let weakest = settings.weak * median(found.events.iter().zip(&answered).filter_map(real));
+    let mut peaks: Vec<f64> = found
+        .events
+        .iter()
+        .zip(&answered)
+        .filter_map(real)
+        .collect();
+    let weakest = settings.weak * median(&mut peaks);
     let counts: Vec<bool> = found
         .events
         .iter()
@@ -112,12 +119,6 @@ fn records(
         start(event)..end.max(start(event))
     };
     events.iter().enumerate().map(record).collect()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// One excursion of the force above the double-hit limit.
@@ -285,12 +286,12 @@ fn limits(recording: &Recording, channel: usize) -> Option<(f64, f64)> {
 /// record sets its length.
 fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
     let last = taps.len().saturating_sub(1);
-    let lengths: Vec<f64> = taps
+    let mut lengths: Vec<f64> = taps
         .iter()
         .filter(|tap| tap.accepted())
         .map(|tap| tap.frames() as f64 / rate)
         .collect();
-    let typical = median(lengths.iter().copied());
+    let typical = median(&mut lengths);
     let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
     for (index, tap) in taps
         .iter_mut()

@@ -187,6 +187,7 @@ fn estimate() -> EstimateSection {
         kt: value(1_382_000.0, 0.041),
         kr: value(318.9, 0.0032),
         pairs: Some(PairsSection {
+            condition: Some(31.0),
             kx: Some(970.5),
             ky: Some(1.251),
             kz: None,
@@ -247,6 +248,7 @@ fn span() -> ResolutionSpanSection {
                 kx_percent: Some([0.02, -1.0, 3.1, 8.2][index]),
                 ky_percent: Some([0.61, 0.2, -0.05, 0.01][index]),
                 kz_percent: None,
+                ..SensitivitySection::default()
             })
             .collect(),
     }

@@ -1,0 +1,31 @@
+//! Small statistics that several stages share; knows nothing of taps or beams.
+
+/// Median (the upper one of an even count), in the unit of the values; 0 of nothing. Reorders them.
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let half = values.len() / 2;
+    *values.select_nth_unstable_by(half, f64::total_cmp).1
+}
+
+/// Root of the mean square, sqrt(sum x^2/n), in the unit of the values; 0 of nothing.
+pub fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limit_nothing_one_and_an_even_count() {
+        assert_eq!((median(&mut []), root_mean_square(&[])), (0.0, 0.0));
+        assert_eq!(
+            (median(&mut [-3.0]), root_mean_square(&[-3.0])),
+            (-3.0, 3.0)
+        );
+        assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
+        assert_eq!(root_mean_square(&[1.0, 7.0]), 5.0);
+    }
+}

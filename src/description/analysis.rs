@@ -4,13 +4,19 @@ use super::error::{DescriptionError, DescriptionProblem};
 use super::limits::Limits;
 use super::reader::{Entry, Table};
 use super::{
-    AnalysisDescription, FitParameter, JointDescription, JointKind, JointModel, Weights, WindowKind,
+    AnalysisDescription, FitParameter, JointDescription, JointKind, JointModel, ReadingMethod,
+    Weights, WindowKind,
 };
 
 const WINDOWS: [(&str, WindowKind); 3] = [
     ("rectangular", WindowKind::Rectangular),
     ("hann", WindowKind::Hann),
     ("exponential", WindowKind::Exponential),
+];
+const READINGS: [(&str, ReadingMethod); 3] = [
+    ("fit", ReadingMethod::Fit),
+    ("interpolated", ReadingMethod::Interpolated),
+    ("line", ReadingMethod::Line),
 ];
 const WEIGHTS: [(&str, Weights); 2] = [
     ("measured", Weights::Measured),
@@ -32,6 +38,7 @@ pub(super) fn read_analysis(
 ) -> Result<AnalysisDescription, DescriptionError> {
     let mut analysis = AnalysisDescription {
         window: None,
+        reading: ReadingMethod::default(),
         fit_modes: None,
         weights: None,
         sensor_mass: true,
@@ -39,6 +46,9 @@ pub(super) fn read_analysis(
     };
     if let Some(table) = table {
         analysis.window = table.optional("window", |entry| entry.choice(&WINDOWS))?;
+        analysis.reading = table
+            .optional("reading", |entry| entry.choice(&READINGS))?
+            .unwrap_or_default();
         analysis.fit_modes = table.optional("fit_modes", |entry| entry.count(&FIT_MODES))?;
         analysis.weights = table.optional("weights", |entry| entry.choice(&WEIGHTS))?;
         analysis.sensor_mass = table

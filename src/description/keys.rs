@@ -92,7 +92,14 @@ pub(super) const MEASURED: KnownTable = KnownTable {
 };
 pub(super) const ANALYSIS: KnownTable = KnownTable {
     header: "[analysis]",
-    keys: &["window", "fit_modes", "weights", "sensor_mass", "fit"],
+    keys: &[
+        "window",
+        "reading",
+        "fit_modes",
+        "weights",
+        "sensor_mass",
+        "fit",
+    ],
 };
 
 const ALL: [&KnownTable; 11] = [

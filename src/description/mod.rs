@@ -290,6 +290,19 @@ pub enum WindowKind {
     Exponential,
 }
 
+/// How natural frequencies are read from a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReadingMethod {
+    /// By a fit of decaying oscillations, with a standard deviation; what cannot be fitted is read
+    /// between the lines or on its line.
+    #[default]
+    Fit,
+    /// Between the lines about the peak; what cannot be had so, on its line.
+    Interpolated,
+    /// On the highest spectral line, as Ingole & Chatterjee read theirs.
+    Line,
+}
+
 /// Weights of the frequencies in an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weights {
@@ -319,6 +332,8 @@ pub enum FitParameter {
 pub struct AnalysisDescription {
     /// Window; `None` = chosen from the decay in the record.
     pub window: Option<WindowKind>,
+    /// How natural frequencies are read.
+    pub reading: ReadingMethod,
     /// The first so many modes enter the estimate; `None` = all.
     pub fit_modes: Option<usize>,
     /// Weights of the frequencies; `None` = measured where bounds are known.

@@ -86,6 +86,7 @@ file = "taps.wav"              # WAV or CSV, seen from the folder of this file
 
 [analysis]
 # window = "exponential"       # "rectangular" | "hann" | "exponential"; default: rectangular where the tap rings down to 1 % in the block, else exponential
+# reading = "fit"              # how frequencies are read: "fit" (default) | "interpolated" | "line", the paper's way
 # fit_modes = 4                # the first so many modes enter the estimate, default: all
 # weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights (not used by this version)
 # sensor_mass = true           # whether the sensors' masses enter the model, default: true (not used by this version)

@@ -10,6 +10,7 @@
 //! writes.
 
 mod analysis;
+mod force;
 mod identification;
 mod measure;
 mod model;

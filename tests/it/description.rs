@@ -381,7 +381,7 @@ fn regress_templates_name_every_key() {
     let keys = "name length width thickness modulus density poisson tolerance kind model kt kr ktr \
                 beam position overlap channel scale sensitivity mass file tap band block at \
                 sample_rate form sensor torque temperature date frequencies modes half_line std \
-                scatter window fit_modes weights sensor_mass fit right";
+                scatter window reading fit_modes weights sensor_mass fit right";
     let all = template(JointKind::Cantilever) + &template(JointKind::Lap);
     for key in keys.split_whitespace() {
         let named = all

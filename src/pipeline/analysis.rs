@@ -35,10 +35,10 @@ pub struct RecordingResult {
     pub file: String,
     /// What kind of file it is.
     pub format: Format,
-    /// Sample rate (Hz).
-    pub sample_rate: f64,
-    /// Length (s).
-    pub seconds: f64,
+    /// Sample rate (Hz); `None` of frequency response functions from a file.
+    pub sample_rate: Option<f64>,
+    /// Length (s); `None` of frequency response functions from a file.
+    pub seconds: Option<f64>,
     /// Every channel in the file.
     pub channels: Vec<ChannelInfo>,
     /// Whether there is a hammer channel.
@@ -56,8 +56,9 @@ pub struct RecordingResult {
     pub measurement: Measurement,
     /// Numbers of the modes that this recording's readings belong to, one for each reading.
     pub mode_numbers: Vec<Option<usize>>,
-    /// The channel on which taps were found, over time.
-    pub overview: Overview,
+    /// The channel on which taps were found, over time; `None` of frequency response functions from a
+    /// file.
+    pub overview: Option<Overview>,
 }
 
 /// Circumstances of a recording that are carried to the outputs as described.

@@ -295,8 +295,8 @@ fn result(
     Ok(RecordingResult {
         file: recording.name().to_string(),
         format: recording.format(),
-        sample_rate: recording.sample_rate(),
-        seconds: recording.duration(),
+        sample_rate: Some(recording.sample_rate()),
+        seconds: Some(recording.duration()),
         channels: recording.channels().to_vec(),
         has_hammer,
         conditions: Conditions::default(),
@@ -307,7 +307,7 @@ fn result(
         },
         responses,
         band: settings.band,
-        overview: overview(recording, shown)?,
+        overview: Some(overview(recording, shown)?),
         measurement,
         mode_numbers: vec![None; readings],
     })

@@ -33,13 +33,13 @@ fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
     };
     RecordingFigure {
         file: recording.file.clone(),
-        overview: TimeOverview {
+        overview: recording.overview.as_ref().map(|overview| TimeOverview {
             label,
-            step: recording.overview.step,
-            low: recording.overview.low.clone(),
-            high: recording.overview.high.clone(),
+            step: overview.step,
+            low: overview.low.clone(),
+            high: overview.high.clone(),
             taps,
-        },
+        }),
         spectra: recording
             .measurement
             .spectra

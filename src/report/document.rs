@@ -76,14 +76,14 @@ pub struct RecordingSection {
     pub file: String,
     /// Format in words: "WAV, 24-bit integer".
     pub format: String,
-    /// Sample rate (Hz).
-    pub sample_rate: f64,
+    /// Sample rate (Hz); null of frequency response functions from a file.
+    pub sample_rate: Option<f64>,
     /// Number of channels.
     pub channels: usize,
     /// Every channel.
     pub channel_details: Vec<ChannelSection>,
-    /// Length (s).
-    pub seconds: f64,
+    /// Length (s); null of frequency response functions from a file.
+    pub seconds: Option<f64>,
     /// Whether there is a hammer channel.
     pub has_hammer: bool,
     /// Names of the responses: sensors, or channels.

@@ -7,8 +7,8 @@ use crate::spectral::Lines;
 pub struct RecordingFigure {
     /// File as the description names it.
     pub file: String,
-    /// Envelope over time of the channel on which taps were found.
-    pub overview: TimeOverview,
+    /// Envelope over time of the channel on which taps were found; `None` where there are no samples.
+    pub overview: Option<TimeOverview>,
     /// The spectra; `None` when no tap was accepted.
     pub spectra: Option<SpectraFigure>,
 }

@@ -136,11 +136,15 @@ fn recording_facts(recording: &RecordingSection) -> Vec<(&'static str, Option<St
         ("Format", Some(recording.format.clone())),
         (
             "Rate",
-            Some(format!("{} Hz", trimmed(recording.sample_rate, 8))),
+            recording
+                .sample_rate
+                .map(|rate| format!("{} Hz", trimmed(rate, 8))),
         ),
         (
             "Length",
-            Some(format!("{} s", trimmed(recording.seconds, 4))),
+            recording
+                .seconds
+                .map(|seconds| format!("{} s", trimmed(seconds, 4))),
         ),
         ("Channels", Some(recording.channels.to_string())),
     ]

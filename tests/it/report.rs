@@ -48,7 +48,7 @@ fn incomplete() -> Vec<(&'static str, Document, Vec<RecordingFigure>)> {
         .into_iter()
         .map(|mut figure| {
             figure.spectra = None;
-            figure.overview.taps.clear();
+            figure.overview.as_mut().unwrap().taps.clear();
             figure
         })
         .collect();
@@ -109,8 +109,8 @@ fn broken() -> Document {
 fn broken_figures() -> Vec<RecordingFigure> {
     let mut figures = fixture::figures();
     for figure in &mut figures {
-        figure.overview.high[7] = f64::NAN;
-        figure.overview.taps[0].peak = f64::INFINITY;
+        figure.overview.as_mut().unwrap().high[7] = f64::NAN;
+        figure.overview.as_mut().unwrap().taps[0].peak = f64::INFINITY;
         if let Some(spectra) = &mut figure.spectra {
             spectra.responses[0].values.fill(0.0);
             spectra.responses[1].values[3] = f64::NAN;
@@ -126,8 +126,8 @@ fn broken_figures() -> Vec<RecordingFigure> {
 fn empty_figures() -> Vec<RecordingFigure> {
     let mut figures = fixture::figures();
     for figure in &mut figures {
-        figure.overview.low.clear();
-        figure.overview.high.clear();
+        figure.overview.as_mut().unwrap().low.clear();
+        figure.overview.as_mut().unwrap().high.clear();
         if let Some(spectra) = &mut figure.spectra {
             spectra.responses.clear();
             spectra.frfs.clear();

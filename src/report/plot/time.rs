@@ -15,7 +15,7 @@ const LINE: f64 = 20.0;
 
 /// The recording over time; `None` for a recording without samples.
 pub fn draw_taps(figure: &RecordingFigure) -> Option<Drawing> {
-    let overview = &figure.overview;
+    let overview = figure.overview.as_ref()?;
     if overview.low.is_empty() || overview.high.is_empty() {
         return None;
     }

@@ -56,8 +56,12 @@ fn recording_row(recording: &RecordingSection) -> Vec<String> {
     vec![
         recording.file.clone(),
         recording.format.clone(),
-        trimmed(recording.sample_rate, 8),
-        trimmed(recording.seconds, 4),
+        recording
+            .sample_rate
+            .map_or(MISSING.into(), |rate| trimmed(rate, 8)),
+        recording
+            .seconds
+            .map_or(MISSING.into(), |seconds| trimmed(seconds, 4)),
         recording.channels.to_string(),
         format!("{used} of {}", recording.taps.len()),
         count(recording.block),

@@ -82,9 +82,9 @@ fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recor
         has_hammer: true,
         responses: vec!["A".into(), "B".into()],
         tap_unit: Some("N".into()),
-        sample_rate: 5120.0,
+        sample_rate: Some(5120.0),
         channels: 3,
-        seconds: 20.5,
+        seconds: Some(20.5),
         taps: taps(),
         line_spacing: Some(lines.spacing),
         resolution: Some(lines.resolution()),
@@ -276,7 +276,7 @@ fn figure(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recordin
     });
     RecordingFigure {
         file: file.into(),
-        overview: overview(),
+        overview: Some(overview()),
         spectra: Some(spectra(lines, peaks)),
     }
 }

@@ -19,7 +19,9 @@ mod zoom;
 pub use average::{AveragedSpectra, SpectralAverager, TapRecord, average_records};
 pub use block::{largest_smooth_block, smallest_smooth_block};
 pub use chirp::chirp_z;
-pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
+pub use decay::{
+    DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay, window_share,
+};
 pub use form::ResponseForm;
 pub use frf::{FrfEstimator, LinePowers, LineQuality, random_error};
 pub use lines::{DISPLAY_RATIO, Lines};

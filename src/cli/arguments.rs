@@ -4,9 +4,10 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tapjoint::description::{ChannelRef, JointKind, WindowKind};
+use tapjoint::description::{ChannelRef, JointKind, SensorKind, WindowKind};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
+use tapjoint::spectral::{FrfEstimator, ResponseForm};
 
 /// Arguments of every command.
 #[derive(Debug, Args)]
@@ -270,6 +271,91 @@ impl From<WindowArgument> for WindowKind {
             WindowArgument::Rectangular => Self::Rectangular,
             WindowArgument::Hann => Self::Hann,
             WindowArgument::Exponential => Self::Exponential,
+        }
+    }
+}
+
+/// Estimators of frequency response functions, as the command line names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum EstimatorArgument {
+    /// Gfx/Gff: right where only the response is noisy
+    #[default]
+    H1,
+    /// Gxx/Gxf: right where only the force is noisy
+    H2,
+    /// Total least squares: between the two
+    Hv,
+}
+
+impl From<EstimatorArgument> for FrfEstimator {
+    fn from(estimator: EstimatorArgument) -> Self {
+        match estimator {
+            EstimatorArgument::H1 => Self::H1,
+            EstimatorArgument::H2 => Self::H2,
+            EstimatorArgument::Hv => Self::Hv,
+        }
+    }
+}
+
+/// Forms of frequency response functions, as the command line names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum FormArgument {
+    /// Acceleration per force, (m/s2)/N
+    Accelerance,
+    /// Velocity per force, (m/s)/N
+    Mobility,
+    /// Displacement per force, m/N
+    Receptance,
+}
+
+impl From<FormArgument> for ResponseForm {
+    fn from(form: FormArgument) -> Self {
+        match form {
+            FormArgument::Accelerance => Self::Accelerance,
+            FormArgument::Mobility => Self::Mobility,
+            FormArgument::Receptance => Self::Receptance,
+        }
+    }
+}
+
+/// Kinds of sensor, as the command line names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum SensorArgument {
+    /// Accelerometer, m/s2
+    Acceleration,
+    /// Velocity, m/s
+    Velocity,
+    /// Displacement, m
+    Displacement,
+    /// Microphone, Pa
+    Sound,
+}
+
+impl From<SensorArgument> for SensorKind {
+    fn from(kind: SensorArgument) -> Self {
+        match kind {
+            SensorArgument::Acceleration => Self::Acceleration,
+            SensorArgument::Velocity => Self::Velocity,
+            SensorArgument::Displacement => Self::Displacement,
+            SensorArgument::Sound => Self::Sound,
+        }
+    }
+}
+
+/// A factor that makes SI units of a file's units; negative = mounted the other way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ChannelScale(pub(super) f64);
+
+impl FromStr for ChannelScale {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wanted =
+            "give SI units per unit of the file, such as 500; negative = the other way round";
+        match text.trim().parse::<f64>() {
+            Ok(value) if value.is_finite() && value != 0.0 => Ok(Self(value)),
+            Ok(value) => Err(format!("{value} is no scale; {wanted}")),
+            Err(_) => Err(format!("\"{text}\" is not a number; {wanted}")),
         }
     }
 }

@@ -7,7 +7,9 @@ mod arguments;
 mod input;
 mod output;
 mod terminal;
+mod wiring;
 
+mod frf;
 mod identify;
 mod init;
 mod inspect;
@@ -47,6 +49,7 @@ enum Command {
     Init(init::InitArguments),
     Inspect(inspect::InspectArguments),
     Spectrum(spectrum::SpectrumArguments),
+    Frf(frf::FrfArguments),
     Identify(identify::IdentifyArguments),
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
@@ -91,6 +94,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Init(arguments) => init::run(arguments, terminal),
         Command::Inspect(arguments) => inspect::run(arguments, terminal),
         Command::Spectrum(arguments) => spectrum::run(arguments, terminal),
+        Command::Frf(arguments) => frf::run(arguments, terminal),
         Command::Identify(arguments) => identify::run(arguments, terminal),
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),

@@ -130,6 +130,7 @@ pub fn measure(
     let stage = Stage::new(recording, settings, &taps, lines);
     let spectra = stage.spectra()?;
     warnings.extend(super::warning::of_spectra(recording.name(), &spectra));
+    warnings.extend(super::doubts::of_readings(recording.name(), &spectra));
     Ok(Measurement {
         taps,
         spectra: Some(spectra),

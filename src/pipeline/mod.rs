@@ -10,7 +10,9 @@
 //! writes.
 
 mod analysis;
+mod doubts;
 mod force;
+mod frf;
 mod identification;
 mod measure;
 mod model;
@@ -19,6 +21,7 @@ mod quiet;
 mod recordings;
 mod stage;
 mod warning;
+mod wired;
 
 use std::path::Path;
 
@@ -28,12 +31,14 @@ pub use analysis::{
     Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
     Perturbation, RecordingResult, Response,
 };
+pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use identification::{IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
-pub use recordings::{PipelineError, inspect_bare, measure_bare};
+pub use recordings::{PipelineError, inspect_bare, measure_bare, si_unit};
 pub use warning::Warning;
+pub use wired::{Wiring, run_wired};
 
 use crate::description::{ChannelRef, TestDescription};
 use crate::recording::Recording;
@@ -106,14 +111,5 @@ pub fn run_recording(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    let mut recording = measure_bare(recording, hammer, adjust)?;
-    let modes = modes::modes_of_bare(&mut recording);
-    Ok(Analysis {
-        name: recording.file.clone(),
-        structure: None,
-        warnings: recording.measurement.warnings.clone(),
-        modes,
-        identification: None,
-        recordings: vec![recording],
-    })
+    measure_bare(recording, hammer, adjust).map(wired::analysis_of)
 }

@@ -271,7 +271,7 @@ fn channel(
     Ok(index)
 }
 
-fn finish(
+pub(super) fn finish(
     recording: Recording,
     settings: MeasureSettings,
     named: Named,
@@ -321,7 +321,7 @@ fn common_unit(responses: &[Response]) -> Option<String> {
 }
 
 /// The SI unit of what a sensor senses.
-fn si_unit(kind: SensorKind) -> &'static str {
+pub fn si_unit(kind: SensorKind) -> &'static str {
     match kind {
         SensorKind::Acceleration => "m/s2",
         SensorKind::Velocity => "m/s",

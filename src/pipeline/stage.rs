@@ -11,8 +11,8 @@ use crate::description::WindowKind;
 use crate::modal::{CompositeLevel, ModeReading, PeakLabel, find_peaks, read_peaks};
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
-    AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, band_limited, choose_window,
-    exponential_to, measure_decay, transform_block,
+    AveragedSpectra, DecayCheck, Lines, SpectralAverager, Transformer, Window, band_limited,
+    choose_window, exponential_to, measure_decay,
 };
 use crate::stats::root_mean_square;
 use crate::taps::{Tap, TapSource, Taps};
@@ -141,6 +141,7 @@ impl<'a> Stage<'a> {
         let rate = self.recording.sample_rate();
         let responses = self.channels.len() - usize::from(self.has_force);
         let mut averager = SpectralAverager::new(self.lines, responses);
+        let transformer = Transformer::new(rate, self.lines, self.gate as usize);
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
         for tap in self.taps.accepted() {
             let mut samples = self.record(tap)?;
@@ -152,7 +153,7 @@ impl<'a> Stage<'a> {
                 .iter_mut()
                 .map(|samples| {
                     window.apply(samples, rate);
-                    transform_block(samples, rate, &self.lines)
+                    transformer.transform(samples)
                 })
                 .collect();
             let responses = transforms.split_off(usize::from(self.has_force));

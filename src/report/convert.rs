@@ -10,7 +10,9 @@ use super::document::{
 };
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::ModeReading;
-use crate::pipeline::{Analysis, ModeResult, RecordingResult, TestedStructure, Warning};
+use crate::pipeline::{
+    Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure, Warning,
+};
 use crate::recording::{Format, Separator};
 use crate::spectral::Window;
 use crate::structure::{Assembly, BeamTheory, NaturalMode};
@@ -24,7 +26,14 @@ pub fn document(analysis: &Analysis) -> Document {
         version: VERSION,
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
         recordings: (!given).then(|| analysis.recordings.iter().map(recording_section).collect()),
-        modes: Some(analysis.modes.iter().map(mode_section).collect()),
+        modes: Some(
+            analysis
+                .modes
+                .iter()
+                .map(|mode| mode_section(mode, &analysis.recordings))
+                .collect(),
+        ),
+        frfs: None,
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
         prediction: identification
@@ -123,7 +132,7 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
             .map(|(reading, &mode)| ModeSection {
                 mode,
                 recording: Some(recording.file.clone()),
-                ..reading_section(reading)
+                ..with_quality(reading_section(reading), spectra)
             })
             .collect()
     });
@@ -238,6 +247,8 @@ fn reading_section(reading: &ModeReading) -> ModeSection {
         std: reading.std,
         damping: reading.damping_ratio,
         damping_std: reading.damping_std,
+        coherence: None,
+        random_error: None,
         lambda: None,
         prominence_db: Some(reading.prominence_db),
         above_noise_db: reading.above_noise_db,
@@ -246,9 +257,26 @@ fn reading_section(reading: &ModeReading) -> ModeSection {
     }
 }
 
-fn mode_section(mode: &ModeResult) -> ModeSection {
+/// The section with the quality of its line in the recording that it was read from.
+fn with_quality(section: ModeSection, spectra: &MeasuredSpectra) -> ModeSection {
+    let quality = spectra.averages.best_quality(section.frequency);
+    ModeSection {
+        coherence: quality.coherence,
+        random_error: quality.random_error,
+        ..section
+    }
+}
+
+fn mode_section(mode: &ModeResult, recordings: &[RecordingResult]) -> ModeSection {
+    let spectra = recordings
+        .iter()
+        .find(|recording| mode.recording.as_ref() == Some(&recording.file))
+        .and_then(|recording| recording.measurement.spectra.as_ref());
     let reading = match &mode.reading {
-        Some(reading) => reading_section(reading),
+        Some(reading) => match spectra {
+            Some(spectra) => with_quality(reading_section(reading), spectra),
+            None => reading_section(reading),
+        },
         None => ModeSection {
             method: "given".to_string(),
             ..Default::default()

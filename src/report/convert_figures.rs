@@ -7,7 +7,10 @@ use super::figures::{
 };
 use super::format::unit_words;
 use crate::description::SensorKind;
-use crate::pipeline::{Analysis, MeasuredSpectra, RecordingResult, Response};
+use crate::pipeline::{
+    Analysis, Frf, FrfSettings, MeasuredSpectra, RecordingResult, Response, frfs_of,
+};
+use crate::spectral::FrfEstimator;
 
 /// One set of pictures for each recording.
 pub fn figures(analysis: &Analysis) -> Vec<RecordingFigure> {
@@ -69,14 +72,12 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
                 values: values.clone(),
             })
             .collect(),
-        frfs: averages.h1.as_ref().map_or(Vec::new(), |h1| {
-            recording
-                .responses
-                .iter()
-                .zip(h1)
-                .map(|(response, h1)| frf(response, recording.tap_unit.as_deref(), h1))
-                .collect()
-        }),
+        // Without a hammer there are none.
+        frfs: frfs_of(recording, &FrfSettings::default())
+            .unwrap_or_default()
+            .iter()
+            .map(|frf| frf_curve(frf, Vec::new()))
+            .collect(),
         peaks: spectra
             .readings
             .iter()
@@ -93,24 +94,47 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
     }
 }
 
-fn frf(response: &Response, force_unit: Option<&str>, h1: &[Complex64]) -> FrfCurve {
-    let form = match response.kind {
-        Some(SensorKind::Acceleration) => "accelerance",
-        Some(SensorKind::Velocity) => "mobility",
-        Some(SensorKind::Displacement) => "receptance",
-        Some(SensorKind::Sound) => "sound pressure per force",
-        None => "response per force",
+/// The recording's pictures with these frequency response functions, all estimators shown.
+pub fn frf_figure(recording: &RecordingResult, frfs: &[Frf]) -> RecordingFigure {
+    let mut figure = recording_figure(recording);
+    if let Some(spectra) = &mut figure.spectra {
+        spectra.frfs = frfs
+            .iter()
+            .map(|frf| frf_curve(frf, other_estimators(frf)))
+            .collect();
+    }
+    figure
+}
+
+/// The estimators that are not meant.
+fn other_estimators(frf: &Frf) -> Vec<FrfEstimator> {
+    let all = FrfEstimator::ALL.into_iter();
+    all.filter(|&estimator| estimator != frf.estimator)
+        .collect()
+}
+
+fn frf_curve(frf: &Frf, others: Vec<FrfEstimator>) -> FrfCurve {
+    let magnitudes = |values: &[Option<Complex64>]| {
+        let magnitude = |value: &Option<Complex64>| value.map_or(f64::NAN, |value| value.norm());
+        values.iter().map(magnitude).collect::<Vec<f64>>()
     };
+    let phase = |value: &Option<Complex64>| value.map_or(f64::NAN, |v| v.arg().to_degrees());
+    let known = |g2: &Option<f64>| g2.unwrap_or(f64::NAN);
     FrfCurve {
-        name: response.name.clone(),
-        form: form.to_string(),
-        unit: match (response.unit.as_deref().map(unit_words), force_unit) {
-            (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
-            (Some(unit), Some(force)) => format!("{unit}/{force}"),
-            _ => "units of the file".to_string(),
-        },
-        magnitude: h1.iter().map(|value| value.norm()).collect(),
-        phase: h1.iter().map(|value| value.arg().to_degrees()).collect(),
+        name: frf.response.clone(),
+        form: frf.form_words.to_string(),
+        unit: unit_words(&frf.unit),
+        magnitude: magnitudes(frf.values()),
+        phase: frf.values().iter().map(phase).collect(),
+        estimator: frf.estimator.name().to_string(),
+        others: others
+            .into_iter()
+            .map(|estimator| (estimator.name().to_string(), magnitudes(frf.of(estimator))))
+            .collect(),
+        coherence: frf
+            .coherence
+            .as_ref()
+            .map(|coherence| coherence.iter().map(known).collect()),
     }
 }
 

@@ -124,7 +124,7 @@ fn number(value: Option<f64>) -> String {
         .unwrap_or_default()
 }
 
-fn write(header: &[&str], rows: Vec<Vec<String>>) -> Result<String, ReportError> {
+pub(super) fn write(header: &[&str], rows: Vec<Vec<String>>) -> Result<String, ReportError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(header).map_err(ReportError::Csv)?;
     for row in rows {

@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use super::document_frf::{FrfResonanceSection, FrfSection};
+
 /// Version of the document's layout.
 pub const VERSION: u32 = 1;
 
@@ -24,6 +26,9 @@ pub struct Document {
     /// Resonances merged over the recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<Vec<ModeSection>>,
+    /// Frequency response functions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frfs: Option<Vec<FrfSection>>,
     /// The joint; `Some(None)` = asked for, but without an answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate: Option<Option<EstimateSection>>,
@@ -189,6 +194,10 @@ pub struct ModeSection {
     pub damping: Option<f64>,
     /// Its standard deviation.
     pub damping_std: Option<f64>,
+    /// Coherence on the mode's line, of the sensor that knows it best; null below two averages.
+    pub coherence: Option<f64>,
+    /// Relative random error (standard deviation) of that sensor's frequency response there.
+    pub random_error: Option<f64>,
     /// Non-dimensional frequency (Euler).
     pub lambda: Option<f64>,
     /// Prominence of the peak (dB).

@@ -69,7 +69,7 @@ pub struct Curve {
     pub values: Vec<f64>,
 }
 
-/// A frequency response function.
+/// A frequency response function; where something does not exist stands what is no number (NaN).
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrfCurve {
     /// Sensor's name.
@@ -82,6 +82,12 @@ pub struct FrfCurve {
     pub magnitude: Vec<f64>,
     /// Phase (degrees), -180 to 180.
     pub phase: Vec<f64>,
+    /// The estimator: "H1".
+    pub estimator: String,
+    /// Magnitudes by other estimators, with their names (unit above); may be empty.
+    pub others: Vec<(String, Vec<f64>)>,
+    /// Coherence; `None` below two averages.
+    pub coherence: Option<Vec<f64>>,
 }
 
 /// A resonance in a picture.

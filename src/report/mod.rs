@@ -6,6 +6,7 @@ mod convert;
 mod convert_estimate;
 mod convert_figures;
 pub mod document;
+mod document_frf;
 pub mod figures;
 pub mod format;
 pub mod html;
@@ -14,6 +15,7 @@ pub mod summary;
 pub mod tables;
 pub mod text;
 
+mod convert_frf;
 mod csv;
 mod json;
 mod run;
@@ -22,11 +24,12 @@ pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
     prediction as prediction_of,
 };
-pub use convert_figures::figures as figures_of;
+pub use convert_figures::{figures as figures_of, frf_figure};
+pub use convert_frf::{frf_document, render_frf_csv};
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use html::render_html;
 pub use json::render_json;
-pub use run::{render_run, render_spectrum_png};
+pub use run::{render_frf_png, render_run, render_spectrum_png};
 pub use text::render_text;
 
 /// A finished file.

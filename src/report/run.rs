@@ -77,6 +77,15 @@ pub fn render_spectrum_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, 
     draw_spectrum(figure).as_ref().map(render_png).transpose()
 }
 
+/// The frequency response functions of a recording as PNG; `None` without a hammer or an accepted
+/// tap.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_frf_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
+    draw_frf(figure).as_ref().map(render_png).transpose()
+}
+
 fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), ReportError> {
     let file = ReportFile {
         name: format!("{}.png", picture.name),
@@ -130,7 +139,7 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
             Shelf::Spectra,
             "frf",
             draw_frf(figure),
-            format!("Response per force (H1) of {file}, magnitude over phase."),
+            format!("Response per force (H1) of {file}, magnitude, phase and coherence."),
         ),
         (
             Shelf::Taps,

@@ -22,6 +22,7 @@ pub fn render_text(document: &Document) -> String {
         recordings(document),
         taps(document),
         modes(document),
+        frfs(document),
         estimate(document),
         prediction(document),
         perturbation(document),
@@ -59,9 +60,17 @@ pub fn taps(document: &Document) -> String {
     }
 }
 
-/// The modes; empty without any.
+/// The modes; empty without any, and where their frequency response functions are listed.
 pub fn modes(document: &Document) -> String {
-    table_or_nothing(tables::modes(document))
+    let listed = document.frfs.as_ref().is_some_and(|frfs| !frfs.is_empty());
+    table_or_nothing(tables::modes(document).filter(|_| !listed))
+}
+
+/// The resonances on the frequency response functions; empty where those were not asked for.
+pub fn frfs(document: &Document) -> String {
+    tables::frfs(document).map_or(String::new(), |table| {
+        render_table(&table) + &wrapped(&table.note, 0)
+    })
 }
 
 /// The estimate and how far its regression closes, or why there is none; empty where it was not

@@ -4,8 +4,11 @@
 //! length of signal it was computed from. Resolution is 1/(length of signal); zooming or zero
 //! padding adds lines, never resolution.
 
+mod average;
 mod block;
+mod chirp;
 mod decay;
+mod form;
 mod frf;
 mod lines;
 mod noise;
@@ -13,14 +16,19 @@ mod transform;
 mod window;
 mod zoom;
 
+pub use average::{AveragedSpectra, SpectralAverager, TapRecord, average_records};
 pub use block::{largest_smooth_block, smallest_smooth_block};
-pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
-pub use frf::{AveragedSpectra, SpectralAverager};
+pub use chirp::chirp_z;
+pub use decay::{
+    DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay, window_share,
+};
+pub use form::ResponseForm;
+pub use frf::{FrfEstimator, LinePowers, LineQuality, random_error};
 pub use lines::{DISPLAY_RATIO, Lines};
 pub use noise::{line_amplitude, noise_power};
-pub use transform::transform_block;
+pub use transform::{Transformer, Workspace, transform_block};
 pub use window::{Window, apply_force_window};
-pub use zoom::{band_limited, chirp_z};
+pub use zoom::band_limited;
 
 /// What makes a spectrum impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

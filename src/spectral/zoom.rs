@@ -1,11 +1,10 @@
-//! Zooming into a band as an analyser does: mix, low-pass, decimate, transform.
+//! Zooming into a band as an analyser does: mix, low-pass, decimate.
 
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
-use super::block::smallest_smooth_block;
+use super::chirp::phase;
 use super::lines::DISPLAY_RATIO;
 
 /// Stop-band attenuation of the zoom's low-pass filter (dB): below the 24-bit noise of good
@@ -59,43 +58,60 @@ pub(super) fn decimation_factor(sample_rate: f64, width: f64) -> usize {
     (sample_rate / (DISPLAY_RATIO / 2.0 * width)).floor() as usize
 }
 
-/// A record mixed down by `centre`, filtered and decimated; sample m is at time
-/// (m * factor - delay)/sample_rate from the record's start.
-pub(super) struct Decimated {
-    pub samples: Vec<Complex64>,
-    pub factor: usize,
-    pub delay: usize,
+/// Mixing, filtering and decimating as an analyser's zoom does it: what every record shares. Output m
+/// is at time (m * factor - delay)/sample_rate from the record's start.
+#[derive(Debug)]
+pub(super) struct Decimator {
+    /// e^{-j 2 pi centre t} at every sample.
+    oscillator: Vec<Complex64>,
+    filter: Vec<f64>,
+    factor: usize,
 }
 
-/// Mixes `samples` down by `centre` (Hz) and decimates so that `width` (Hz) around it survives.
-///
-/// The record is taken as zero outside its ends and the filter's tails are kept, so that the result
-/// has exactly the spectrum of the record times the filter's pass band.
-pub(super) fn mix_and_decimate(
-    samples: &[f64],
-    sample_rate: f64,
-    (centre, width): (f64, f64),
-    factor: usize,
-) -> Decimated {
-    let rate = sample_rate / factor as f64;
-    let filter = low_pass(width / 2.0, rate - width / 2.0, sample_rate);
-    let half = filter.len() / 2;
-    let mixed: Vec<Complex64> = samples
-        .iter()
-        .enumerate()
-        .map(|(n, &x)| Complex64::from_polar(x, phase(centre / sample_rate, n as f64)))
-        .collect();
-    let outputs = (samples.len() + 2 * half).div_ceil(factor);
-    let decimated = (0..outputs)
-        .map(|m| {
-            let centre_index = (m * factor) as i64 - half as i64;
-            filtered(&mixed, &filter, centre_index)
-        })
-        .collect();
-    Decimated {
-        samples: decimated,
-        factor,
-        delay: half,
+impl Decimator {
+    /// Mixes records of at most `length` samples down by `centre` (Hz) and decimates by `factor`, so
+    /// that `width` (Hz) around it survives.
+    pub(super) fn new(
+        sample_rate: f64,
+        (centre, width): (f64, f64),
+        factor: usize,
+        length: usize,
+    ) -> Self {
+        let rate = sample_rate / factor as f64;
+        let turn = |n| Complex64::from_polar(1.0, phase(centre / sample_rate, n as f64));
+        Decimator {
+            oscillator: (0..length).map(turn).collect(),
+            filter: low_pass(width / 2.0, rate - width / 2.0, sample_rate),
+            factor,
+        }
+    }
+
+    /// Samples by which the first output lies before the record's start.
+    pub(super) fn delay(&self) -> usize {
+        self.filter.len() / 2
+    }
+
+    /// Outputs of a record of `length` samples.
+    pub(super) fn outputs(&self, length: usize) -> usize {
+        (length + 2 * self.delay()).div_ceil(self.factor)
+    }
+
+    /// The record decimated.
+    ///
+    /// It is taken as zero outside its ends and the filter's tails are kept, so that the result has
+    /// exactly the spectrum of the record times the filter's pass band.
+    pub(super) fn run(&self, samples: &[f64]) -> Vec<Complex64> {
+        let mixed: Vec<Complex64> = samples
+            .iter()
+            .zip(&self.oscillator)
+            .map(|(&x, turn)| turn * x)
+            .collect();
+        (0..self.outputs(mixed.len()))
+            .map(|m| {
+                let centre_index = (m * self.factor) as i64 - self.delay() as i64;
+                filtered(&mixed, &self.filter, centre_index)
+            })
+            .collect()
     }
 }
 
@@ -107,17 +123,13 @@ pub fn band_limited(samples: &[f64], sample_rate: f64, (low, high): (f64, f64)) 
     if factor < 3 {
         return samples.to_vec();
     }
-    let zoomed = mix_and_decimate(
-        samples,
-        sample_rate,
-        (0.5 * (low + high), high - low),
-        factor,
-    );
-    let skip = zoomed.delay / factor;
+    let band = (0.5 * (low + high), high - low);
+    let decimator = Decimator::new(sample_rate, band, factor, samples.len());
+    let skip = decimator.delay() / factor;
     let keep = samples.len() / factor;
     // A real oscillation of amplitude a leaves a magnitude of a/2.
-    zoomed
-        .samples
+    decimator
+        .run(samples)
         .iter()
         .skip(skip)
         .take(keep)
@@ -130,54 +142,20 @@ fn filtered(mixed: &[Complex64], filter: &[f64], index: i64) -> Complex64 {
     let half = (filter.len() / 2) as i64;
     let first = (index - half).max(0);
     let last = (index + half).min(mixed.len() as i64 - 1);
-    let mut sum = Complex64::ZERO;
-    for n in first..=last {
-        sum += mixed[n as usize] * filter[(n - index + half) as usize];
+    if last < first {
+        return Complex64::ZERO;
     }
-    sum
-}
-
-/// Phase -2 pi cycles n, reduced to one turn before it is rounded.
-fn phase(cycles: f64, n: f64) -> f64 {
-    let product = cycles * n;
-    // The rounding error of the product, recovered exactly, keeps long records accurate.
-    let error = cycles.mul_add(n, -product);
-    -TAU * ((product - product.round()) + error)
-}
-
-/// Chirp z-transform (Bluestein): sum over n of x(n) e^{-j 2 pi n (start + k step)} for k below
-/// `count`, `start` and `step` in cycles per sample.
-pub fn chirp_z(samples: &[Complex64], start: f64, step: f64, count: usize) -> Vec<Complex64> {
-    let n = samples.len();
-    if n == 0 || count == 0 {
-        return vec![Complex64::ZERO; count];
+    let samples = &mixed[first as usize..=last as usize];
+    let weights = &filter[(first - index + half) as usize..];
+    // Four sums side by side: one would wait for each addition before the next.
+    let mut sums = [Complex64::ZERO; 4];
+    let mut quarters = samples.chunks_exact(4).zip(weights.chunks_exact(4));
+    for (samples, weights) in &mut quarters {
+        for ((sum, x), weight) in sums.iter_mut().zip(samples).zip(weights) {
+            *sum += x * weight;
+        }
     }
-    let length = smallest_smooth_block(n + count);
-    // e^{-j pi step k^2}: half the chirp, so that nk = (n^2 + k^2 - (k-n)^2)/2.
-    let chirp = |k: i64| Complex64::from_polar(1.0, phase(step / 2.0, (k * k) as f64));
-    let mut signal: Vec<Complex64> = samples
-        .iter()
-        .enumerate()
-        .map(|(i, x)| x * Complex64::from_polar(1.0, phase(start, i as f64)) * chirp(i as i64))
-        .collect();
-    signal.resize(length, Complex64::ZERO);
-    let mut kernel = vec![Complex64::ZERO; length];
-    for (k, value) in kernel.iter_mut().take(count).enumerate() {
-        *value = chirp(k as i64).conj();
-    }
-    for i in 1..n {
-        kernel[length - i] = chirp(i as i64).conj();
-    }
-    let mut planner = FftPlanner::new();
-    let forward = planner.plan_fft_forward(length);
-    forward.process(&mut signal);
-    forward.process(&mut kernel);
-    for (x, k) in signal.iter_mut().zip(&kernel) {
-        *x *= k;
-    }
-    planner.plan_fft_inverse(length).process(&mut signal);
-    let scale = 1.0 / length as f64;
-    (0..count)
-        .map(|k| signal[k] * chirp(k as i64) * scale)
-        .collect()
+    let done = samples.len() / 4 * 4;
+    let rest = samples[done..].iter().zip(&weights[done..]);
+    sums.iter().sum::<Complex64>() + rest.map(|(x, weight)| x * weight).sum::<Complex64>()
 }

@@ -1,21 +1,30 @@
-//! The picture of a recording's frequency response functions: magnitude over phase.
+//! The picture of a recording's frequency response functions: magnitude, phase, coherence.
 
 use super::super::figures::{FrfCurve, RecordingFigure, SpectraFigure};
 use super::axis::{Axis, Tick};
-use super::drawing::{Drawing, Stroke};
+use super::drawing::{Drawing, Stroke, Text};
 use super::marks::{STRIP, draw_marks};
-use super::palette::{BLUE, ORANGE, curve};
-use super::panel::{Panel, Sample, X_SPACING, draw_legend, draw_title};
+use super::palette::{BLUE, Color, ORANGE, SOFT, curve};
+use super::panel::{LABEL_SIZE, Panel, Sample, X_SPACING, draw_legend, draw_title};
 use super::spectrum::{
     LEFT, RIGHT, WIDTH, draw_x_grid, frequency_axis, magnitude_axis, over_lines, subtitle,
 };
 
+/// Colour that stands for faint curves in the legend.
+const FAINT_SAMPLE: Color = Color(190, 190, 190);
 /// Phase steps above this many degrees are the wrap at 180 degrees, where no line is drawn.
 const WRAP: f64 = 180.0;
 /// Height of one magnitude panel (pixels).
 const MAGNITUDE: f64 = 320.0;
 /// Height of the phase panel (pixels).
 const PHASE: f64 = 150.0;
+/// Height of the coherence panel (pixels), and where there is none of the sentence that says so.
+const COHERENCE: f64 = 120.0;
+const NO_COHERENCE: f64 = 26.0;
+/// Space between panels (pixels).
+const SPACE: f64 = 18.0;
+/// How strongly curves of other estimators show.
+const FAINT: f64 = 0.4;
 
 /// The frequency response functions of a recording; `None` without a hammer or without taps.
 pub fn draw_frf(figure: &RecordingFigure) -> Option<Drawing> {
@@ -25,24 +34,34 @@ pub fn draw_frf(figure: &RecordingFigure) -> Option<Drawing> {
         return None;
     }
     let top = 98.0 + STRIP;
-    let phase_top = top + groups.len() as f64 * (MAGNITUDE + 18.0);
-    let height = phase_top + PHASE + 60.0;
+    let phase_top = top + groups.len() as f64 * (MAGNITUDE + SPACE);
+    let coherence_top = phase_top + PHASE + SPACE;
+    let coherent = spectra.frfs.iter().any(|frf| frf.coherence.is_some());
+    let coherence = if coherent { COHERENCE } else { NO_COHERENCE };
+    let height = coherence_top + coherence + 60.0;
     let description = format!("Frequency response functions of {}", figure.file);
     let mut drawing = Drawing::new(description, WIDTH, height as u32);
     let title = format!("Frequency response functions, {}", figure.file);
     draw_title(&mut drawing, &title, &subtitle(spectra));
     for (index, group) in groups.iter().enumerate() {
-        let panel_top = top + index as f64 * (MAGNITUDE + 18.0);
+        let panel_top = top + index as f64 * (MAGNITUDE + SPACE);
         let panel = draw_magnitude(&mut drawing, spectra, group, panel_top);
         if index == 0 {
             draw_marks(&mut drawing, &panel, &spectra.peaks);
         }
         for (color, frf) in group {
-            let stroke = Stroke::new(curve(*color), 1.5);
-            panel.draw_curve(&mut drawing, over_lines(spectra, &frf.magnitude), stroke);
+            draw_magnitudes(&mut drawing, &panel, spectra, (curve(*color), frf));
         }
     }
-    draw_phase(&mut drawing, spectra, phase_top);
+    let phase = draw_phase(&mut drawing, spectra, phase_top);
+    let lowest = if coherent {
+        draw_coherence(&mut drawing, spectra, coherence_top)
+    } else {
+        say_no_coherence(&mut drawing, spectra, coherence_top);
+        phase
+    };
+    lowest.draw_x_ticks(&mut drawing, &lowest.x.ticks(X_SPACING));
+    lowest.draw_x_title(&mut drawing, "frequency (Hz)");
     draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &legend(spectra));
     Some(drawing)
 }
@@ -84,7 +103,57 @@ fn draw_magnitude(
     panel
 }
 
-fn draw_phase(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) {
+/// One function by its estimator, and fainter by the others.
+fn draw_magnitudes(
+    drawing: &mut Drawing,
+    panel: &Panel,
+    spectra: &SpectraFigure,
+    (color, frf): (Color, &FrfCurve),
+) {
+    for (_, magnitude) in &frf.others {
+        let mut stroke = Stroke::new(color, 1.0);
+        stroke.opacity = FAINT;
+        panel.draw_curve(drawing, over_lines(spectra, magnitude), stroke);
+    }
+    let stroke = Stroke::new(color, 1.5);
+    panel.draw_curve(drawing, over_lines(spectra, &frf.magnitude), stroke);
+}
+
+/// The coherence of every response with the force.
+fn draw_coherence(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) -> Panel {
+    let panel = Panel {
+        x: frequency_axis(spectra),
+        y: Axis::linear((0.0, 1.05), (top + COHERENCE, top)),
+    };
+    let ticks = [0.0, 0.5, 1.0].map(|value: f64| Tick {
+        value,
+        label: Some(format!("{value}")),
+    });
+    panel.draw_y_ticks(drawing, &ticks);
+    draw_x_grid(drawing, &panel);
+    panel.draw_frame(drawing);
+    for (index, frf) in spectra.frfs.iter().enumerate() {
+        if let Some(coherence) = &frf.coherence {
+            let stroke = Stroke::new(curve(index), 1.2);
+            panel.draw_curve(drawing, over_lines(spectra, coherence), stroke);
+        }
+    }
+    panel.draw_y_title(drawing, "coherence");
+    panel
+}
+
+/// Of one average the coherence is 1 whatever the noise: it is not drawn.
+fn say_no_coherence(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) {
+    let words = if spectra.averages == 1 {
+        "one average: no coherence"
+    } else {
+        "no coherence"
+    };
+    let at = (LEFT, top + 42.0);
+    drawing.text(Text::new(words, at, LABEL_SIZE).colored(SOFT));
+}
+
+fn draw_phase(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) -> Panel {
     let panel = Panel {
         x: frequency_axis(spectra),
         y: Axis::linear((-190.0, 190.0), (top + PHASE, top)),
@@ -94,7 +163,7 @@ fn draw_phase(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) {
         label: Some(format!("{value:.0}").replace('-', "\u{2212}")),
     });
     panel.draw_y_ticks(drawing, &ticks);
-    panel.draw_x_ticks(drawing, &panel.x.ticks(X_SPACING));
+    draw_x_grid(drawing, &panel);
     panel.draw_frame(drawing);
     for (index, frf) in spectra.frfs.iter().enumerate() {
         for piece in unwrapped_pieces(spectra, &frf.phase) {
@@ -102,7 +171,7 @@ fn draw_phase(drawing: &mut Drawing, spectra: &SpectraFigure, top: f64) {
         }
     }
     panel.draw_y_title(drawing, "phase (\u{b0})");
-    panel.draw_x_title(drawing, "frequency (Hz)");
+    panel
 }
 
 /// The phase cut where it wraps, so that no line runs from -180 to 180 degrees.
@@ -127,10 +196,15 @@ fn legend(spectra: &SpectraFigure) -> Vec<(Sample, String)> {
         .iter()
         .enumerate()
         .map(|(index, frf)| {
-            let words = format!("{}, {}", frf.name, frf.form);
+            let words = format!("{}, {} {}", frf.name, frf.form, frf.estimator);
             (Sample::Line(curve(index)), words)
         })
         .collect();
+    if let Some(frf) = spectra.frfs.iter().find(|frf| !frf.others.is_empty()) {
+        let names: Vec<&str> = frf.others.iter().map(|(name, _)| name.as_str()).collect();
+        let words = format!("faint: {}", names.join(", "));
+        entries.push((Sample::Line(FAINT_SAMPLE), words));
+    }
     if spectra.peaks.iter().any(|peak| peak.mode.is_some()) {
         entries.push((Sample::Dashed(BLUE), "mode".to_owned()));
     }

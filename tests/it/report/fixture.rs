@@ -346,6 +346,9 @@ fn frf(name: &str, shape: &[f64; 5], lines: &Lines, random: &mut ChaCha8Rng) -> 
             .iter()
             .map(|(re, im)| im.atan2(*re).to_degrees())
             .collect(),
+        estimator: "H1".into(),
+        others: Vec::new(),
+        coherence: Some(vec![0.98; lines.points()]),
     }
 }
 

@@ -1,0 +1,211 @@
+//! Averages over taps: power spectra, cross spectra and H1.
+
+use num_complex::Complex64;
+use rayon::prelude::*;
+
+use super::lines::Lines;
+use super::transform::{Transformer, Workspace};
+
+/// Sums of spectra over taps, one tap at a time, so that only one record is in memory.
+#[derive(Debug, Clone)]
+pub struct SpectralAverager {
+    lines: Lines,
+    taps: usize,
+    force_power: Vec<f64>,
+    cross: Vec<Vec<Complex64>>,
+    response_power: Vec<Vec<f64>>,
+}
+
+/// Averages over taps, on one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AveragedSpectra {
+    /// The axis.
+    pub lines: Lines,
+    /// Number of taps averaged.
+    pub taps: usize,
+    /// Root mean square of the force's transforms (N s); `None` without a hammer.
+    pub force: Option<Vec<f64>>,
+    /// Root mean square of each response's transforms (unit of the response times s).
+    pub responses: Vec<Vec<f64>>,
+    /// Gff = mean |F|^2 (N2 s2); `None` without a hammer.
+    pub force_power: Option<Vec<f64>>,
+    /// Gxx = mean |X|^2 of each response (its unit squared times s2).
+    pub response_power: Vec<Vec<f64>>,
+    /// Gfx = mean conj(F) X of each response (N times its unit times s2), in the convention
+    /// e^{+j omega t}; `None` without a hammer.
+    pub cross: Option<Vec<Vec<Complex64>>>,
+    /// H1 = Gfx/Gff of each response (unit of the response per N), 0 where the force has no power at
+    /// all; `None` without a hammer.
+    pub h1: Option<Vec<Vec<Complex64>>>,
+}
+
+impl SpectralAverager {
+    /// Nothing averaged yet, for so many responses.
+    pub fn new(lines: Lines, responses: usize) -> Self {
+        let points = lines.points();
+        SpectralAverager {
+            lines,
+            taps: 0,
+            force_power: vec![0.0; points],
+            cross: vec![vec![Complex64::ZERO; points]; responses],
+            response_power: vec![vec![0.0; points]; responses],
+        }
+    }
+
+    /// Adds one tap: the force's transform (if there is a hammer) and each response's.
+    pub fn add(&mut self, force: Option<&[Complex64]>, responses: &[Vec<Complex64>]) {
+        self.taps += 1;
+        if let Some(force) = force {
+            add_power(&mut self.force_power, force);
+        }
+        let sums = self.response_power.iter_mut().zip(&mut self.cross);
+        for ((power, cross), response) in sums.zip(responses) {
+            add_power(power, response);
+            if let Some(force) = force {
+                for ((sum, f), x) in cross.iter_mut().zip(force).zip(response) {
+                    *sum += f.conj() * x;
+                }
+            }
+        }
+    }
+
+    /// Adds what another averager of the same lines and responses has summed.
+    pub fn merge(&mut self, other: &SpectralAverager) {
+        self.taps += other.taps;
+        add_all(&mut self.force_power, &other.force_power);
+        for (sum, values) in self.response_power.iter_mut().zip(&other.response_power) {
+            add_all(sum, values);
+        }
+        for (sum, values) in self.cross.iter_mut().zip(&other.cross) {
+            add_all(sum, values);
+        }
+    }
+
+    /// The averages; `None` before the first tap.
+    pub fn finish(mut self) -> Option<AveragedSpectra> {
+        if self.taps == 0 {
+            return None;
+        }
+        let share = 1.0 / self.taps as f64;
+        let powers = self
+            .response_power
+            .iter_mut()
+            .chain([&mut self.force_power]);
+        powers.flatten().for_each(|power| *power *= share);
+        self.cross.iter_mut().flatten().for_each(|x| *x *= share);
+        let root = |power: &Vec<f64>| power.iter().map(|p| p.sqrt()).collect::<Vec<_>>();
+        let has_force = self.force_power.iter().any(|&power| power > 0.0);
+        let h1 = |cross: &Vec<Complex64>| divide(cross, &self.force_power);
+        Some(AveragedSpectra {
+            lines: self.lines,
+            taps: self.taps,
+            force: has_force.then(|| root(&self.force_power)),
+            responses: self.response_power.iter().map(root).collect(),
+            h1: has_force.then(|| self.cross.iter().map(h1).collect()),
+            response_power: self.response_power,
+            cross: has_force.then_some(self.cross),
+            force_power: has_force.then_some(self.force_power),
+        })
+    }
+}
+
+fn add_power(sums: &mut [f64], values: &[Complex64]) {
+    for (sum, x) in sums.iter_mut().zip(values) {
+        *sum += x.norm_sqr();
+    }
+}
+
+fn add_all<T: std::ops::AddAssign + Copy>(sums: &mut [T], values: &[T]) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += *value;
+    }
+}
+
+/// cross/power, 0 where the force has no power at all.
+fn divide(cross: &[Complex64], power: &[f64]) -> Vec<Complex64> {
+    cross
+        .iter()
+        .zip(power)
+        .map(|(c, &p)| if p > 0.0 { c / p } else { Complex64::ZERO })
+        .collect()
+}
+
+impl AveragedSpectra {
+    /// Averages over nothing, on an axis.
+    pub fn empty(lines: Lines) -> Self {
+        AveragedSpectra {
+            lines,
+            taps: 0,
+            force: None,
+            responses: Vec::new(),
+            force_power: None,
+            response_power: Vec::new(),
+            cross: None,
+            h1: None,
+        }
+    }
+}
+
+/// One tap's windowed samples: the force, where there is a hammer, and every response.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapRecord<'a> {
+    /// Force (N).
+    pub force: Option<&'a [f64]>,
+    /// Responses, each in its unit.
+    pub responses: Vec<&'a [f64]>,
+}
+
+/// Fewest records that one thread takes at a time.
+const LEAST_SHARE: usize = 8;
+/// Most partial sums that are in memory at a time.
+const MOST_SHARES: usize = 64;
+
+/// Averages over records that are all in memory, in parallel; `None` without records.
+///
+/// The records are shared out by their number alone and the partial sums are added in order, so that
+/// the result is the same to the last bit whatever the number of threads.
+pub fn average_records(
+    transformer: &Transformer,
+    records: &[TapRecord<'_>],
+) -> Option<AveragedSpectra> {
+    let responses = records.first()?.responses.len();
+    let share = records.len().div_ceil(MOST_SHARES).max(LEAST_SHARE);
+    let empty = || SpectralAverager::new(*transformer.lines(), responses);
+    let parts: Vec<SpectralAverager> = records
+        .par_chunks(share)
+        .map(|records| {
+            let mut sum = empty();
+            let mut room = (Workspace::default(), Vec::new());
+            let mut transforms = vec![Vec::new(); responses];
+            for record in records {
+                add_record(&mut sum, transformer, record, (&mut room, &mut transforms));
+            }
+            sum
+        })
+        .collect();
+    let mut sum = empty();
+    parts.iter().for_each(|part| sum.merge(part));
+    sum.finish()
+}
+
+/// Room for the force's transform and for those of the responses.
+type Room<'a> = (
+    &'a mut (Workspace, Vec<Complex64>),
+    &'a mut [Vec<Complex64>],
+);
+
+fn add_record(
+    sum: &mut SpectralAverager,
+    transformer: &Transformer,
+    record: &TapRecord<'_>,
+    ((workspace, of_force), of_responses): Room<'_>,
+) {
+    for (samples, values) in record.responses.iter().zip(of_responses.iter_mut()) {
+        transformer.transform_into(samples, workspace, values);
+    }
+    let force = record.force.map(|samples| {
+        transformer.transform_into(samples, workspace, of_force);
+        of_force.as_slice()
+    });
+    sum.add(force, of_responses);
+}

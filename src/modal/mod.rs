@@ -9,6 +9,7 @@ mod interpolation;
 mod mains;
 mod merge;
 mod peaks;
+pub mod polyreference;
 mod reading;
 
 pub use interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};

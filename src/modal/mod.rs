@@ -4,6 +4,9 @@
 //! a pole ([`interpolate_pole`]) and on the line nearest to that, with the half-line bound
 //! ([`read_peaks`]); mains lines are recognised, and the readings of several recordings are merged
 //! ([`merge_modes`]).
+//! Along a decay [`amplitude`] follows frequency and damping against amplitude.
+
+pub mod amplitude;
 
 mod interpolation;
 mod mains;

@@ -1,0 +1,233 @@
+//! One mode's band of every response: mixed down, low-pass filtered, thinned out.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+
+use super::{AmplitudeSettings, Decay, KnownMode};
+
+/// Attenuation of the stop band (dB): a neighbour a hundred times as strong is left at 3 %.
+const ATTENUATION: f64 = 70.0;
+/// Edge of the pass band over the edge of the stop band; between them the filter falls off.
+const PASS: f64 = 0.3;
+/// Parts of the record that a decay time is limited to: a lightly damped mode needs segments too.
+const PARTS: f64 = 4.0;
+/// Decay times that are followed: 104 dB.
+const REACH: f64 = 12.0;
+/// Neighbours are kept this far beyond the stop edge.
+const MARGIN: f64 = 0.95;
+/// Share of the distance to 0 Hz and to half the sample rate that the stop edge leaves: beyond them
+/// lies the mode's mirror image, and at 0 Hz the sensors' drift.
+const FROM_ENDS: f64 = 0.8;
+
+/// A mode's band after one tap.
+pub(super) struct Band {
+    /// Which decay.
+    pub tap: usize,
+    /// Frequency it was mixed down from (rad/s).
+    pub omega: f64,
+    /// Rough pole relative to it: its decay (1/s), negative.
+    pub decay: f64,
+    /// Time scale of the cut: the decay time, or a part of the record (s).
+    pub scale: f64,
+    /// Time of the first value after the tap (s).
+    pub first: f64,
+    /// Step of the values (s).
+    pub step: f64,
+    /// Length of the filter (s).
+    pub filter: f64,
+    /// Noise density at the band's middle over the mean density of the values.
+    pub noise_ratio: f64,
+    /// Filter taps and their rate (Hz), for the gain at a pole.
+    pub taps: Vec<f64>,
+    pub sample_rate: f64,
+    /// Complex amplitude (peak, unit of the sensor) of every sensor.
+    pub sensors: Vec<Vec<Complex64>>,
+    /// Listed modes inside the band: poles relative to `omega` (rad/s).
+    pub neighbours: Vec<Complex64>,
+}
+
+impl Band {
+    /// Gain of the filter at a pole relative to the band's middle:
+    /// sum h(m) e^{p (m - (M-1)/2)/rate}.
+    pub fn gain(&self, pole: Complex64) -> Complex64 {
+        let middle = (self.taps.len() - 1) as f64 / 2.0;
+        let gain = |(m, h): (usize, &f64)| {
+            (pole * ((m as f64 - middle) / self.sample_rate)).exp() * *h
+        };
+        self.taps.iter().enumerate().map(gain).sum()
+    }
+
+    /// Frequency (Hz) of a pole relative to the middle, undamped.
+    pub fn frequency(&self, pole: Complex64) -> f64 {
+        Complex64::new(pole.re, self.omega + pole.im).norm() / TAU
+    }
+}
+
+/// The band of mode `index` after every tap; decays that are too short are left out.
+pub(super) fn extract_bands(
+    decays: &[Decay],
+    modes: &[KnownMode],
+    index: usize,
+    settings: &AmplitudeSettings,
+) -> Vec<Band> {
+    decays
+        .iter()
+        .enumerate()
+        .filter_map(|(tap, decay)| extract_band(decay, tap, (modes, index), settings))
+        .collect()
+}
+
+fn extract_band(
+    decay: &Decay,
+    tap: usize,
+    (modes, index): (&[KnownMode], usize),
+    settings: &AmplitudeSettings,
+) -> Option<Band> {
+    let mode = modes.get(index)?;
+    let samples = decay.responses.iter().map(Vec::len).min()?;
+    let omega = TAU * mode.frequency;
+    let sigma = mode.damping_ratio.max(1e-6) * omega;
+    let rate = decay.sample_rate;
+    let usable = omega.is_finite() && omega > 0.0 && omega < PI * rate;
+    let scale = (1.0 / sigma).min(samples as f64 / rate / PARTS);
+    if !usable || samples < 16 {
+        return None;
+    }
+    let stop = stop_edge(modes, index, (scale, rate), settings);
+    let taps = low_pass(stop, rate);
+    // Stop and pass edge fold onto each other at this rate, so nothing reaches the pass band.
+    let stride = (rate / ((1.0 + PASS) * stop)).floor().max(1.0) as usize;
+    let wanted = ((REACH * scale + taps.len() as f64 / rate) * rate) as usize;
+    let kept = samples.min(wanted);
+    let count = kept.checked_sub(taps.len())? / stride + 1;
+    let carrier = modulated(&taps, omega / rate);
+    let sensors = decay
+        .responses
+        .iter()
+        .map(|x| filter(&x[..kept], &carrier, (stride, count), omega / rate))
+        .collect();
+    let squares: f64 = taps.iter().map(|h| h * h).sum();
+    Some(Band {
+        tap,
+        omega,
+        decay: -sigma,
+        scale,
+        first: decay.start + (taps.len() - 1) as f64 / 2.0 / rate,
+        step: stride as f64 / rate,
+        filter: taps.len() as f64 / rate,
+        // White noise of variance s^2 leaves the filter with s^2 sum h^2; white noise that is as dense
+        // as it is in the pass band would have s^2 |H(0)|^2/stride, and H(0) = 1.
+        noise_ratio: 1.0 / (stride as f64 * squares),
+        taps,
+        sample_rate: rate,
+        sensors,
+        neighbours: neighbours(modes, index, stop),
+    })
+}
+
+/// Edge of the stop band (Hz): as wide as the wanted time resolution needs, narrower where that keeps
+/// a neighbour out, but not narrower than the longest filter allows.
+fn stop_edge(
+    modes: &[KnownMode],
+    index: usize,
+    (scale, rate): (f64, f64),
+    settings: &AmplitudeSettings,
+) -> f64 {
+    let frequency = modes[index].frequency;
+    let ends = FROM_ENDS * frequency.min(0.5 * rate - frequency);
+    // Length of the filter times its stop edge (1), see `low_pass`.
+    let product = kaiser_length() / (1.0 - PASS);
+    let widest = (product / (settings.filter * scale)).min(ends);
+    let narrowest = (product / (settings.longest_filter * scale)).min(widest);
+    let nearest = modes
+        .iter()
+        .enumerate()
+        .filter(|(other, _)| *other != index)
+        .map(|(_, mode)| MARGIN * (mode.frequency - frequency).abs())
+        .filter(|distance| *distance >= narrowest)
+        .fold(widest, f64::min);
+    nearest.min(widest)
+}
+
+/// Length of a Kaiser window's filter times its transition band, (A - 7.95)/14.36 (Oppenheim &
+/// Schafer).
+fn kaiser_length() -> f64 {
+    (ATTENUATION - 7.95) / 14.36
+}
+
+/// Low-pass filter with Kaiser's window, odd in length, gain 1 at 0 Hz.
+fn low_pass(stop: f64, rate: f64) -> Vec<f64> {
+    let transition = (1.0 - PASS) * stop;
+    let half = (kaiser_length() * rate / transition / 2.0).ceil().max(2.0);
+    let cutoff = 0.5 * (1.0 + PASS) * stop / rate;
+    // beta = 0.1102 (A - 8.7) above 50 dB (Oppenheim & Schafer).
+    let beta = 0.1102 * (ATTENUATION - 8.7);
+    let taps: Vec<f64> = (0..=2 * half as usize)
+        .map(|n| {
+            let m = n as f64 - half;
+            let sinc = if m == 0.0 {
+                2.0 * cutoff
+            } else {
+                (TAU * cutoff * m).sin() / (PI * m)
+            };
+            sinc * bessel_i0(beta * (1.0 - (m / half).powi(2)).max(0.0).sqrt())
+        })
+        .collect();
+    let sum: f64 = taps.iter().sum();
+    taps.into_iter().map(|h| h / sum).collect()
+}
+
+/// Modified Bessel function of order zero by its power series.
+fn bessel_i0(x: f64) -> f64 {
+    let (mut term, mut sum) = (1.0, 1.0);
+    for k in 1..60 {
+        term *= (x / 2.0 / f64::from(k)).powi(2);
+        sum += term;
+    }
+    sum
+}
+
+/// Filter taps that mix down as well: 2 h(m) e^{-j theta (m - (M-1)/2)}. The factor 2 makes a real
+/// oscillation's peak amplitude the modulus of the result.
+fn modulated(taps: &[f64], theta: f64) -> Vec<Complex64> {
+    let middle = (taps.len() - 1) as f64 / 2.0;
+    taps.iter()
+        .enumerate()
+        .map(|(m, h)| Complex64::from_polar(2.0 * h, -theta * (m as f64 - middle)))
+        .collect()
+}
+
+fn filter(
+    samples: &[f64],
+    carrier: &[Complex64],
+    (stride, count): (usize, usize),
+    theta: f64,
+) -> Vec<Complex64> {
+    (0..count)
+        .map(|n| {
+            let from = n * stride;
+            let piece = &samples[from..from + carrier.len()];
+            let (mut re, mut im) = (0.0, 0.0);
+            for (x, h) in piece.iter().zip(carrier) {
+                re += x * h.re;
+                im += x * h.im;
+            }
+            Complex64::new(re, im) * Complex64::from_polar(1.0, -theta * from as f64)
+        })
+        .collect()
+}
+
+/// Poles relative to mode `index` (rad/s) of the other modes nearer than `stop` (Hz).
+fn neighbours(modes: &[KnownMode], index: usize, stop: f64) -> Vec<Complex64> {
+    let frequency = modes[index].frequency;
+    modes
+        .iter()
+        .enumerate()
+        .filter(|(other, mode)| *other != index && (mode.frequency - frequency).abs() < stop)
+        .map(|(_, mode)| {
+            let sigma = TAU * mode.frequency * mode.damping_ratio;
+            Complex64::new(-sigma, TAU * (mode.frequency - frequency))
+        })
+        .collect()
+}

@@ -7,6 +7,9 @@ use crate::stats::{median, root_mean_square};
 /// Length of the pieces in which drift and noise are surveyed (s). A pulse of a few milliseconds
 /// does not move the median of 0.1 s.
 const PIECE: f64 = 0.1;
+/// Fewest pieces from which a usual one is told: a recording that is shorter is cut finer for its noise,
+/// so that its only pulse is not taken for what goes on all the time.
+const FEWEST_PIECES: u64 = 20;
 /// An excursion longer than this is no hammer pulse but a moving cable or hand (s).
 const LONGEST_PULSE: f64 = 0.05;
 
@@ -61,8 +64,10 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
             pieces.extend(piece(samples));
         }
     }
+    let fine = fine_pieces(recording, channel, frames)?;
+    let fine = fine.as_ref().unwrap_or(&pieces);
     let mut deviations: Vec<f64> = pieces.iter().map(|piece| piece.deviation).collect();
-    let mut roots: Vec<f64> = pieces.iter().map(|piece| piece.rms).collect();
+    let mut roots: Vec<f64> = fine.iter().map(|piece| piece.rms).collect();
     // 1.4826 turns a median deviation into a standard deviation of normal noise. Coarsely quantised
     // noise has a median deviation of zero: the rms of a usual piece and a third of a quantum (what
     // rounding alone leaves) hold it up.
@@ -73,7 +78,7 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
     let down = pieces.iter().map(|p| p.median - p.low).fold(0.0, f64::max);
     // A filter's ringing swings to the other side by up to a quarter: only a clear excess inverts.
     let polarity = if down > 1.5 * up { -1.0 } else { 1.0 };
-    let mut reached: Vec<f64> = pieces
+    let mut reached: Vec<f64> = fine
         .iter()
         .map(|p| (p.high - p.median).max(p.median - p.low))
         .collect();
@@ -88,6 +93,21 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
         polarity,
         largest: if polarity > 0.0 { up } else { down },
     })
+}
+
+/// The pieces of a recording that holds fewer than [`FEWEST_PIECES`] of `frames`; `None` of a longer one.
+fn fine_pieces(
+    recording: &Recording,
+    channel: usize,
+    frames: usize,
+) -> Result<Option<Vec<Piece>>, RecordingError> {
+    if recording.frames() >= FEWEST_PIECES * frames as u64 {
+        return Ok(None);
+    }
+    let length = (recording.frames() / FEWEST_PIECES).max(32) as usize;
+    let samples = recording.read(channel, 0..recording.frames())?;
+    let pieces = samples.chunks(length).map(<[f64]>::to_vec);
+    Ok(Some(pieces.filter_map(piece).collect()))
 }
 
 fn piece(mut samples: Vec<f64>) -> Option<Piece> {

@@ -18,8 +18,12 @@ fn main() {
         .unwrap_or(5000);
     clean(taps);
     disturbed(taps / 5);
-    println!("\nsecond hits, force noise -60 dB of the peak, at least 8 samples per pulse, widths x 0.7 to 1.3");
-    println!("ratio  delay (pulse widths)  records  rejected  warned  missed  rms ratio error  rms delay error (samples)");
+    println!(
+        "\nsecond hits, force noise -60 dB of the peak, at least 8 samples per pulse, widths x 0.7 to 1.3"
+    );
+    println!(
+        "ratio  delay (pulse widths)  records  rejected  warned  missed  rms ratio error  rms delay error (samples)"
+    );
     for ratio in [0.03, 0.05, 0.08, 0.12, 0.2, 0.5, 0.9] {
         for delay in [(3.0, 3.5), (3.5, 10.0), (10.0, 40.0)] {
             detection(taps / 20, ratio, delay);
@@ -61,7 +65,11 @@ fn disturbed(taps: usize) {
     for disturbance in DISTURBANCES {
         count(&format!("{disturbance:?}"), taps, |random| {
             let shape = SHAPES[random.random_range(0..SHAPES.len())];
-            let least = if disturbance == Disturbance::Filter { 0.0 } else { 4.0 };
+            let least = if disturbance == Disturbance::Filter {
+                0.0
+            } else {
+                4.0
+            };
             let mut record = Record::draw(random, shape, -60.0, least);
             record.disturb(disturbance, random);
             record

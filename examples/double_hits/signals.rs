@@ -85,8 +85,8 @@ pub struct Record {
 impl Record {
     /// A record with its pulse and noise (dB of the peak); the pulse has at least `least` samples.
     pub fn draw(random: &mut ChaCha8Rng, shape: Shape, noise: f64, least: f64) -> Record {
-        let rate: f64 = [10_000.0, 12_800.0, 20_480.0, 25_600.0, 44_100.0, 51_200.0]
-            [random.random_range(0..6)];
+        let rate: f64 =
+            [10_000.0, 12_800.0, 20_480.0, 25_600.0, 44_100.0, 51_200.0][random.random_range(0..6)];
         // Evenly over the logarithm, so that short pulses and records are as frequent as long ones.
         let width = 1e-3 * 10f64.powf(random.random_range(0.2f64.log10()..4f64.log10()));
         let width = width.max(least / rate);
@@ -168,7 +168,11 @@ impl Record {
                     continue;
                 }
                 let angle = TAU * cutoff * x;
-                let sinc = if angle == 0.0 { 1.0 } else { angle.sin() / angle };
+                let sinc = if angle == 0.0 {
+                    1.0
+                } else {
+                    angle.sin() / angle
+                };
                 let taper = 0.5 + 0.5 * (PI * x / reach).cos();
                 let weight = width * self.rate / f64::from(steps);
                 *sample += self.shape.at(share) * weight * 2.0 * cutoff * sinc * taper;
@@ -180,7 +184,8 @@ impl Record {
     fn ring(&mut self, random: &mut ChaCha8Rng) {
         // From as slow as the pulse is wide to near half the sample rate.
         let highest = (0.45 * self.rate * self.width).max(0.6);
-        let frequency = 10f64.powf(random.random_range(0.3f64.log10()..highest.log10())) / self.width;
+        let frequency =
+            10f64.powf(random.random_range(0.3f64.log10()..highest.log10())) / self.width;
         let damping = random.random_range(0.02..0.3);
         let level = random.random_range(0.02..0.25);
         let begin = self.begin + self.shape.crest() * self.width;
@@ -266,9 +271,10 @@ pub fn found(record: &Record) -> Found {
     let taps = Recording::from_samples("one tap", record.rate, vec![channel])
         .and_then(|recording| find_taps(&recording, &source, &TapSettings::default()));
     let Ok(taps) = taps else { return Found::NoTap };
-    let near = (2e-3 * record.rate).max(3.0) / record.rate + record.width;
+    // Drift above the threshold lets a tap begin early: what counts is the tap that holds the pulse.
+    let frame = ((record.begin + 0.5 * record.width) * record.rate) as u64;
     let mut taps = taps.taps.iter();
-    let Some(tap) = taps.find(|tap| (tap.time - record.begin).abs() < near) else {
+    let Some(tap) = taps.find(|tap| tap.record.contains(&frame)) else {
         return Found::NoTap;
     };
     match (&tap.rejection, tap.second_hit) {

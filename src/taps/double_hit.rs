@@ -59,7 +59,12 @@ pub(super) fn second_hit(
     let start = force.index(event.trigger);
     let samples = &force.samples;
     let near = samples.get(start..own)?;
-    let (offset, _) = near.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    // The first of equal samples, where the pulse is clipped.
+    let (offset, _) = near
+        .iter()
+        .enumerate()
+        .rev()
+        .max_by(|a, b| a.1.total_cmp(b.1))?;
     let main = Pulse::new(samples, start + offset);
     let copies = copies(&main, settings.double_hit_warning);
     let excursion = excursion(&main, force.noise, (own, settings));
@@ -210,7 +215,8 @@ fn excursion(main: &Pulse, noise: f64, (own, settings): (usize, &TapSettings)) -
     let samples = main.samples.get(..own)?;
     excursions(samples, limit, rearm)
         .into_iter()
-        .filter(|other| other.place != main.crest && !is_ringing(main, other))
+        .filter(|other| main.crest.abs_diff(other.place) as f64 > main.width)
+        .filter(|other| !is_ringing(main, other))
         .filter(|other| {
             let width = half_width(samples, other.place);
             width <= OTHER_WIDTH * main.width + 2.0 && OTHER_WIDTH * width + 2.0 >= main.width
@@ -252,29 +258,23 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Crest> {
     found
 }
 
-/// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
-/// pulls. A crest right beside a comparable downward swing is such ringing: within twice its own
-/// width, or three samples, on the side of the pulse.
+/// An anti-alias filter rings around a short pulse, and a hammer's own resonance after a long one,
+/// swinging as far down as up; a hammer never pulls. A crest right beside a comparable downward swing is
+/// such ringing: within twice its own width, or three samples, on either side.
 fn is_ringing(main: &Pulse, other: &Crest) -> bool {
     let force = main.samples;
-    let above = |frame: &usize| {
-        force
-            .get(*frame)
-            .is_some_and(|&x| x - other.base > 0.5 * other.peak)
-    };
-    let width = (other.place..).take_while(above).count()
-        + (0..other.place).rev().take_while(above).count();
+    let height = |x: &f64| x - other.base;
+    let above = |x: &&f64| height(x) > 0.5 * other.peak;
+    let (before, after) = force.split_at(other.place.min(force.len()));
+    let width =
+        after.iter().take_while(above).count() + before.iter().rev().take_while(above).count();
+    // Not beyond the crest of the pulse itself.
     let reach = (2 * width).max(3).min(main.crest.abs_diff(other.place));
-    let beside = if main.crest < other.place {
-        other.place - reach..other.place
-    } else {
-        other.place..other.place + reach
-    };
-    let lowest = force
-        .get(beside)
-        .into_iter()
-        .flatten()
-        .map(|x| x - other.base)
-        .fold(0.0, f64::min);
+    let beside = before
+        .iter()
+        .rev()
+        .take(reach)
+        .chain(after.iter().take(reach));
+    let lowest = beside.map(height).fold(0.0, f64::min);
     -lowest > 0.5 * other.peak
 }

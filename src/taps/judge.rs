@@ -125,11 +125,12 @@ fn force_of(
     let before = index.checked_sub(1).and_then(|last| events.get(last));
     let first = before.map_or(0, |last| last.trigger + least);
     let first = trigger.saturating_sub(least).max(first).min(record.start);
-    // Long enough for the pulse of a tap whose record the next one cuts short.
-    let end = record
-        .end
-        .max(trigger + (0.01 * recording.sample_rate()) as u64 + 16);
-    let mut force = hammer.force(first..end.min(recording.frames()))?;
+    // What comes nearer to the next tap than the least distance is the next one's.
+    let mut end = record.end;
+    if end < recording.frames() {
+        end = end.saturating_sub(least).max(end.min(trigger + least));
+    }
+    let mut force = hammer.force(first..end)?;
     let others = events.iter().zip(answered).enumerate();
     for (_, (other, _)) in others.filter(|(other, (_, answered))| *other != index && !**answered) {
         let range = force.index(other.trigger.saturating_sub(least / 100))

@@ -7,6 +7,9 @@ use crate::stats::{median, root_mean_square};
 /// Length of the pieces in which drift and noise are surveyed (s). A pulse of a few milliseconds
 /// does not move the median of 0.1 s.
 const PIECE: f64 = 0.1;
+/// Fewest pieces from which a usual one is told: a recording that is shorter is cut finer for its noise,
+/// so that its only pulse is not taken for what goes on all the time.
+const FEWEST_PIECES: usize = 20;
 /// An excursion longer than this is no hammer pulse but a moving cable or hand (s).
 const LONGEST_PULSE: f64 = 0.05;
 
@@ -63,31 +66,55 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
     }
     let mut deviations: Vec<f64> = pieces.iter().map(|piece| piece.deviation).collect();
     let mut roots: Vec<f64> = pieces.iter().map(|piece| piece.rms).collect();
+    let mut reached: Vec<f64> = pieces
+        .iter()
+        .map(|p| (p.high - p.median).max(p.median - p.low))
+        .collect();
+    let baseline = Baseline {
+        medians: pieces.iter().map(|piece| piece.median).collect(),
+        frames: frames as f64,
+    };
+    let (usual, usual_rms) = if pieces.len() < FEWEST_PIECES {
+        usual_of_short(recording, channel, &baseline)?
+    } else {
+        (median(&mut reached), median(&mut roots))
+    };
     // 1.4826 turns a median deviation into a standard deviation of normal noise. Coarsely quantised
     // noise has a median deviation of zero: the rms of a usual piece and a third of a quantum (what
     // rounding alone leaves) hold it up.
     let noise = (1.4826 * median(&mut deviations))
-        .max(median(&mut roots))
+        .max(usual_rms)
         .max(0.3 * recording.quantum(channel));
     let up = pieces.iter().map(|p| p.high - p.median).fold(0.0, f64::max);
     let down = pieces.iter().map(|p| p.median - p.low).fold(0.0, f64::max);
     // A filter's ringing swings to the other side by up to a quarter: only a clear excess inverts.
     let polarity = if down > 1.5 * up { -1.0 } else { 1.0 };
-    let mut reached: Vec<f64> = pieces
-        .iter()
-        .map(|p| (p.high - p.median).max(p.median - p.low))
-        .collect();
-    let medians = pieces.iter().map(|piece| piece.median).collect();
     Ok(Survey {
-        baseline: Baseline {
-            medians,
-            frames: frames as f64,
-        },
+        baseline,
         noise,
-        usual: median(&mut reached),
+        usual,
         polarity,
         largest: if polarity > 0.0 { up } else { down },
     })
+}
+
+/// What a usual piece reaches, and the rms of one, of a recording of fewer than [`FEWEST_PIECES`] pieces:
+/// told from finer ones, so that its only pulse is not taken for what goes on all the time. They are
+/// measured from the baseline, so that drift counts.
+fn usual_of_short(
+    recording: &Recording,
+    channel: usize,
+    baseline: &Baseline,
+) -> Result<(f64, f64), RecordingError> {
+    let mut samples = recording.read(channel, 0..recording.frames())?;
+    for (frame, x) in samples.iter_mut().enumerate() {
+        *x -= baseline.at(frame as u64);
+    }
+    let length = (samples.len() / FEWEST_PIECES).max(32);
+    let reach = |piece: &[f64]| piece.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let mut reached: Vec<f64> = samples.chunks(length).map(reach).collect();
+    let mut roots: Vec<f64> = samples.chunks(length).map(root_mean_square).collect();
+    Ok((median(&mut reached), median(&mut roots)))
 }
 
 fn piece(mut samples: Vec<f64>) -> Option<Piece> {

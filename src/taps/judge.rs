@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::answer::is_answered;
-use super::hammer::Survey;
+use super::double_hit::{SecondHit, second_hit};
+use super::force::{Force, Hammer};
 use super::{Event, Found, Rejection, Tap, TapSettings, TapSource, Taps};
 use crate::recording::{Recording, RecordingError};
 use crate::stats::median;
@@ -37,17 +38,20 @@ pub(super) fn judge(
         .collect();
     let records = records(recording, (&found.events, &counts), settings);
     let mut taps = Vec::with_capacity(found.events.len());
-    for ((event, record), answered) in found.events.iter().zip(records).zip(answered) {
-        let force = force_about(recording, source, &found, event, settings)?;
-        let weak = Rejection::TooWeak {
-            peak: event.peak,
-            limit: weakest,
-        };
-        let rejection = if !answered {
+    for (index, (event, record)) in found.events.iter().zip(records).enumerate() {
+        let place = (index, &record);
+        let force = force_of(recording, source, (&found, &answered), place, settings)?;
+        let own_end = record.end.min(event.trigger + least(recording, settings));
+        let pulse_end = force.as_ref().map(|f| f.pulse_end(event, f.index(own_end)));
+        let second = force.and_then(|f| second_hit(&f, (event, f.index(own_end)), settings));
+        let rejection = if !answered[index] {
             Some(Rejection::NoResponse)
         } else if event.peak < weakest {
-            Some(weak)
-        } else if let Some(double) = force.as_ref().and_then(|f| f.double_hit(event, settings)) {
+            Some(Rejection::TooWeak {
+                peak: event.peak,
+                limit: weakest,
+            })
+        } else if let Some(double) = second.and_then(|second| double(second, settings)) {
             Some(double)
         } else {
             overload(recording, source, &record)?
@@ -55,8 +59,9 @@ pub(super) fn judge(
         taps.push(Tap {
             time: event.trigger as f64 / recording.sample_rate(),
             peak: event.peak,
-            pulse_end: force.map(|force| force.pulse_end(event)),
+            pulse_end,
             record,
+            second_hit: second,
             rejection,
         });
     }
@@ -83,12 +88,27 @@ fn answers(
     }
 }
 
-/// The force about an event; `None` without a hammer.
-fn force_about(
+/// Least distance of two taps (frames).
+fn least(recording: &Recording, settings: &TapSettings) -> u64 {
+    (settings.least_distance * recording.sample_rate()) as u64
+}
+
+/// A second hit that is large enough to reject its tap.
+fn double(second: SecondHit, settings: &TapSettings) -> Option<Rejection> {
+    (second.ratio >= settings.double_hit).then_some(Rejection::DoubleHit {
+        delay: second.delay,
+        ratio: second.ratio,
+        limit: settings.double_hit,
+    })
+}
+
+/// The force over an event's record and ahead of it, as far as that belongs to no other event; `None`
+/// without a hammer. What no sensor answers is taken out: no hit of the structure.
+fn force_of(
     recording: &Recording,
     source: &TapSource,
-    found: &Found,
-    event: &Event,
+    (found, answered): (&Found, &[bool]),
+    (index, record): (usize, &Range<u64>),
     settings: &TapSettings,
 ) -> Result<Option<Force>, RecordingError> {
     let (TapSource::Hammer { channel, .. }, Some(survey)) = (source, &found.survey) else {
@@ -99,7 +119,25 @@ fn force_about(
         channel: *channel,
         survey,
     };
-    hammer.force(event, settings).map(Some)
+    let (events, least) = (&found.events, least(recording, settings));
+    let trigger = events[index].trigger;
+    // Another hit of this event comes less than the least distance ahead, and after all of the last.
+    let before = index.checked_sub(1).and_then(|last| events.get(last));
+    let first = before.map_or(0, |last| last.trigger + least);
+    let first = trigger.saturating_sub(least).max(first).min(record.start);
+    // What comes nearer to the next tap than the least distance is the next one's.
+    let mut end = record.end;
+    if end < recording.frames() {
+        end = end.saturating_sub(least).max(end.min(trigger + least));
+    }
+    let mut force = hammer.force(first..end)?;
+    let others = events.iter().zip(answered).enumerate();
+    for (_, (other, _)) in others.filter(|(other, (_, answered))| *other != index && !**answered) {
+        let range = force.index(other.trigger.saturating_sub(least / 100))
+            ..force.index(other.trigger + least);
+        force.samples[range].fill(0.0);
+    }
+    Ok(Some(force))
 }
 
 /// Each event's record: from the pre-trigger to that of the next event that `counts`, or the file's
@@ -119,124 +157,6 @@ fn records(
         start(event)..end.max(start(event))
     };
     events.iter().enumerate().map(record).collect()
-}
-
-/// One excursion of the force above the double-hit limit.
-struct Excursion {
-    frame: usize,
-    peak: f64,
-}
-
-/// The hammer channel, with its drift and noise.
-struct Hammer<'a> {
-    recording: &'a Recording,
-    channel: usize,
-    survey: &'a Survey,
-}
-
-impl Hammer<'_> {
-    /// The force about an event, drift taken out, pulses upwards: from a little before the trigger
-    /// to the least distance of the next tap.
-    fn force(&self, event: &Event, settings: &TapSettings) -> Result<Force, RecordingError> {
-        let rate = self.recording.sample_rate();
-        let first = event.trigger.saturating_sub((2e-3 * rate) as u64 + 8);
-        let last = event.trigger + (settings.least_distance * rate) as u64;
-        let samples = self.recording.read(self.channel, first..last)?;
-        let drift = |frame: usize| self.survey.baseline.at(first + frame as u64);
-        let samples = samples
-            .iter()
-            .enumerate()
-            .map(|(i, x)| self.survey.polarity * (x - drift(i)))
-            .collect();
-        Ok(Force {
-            first,
-            samples,
-            noise: self.survey.noise,
-            rate,
-        })
-    }
-}
-
-/// The force about one event.
-struct Force {
-    /// Frame of the first sample.
-    first: u64,
-    samples: Vec<f64>,
-    noise: f64,
-    rate: f64,
-}
-
-impl Force {
-    /// Looks for a second excursion above `double_hit` of the peak after the force has fallen below
-    /// `rearm` of it.
-    fn double_hit(&self, event: &Event, settings: &TapSettings) -> Option<Rejection> {
-        let limit = (settings.double_hit * event.peak).max(6.0 * self.noise);
-        let rearm = (settings.rearm * event.peak).max(3.0 * self.noise);
-        let excursions = excursions(&self.samples, limit, rearm);
-        let main = excursions.iter().max_by(|a, b| a.peak.total_cmp(&b.peak))?;
-        excursions
-            .iter()
-            .filter(|other| other.frame != main.frame && !is_ringing(&self.samples, main, other))
-            .max_by(|a, b| a.peak.total_cmp(&b.peak))
-            .map(|second| Rejection::DoubleHit {
-                delay: main.frame.abs_diff(second.frame) as f64 / self.rate,
-                ratio: second.peak / main.peak,
-                limit: settings.double_hit,
-            })
-    }
-
-    /// Frame after which the force stays within its noise, or 1 % of its peak, for a millisecond.
-    fn pulse_end(&self, event: &Event) -> u64 {
-        let limit = (4.0 * self.noise).max(0.01 * event.peak);
-        let rest = ((1e-3 * self.rate) as usize).max(8);
-        let start = (event.trigger - self.first.min(event.trigger)) as usize;
-        let mut calm = 0;
-        for (index, force) in self.samples.iter().enumerate().skip(start) {
-            calm = if force.abs() < limit { calm + 1 } else { 0 };
-            if calm == rest {
-                return self.first + (index + 1 - rest) as u64;
-            }
-        }
-        self.first + self.samples.len() as u64
-    }
-}
-
-fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Excursion> {
-    let mut found: Vec<Excursion> = Vec::new();
-    let mut armed = true;
-    for (frame, &x) in force.iter().enumerate() {
-        if armed && x > limit {
-            found.push(Excursion { frame, peak: x });
-            armed = false;
-        } else if !armed && x < rearm {
-            armed = true;
-        } else if let Some(open) = found.last_mut().filter(|open| !armed && x > open.peak) {
-            *open = Excursion { frame, peak: x };
-        }
-    }
-    found
-}
-
-/// An anti-alias filter rings around a short pulse, swinging as far down as up; a hammer never
-/// pulls. An excursion right beside a comparable downward swing is such ringing: within twice its own
-/// width, or three samples, on the side of the pulse.
-fn is_ringing(force: &[f64], main: &Excursion, other: &Excursion) -> bool {
-    let above = |frame: &usize| force.get(*frame).is_some_and(|&x| x > 0.5 * other.peak);
-    let width = (other.frame..).take_while(above).count()
-        + (0..other.frame).rev().take_while(above).count();
-    let reach = (2 * width).max(3).min(main.frame.abs_diff(other.frame));
-    let beside = if main.frame < other.frame {
-        other.frame - reach..other.frame
-    } else {
-        other.frame..other.frame + reach
-    };
-    let lowest = force
-        .get(beside)
-        .into_iter()
-        .flatten()
-        .copied()
-        .fold(0.0, f64::min);
-    -lowest > 0.5 * other.peak
 }
 
 /// Samples at a channel's limit: at the integer format's full scale, or at the level of its flat

@@ -5,6 +5,7 @@
 //! ([`read_peaks`]); mains lines are recognised, and the readings of several recordings are merged
 //! ([`merge_modes`]).
 
+pub mod fit;
 mod interpolation;
 mod mains;
 mod merge;

@@ -8,6 +8,7 @@
 
 pub mod amplitude;
 
+pub mod fit;
 mod interpolation;
 mod mains;
 mod merge;

@@ -1,0 +1,163 @@
+//! What is fitted: columns of complex lines on a common axis, and the functions they are made of.
+
+use num_complex::Complex64;
+
+use super::FitError;
+
+/// What kind of lines the columns hold, and with it the function of one pole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Basis {
+    /// Discrete Fourier transforms of free decays that all have the same number of samples, without
+    /// any window, on lines that are multiples of sample_rate/samples.
+    FreeDecay {
+        /// Sample rate (Hz).
+        sample_rate: f64,
+        /// Samples of each decay.
+        samples: usize,
+    },
+    /// Frequency response functions.
+    FrequencyResponse {
+        /// Resolution 1/T of what they were computed from (Hz). Lines denser than that are not
+        /// independent of each other.
+        resolution: f64,
+    },
+}
+
+/// The lines of one sensor for one tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Number of the tap (from 0); of frequency response functions: of the place or the group of taps.
+    pub tap: usize,
+    /// Number of the sensor (from 0). Columns of one sensor share one noise level.
+    pub sensor: usize,
+    /// Value on each line (any unit).
+    pub values: Vec<Complex64>,
+}
+
+/// Columns on a common axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalData {
+    basis: Basis,
+    frequencies: Vec<f64>,
+    columns: Vec<Column>,
+    spacing: f64,
+}
+
+impl ModalData {
+    /// Checks and takes the data: `frequencies` (Hz) ascending and positive, one for each value of every
+    /// column. Stretches may be left out of the axis.
+    ///
+    /// # Errors
+    /// [`FitError`] where lines and values do not belong together, or a value is no number.
+    pub fn new(
+        basis: Basis,
+        frequencies: Vec<f64>,
+        columns: Vec<Column>,
+    ) -> Result<Self, FitError> {
+        if columns.is_empty() || frequencies.len() < 2 {
+            return Err(FitError::Empty {
+                columns: columns.len(),
+                lines: frequencies.len(),
+            });
+        }
+        for (index, column) in columns.iter().enumerate() {
+            check_column(column, index, frequencies.len())?;
+        }
+        let ascending = frequencies.windows(2).all(|pair| pair[0] < pair[1]);
+        if !ascending || frequencies[0] <= 0.0 || frequencies.iter().any(|f| !f.is_finite()) {
+            return Err(FitError::Axis);
+        }
+        let spacing = line_spacing(basis, &frequencies)?;
+        Ok(ModalData {
+            basis,
+            frequencies,
+            columns,
+            spacing,
+        })
+    }
+
+    /// What the lines are.
+    pub fn basis(&self) -> Basis {
+        self.basis
+    }
+
+    /// Frequencies of the lines (Hz).
+    pub fn frequencies(&self) -> &[f64] {
+        &self.frequencies
+    }
+
+    /// The columns.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Distance of neighbouring lines (Hz).
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Resolution (Hz): 1/T.
+    pub(super) fn resolution(&self) -> f64 {
+        match self.basis {
+            Basis::FreeDecay { .. } => self.spacing,
+            Basis::FrequencyResponse { resolution } => resolution.max(self.spacing),
+        }
+    }
+
+    /// Highest frequency a pole can have (Hz).
+    pub(super) fn highest(&self) -> f64 {
+        match self.basis {
+            Basis::FreeDecay { sample_rate, .. } => 0.5 * sample_rate,
+            Basis::FrequencyResponse { .. } => f64::INFINITY,
+        }
+    }
+}
+
+fn check_column(column: &Column, index: usize, lines: usize) -> Result<(), FitError> {
+    if column.values.len() != lines {
+        return Err(FitError::Length {
+            column: index,
+            values: column.values.len(),
+            lines,
+        });
+    }
+    match column.values.iter().position(|value| !value.is_finite()) {
+        Some(line) => Err(FitError::NotFinite {
+            column: index,
+            line,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Distance of the lines (Hz). Those of a decay must be multiples of it, or the truncation factor
+/// differs from line to line.
+fn line_spacing(basis: Basis, frequencies: &[f64]) -> Result<f64, FitError> {
+    match basis {
+        Basis::FreeDecay {
+            sample_rate,
+            samples,
+        } => {
+            let spacing = sample_rate / samples as f64;
+            let off = |f: &&f64| {
+                let line = *f / spacing;
+                // The largest transform has some 10^6 lines; rounding moves none by 10^-6.
+                (line - line.round()).abs() > 1e-6 || **f >= 0.5 * sample_rate
+            };
+            match frequencies.iter().find(off) {
+                _ if !(spacing > 0.0 && spacing.is_finite()) => Err(FitError::Axis),
+                Some(&frequency) => Err(FitError::OffGrid { frequency, spacing }),
+                None => Ok(spacing),
+            }
+        }
+        Basis::FrequencyResponse { resolution } => {
+            let steps = frequencies.windows(2).map(|pair| pair[1] - pair[0]);
+            let spacing = steps.fold(f64::INFINITY, f64::min);
+            if resolution > 0.0 && resolution.is_finite() {
+                Ok(spacing)
+            } else {
+                Err(FitError::Axis)
+            }
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The function of one pole on the lines, its derivative, and the real columns made of them.
+//!
+//! Inside the fit a line stands at m (its frequency over the line spacing df), and a pole at
+//! q = p/(2 pi df) = -decay + j position. With kappa = 2 pi/M, the transform of a decay
+//! x(n) = Re(a z^n), z = e^{kappa q}, over its M samples (times 1/rate) is on the line m
+//!
+//! ```text
+//! X(m) = b phi(m; q) + conj(b) phi(m; conj q),     phi(m; q) = kappa/(1 - e^{kappa (q - j m)}),
+//! a = 2 b (2 pi df)/(1 - e^{2 pi q}),
+//! ```
+//!
+//! because e^{-j kappa m M} = 1 on every line: the truncation is a factor of the amplitude and no
+//! error. For a frequency response function phi = 1/(j m - q), and its residue is R = b (2 pi df).
+
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+
+use super::data::{Basis, ModalData};
+
+/// Least decay (lines) of a steady line: on its own line it is a million times its neighbours.
+pub(super) const STEADY: f64 = 1e-6;
+
+/// The lines of one band.
+#[derive(Debug, Clone)]
+pub(super) struct Lines {
+    /// First line of the band in the data.
+    pub first: usize,
+    /// Positions (lines).
+    pub positions: Vec<f64>,
+    /// 2 pi/M of a decay; `None` for a frequency response function.
+    kappa: Option<f64>,
+}
+
+/// Values of one pole and of its image on the lines, and their derivatives to the pole.
+struct Values {
+    pole: Vec<[Complex64; 2]>,
+    image: Vec<[Complex64; 2]>,
+}
+
+impl Lines {
+    /// The lines from index `first` up to `end` (not included).
+    pub fn new(data: &ModalData, first: usize, end: usize) -> Self {
+        let positions = data.frequencies()[first..end]
+            .iter()
+            .map(|f| f / data.spacing())
+            .collect();
+        let kappa = match data.basis() {
+            Basis::FreeDecay { samples, .. } => Some(std::f64::consts::TAU / samples as f64),
+            Basis::FrequencyResponse { .. } => None,
+        };
+        Lines {
+            first,
+            positions,
+            kappa,
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// phi and d phi/dq.
+    fn value(&self, pole: Complex64, line: f64) -> [Complex64; 2] {
+        let distance = pole - Complex64::new(0.0, line);
+        match self.kappa {
+            // phi = kappa/(1 - e^u), d phi/dq = e^u phi^2, u = kappa (q - j m).
+            Some(kappa) => {
+                let less_one = exp_less_one(kappa * distance);
+                let value = -kappa / less_one;
+                [value, (less_one + 1.0) * value * value]
+            }
+            // phi = 1/(j m - q), d phi/dq = phi^2.
+            None => {
+                let value = -distance.inv();
+                [value, value * value]
+            }
+        }
+    }
+
+    fn values(&self, pole: Complex64) -> Values {
+        let both = |pole: Complex64| self.positions.iter().map(move |&m| self.value(pole, m));
+        Values {
+            pole: both(pole).collect(),
+            image: both(pole.conj()).collect(),
+        }
+    }
+
+    /// Real columns of `poles`: for each pole two of the model and two of its derivative.
+    ///
+    /// With b = b1 + j b2 the model is b1 (phi + image) + b2 j (phi - image); rows are the real parts
+    /// of all lines, then the imaginary parts. With phi' and image' the derivatives and
+    /// u = phi' + image', v = j (phi' - image'), the model changes
+    ///
+    /// ```text
+    /// with the position by  b1 v - b2 u,     with the decay by  -(b1 u + b2 v).
+    /// ```
+    pub fn columns(&self, poles: &[Complex64]) -> (DMatrix<f64>, DMatrix<f64>) {
+        let rows = 2 * self.count();
+        let mut model = DMatrix::zeros(rows, 2 * poles.len());
+        let mut slopes = DMatrix::zeros(rows, 2 * poles.len());
+        for (place, &pole) in poles.iter().enumerate() {
+            let values = self.values(pole);
+            for (line, (one, image)) in values.pole.iter().zip(&values.image).enumerate() {
+                self.put(&mut model, (line, 2 * place), (one[0], image[0]));
+                self.put(&mut slopes, (line, 2 * place), (one[1], image[1]));
+            }
+        }
+        (model, slopes)
+    }
+
+    /// Only the columns of the model.
+    pub fn model(&self, poles: &[Complex64]) -> DMatrix<f64> {
+        let mut model = DMatrix::zeros(2 * self.count(), 2 * poles.len());
+        for (place, &pole) in poles.iter().enumerate() {
+            for (line, &m) in self.positions.iter().enumerate() {
+                let pair = (self.value(pole, m)[0], self.value(pole.conj(), m)[0]);
+                self.put(&mut model, (line, 2 * place), pair);
+            }
+        }
+        model
+    }
+
+    fn put(
+        &self,
+        matrix: &mut DMatrix<f64>,
+        (line, column): (usize, usize),
+        (one, image): (Complex64, Complex64),
+    ) {
+        let sum = one + image;
+        let turned = Complex64::i() * (one - image);
+        let imaginary = line + self.count();
+        matrix[(line, column)] = sum.re;
+        matrix[(imaginary, column)] = sum.im;
+        matrix[(line, column + 1)] = turned.re;
+        matrix[(imaginary, column + 1)] = turned.im;
+    }
+
+    /// Columns of a complex polynomial with `terms` terms over the band, for what lies outside it.
+    pub fn polynomial(&self, terms: usize) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(2 * self.count(), 2 * terms);
+        let low = self.positions.first().copied().unwrap_or(0.0);
+        let high = self.positions.last().copied().unwrap_or(1.0);
+        for (line, m) in self.positions.iter().enumerate() {
+            let place = (2.0 * m - low - high) / (high - low).max(f64::MIN_POSITIVE);
+            for term in 0..terms {
+                let value = place.powi(term as i32);
+                columns[(line, 2 * term)] = value;
+                columns[(line + self.count(), 2 * term + 1)] = value;
+            }
+        }
+        columns
+    }
+}
+
+/// e^u - 1 without cancellation near zero: with u = x + j y,
+/// (e^x - 1) cos y - 2 sin^2(y/2) + j e^x sin y.
+fn exp_less_one(u: Complex64) -> Complex64 {
+    let (half_sin, half_cos) = (0.5 * u.im).sin_cos();
+    let grown = u.re.exp_m1();
+    let versine = 2.0 * half_sin * half_sin;
+    Complex64::new(
+        grown * (1.0 - versine) - versine,
+        (grown + 1.0) * 2.0 * half_sin * half_cos,
+    )
+}

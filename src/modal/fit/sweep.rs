@@ -1,0 +1,340 @@
+//! Sweeps over the groups until the poles stay.
+
+use num_complex::Complex64;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use super::data::ModalData;
+use super::local::{GroupFit, Local, Neighbour};
+use super::{PoleStart, Unfit, band};
+
+/// Most sweeps; two suffice for modes far apart.
+const MOST_SWEEPS: usize = 8;
+/// A sweep that moves no pole by more than this share of its standard deviation is the last.
+const STILL: f64 = 0.02;
+/// Terms of the background while neighbours have not been fitted.
+const FIRST_TERMS: usize = 2;
+/// Most terms of the background: constant, slope, curvature.
+const MOST_TERMS: usize = 3;
+/// A term of background is taken when the residual or the pole asks for it on this level. 5 %: the
+/// price of a term not needed is a standard deviation some percent larger, that of one left out a bias.
+const TERM_LEVEL: f64 = 0.05;
+
+/// State of one mode between the sweeps.
+#[derive(Debug, Clone)]
+pub(super) struct Mode {
+    pub start: Complex64,
+    /// Whether the start has a damping of its own.
+    pub damping_known: bool,
+    pub pole: Complex64,
+    pub amplitudes: Option<Vec<Complex64>>,
+    pub failed: Option<Unfit>,
+}
+
+/// A group after the last sweep.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    pub members: Vec<usize>,
+    pub fit: GroupFit,
+}
+
+/// All modes and what surrounds them.
+pub(super) struct Sweeper<'a> {
+    pub data: &'a ModalData,
+    pub modes: Vec<Mode>,
+    /// Positions of undamped lines (lines).
+    pub steady: Vec<f64>,
+}
+
+impl<'a> Sweeper<'a> {
+    pub fn new(data: &'a ModalData, starts: &[PoleStart], steady: &[f64], added: f64) -> Self {
+        let lines = |hertz: f64| hertz / data.spacing();
+        let modes = starts
+            .iter()
+            .map(|start| mode(data, start, added / std::f64::consts::TAU))
+            .collect();
+        Sweeper {
+            data,
+            modes,
+            steady: steady.iter().map(|&f| lines(f)).collect(),
+        }
+    }
+
+    fn alive(&self) -> Vec<(usize, Complex64)> {
+        self.modes
+            .iter()
+            .enumerate()
+            .filter(|(_, mode)| mode.failed.is_none())
+            .map(|(index, mode)| (index, mode.pole))
+            .collect()
+    }
+
+    /// Sweeps until the poles stay; the groups of the last sweep.
+    pub fn run(&mut self) -> Vec<Group> {
+        let mut fitted = Vec::new();
+        for sweep in 0..MOST_SWEEPS {
+            let mut groups = band::groups(&self.alive());
+            if sweep == 0 {
+                self.strongest_first(&mut groups);
+            }
+            fitted.clear();
+            let mut moved: f64 = 0.0;
+            for members in groups {
+                match self.fit_group(&members, sweep == 0) {
+                    Ok(fit) => {
+                        moved = moved.max(self.accept(&members, &fit));
+                        fitted.push(Group { members, fit });
+                    }
+                    Err(reason) => {
+                        moved = f64::INFINITY;
+                        for index in members {
+                            self.modes[index].failed = Some(reason.clone());
+                        }
+                    }
+                }
+            }
+            if sweep > 0 && moved < STILL {
+                break;
+            }
+        }
+        fitted.retain(|group| {
+            let alive = |&index: &usize| self.modes[index].failed.is_none();
+            group.members.iter().all(alive)
+        });
+        fitted
+    }
+
+    /// Strong modes first: their flanks disturb the weak ones.
+    fn strongest_first(&self, groups: &mut [Vec<usize>]) {
+        let height = |group: &Vec<usize>| {
+            let index = group.first().copied().unwrap_or(0);
+            let position = self.modes[index].pole.im;
+            let (first, end) = band::within(self.data, (position - 0.5, position + 0.5));
+            let columns = self.data.columns().iter();
+            columns
+                .flat_map(|column| &column.values[first..end])
+                .map(Complex64::norm_sqr)
+                .sum::<f64>()
+        };
+        groups.sort_by(|a, b| height(b).total_cmp(&height(a)));
+    }
+
+    /// Takes the poles of a fit over; how far they moved in standard deviations.
+    fn accept(&mut self, members: &[usize], fit: &GroupFit) -> f64 {
+        let deviations = super::uncertainty::deviations(fit);
+        let mut most: f64 = 0.0;
+        for (place, &index) in members.iter().enumerate() {
+            let mode = &mut self.modes[index];
+            let pole = fit.at.poles[place];
+            let (of_position, of_decay) = deviations[place];
+            let change = pole - mode.pole;
+            most = most
+                .max(change.im.abs() / of_position)
+                .max(change.re.abs() / of_decay);
+            mode.pole = pole;
+            mode.amplitudes = Some(fit.amplitudes(place, self.data.columns().len()));
+            mode.failed = refusal(self.data, mode, deviations[place]);
+        }
+        if most.is_nan() { f64::INFINITY } else { most }
+    }
+
+    fn fit_group(&self, members: &[usize], first: bool) -> Result<GroupFit, Unfit> {
+        let poles: Vec<Complex64> = members
+            .iter()
+            .map(|&index| self.modes[index].pole)
+            .collect();
+        let local = Local::new(self.data, &poles, &self.neighbours(members), &self.steady)?;
+        if first {
+            self.first_fit(&local, members, poles)
+        } else {
+            settled_fit(&local, &poles)
+        }
+    }
+
+    pub fn neighbours(&self, members: &[usize]) -> Vec<Neighbour> {
+        self.modes
+            .iter()
+            .enumerate()
+            .filter(|(index, mode)| !members.contains(index) && mode.failed.is_none())
+            .map(|(_, mode)| Neighbour {
+                pole: mode.pole,
+                amplitudes: mode.amplitudes.clone(),
+            })
+            .collect()
+    }
+
+    /// From the starts, after a look about each.
+    fn first_fit(
+        &self,
+        local: &Local,
+        members: &[usize],
+        mut poles: Vec<Complex64>,
+    ) -> Result<GroupFit, Unfit> {
+        let terms = (0..=FIRST_TERMS)
+            .rev()
+            .find(|&terms| local.has_room(&poles, terms))
+            .unwrap_or(0);
+        let scale = local.scale();
+        for (place, &index) in members.iter().enumerate() {
+            let known = self.modes[index].damping_known;
+            local.look_about(&mut poles, place, (terms, &scale), known);
+        }
+        let fit = local.fit(&poles, terms, &scale)?;
+        let noise = local.noise_of(&fit);
+        local.fit(&fit.at.poles, terms, &noise)
+    }
+}
+
+fn mode(data: &ModalData, start: &PoleStart, added: f64) -> Mode {
+    let position = start.frequency / data.spacing();
+    let unknown = 0.3 * data.resolution() / data.spacing();
+    let decay = start
+        .damping_ratio
+        .filter(|ratio| *ratio > 0.0)
+        .map_or(unknown, |ratio| ratio * position);
+    let pole = Complex64::new(-decay - added / data.spacing(), position);
+    let within = position > 0.0 && start.frequency < data.highest() && pole.is_finite();
+    Mode {
+        start: pole,
+        damping_known: start.damping_ratio.is_some(),
+        pole,
+        amplitudes: None,
+        failed: (!within).then_some(Unfit::OutsideBand),
+    }
+}
+
+/// Why a fitted pole is no mode near its start.
+fn refusal(data: &ModalData, mode: &Mode, (of_position, of_decay): (f64, f64)) -> Option<Unfit> {
+    let lines = |hertz: f64| hertz / data.spacing();
+    let line = lines(data.resolution());
+    let pole = mode.pole;
+    let allowed = 3.0 * line + 3.0 * mode.start.re.abs().max(pole.re.abs());
+    let first = data.frequencies().first().copied().unwrap_or(0.0);
+    let last = data.frequencies().last().copied().unwrap_or(0.0);
+    let away = (pole.im - mode.start.im).abs();
+    if pole.im < lines(first) || pole.im > lines(last) || away > allowed {
+        return Some(Unfit::LeftStart {
+            frequency: pole.im * data.spacing(),
+            distance: away * data.spacing(),
+        });
+    }
+    if pole.re >= 0.0 {
+        return Some(Unfit::NoDecay);
+    }
+    let wide = line.max(pole.re.abs());
+    let vague = of_position.is_nan() || of_position > wide || of_decay.is_nan() || of_decay > wide;
+    vague.then_some(Unfit::Undetermined {
+        std: of_position * data.spacing(),
+    })
+}
+
+/// From poles of the sweep before: background as the data ask for it, noise from the residual.
+fn settled_fit(local: &Local, poles: &[Complex64]) -> Result<GroupFit, Unfit> {
+    let rough = local.fit(poles, 0, &local.scale())?;
+    let noise = local.noise_of(&rough);
+    let mut fit = local.fit(&rough.at.poles, 0, &noise)?;
+    for terms in 1..=MOST_TERMS {
+        if !local.has_room(poles, terms) {
+            break;
+        }
+        let noise = local.noise_of(&fit);
+        let (Ok(fewer), Ok(more)) = (
+            local.fit(&fit.at.poles, terms - 1, &noise),
+            local.fit(&fit.at.poles, terms, &noise),
+        ) else {
+            break;
+        };
+        if !asked_for(&fewer, &more) {
+            return Ok(fewer);
+        }
+        fit = more;
+    }
+    let noise = local.noise_of(&fit);
+    local.fit(&fit.at.poles, fit.terms, &noise)
+}
+
+/// Whether the data ask for the background of `more`: by the residual (F test), or because the poles
+/// move by more than what the term costs in precision explains (Hausman 1978).
+fn asked_for(fewer: &GroupFit, more: &GroupFit) -> bool {
+    let terms = fewer.freedom - more.freedom;
+    let gain = (fewer.at.square_sum - more.at.square_sum) / terms / more.variance;
+    let by_residual = FisherSnedecor::new(terms, more.freedom)
+        .is_ok_and(|f| gain > 0.0 && f.sf(gain) < TERM_LEVEL);
+    by_residual || poles_differ(fewer, more)
+}
+
+fn poles_differ(fewer: &GroupFit, more: &GroupFit) -> bool {
+    let covariance = |fit: &GroupFit| fit.slopes.information.clone().try_inverse();
+    let (Some(efficient), Some(robust)) = (covariance(fewer), covariance(more)) else {
+        return false;
+    };
+    let parameters = efficient.nrows();
+    let level = TERM_LEVEL / parameters as f64;
+    let Ok(chi_squared) = ChiSquared::new(1.0) else {
+        return false;
+    };
+    (0..parameters).any(|i| {
+        let change = more.at.poles[i / 2] - fewer.at.poles[i / 2];
+        let change = if i % 2 == 0 { change.im } else { change.re };
+        let explained = (robust[(i, i)] - efficient[(i, i)]) * more.variance;
+        explained > 0.0 && chi_squared.sf(change * change / explained) < level
+    })
+}
+
+impl Local<'_> {
+    /// Whether the lines bear `terms` terms of background beside the poles: half of them are left.
+    fn has_room(&self, poles: &[Complex64], terms: usize) -> bool {
+        self.lines.count() >= 2 * (terms + 2 * poles.len()) + 2
+    }
+
+    /// Tries some dampings, some places and some dampings again for one pole, and keeps the best: a start
+    /// half a line off lies outside the valley of a resonance narrower than a line.
+    fn look_about(
+        &self,
+        poles: &mut [Complex64],
+        place: usize,
+        (terms, scale): (usize, &[f64]),
+        damping_known: bool,
+    ) {
+        let factors: &[f64] = if damping_known {
+            &[0.5, 1.0, 2.0]
+        } else {
+            &[0.1, 0.3, 1.0, 3.0, 10.0]
+        };
+        let line = self.data.resolution() / self.data.spacing();
+        let offsets = [-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75].map(|share| share * line);
+        let damped = |pole: Complex64| {
+            factors
+                .iter()
+                .map(move |f| Complex64::new(pole.re * f, pole.im))
+        };
+        for round in 0..3 {
+            let pole = poles[place];
+            let tries: Vec<Complex64> = if round == 1 {
+                offsets
+                    .iter()
+                    .map(|&o| pole + Complex64::new(0.0, o))
+                    .collect()
+            } else {
+                damped(pole).collect()
+            };
+            let found = self.best(poles, place, &tries, (terms, scale));
+            poles[place] = found.unwrap_or(pole);
+        }
+    }
+
+    fn best(
+        &self,
+        poles: &[Complex64],
+        place: usize,
+        tries: &[Complex64],
+        (terms, scale): (usize, &[f64]),
+    ) -> Option<Complex64> {
+        let sums = self.square_sums(poles, place, tries, (terms, scale));
+        tries
+            .iter()
+            .zip(sums)
+            .filter_map(|(&pole, sum)| sum.map(|sum| (pole, sum)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(pole, _)| pole)
+    }
+}

@@ -2,11 +2,18 @@
 
 use std::fmt;
 
+use super::amplitude::AmplitudeCurve;
+use super::fit::{ModalConstant, ModeFit};
+
 /// One resonance as one recording reads it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeReading {
-    /// Best frequency (Hz): interpolated where that succeeded, else on the line.
+    /// Best frequency (Hz).
     pub frequency: f64,
+    /// Where that comes from.
+    pub source: FrequencySource,
+    /// Its interval (Hz): 95 % of a fit, the bounds of a reading between the lines or on one.
+    pub interval: (f64, f64),
     /// Frequency of the peak's line (Hz).
     pub line_frequency: f64,
     /// Bound of the line reading (Hz).
@@ -27,6 +34,83 @@ pub struct ModeReading {
     pub above_noise_db: Option<f64>,
     /// What it is when it is no mode of the structure.
     pub label: Option<PeakLabel>,
+    /// The fit of the mode, where it succeeded.
+    pub fit: Option<Box<FittedReading>>,
+}
+
+/// How a frequency was read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrequencySource {
+    /// By a fit.
+    Fit,
+    /// Between the lines about the peak.
+    BetweenLines,
+    /// On the spectral line.
+    Line,
+}
+
+impl ModeReading {
+    /// Takes as the best frequency what `wanted` gives, or the next best that there is: fit, between
+    /// the lines, line. The damping stays that of the fit, or of the reading between the lines.
+    pub fn prefer(&mut self, wanted: FrequencySource) {
+        let fit = self.fit.as_deref().map(|fit| &fit.mode);
+        if let Some(fit) = fit {
+            self.damping_ratio = Some(fit.damping_ratio.value);
+            self.damping_std = Some(fit.damping_ratio.std);
+        }
+        let fitted = fit
+            .filter(|_| wanted == FrequencySource::Fit)
+            .map(|fit| fit.frequency);
+        let between = self
+            .interpolated
+            .zip(self.bound)
+            .filter(|_| wanted != FrequencySource::Line);
+        let within = |value: f64, bound: f64| (value - bound, value + bound);
+        (self.frequency, self.source, self.std, self.interval) = match (fitted, between) {
+            (Some(fit), _) => (
+                fit.value,
+                FrequencySource::Fit,
+                Some(fit.std),
+                (fit.low, fit.high),
+            ),
+            (None, Some((value, bound))) => (
+                value,
+                FrequencySource::BetweenLines,
+                // The bound is two standard deviations.
+                Some(0.5 * bound),
+                within(value, bound),
+            ),
+            // On a line the truth lies anywhere within the half line.
+            (None, None) => (
+                self.line_frequency,
+                FrequencySource::Line,
+                Some(self.half_line / 3f64.sqrt()),
+                within(self.line_frequency, self.half_line),
+            ),
+        };
+    }
+}
+
+/// What a fit says of one mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedReading {
+    /// Frequency, damping, amplitudes, each with its standard deviation.
+    pub mode: ModeFit,
+    /// Modal constants of the sensors; empty without a hammer, or where a sensor's quantity is unknown.
+    pub constants: Vec<ModalConstant>,
+    /// Frequency and damping against amplitude; `None` where they were not followed.
+    pub amplitude: Option<AmplitudeCurve>,
+}
+
+impl FittedReading {
+    /// A fit alone.
+    pub fn new(mode: ModeFit) -> Self {
+        FittedReading {
+            mode,
+            constants: Vec::new(),
+            amplitude: None,
+        }
+    }
 }
 
 /// A peak that is no mode of the structure.

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};
-use super::merge::{ModeReading, PeakLabel};
+use super::merge::{FrequencySource, ModeReading, PeakLabel};
 use super::peaks::{CompositeLevel, Peak};
 use crate::spectral::Window;
 
@@ -95,20 +95,24 @@ fn reading(
     let half_line = lines.half_line();
     let sharp = between.filter(|found| found.bound < half_line.max(half_width(found)));
     let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
-    ModeReading {
-        frequency: sharp.map_or(lines.frequency(line), |found| found.frequency),
+    let mut reading = ModeReading {
+        frequency: lines.frequency(line),
+        source: FrequencySource::Line,
+        interval: (0.0, 0.0),
         line_frequency: lines.frequency(line),
         half_line,
         interpolated: sharp.map(|found| found.frequency),
         bound: sharp.map(|found| found.bound),
-        // Without interpolation the truth lies anywhere within the half line.
-        std: Some(sharp.map_or(half_line / 3f64.sqrt(), |found| found.std)),
+        std: None,
         damping_ratio: sharp.and_then(|found| found.damping_ratio),
         damping_std: sharp.and_then(|found| found.damping_ratio.map(|_| found.damping_std)),
         prominence_db: peak.prominence_db,
         above_noise_db: peak.above_noise_db,
         label,
-    }
+        fit: None,
+    };
+    reading.prefer(FrequencySource::BetweenLines);
+    reading
 }
 
 /// Lines to either side of a peak that are its own: a third of the way to its neighbour.

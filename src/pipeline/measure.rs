@@ -1,8 +1,10 @@
 //! One recording: taps, spectra, peaks and their readings.
 
+use super::fits::Stabilisation;
 use super::stage::Stage;
 use super::warning::Warning;
-use crate::description::WindowKind;
+use crate::description::{ReadingMethod, WindowKind};
+use crate::modal::fit::ResponseKind;
 use crate::modal::{MainsSettings, ModeReading, PeakSettings};
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
@@ -22,6 +24,11 @@ pub struct MeasureSettings {
     pub block: Option<usize>,
     /// Window; `None` = by the decay in the record.
     pub window: Option<WindowKind>,
+    /// How natural frequencies are read.
+    pub reading: ReadingMethod,
+    /// What each response measures, for modal constants; `None` where nobody said, or it is no motion in
+    /// SI units over a force in N.
+    pub kinds: Vec<Option<ResponseKind>>,
     /// How taps are judged.
     pub taps: TapSettings,
     /// What counts as a resonance.
@@ -38,6 +45,8 @@ impl MeasureSettings {
             band: None,
             block: None,
             window: None,
+            reading: ReadingMethod::default(),
+            kinds: Vec::new(),
             taps: TapSettings::default(),
             peaks: PeakSettings::default(),
             mains: MainsSettings::default(),
@@ -67,6 +76,8 @@ pub struct MeasuredSpectra {
     pub decay: DecayCheck,
     /// Resonances and mains lines, ascending.
     pub readings: Vec<ModeReading>,
+    /// What the polyreference fit found.
+    pub stabilisation: Stabilisation,
 }
 
 /// What stops a measurement.

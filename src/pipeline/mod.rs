@@ -10,7 +10,9 @@
 //! writes.
 
 mod analysis;
+mod decays;
 mod doubts;
+mod fits;
 mod force;
 mod frf;
 mod identification;

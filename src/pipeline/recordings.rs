@@ -7,6 +7,7 @@ use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
 use crate::description::{
     ChannelRef, RecordingDescription, Scale, SensorDescription, SensorKind, TestDescription,
 };
+use crate::modal::fit::ResponseKind;
 use crate::recording::{ReadSettings, Recording, RecordingError};
 use crate::spectral::SpectralError;
 use crate::taps::{TapSettings, TapSource, find_taps};
@@ -84,6 +85,8 @@ pub(super) fn measure_described(
     settings.band = description.band;
     settings.block = description.block;
     settings.window = test.analysis.window;
+    settings.reading = test.analysis.reading;
+    settings.kinds = response_kinds(test);
     let responses = test
         .sensors
         .iter()
@@ -115,6 +118,20 @@ pub(super) fn measure_described(
         }
     }
     Ok(result)
+}
+
+/// What the sensors measure, where the hammer's force makes modal constants of it.
+fn response_kinds(test: &TestDescription) -> Vec<Option<ResponseKind>> {
+    let kind = |sensor: &SensorDescription| match sensor.kind {
+        SensorKind::Acceleration => Some(ResponseKind::Acceleration),
+        SensorKind::Velocity => Some(ResponseKind::Velocity),
+        SensorKind::Displacement => Some(ResponseKind::Displacement),
+        SensorKind::Sound => None,
+    };
+    match &test.hammer {
+        Some(_) => test.sensors.iter().map(kind).collect(),
+        None => Vec::new(),
+    }
 }
 
 /// The unit that the description gives to each channel's values.

@@ -4,11 +4,15 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use super::decays::FreeDecays;
+use super::fits::{Candidates, Stabilisation, complete, stabilisation};
 use super::force::{PulseWindow, pulse_window, remove_offset};
 use super::measure::{MeasureSettings, MeasuredSpectra};
 use super::quiet::Quiet;
-use crate::description::WindowKind;
-use crate::modal::{CompositeLevel, ModeReading, PeakLabel, find_peaks, read_peaks};
+use crate::description::{ReadingMethod, WindowKind};
+use crate::modal::{
+    CompositeLevel, FrequencySource, ModeReading, PeakLabel, find_peaks, read_peaks,
+};
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
     AveragedSpectra, DecayCheck, Lines, SpectralAverager, Transformer, Window, band_limited,
@@ -19,15 +23,15 @@ use crate::taps::{Tap, TapSource, Taps};
 
 /// What every step of one recording's measurement needs.
 pub(super) struct Stage<'a> {
-    recording: &'a Recording,
-    settings: &'a MeasureSettings,
-    taps: &'a Taps,
-    lines: Lines,
+    pub(super) recording: &'a Recording,
+    pub(super) settings: &'a MeasureSettings,
+    pub(super) taps: &'a Taps,
+    pub(super) lines: Lines,
     /// Force first, where there is one, then the responses.
-    channels: Vec<usize>,
-    has_force: bool,
+    pub(super) channels: Vec<usize>,
+    pub(super) has_force: bool,
     /// Frames of a block.
-    gate: u64,
+    pub(super) gate: u64,
 }
 
 impl<'a> Stage<'a> {
@@ -49,7 +53,10 @@ impl<'a> Stage<'a> {
     }
 
     /// Samples of all channels in a range of frames, each channel's mean taken out.
-    fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
+    pub(super) fn read(
+        &self,
+        range: std::ops::Range<u64>,
+    ) -> Result<Vec<Vec<f64>>, RecordingError> {
         let mut channels = self.recording.read_channels(&self.channels, range)?;
         for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
             let mean = self.recording.mean(channel);
@@ -95,13 +102,42 @@ impl<'a> Stage<'a> {
             Some(WindowKind::Exponential) => exponential_to(decay.remaining, self.lines.duration),
         };
         let (averages, transforms) = self.averages(window)?;
-        let readings = self.readings(&averages, &transforms, &quiet, window);
+        let mut readings = self.readings(&averages, &transforms, &quiet, window);
+        let stabilisation = self.fit(&mut readings)?;
+        for reading in &mut readings {
+            reading.prefer(match self.settings.reading {
+                ReadingMethod::Fit => FrequencySource::Fit,
+                ReadingMethod::Interpolated => FrequencySource::BetweenLines,
+                ReadingMethod::Line => FrequencySource::Line,
+            });
+        }
+        readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
             averages,
             window,
             decay,
             readings,
+            stabilisation,
         })
+    }
+
+    /// Fits the free decays, and puts what that gives into the readings.
+    fn fit(&self, readings: &mut Vec<ModeReading>) -> Result<Stabilisation, RecordingError> {
+        let Some(decays) = FreeDecays::read(self)? else {
+            return Ok(Stabilisation::default());
+        };
+        let functions = decays.functions();
+        let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
+        let first = decays.data.frequencies().first().copied().unwrap_or(0.0);
+        let stabilisation = stabilisation(first, decays.data.spacing(), &columns);
+        let candidates = Candidates {
+            lines: &self.lines,
+            data: &decays.data,
+            stabilisation: &stabilisation,
+        };
+        candidates.fit(readings);
+        complete(readings, &decays, &self.settings.kinds);
+        Ok(stabilisation)
     }
 
     /// The decay of each response inside the band, the largest over the accepted taps.
@@ -272,15 +308,15 @@ fn is_force_gap(force: &[f64], level: &CompositeLevel, peak: usize) -> bool {
 
 /// A mains line keeps its line reading and loses what only a resonance has.
 fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> ModeReading {
-    ModeReading {
-        frequency: line_frequency,
+    let mut reading = ModeReading {
         line_frequency,
         interpolated: None,
         bound: None,
-        std: Some(reading.half_line / 3f64.sqrt()),
         damping_ratio: None,
         damping_std: None,
         label: Some(label),
         ..reading.clone()
-    }
+    };
+    reading.prefer(FrequencySource::Line);
+    reading
 }

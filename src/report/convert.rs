@@ -4,12 +4,13 @@ use super::convert_estimate::{
     average_section, estimate_section, monte_carlo_section, perturbation_section,
     prediction_section, span_section,
 };
+use super::convert_fit::fit_section;
 use super::document::{
     ChannelSection, Document, ModeSection, PredictionSection, RecordingSection, TapSection,
     TestSection, VERSION, WarningSection,
 };
 use crate::identify::{PairsModel, PredictedMode};
-use crate::modal::ModeReading;
+use crate::modal::{FrequencySource, ModeReading};
 use crate::pipeline::{
     Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure, Warning,
 };
@@ -231,10 +232,10 @@ fn tap_sections(recording: &RecordingResult) -> Vec<TapSection> {
 }
 
 fn reading_section(reading: &ModeReading) -> ModeSection {
-    let method = if reading.interpolated.is_some() {
-        "interpolated"
-    } else {
-        "line"
+    let method = match reading.source {
+        FrequencySource::Fit => "fit",
+        FrequencySource::BetweenLines => "interpolated",
+        FrequencySource::Line => "line",
     };
     ModeSection {
         mode: None,
@@ -245,8 +246,11 @@ fn reading_section(reading: &ModeReading) -> ModeSection {
         interpolated_frequency: reading.interpolated,
         interpolated_bound: reading.bound,
         std: reading.std,
+        low: Some(reading.interval.0),
+        high: Some(reading.interval.1),
         damping: reading.damping_ratio,
         damping_std: reading.damping_std,
+        fit: reading.fit.as_deref().map(fit_section),
         coherence: None,
         random_error: None,
         lambda: None,

@@ -7,6 +7,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use super::document_fit::{
+    AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection, TapFitSection,
+    TrendSection,
+};
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
 
 /// Version of the document's layout.
@@ -178,7 +182,7 @@ pub struct ModeSection {
     pub mode: Option<usize>,
     /// Best frequency (Hz).
     pub frequency: f64,
-    /// "line" or "interpolated" ("given" when read elsewhere).
+    /// "fit", "interpolated" or "line" ("given" when read elsewhere).
     pub method: String,
     /// Frequency on the line (Hz).
     pub line_frequency: Option<f64>,
@@ -190,10 +194,16 @@ pub struct ModeSection {
     pub interpolated_bound: Option<f64>,
     /// Standard deviation of the best frequency (Hz).
     pub std: Option<f64>,
+    /// Lower end of its interval (Hz): 95 % of a fit, else the bound of the reading.
+    pub low: Option<f64>,
+    /// Upper end of its interval (Hz).
+    pub high: Option<f64>,
     /// Damping ratio.
     pub damping: Option<f64>,
     /// Its standard deviation.
     pub damping_std: Option<f64>,
+    /// The fit; null where the mode was not fitted.
+    pub fit: Option<FitSection>,
     /// Coherence on the mode's line, of the sensor that knows it best; null below two averages.
     pub coherence: Option<f64>,
     /// Relative random error (standard deviation) of that sensor's frequency response there.

@@ -5,7 +5,9 @@
 mod convert;
 mod convert_estimate;
 mod convert_figures;
+mod convert_fit;
 pub mod document;
+mod document_fit;
 mod document_frf;
 pub mod figures;
 pub mod format;

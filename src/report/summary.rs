@@ -240,7 +240,9 @@ fn resolution(document: &Document) -> Option<String> {
 /// be taken for that one's.
 fn bound_name(document: &Document) -> &'static str {
     let modes = document.modes.as_deref().unwrap_or_default();
-    let between = modes.iter().any(|mode| mode.method == "interpolated");
+    let between = modes
+        .iter()
+        .any(|mode| matches!(mode.method.as_str(), "fit" | "interpolated"));
     if between {
         "half line (as if it had been read on a line only)"
     } else {

@@ -59,7 +59,10 @@ pub(super) fn explain(series: &[Complex64], band: &Band) -> Context {
     let mut tracks = whole.listed_alone(&start);
     for _ in 0..MOST_FOUND {
         let best = lowest(&tracks);
-        let grown: Vec<Candidate> = tracks.iter().filter_map(|t| whole.grow(t, listed)).collect();
+        let grown: Vec<Candidate> = tracks
+            .iter()
+            .filter_map(|t| whole.grow(t, listed))
+            .collect();
         if lowest(&grown) > best - WORTH {
             break;
         }
@@ -151,7 +154,9 @@ impl Whole<'_> {
         let fit = fit_exponentials(&self.times, self.series, model, &priors)?;
         let values = 2.0 * count as f64;
         let criterion = values * (fit.squares / values).ln() + unknowns * values.ln();
-        criterion.is_finite().then_some(Candidate { fit, criterion })
+        criterion
+            .is_finite()
+            .then_some(Candidate { fit, criterion })
     }
 
     /// The same model with the strongest line of what it leaves: one that decays like the mode, or one

@@ -73,7 +73,9 @@ fn finish(model: Exponentials, state: State) -> Option<Fit> {
     let scale: Vec<f64> = (0..size)
         .map(|k| state.left[(k, k)].re.max(f64::MIN_POSITIVE).sqrt())
         .collect();
-    let scaled = DMatrix::from_fn(size, size, |i, k| state.left[(i, k)] / (scale[i] * scale[k]));
+    let scaled = DMatrix::from_fn(size, size, |i, k| {
+        state.left[(i, k)] / (scale[i] * scale[k])
+    });
     let inverse = scaled.try_inverse()?;
     let inverse = DMatrix::from_fn(size, size, |i, k| inverse[(i, k)] / (scale[i] * scale[k]));
     Some(Fit {

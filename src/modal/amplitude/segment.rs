@@ -110,10 +110,7 @@ fn effective_time(times: &[f64], decay: f64) -> f64 {
     let total: f64 = weights.iter().sum();
     let moment = |about: f64, power: i32| {
         let terms = times.iter().zip(&weights);
-        terms
-            .map(|(t, w)| w * (t - about).powi(power))
-            .sum::<f64>()
-            / total
+        terms.map(|(t, w)| w * (t - about).powi(power)).sum::<f64>() / total
     };
     let mean = moment(0.0, 1);
     mean + 0.5 * moment(mean, 3) / moment(mean, 2)

@@ -114,8 +114,8 @@ impl Column {
     }
 }
 
-/// Bound of the best reading of a mode (Hz): the interpolated frequency's own bound, else the half
-/// line, else two standard deviations.
+/// Bound of the best reading of a mode (Hz): half the interval of a fit, the bound of a reading between
+/// the lines, else the half line, else two standard deviations.
 pub fn reading_bound(document: &Document, mode: usize) -> Option<f64> {
     bound_of(mode_of(document, mode)?)
 }
@@ -128,11 +128,15 @@ fn mode_of(document: &Document, mode: usize) -> Option<&ModeSection> {
 
 /// Bound of a resonance's best frequency (Hz).
 pub fn bound_of(mode: &ModeSection) -> Option<f64> {
-    let interpolated = mode
-        .interpolated_bound
-        .filter(|_| mode.method == "interpolated");
-    interpolated
-        .or(mode.half_line)
+    let own = match mode.method.as_str() {
+        "interpolated" => mode.interpolated_bound,
+        "fit" => mode
+            .low
+            .zip(mode.high)
+            .map(|(low, high)| 0.5 * (high - low)),
+        _ => None,
+    };
+    own.or(mode.half_line)
         .or(mode.std.map(|std| 2.0 * std))
         .filter(|bound| bound.is_finite() && *bound > 0.0)
 }

@@ -163,3 +163,78 @@ fn exp_less_one(u: Complex64) -> Complex64 {
         (grown + 1.0) * 2.0 * half_sin * half_cos,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modal::fit::Column;
+
+    fn lines(basis: Basis) -> Lines {
+        let frequencies: Vec<f64> = (20..40).map(f64::from).collect();
+        let values = vec![Complex64::ONE; frequencies.len()];
+        let column = Column {
+            tap: 0,
+            sensor: 0,
+            values,
+        };
+        let data = ModalData::new(basis, frequencies, vec![column]).unwrap();
+        Lines::new(&data, 0, 20)
+    }
+
+    const DECAY: Basis = Basis::FreeDecay {
+        sample_rate: 100.0,
+        samples: 100,
+    };
+    const RESPONSE: Basis = Basis::FrequencyResponse { resolution: 1.0 };
+
+    #[test]
+    fn limit_the_model_is_the_transform_of_a_sampled_decay() {
+        let (pole, amplitude) = (Complex64::new(-0.2, 30.3), Complex64::new(0.7, -1.1));
+        let lines = lines(DECAY);
+        // b = a (1 - e^{pT})/(2 2 pi df), all in lines; df = 1 Hz, T = 1 s.
+        let tau = std::f64::consts::TAU;
+        let b = amplitude * (1.0 - (tau * pole).exp()) / (2.0 * tau);
+        let model = lines.model(&[pole]);
+        for (row, m) in lines.positions.iter().enumerate() {
+            let transform: Complex64 = (0..100)
+                .map(|n| {
+                    let time = f64::from(n) / 100.0;
+                    let x = (amplitude * (tau * pole * time).exp()).re;
+                    x * Complex64::from_polar(0.01, -tau * m * time)
+                })
+                .sum();
+            let imaginary = row + lines.count();
+            let fitted = Complex64::new(
+                b.re * model[(row, 0)] + b.im * model[(row, 1)],
+                b.re * model[(imaginary, 0)] + b.im * model[(imaginary, 1)],
+            );
+            // Rounding of a sum of a hundred terms.
+            assert!((fitted - transform).norm() < 1e-12, "line {m}");
+        }
+    }
+
+    #[test]
+    fn prop_the_slopes_are_differences_of_the_model() {
+        let pole = Complex64::new(-0.4, 29.6);
+        let step = 1e-6;
+        for basis in [DECAY, RESPONSE] {
+            let lines = lines(basis);
+            let (_, slopes) = lines.columns(&[pole]);
+            let difference = |by: Complex64| {
+                (lines.model(&[pole + by]) - lines.model(&[pole - by])) / (2.0 * step)
+            };
+            let position = difference(Complex64::new(0.0, step));
+            let decay = difference(Complex64::new(-step, 0.0));
+            let (u, v) = (slopes.column(0), slopes.column(1));
+            // Second differences of order one over the step squared: 10^-9 at most.
+            for (found, expected) in [
+                (position.column(0), v.into_owned()),
+                (position.column(1), -u.into_owned()),
+                (decay.column(0), -u.into_owned()),
+                (decay.column(1), -v.into_owned()),
+            ] {
+                assert!((found - expected).norm() < 1e-7, "{basis:?}");
+            }
+        }
+    }
+}

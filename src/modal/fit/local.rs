@@ -187,6 +187,11 @@ impl<'a> Local<'a> {
         tries.iter().map(sum).collect()
     }
 
+    /// Sum of the squares without any pole.
+    pub fn square_sum_without(&self, terms: usize, noise: &[f64]) -> f64 {
+        self.prepare(terms, noise).1.norm_squared()
+    }
+
     /// Fits from `start` with `terms` terms of background and given noise of the columns (any scale).
     pub fn fit(&self, start: &[Complex64], terms: usize, noise: &[f64]) -> Result<GroupFit, Unfit> {
         const MOST_STEPS: usize = 30;

@@ -13,9 +13,11 @@
 mod band;
 mod collector;
 mod data;
+mod extra;
 mod function;
 mod kernel;
 mod local;
+mod residue;
 mod result;
 mod sweep;
 mod uncertainty;
@@ -23,7 +25,9 @@ mod uncertainty;
 pub use band::bands_for;
 pub use collector::FreeDecayCollector;
 pub use data::{Basis, Column, ModalData};
+pub use extra::{ExtraMode, ExtraVerdict, test_extra_mode};
 pub use kernel::StopReason;
+pub use residue::{ModalConstant, ResponseKind, TapForce, modal_constants, modal_constants_of_frf};
 pub use result::{ColumnAmplitude, ModeFit, fit_modes};
 pub use uncertainty::{FittedValue, TapFit, UncertaintySource};
 

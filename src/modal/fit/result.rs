@@ -8,7 +8,7 @@ use num_complex::Complex64;
 use super::data::{Basis, ModalData};
 use super::kernel::StopReason;
 use super::local::GroupFit;
-use super::sweep::{Group, Sweeper};
+use super::sweep::{Group, Mode, Sweeper};
 use super::uncertainty::{
     FittedValue, TapFit, fit_taps, inflation, judge, pole_covariance, reading, residual_correlation,
 };
@@ -78,9 +78,18 @@ pub fn fit_modes(
 ) -> Vec<Result<ModeFit, Unfit>> {
     let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
     let groups = sweeper.run();
-    let mut modes: Vec<Option<ModeFit>> = vec![None; starts.len()];
-    for group in &groups {
-        let fits = Reporter::new(data, settings, group).modes();
+    report(&mut sweeper, &groups, settings)
+}
+
+/// For each start its mode, or why there is none.
+pub(super) fn report(
+    sweeper: &mut Sweeper,
+    groups: &[Group],
+    settings: &FitSettings,
+) -> Vec<Result<ModeFit, Unfit>> {
+    let mut modes: Vec<Option<ModeFit>> = vec![None; sweeper.modes.len()];
+    for group in groups {
+        let fits = Reporter::new(sweeper.data, settings, group).modes();
         for (&index, fit) in group.members.iter().zip(fits) {
             match fit {
                 Ok(fit) => modes[index] = Some(fit),
@@ -88,7 +97,7 @@ pub fn fit_modes(
             }
         }
     }
-    let outcome = |(mode, state): (Option<ModeFit>, &super::sweep::Mode)| {
+    let outcome = |(mode, state): (Option<ModeFit>, &Mode)| {
         let reason = state.failed.clone().unwrap_or(Unfit::NotIndependent);
         mode.ok_or(reason)
     };

@@ -142,7 +142,7 @@ impl<'a> Sweeper<'a> {
             .iter()
             .map(|&index| self.modes[index].pole)
             .collect();
-        let local = Local::new(self.data, &poles, &self.neighbours(members), &self.steady)?;
+        let local = self.local(members)?;
         if first {
             self.first_fit(&local, members, poles)
         } else {
@@ -150,7 +150,16 @@ impl<'a> Sweeper<'a> {
         }
     }
 
-    pub fn neighbours(&self, members: &[usize]) -> Vec<Neighbour> {
+    /// The band of these modes as their present poles have it.
+    pub fn local(&self, members: &[usize]) -> Result<Local<'a>, Unfit> {
+        let poles: Vec<Complex64> = members
+            .iter()
+            .map(|&index| self.modes[index].pole)
+            .collect();
+        Local::new(self.data, &poles, &self.neighbours(members), &self.steady)
+    }
+
+    fn neighbours(&self, members: &[usize]) -> Vec<Neighbour> {
         self.modes
             .iter()
             .enumerate()

@@ -1,0 +1,168 @@
+//! Whether the data ask for one more mode.
+
+use num_complex::Complex64;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::data::ModalData;
+use super::local::{GroupFit, Local};
+use super::result::{ModeFit, report};
+use super::sweep::Sweeper;
+use super::{FitSettings, PoleStart, Unfit};
+
+/// What speaks for one more mode, and what against it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtraMode {
+    /// Whether the data ask for it: all of what follows speaks for it.
+    pub verdict: ExtraVerdict,
+    /// Fall of the residual per unknown over the residual per degree of freedom.
+    pub f_statistic: f64,
+    /// Probability of a larger fall by noise alone at one given place.
+    pub probability: f64,
+    /// Fall of Schwarz's criterion; positive speaks for the mode.
+    pub information_gain: f64,
+    /// Size of its amplitudes over their standard deviation, root of the mean square over the columns.
+    pub amplitude_over_std: f64,
+    /// Likeness of its amplitudes to those of the nearest other mode of its group (modal assurance
+    /// criterion over all columns); `None` without such a mode, or with one column. Near 1 the second pole
+    /// may only mend a line that is no straight decay: one mode whose frequency changes while it rings.
+    pub likeness: Option<f64>,
+    /// Its fit together with the others, where there is one.
+    pub fit: Result<ModeFit, Unfit>,
+}
+
+/// Outcome of the test for one more mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExtraVerdict {
+    /// The data ask for it.
+    Needed,
+    /// Noise alone would do as well.
+    NotSignificant,
+    /// It has no pole of its own near its start, or one that does not decay by two standard deviations.
+    NoMode,
+}
+
+/// The fall of the residual by chance must be less probable than this. 10^-4: the place of the pole was
+/// chosen to suit the data, out of some tens of lines.
+const LEVEL: f64 = 1e-4;
+/// Least amplitude in standard deviations.
+const LEAST_AMPLITUDE: f64 = 4.0;
+
+/// Tests whether the data ask for a mode that begins at `extra` beside the `accepted` ones.
+///
+/// Both models are fitted to the same lines with the same background; the one more pole must lower the
+/// residual by far more than its unknowns explain, decay, and stand out of its own uncertainty.
+pub fn test_extra_mode(
+    data: &ModalData,
+    accepted: &[PoleStart],
+    extra: PoleStart,
+    settings: &FitSettings,
+) -> ExtraMode {
+    let mut starts = accepted.to_vec();
+    starts.push(extra);
+    let place = accepted.len();
+    let mut sweeper = Sweeper::new(data, &starts, &settings.steady_lines, settings.added_decay);
+    let groups = sweeper.run();
+    let fit = report(&mut sweeper, &groups, settings)
+        .pop()
+        .unwrap_or(Err(Unfit::NotIndependent));
+    let group = groups.iter().find(|group| group.members.contains(&place));
+    let (Some(group), Ok(mode)) = (group, &fit) else {
+        return without_mode(fit);
+    };
+    let inside = group.members.iter().position(|&index| index == place);
+    let compared = inside.and_then(|inside| {
+        let local = sweeper.local(&group.members).ok()?;
+        compare(&local, &group.fit, inside)
+    });
+    let Some((f_statistic, probability, information_gain)) = compared else {
+        return without_mode(fit);
+    };
+    let amplitude_over_std = over_std(mode);
+    let decays = mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
+    let needed =
+        probability < LEVEL && information_gain > 0.0 && amplitude_over_std > LEAST_AMPLITUDE;
+    ExtraMode {
+        verdict: match (needed, decays) {
+            (true, true) => ExtraVerdict::Needed,
+            (true, false) => ExtraVerdict::NoMode,
+            (false, _) => ExtraVerdict::NotSignificant,
+        },
+        f_statistic,
+        probability,
+        information_gain,
+        amplitude_over_std,
+        likeness: inside.and_then(|inside| likeness(&group.fit, inside)),
+        fit,
+    }
+}
+
+fn without_mode(fit: Result<ModeFit, Unfit>) -> ExtraMode {
+    ExtraMode {
+        verdict: ExtraVerdict::NoMode,
+        f_statistic: 0.0,
+        probability: 1.0,
+        information_gain: f64::NEG_INFINITY,
+        amplitude_over_std: 0.0,
+        likeness: None,
+        fit,
+    }
+}
+
+/// F statistic, its probability by chance, and the fall of Schwarz's criterion for the pole at `place`.
+///
+/// With residuals S0 and S1 of the models without and with it, k unknowns more (two of the pole, two
+/// amplitudes a column) and n real values: F = (S0 - S1)/k/(S1/freedom); criterion n ln S + k ln n.
+fn compare(local: &Local, fit: &GroupFit, place: usize) -> Option<(f64, f64, f64)> {
+    let mut fewer: Vec<Complex64> = fit.at.poles.clone();
+    fewer.remove(place);
+    let columns = fit.used.len() as f64;
+    let unknowns = 2.0 + 2.0 * columns;
+    let values = 2.0 * local.lines.count() as f64 * columns;
+    // Both anew over the same lines: those of the last sweep followed from the poles before it.
+    let with = local.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
+    let without = if fewer.is_empty() {
+        local.square_sum_without(fit.terms, &fit.noise)
+    } else {
+        local.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum
+    };
+    let statistic = (without - with.at.square_sum) / unknowns / with.variance;
+    let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
+    let probability = if statistic > 0.0 {
+        chance.sf(statistic)
+    } else {
+        1.0
+    };
+    let gain = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
+    Some((statistic, probability, gain))
+}
+
+/// Root of the mean square of amplitude over standard deviation.
+fn over_std(mode: &ModeFit) -> f64 {
+    let squares = mode
+        .amplitudes
+        .iter()
+        .map(|a| (a.value.norm() / a.std).powi(2));
+    (squares.sum::<f64>() / mode.amplitudes.len().max(1) as f64).sqrt()
+}
+
+/// |sum conj(b) c|^2/(sum |b|^2 sum |c|^2) with the nearest pole of the group, in units of noise.
+fn likeness(fit: &GroupFit, place: usize) -> Option<f64> {
+    let poles = &fit.at.poles;
+    let distance = |other: &usize| (poles[*other] - poles[place]).norm();
+    let nearest = (0..poles.len())
+        .filter(|&other| other != place)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let of = |pole: usize, column: usize| {
+        let amplitudes = &fit.at.amplitudes;
+        Complex64::new(
+            amplitudes[(2 * pole, column)],
+            amplitudes[(2 * pole + 1, column)],
+        )
+    };
+    let columns = fit.used.len();
+    let product: Complex64 = (0..columns)
+        .map(|c| of(place, c).conj() * of(nearest, c))
+        .sum();
+    let power = |pole: usize| (0..columns).map(|c| of(pole, c).norm_sqr()).sum::<f64>();
+    (columns > 1).then(|| product.norm_sqr() / (power(place) * power(nearest)))
+}

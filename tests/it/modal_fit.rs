@@ -332,6 +332,21 @@ fn limit_hum_at_a_known_frequency_does_not_move_a_mode_beside_it() {
     assert!(fit.frequency.std < 1e-3, "{fit:?}");
 }
 
+#[test]
+fn limit_of_two_starts_for_one_resonance_the_later_one_fails() {
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let mode = (60.0, 0.004);
+    let one = decay(&[(mode, Complex64::ONE)], (256.0, 512), 1e-3, &mut random);
+    let data = collect(&[vec![one]], 256.0, &[(30.0, 90.0)]);
+    let starts = [start(mode, 0.1), start(mode, 0.1), start(mode, -0.1)];
+    let fits = fit_modes(&data, &starts, &FitSettings::default());
+    let first = fits[0].as_ref().unwrap_or_else(|reason| panic!("{reason}"));
+    let error = (first.frequency.value - mode.0).abs();
+    assert!(error < 4.0 * first.frequency.std, "{first:?}");
+    assert!(first.frequency.std < 1e-3, "{first:?}");
+    assert!(fits[1].is_err(), "{fits:?}");
+}
+
 fn five_taps() -> TapTestSettings {
     TapTestSettings {
         sample_rate: 4096.0,

@@ -16,3 +16,9 @@
 //! - **Bathe**: "Finite Element Procedures", 11.6. Subspace iteration.
 //! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
 //!   the beam element with shear and rotary inertia.
+//! - **Golub & Pereyra 1973**, SIAM Journal on Numerical Analysis 10, 413-432, and **Kaufman 1975**, BIT
+//!   15, 49-57. Variable projection: least squares whose linear unknowns are eliminated.
+//! - **Hausman 1978**: "Specification tests in econometrics", Econometrica 46, 1251-1271. Whether a smaller
+//!   model biases what a larger one estimates less precisely.
+//! - **DerSimonian & Laird 1986**, Controlled Clinical Trials 7, 177-188, and **Hartung & Knapp 2001**,
+//!   Statistics in Medicine 20, 3875-3889. Mean of values that scatter beyond their own uncertainty.

@@ -8,6 +8,7 @@ mod errors;
 mod identify;
 mod layers;
 mod modal;
+mod modal_fit;
 mod pipeline;
 mod real_data;
 mod recording;

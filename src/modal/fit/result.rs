@@ -70,7 +70,8 @@ pub struct ModeFit {
 ///
 /// Modes nearer than three of their half widths together and a few lines are fitted jointly; the others
 /// are subtracted with their own amplitudes, or keep free ones where they lie in the band. What else
-/// lies outside is a polynomial of the frequency where the data ask for it.
+/// lies outside is a polynomial of the frequency where the data ask for it. Where two starts turn out to
+/// be one resonance, the later one fails: put those first that are surer.
 pub fn fit_modes(
     data: &ModalData,
     starts: &[PoleStart],

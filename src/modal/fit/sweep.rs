@@ -7,7 +7,7 @@ use super::data::ModalData;
 use super::local::{GroupFit, Local, Neighbour};
 use super::{PoleStart, Unfit, band};
 
-/// Most sweeps; two suffice for modes far apart.
+/// Most sweeps in which no start fails; two suffice for modes far apart.
 const MOST_SWEEPS: usize = 8;
 /// A sweep that moves no pole by more than this share of its standard deviation is the last.
 const STILL: f64 = 0.02;
@@ -71,36 +71,57 @@ impl<'a> Sweeper<'a> {
     /// Sweeps until the poles stay; the groups of the last sweep.
     pub fn run(&mut self) -> Vec<Group> {
         let mut fitted = Vec::new();
-        for sweep in 0..MOST_SWEEPS {
+        let mut sweeps = 0;
+        // A sweep in which a start fails is one more: what was fitted together with it begins again.
+        let mut most = MOST_SWEEPS;
+        while sweeps < most {
             let mut groups = band::groups(&self.alive());
-            if sweep == 0 {
+            if sweeps == 0 {
                 self.strongest_first(&mut groups);
             }
-            fitted.clear();
-            let mut moved: f64 = 0.0;
-            for members in groups {
-                match self.fit_group(&members, sweep == 0) {
-                    Ok(fit) => {
-                        moved = moved.max(self.accept(&members, &fit));
-                        fitted.push(Group { members, fit });
-                    }
-                    Err(reason) => {
-                        moved = f64::INFINITY;
-                        for index in members {
-                            self.modes[index].failed = Some(reason.clone());
-                        }
-                    }
-                }
-            }
-            if sweep > 0 && moved < STILL {
+            let before = self.alive().len();
+            let moved = self.sweep(groups, &mut fitted);
+            most += usize::from(self.alive().len() < before);
+            sweeps += 1;
+            if sweeps > 1 && moved < STILL {
                 break;
             }
         }
-        fitted.retain(|group| {
-            let alive = |&index: &usize| self.modes[index].failed.is_none();
-            group.members.iter().all(alive)
-        });
+        let settled = |&index: &usize| self.modes[index].amplitudes.is_some();
+        fitted.retain(|group: &Group| group.members.iter().all(settled));
         fitted
+    }
+
+    /// One sweep over the groups; how far the poles moved, in their standard deviations.
+    fn sweep(&mut self, groups: Vec<Vec<usize>>, fitted: &mut Vec<Group>) -> f64 {
+        fitted.clear();
+        let mut moved: f64 = 0.0;
+        for members in groups {
+            match self.fit_group(&members) {
+                Ok(fit) => {
+                    moved = moved.max(self.accept(&members, &fit));
+                    fitted.push(Group { members, fit });
+                }
+                Err(reason) => {
+                    moved = f64::INFINITY;
+                    let last = members.iter().copied().max();
+                    self.give_up(&members, last.map(|index| (index, reason)));
+                }
+            }
+        }
+        moved
+    }
+
+    /// One start fails; those fitted together with it begin again without it.
+    fn give_up(&mut self, members: &[usize], failure: Option<(usize, Unfit)>) {
+        for &index in members {
+            let mode = &mut self.modes[index];
+            mode.pole = mode.start;
+            mode.amplitudes = None;
+        }
+        if let Some((index, reason)) = failure {
+            self.modes[index].failed = Some(reason);
+        }
     }
 
     /// Strong modes first: their flanks disturb the weak ones.
@@ -132,18 +153,29 @@ impl<'a> Sweeper<'a> {
                 .max(change.re.abs() / of_decay);
             mode.pole = pole;
             mode.amplitudes = Some(fit.amplitudes(place, self.data.columns().len()));
-            mode.failed = refusal(self.data, mode, deviations[place]);
+        }
+        // Of several doubtful poles the one whose start came last goes: two poles for one resonance
+        // make each other doubtful.
+        let refused = members.iter().enumerate().filter_map(|(place, &index)| {
+            let reason = refusal(self.data, &self.modes[index], deviations[place])?;
+            Some((index, reason))
+        });
+        let worst = refused.max_by_key(|(index, _)| *index);
+        if worst.is_some() {
+            self.give_up(members, worst);
+            return f64::INFINITY;
         }
         if most.is_nan() { f64::INFINITY } else { most }
     }
 
-    fn fit_group(&self, members: &[usize], first: bool) -> Result<GroupFit, Unfit> {
+    fn fit_group(&self, members: &[usize]) -> Result<GroupFit, Unfit> {
+        let new = |&index: &usize| self.modes[index].amplitudes.is_none();
         let poles: Vec<Complex64> = members
             .iter()
             .map(|&index| self.modes[index].pole)
             .collect();
         let local = self.local(members)?;
-        if first {
+        if members.iter().any(new) {
             self.first_fit(&local, members, poles)
         } else {
             settled_fit(&local, &poles)

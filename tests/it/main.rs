@@ -14,5 +14,6 @@ mod recording;
 mod report;
 mod simulate;
 mod spectral;
+mod spectral_frf;
 mod structure;
 mod taps;

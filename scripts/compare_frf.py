@@ -66,7 +66,7 @@ def table_for_the_tests():
     values = by_scipy(force, response)
     for line in (1, 5, 12, 20, 25):
         h1, h2, hv, g2 = (value[line] for value in values)
-        cells = [f"{x:.15e}" for h in (h1, h2, hv) for x in (h.real, h.imag)] + [f"{g2:.15e}"]
+        cells = [repr(float(x)) for h in (h1, h2, hv) for x in (h.real, h.imag)] + [repr(float(g2))]
         print(f"({line}, [{', '.join(cells)}]),")
 
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
 mod cli;
+mod cli_frf;
 mod description;
 mod errors;
 mod identify;

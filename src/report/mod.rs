@@ -7,6 +7,7 @@ mod convert_estimate;
 mod convert_figures;
 pub mod document;
 mod document_frf;
+mod document_resolution;
 pub mod figures;
 pub mod format;
 pub mod html;

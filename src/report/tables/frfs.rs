@@ -2,7 +2,7 @@
 
 use super::super::document::{Document, FrfResonanceSection, FrfSection};
 use super::super::format::{MISSING, optional, trimmed, unit_words};
-use super::{Table, number, words};
+use super::{Table, coherence, number, words};
 
 /// One row for each resonance on each function; `None` where no functions were asked for or none
 /// exist.
@@ -93,15 +93,6 @@ fn recording_name(document: &Document, frf: &FrfSection) -> String {
         frf.recording.clone()
     } else {
         String::new()
-    }
-}
-
-/// A coherence in four digits; one that only rounding would make 1 is said to be above 0.9999.
-fn coherence(value: Option<f64>) -> String {
-    match value {
-        None => MISSING.to_owned(),
-        Some(value) if value > 0.9999 => ">0.9999".to_owned(),
-        Some(value) => format!("{value:.4}"),
     }
 }
 

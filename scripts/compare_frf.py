@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """H1, H2, Hv, coherence and their speed beside scipy.signal, pyFRF and bare numpy + scipy.fft.
 
-    scripts/compare_frf.py [--records 1000] [--block 2048] [--repetitions 41]
+    scripts/compare_frf.py [--records 1000] [--block 2048] [--repetitions 41] [--table]
 
 Needs numpy, scipy and pyFRF, and cargo. Random forces and responses (seeded) are written to a file
 that examples/frf_timing.rs reads; everybody works on the same arrays. Exits with 1 where the
@@ -9,6 +9,7 @@ numbers differ by more than 1e-10 or the speed falls below three times that of n
 """
 
 import argparse
+import os
 import pathlib
 import subprocess
 import sys
@@ -48,6 +49,25 @@ def by_scipy(force, response):
     matrices[:, 0, 1], matrices[:, 1, 0] = gfx.conj(), gfx
     vectors = np.linalg.eigh(matrices)[1][:, :, 1]
     return gfx / gff, gxx / gfx.conj(), vectors[:, 1] / vectors[:, 0], abs(gfx) ** 2 / (gff * gxx)
+
+
+def table_for_the_tests():
+    """The numbers in tests/it/spectral_frf.rs: five records of 64 samples of a congruential generator."""
+    state, numbers = 1, []
+    for _ in range(2 * 5 * 64):
+        state = (1103515245 * state + 12345) % 2**31
+        numbers.append(state / 2**30 - 1.0)
+    force, noise = np.reshape(numbers, (2, 5, 64))
+    # Each response is the force one sample ago, half of it two samples ago, and noise.
+    response = np.zeros_like(force)
+    response[:, 1:] += force[:, :-1]
+    response[:, 2:] += 0.5 * force[:, :-2]
+    response += 0.4 * noise
+    values = by_scipy(force, response)
+    for line in (1, 5, 12, 20, 25):
+        h1, h2, hv, g2 = (value[line] for value in values)
+        cells = [repr(float(x)) for h in (h1, h2, hv) for x in (h.real, h.imag)] + [repr(float(g2))]
+        print(f"({line}, [{', '.join(cells)}]),")
 
 
 def by_fft(force, response):
@@ -100,8 +120,6 @@ def ours(force, response, repetitions, threads=None):
         np.concatenate([force.ravel(), response.ravel()]).astype("<f8").tofile(source)
         program = ["cargo", "run", "--quiet", "--release", "--example", "frf_timing", "--"]
         numbers = [str(x) for x in (*force.shape, RATE, repetitions)]
-        import os
-
         environment = dict(os.environ)
         if threads:
             environment["RAYON_NUM_THREADS"] = str(threads)
@@ -137,7 +155,11 @@ def main():
     parser.add_argument("--records", type=int, default=1000)
     parser.add_argument("--block", type=int, default=2048)
     parser.add_argument("--repetitions", type=int, default=41)
+    parser.add_argument("--table", action="store_true", help="print the numbers of the tests")
     arguments = parser.parse_args()
+    if arguments.table:
+        table_for_the_tests()
+        return 0
     force, response = records(arguments.records, arguments.block)
     print(f"{arguments.records} records of {arguments.block} samples, force and one response")
     _, table = ours(force, response, 1)

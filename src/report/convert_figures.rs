@@ -106,9 +106,9 @@ pub fn frf_figure(recording: &RecordingResult, frfs: &[Frf]) -> RecordingFigure 
     figure
 }
 
-/// The estimators that are not meant.
+/// The estimators that are not meant; of one average all are the same.
 fn other_estimators(frf: &Frf) -> Vec<FrfEstimator> {
-    let all = FrfEstimator::ALL.into_iter();
+    let all = FrfEstimator::ALL.into_iter().filter(|_| frf.averages > 1);
     all.filter(|&estimator| estimator != frf.estimator)
         .collect()
 }

@@ -7,7 +7,7 @@ use super::document::{Document, EstimateSection, ModeSection, PairsSection, Valu
 const PARAMETER_COLUMNS: [&str; 7] = ["parameter", "method", "unit", "value", "std", "low", "high"];
 
 /// Columns of `modes.csv`.
-const MODE_COLUMNS: [&str; 13] = [
+const MODE_COLUMNS: [&str; 15] = [
     "mode",
     "label",
     "recording",
@@ -21,6 +21,8 @@ const MODE_COLUMNS: [&str; 13] = [
     "damping",
     "damping_std",
     "lambda",
+    "coherence",
+    "random_error",
 ];
 
 /// `parameters.csv`: one row for each parameter and method; only its header without an estimate.
@@ -113,6 +115,8 @@ fn mode_row(mode: &ModeSection) -> Vec<String> {
         number(mode.damping),
         number(mode.damping_std),
         number(mode.lambda),
+        number(mode.coherence),
+        number(mode.random_error),
     ]
 }
 

@@ -9,6 +9,7 @@ mod convert_fit;
 pub mod document;
 mod document_fit;
 mod document_frf;
+mod document_resolution;
 pub mod figures;
 pub mod format;
 pub mod html;

@@ -97,6 +97,7 @@ fn regress_help_of_every_command_names_an_example() {
         "init",
         "inspect",
         "spectrum",
+        "frf",
         "identify",
         "predict",
         "perturb",

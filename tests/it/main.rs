@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
 mod cli;
+mod cli_frf;
 mod description;
 mod errors;
 mod identify;
@@ -15,5 +16,6 @@ mod recording;
 mod report;
 mod simulate;
 mod spectral;
+mod spectral_frf;
 mod structure;
 mod taps;

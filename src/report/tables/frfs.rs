@@ -2,16 +2,32 @@
 
 use super::super::document::{Document, FrfResonanceSection, FrfSection};
 use super::super::format::{MISSING, optional, trimmed, unit_words};
-use super::{Table, number, words};
+use super::{Table, coherence, number, words};
 
 /// One row for each resonance on each function; `None` where no functions were asked for or none
 /// exist.
 pub fn frfs(document: &Document) -> Option<Table> {
     let frfs = document.frfs.as_deref()?;
     let first = frfs.first()?;
+    let one_unit = frfs.iter().all(|frf| frf.unit == first.unit);
+    let magnitude = if one_unit {
+        format!("|{}| ({})", first.estimator, unit_words(&first.unit))
+    } else {
+        format!("|{}|", first.estimator)
+    };
     let rows = frfs
         .iter()
-        .flat_map(|frf| frf.resonances.iter().map(|found| row(document, frf, found)))
+        .flat_map(|frf| {
+            let unit = if one_unit {
+                String::new()
+            } else {
+                unit_words(&frf.unit)
+            };
+            let named = (recording_name(document, frf), unit);
+            frf.resonances
+                .iter()
+                .map(move |found| row(frf, found, named.clone()))
+        })
         .collect();
     let taps = frfs.iter().map(|frf| frf.averages);
     let (least, most) = (taps.clone().min().unwrap_or(0), taps.max().unwrap_or(0));
@@ -26,11 +42,11 @@ pub fn frfs(document: &Document) -> Option<Table> {
             words("Response"),
             words("Mode"),
             number("Frequency (Hz)"),
-            number(&format!("|{}|", first.estimator)),
+            number(&magnitude),
             words("Unit"),
             number("Phase (\u{b0})"),
             number("Coherence"),
-            number("Random error (%)"),
+            number("Error (%)"),
         ],
         rows,
         note: note(frfs, least),
@@ -47,11 +63,12 @@ fn averages(least: usize, most: usize) -> String {
 }
 
 fn note(frfs: &[FrfSection], least: usize) -> String {
-    let mut text =
-        "Magnitude, phase and coherence stand on the line nearest to each resonance.".to_owned();
-    if least < 2 {
+    let mut text = "On the line nearest to each resonance.".to_owned();
+    if least >= 2 {
+        text.push_str(" Error: random error of the magnitude (standard deviation).");
+    } else {
         text.push_str(
-            " Of one average there is no coherence: it would be 1 whatever the noise, and mean nothing.",
+            " One average: no coherence; it would be 1 whatever the noise, and mean nothing.",
         );
     }
     if frfs.iter().any(|frf| frf.unit.contains("unit of the file")) {
@@ -69,29 +86,36 @@ fn note(frfs: &[FrfSection], least: usize) -> String {
     text
 }
 
-fn row(document: &Document, frf: &FrfSection, found: &FrfResonanceSection) -> Vec<String> {
+/// The recording's name where there are several.
+fn recording_name(document: &Document, frf: &FrfSection) -> String {
     let several = document.recordings.as_ref().is_some_and(|r| r.len() > 1);
+    if several {
+        frf.recording.clone()
+    } else {
+        String::new()
+    }
+}
+
+fn row(
+    frf: &FrfSection,
+    found: &FrfResonanceSection,
+    (recording, unit): (String, String),
+) -> Vec<String> {
     let name = match (found.mode, &found.label) {
         (Some(mode), _) => mode.to_string(),
         (None, Some(label)) => label.clone(),
         (None, None) => "unpaired".to_owned(),
     };
-    let fixed = |value: Option<f64>, digits: usize| {
-        value.map_or(MISSING.to_owned(), |value| format!("{value:.digits$}"))
-    };
+    let phase = |value: f64| format!("{value:.1}").replace('-', "\u{2212}");
     vec![
-        if several {
-            frf.recording.clone()
-        } else {
-            String::new()
-        },
+        recording,
         frf.response.clone(),
         name,
         trimmed(found.frequency, 6),
         optional(found.magnitude, 4),
-        unit_words(&frf.unit),
-        fixed(found.phase, 1),
-        fixed(found.coherence, 4),
+        unit,
+        found.phase.map_or(MISSING.to_owned(), phase),
+        coherence(found.coherence),
         optional(found.random_error.map(|error| 100.0 * error), 2),
     ]
 }

@@ -149,3 +149,12 @@ fn mode_name(mode: &ModeSection) -> String {
         (None, None) => "unpaired".to_owned(),
     }
 }
+
+/// A coherence in four digits; one that only rounding would make 1 is said to be above 0.9999.
+fn coherence(value: Option<f64>) -> String {
+    match value {
+        None => MISSING.to_owned(),
+        Some(value) if value > 0.9999 => ">0.9999".to_owned(),
+        Some(value) => format!("{value:.4}"),
+    }
+}

@@ -5,7 +5,7 @@ use super::super::format::{
     MISSING, Rounded, frequency_reading, last_place, line_reading, optional, rounded_digits,
     rounded_to, significant,
 };
-use super::{Column, Table, bound_of, mode_name, number, words};
+use super::{Column, Table, bound_of, coherence, mode_name, number, words};
 
 /// Most significant digits of lambda.
 const LAMBDA_DIGITS: i32 = 6;
@@ -84,6 +84,8 @@ fn columns() -> Vec<Column> {
         number("\u{3bb} (1)"),
         number("Prominence (dB)").on_page(),
         number("Above noise (dB)").on_page(),
+        number("Coherence").on_page(),
+        number("Random error (%)").on_page(),
         words("Recording"),
     ]
 }
@@ -102,6 +104,8 @@ fn row(mode: &ModeSection) -> Vec<String> {
         lambda(mode),
         optional(mode.prominence_db, 2),
         optional(mode.above_noise_db, 2),
+        coherence(mode.coherence),
+        optional(mode.random_error.map(|error| 100.0 * error), 2),
         mode.recording.clone().unwrap_or_else(|| MISSING.into()),
     ]
 }

@@ -16,6 +16,7 @@ const LAMBDAS: [f64; 5] = [1.6061, 4.2318, 7.1372, 9.7680, 12.2817];
 /// A whole run with two recordings.
 pub fn document() -> Document {
     Document {
+        frfs: None,
         monte_carlo: None,
         perturbation_averages: None,
         version: VERSION,
@@ -125,6 +126,8 @@ fn taps() -> Vec<TapSection> {
 fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
     let frequency = FREQUENCIES[index];
     ModeSection {
+        coherence: Some(0.998),
+        random_error: Some(0.016),
         mode: Some(index + 1),
         frequency,
         method: "interpolated".into(),

@@ -3,8 +3,8 @@
 use num_complex::Complex64;
 
 use super::{
-    Check, Outcome, QualitySettings, RecordingEvidence, ResponseForm, SensorEvidence, Subject,
-    Verdict,
+    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, ResponseForm,
+    SensorEvidence, Subject, Verdict,
 };
 
 /// Lines to either side of a resonance over which its sign is taken.
@@ -56,23 +56,30 @@ pub fn check_antiresonances(
     recording: &RecordingEvidence,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
+    // A resonance's line, and the lines of half its half-power width: there its own real part is
+    // largest, where on the line itself that of the other modes decides.
+    let place = |mode: &ResonanceEvidence| {
+        let half = mode.apparent_damping_ratio.unwrap_or(0.0) * mode.frequency;
+        let width = (half / recording.lines.spacing).round() as usize;
+        (recording.lines.nearest(mode.frequency), width.max(1))
+    };
     of_driving_points(
         recording,
         (Check::Antiresonances, 2),
         settings,
         |receptance| {
-            let places: Vec<usize> = modes(recording)
-                .map(|f| recording.lines.nearest(f))
-                .collect();
+            let places: Vec<(usize, usize)> = recording.resonances.iter().map(place).collect();
             // A channel with the wrong sign is the other check's matter.
             let sum: f64 = places
                 .iter()
-                .filter_map(|&line| receptance.get(line))
+                .filter_map(|&(line, _)| receptance.get(line))
                 .map(|x| x.im)
                 .sum();
             let upright = if sum > 0.0 { -1.0 } else { 1.0 };
-            let passes = |pair: &&[usize]| {
-                let between = receptance.get(pair[0]..=pair[1]).unwrap_or_default();
+            let passes = |pair: &&[(usize, usize)]| {
+                let ((first, wide), (last, narrow)) = (pair[0], pair[1]);
+                let between = receptance.get(first + wide..last.saturating_sub(narrow) + 1);
+                let between = between.unwrap_or_default();
                 let mut parts = between.iter().map(|x| upright * x.re);
                 parts.any(|re| re < 0.0) && parts.any(|re| re > 0.0)
             };

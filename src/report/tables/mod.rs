@@ -3,12 +3,14 @@
 mod joint;
 mod measured;
 mod modes;
+mod quality;
 mod taps;
 mod uncertainty;
 
 pub use joint::{Parameter, estimated, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};
+pub use quality::{quality, quality_doubts};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 

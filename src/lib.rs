@@ -21,6 +21,7 @@ pub mod quantity;
 pub mod stats;
 
 pub mod modal;
+pub mod quality;
 pub mod recording;
 pub mod spectral;
 pub mod taps;

@@ -17,6 +17,10 @@ const TABLE: &[(&str, &[&str])] = &[
     ("taps", &["recording", "stats"]),
     ("spectral", &["recording", "taps"]),
     ("modal", &["recording", "taps", "spectral", "stats"]),
+    (
+        "quality",
+        &["recording", "taps", "spectral", "modal", "stats"],
+    ),
     ("structure", &["quantity"]),
     ("identify", &["modal", "structure"]),
     (
@@ -32,6 +36,7 @@ const TABLE: &[(&str, &[&str])] = &[
             "taps",
             "spectral",
             "modal",
+            "quality",
             "structure",
             "identify",
             "stats",
@@ -47,6 +52,7 @@ const TABLE: &[(&str, &[&str])] = &[
             "taps",
             "spectral",
             "modal",
+            "quality",
             "structure",
             "identify",
             "pipeline",

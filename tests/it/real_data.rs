@@ -212,6 +212,9 @@ fn val_the_laboratory_cantilever_with_its_hammer_and_without() {
         let found = modes(&analysis);
         assert_eq!(found.len(), 2, "hammer {with_hammer}: {found:?}");
         if with_hammer {
+            // Its drifting baseline is no second hit.
+            let taps = &analysis.recordings[0].measurement.taps.taps;
+            assert!(taps.iter().all(|tap| tap.second_hit.is_none()), "{taps:?}");
             // One record: nothing shows how well it repeats.
             let codes = codes(&analysis);
             assert!(codes.contains(&"single-tap"), "{codes:?}");
@@ -270,6 +273,12 @@ fn recover_everything_about_a_cantilever_simulated_elsewhere() {
         }
         for (index, tap) in recording.measurement.taps.taps.iter().enumerate() {
             let twice = matches!((file.as_str(), index), ("r4.wav", 1) | ("r5.wav", 3));
+            assert_eq!(
+                tap.second_hit.is_some(),
+                twice,
+                "{file}, tap {}: {tap:?}",
+                index + 1
+            );
             match &tap.rejection {
                 Some(Rejection::DoubleHit { .. }) if twice => {}
                 None if !twice => {}

@@ -4,6 +4,7 @@ mod frfs;
 mod joint;
 mod measured;
 mod modes;
+mod quality;
 mod taps;
 mod uncertainty;
 
@@ -11,6 +12,7 @@ pub use frfs::frfs;
 pub use joint::{Parameter, estimated, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};
+pub use quality::{quality, quality_doubts};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 

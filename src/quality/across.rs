@@ -1,0 +1,263 @@
+//! Checks that need several recordings.
+
+use num_complex::Complex64;
+
+use super::averages::of_mode;
+use super::{
+    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject,
+    Verdict,
+};
+
+/// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
+pub fn check_reciprocity(
+    recordings: &[RecordingEvidence],
+    settings: &QualitySettings,
+) -> Vec<Verdict> {
+    let mut verdicts = Vec::new();
+    for (index, first) in recordings.iter().enumerate() {
+        for second in &recordings[index + 1..] {
+            for pair in swapped(first, second, settings) {
+                verdicts.extend(compare((first, second), pair, settings));
+            }
+        }
+    }
+    if verdicts.is_empty() {
+        let verdict = Verdict::new(Check::Reciprocity, Subject::Test, settings.reciprocity);
+        verdicts.push(verdict.missing(
+            "Not applicable: no two recordings swap the places of tap and sensor; tap once where the sensor was, with the sensor where the tap was.",
+        ));
+    }
+    verdicts
+}
+
+/// Sensors of two recordings, each where the other recording is tapped; a driving point is no pair.
+fn swapped<'a>(
+    first: &'a RecordingEvidence,
+    second: &'a RecordingEvidence,
+    settings: &QualitySettings,
+) -> Vec<(&'a SensorEvidence, &'a SensorEvidence)> {
+    let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() <= settings.same_position,
+        _ => false,
+    };
+    if near(first.tap_position, second.tap_position) {
+        return Vec::new();
+    }
+    let at = |recording: &'a RecordingEvidence, place: Option<f64>| {
+        let sensors = recording.sensors.iter();
+        sensors.filter(move |sensor| near(sensor.position, place))
+    };
+    at(first, second.tap_position)
+        .flat_map(|a| at(second, first.tap_position).map(move |b| (a, b)))
+        .filter(|(a, b)| a.form == b.form)
+        .collect()
+}
+
+fn compare(
+    (first, second): (&RecordingEvidence, &RecordingEvidence),
+    (a, b): (&SensorEvidence, &SensorEvidence),
+    settings: &QualitySettings,
+) -> Option<Verdict> {
+    let (h1, h2) = (a.frf.as_ref()?, b.frf.as_ref()?);
+    let (mut cross, mut power1, mut power2) = (Complex64::ZERO, 0.0, 0.0);
+    for (line, x) in h1.iter().enumerate() {
+        let Some(y) = at_frequency(second, h2, first.lines.frequency(line)) else {
+            continue;
+        };
+        cross += x * y.conj();
+        power1 += x.norm_sqr();
+        power2 += y.norm_sqr();
+    }
+    if power1 <= 0.0 || power2 <= 0.0 {
+        return None;
+    }
+    let agreement = cross.norm_sqr() / (power1 * power2);
+    let gain = (power1 / power2).sqrt();
+    let level = (gain - 1.0).abs().max((1.0 / gain - 1.0).abs());
+    let opposite = cross.re < 0.0;
+    let outcome = match agreement {
+        g if opposite || g < 0.5 => Outcome::Bad,
+        g if g < settings.reciprocity || level > settings.reciprocity_gain => Outcome::Doubtful,
+        _ => Outcome::Good,
+    };
+    let sign = if opposite {
+        ", but of opposite sign"
+    } else {
+        ""
+    };
+    let happened = format!(
+        "Sensor {} here and sensor {} in {}, tap and sensor swapped, agree to {agreement:.3}{sign}, at a level ratio of {gain:.2} (limits {:.2} and 1 +- {:.1}).",
+        a.name, b.name, second.file, settings.reciprocity, settings.reciprocity_gain
+    );
+    let subject = Subject::Sensor {
+        file: first.file.clone(),
+        sensor: a.name.clone(),
+    };
+    let verdict = Verdict::new(Check::Reciprocity, subject, settings.reciprocity);
+    Some(verdict.found(agreement, outcome, happened))
+}
+
+/// An FRF at a frequency, linear between its lines; `None` outside its band.
+fn at_frequency(
+    recording: &RecordingEvidence,
+    frf: &[Complex64],
+    frequency: f64,
+) -> Option<Complex64> {
+    let place = (frequency - recording.lines.low) / recording.lines.spacing;
+    let index = (place + 1e-9).floor();
+    if index < 0.0 {
+        return None;
+    }
+    let share = (place - index).max(0.0);
+    let one = frf.get(index as usize)?;
+    match frf.get(index as usize + 1) {
+        Some(next) => Some(one * (1.0 - share) + next * share),
+        None => (share < 1e-6).then_some(*one),
+    }
+}
+
+/// Frequencies at two tap levels in one arrangement agree within their uncertainty.
+pub fn check_linearity(
+    recordings: &[RecordingEvidence],
+    settings: &QualitySettings,
+) -> Vec<Verdict> {
+    let level_ratio = |first: &RecordingEvidence, second: &RecordingEvidence| {
+        let (a, b) = (first.tap_level()?, second.tap_level()?);
+        (a > 0.0 && b > 0.0).then(|| b / a)
+    };
+    let mut verdicts = Vec::new();
+    for (index, first) in recordings.iter().enumerate() {
+        for second in &recordings[index + 1..] {
+            let Some(ratio) = level_ratio(first, second) else {
+                continue;
+            };
+            let differ = ratio.max(1.0 / ratio) >= settings.two_levels;
+            if differ && same_arrangement(first, second, settings) {
+                let what = format!("at {ratio:.2} times the tap level");
+                verdicts.extend(shifts(Check::Linearity, (first, second), &what, settings));
+            }
+        }
+    }
+    or_missing(
+        verdicts,
+        (Check::Linearity, settings),
+        "Not applicable: no two recordings differ in the tap level alone; record once more with softer or harder taps.",
+    )
+}
+
+/// Frequencies with the sensors elsewhere agree within their uncertainty.
+pub fn check_mass_loading(
+    recordings: &[RecordingEvidence],
+    settings: &QualitySettings,
+) -> Vec<Verdict> {
+    let mut verdicts = Vec::new();
+    // Each arrangement once, beside the first recording.
+    if let Some((first, later)) = recordings.split_first() {
+        let mut seen = vec![first];
+        for second in later {
+            if seen
+                .iter()
+                .any(|known| same_sensors(known, second, settings))
+            {
+                continue;
+            }
+            seen.push(second);
+            let what = "with the sensors elsewhere";
+            verdicts.extend(shifts(Check::MassLoading, (first, second), what, settings));
+        }
+    }
+    or_missing(
+        verdicts,
+        (Check::MassLoading, settings),
+        "Not applicable: the sensors are at the same places in all recordings; move or remove one and record again.",
+    )
+}
+
+fn or_missing(
+    mut verdicts: Vec<Verdict>,
+    (check, settings): (Check, &QualitySettings),
+    why: &str,
+) -> Vec<Verdict> {
+    if verdicts.is_empty() {
+        verdicts.push(Verdict::new(check, Subject::Test, settings.deviations).missing(why));
+    }
+    verdicts
+}
+
+fn same_sensors(
+    first: &RecordingEvidence,
+    second: &RecordingEvidence,
+    settings: &QualitySettings,
+) -> bool {
+    let near = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() <= settings.same_position,
+        (a, b) => a == b,
+    };
+    let mut pairs = first.sensors.iter().zip(&second.sensors);
+    first.sensors.len() == second.sensors.len() && pairs.all(|(a, b)| near(a.position, b.position))
+}
+
+fn same_arrangement(
+    first: &RecordingEvidence,
+    second: &RecordingEvidence,
+    settings: &QualitySettings,
+) -> bool {
+    let same_tap = match (first.tap_position, second.tap_position) {
+        (Some(a), Some(b)) => (a - b).abs() <= settings.same_position,
+        (a, b) => a == b,
+    };
+    same_tap && same_sensors(first, second, settings)
+}
+
+/// One verdict for each mode of both recordings: its shift in standard deviations.
+fn shifts(
+    check: Check,
+    (first, second): (&RecordingEvidence, &RecordingEvidence),
+    what: &str,
+    settings: &QualitySettings,
+) -> Vec<Verdict> {
+    let of_pair = |mode: &ResonanceEvidence| {
+        let other = partner(mode, first, second, settings)?;
+        let verdict = of_mode(first, check, (mode, settings.deviations));
+        let shift = 100.0 * (other.frequency / mode.frequency - 1.0);
+        let (Some(a), Some(b)) = (mode.std, other.std) else {
+            return Some(verdict.missing(&format!(
+                "Not applicable: {what} ({}) it moves by {shift:+.3} %, and its uncertainty is not known.",
+                second.file
+            )));
+        };
+        let deviations =
+            (other.frequency - mode.frequency).abs() / a.hypot(b).max(f64::MIN_POSITIVE);
+        let outcome = match deviations <= settings.deviations {
+            true => Outcome::Good,
+            false => Outcome::Doubtful,
+        };
+        let happened = format!(
+            "It moves by {shift:+.3} % {what} ({}), {deviations:.1} standard deviations (limit {:.0}).",
+            second.file, settings.deviations
+        );
+        Some(verdict.found(deviations, outcome, happened))
+    };
+    first.resonances.iter().filter_map(of_pair).collect()
+}
+
+/// The nearest resonance of the other recording, where each is the other's nearest and both are within
+/// what counts as the same mode.
+fn partner<'a>(
+    mode: &ResonanceEvidence,
+    first: &RecordingEvidence,
+    second: &'a RecordingEvidence,
+    settings: &QualitySettings,
+) -> Option<&'a ResonanceEvidence> {
+    let other = nearest(&second.resonances, mode.frequency)?;
+    let back = nearest(&first.resonances, other.frequency)?;
+    let near = (other.frequency / mode.frequency - 1.0).abs() <= settings.same_mode;
+    (near && back.frequency == mode.frequency).then_some(other)
+}
+
+fn nearest(modes: &[ResonanceEvidence], frequency: f64) -> Option<&ResonanceEvidence> {
+    let distance = |mode: &&ResonanceEvidence| (mode.frequency - frequency).abs();
+    modes
+        .iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}

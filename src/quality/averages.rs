@@ -1,0 +1,187 @@
+//! What the averages over taps are good for.
+
+use super::{
+    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Subject, Verdict,
+};
+
+/// Quantile of the normal distribution beyond which one in a hundred lies.
+const ONE_IN_A_HUNDRED: f64 = 2.326;
+
+/// Enough taps.
+pub fn check_averages(recording: &RecordingEvidence, settings: &QualitySettings) -> Verdict {
+    let file = recording.file.clone();
+    let limit = settings.averages as f64;
+    let verdict = Verdict::new(Check::Averages, Subject::Recording { file }, limit);
+    let count = recording.averages();
+    let (outcome, meaning) = match count {
+        0 => (Outcome::Bad, "there is no spectrum"),
+        1 => (
+            Outcome::Bad,
+            "nothing shows how well it repeats, and a coherence of 1 means nothing",
+        ),
+        n if n < settings.averages => (Outcome::Doubtful, "chance alone gives a high coherence"),
+        n if n < settings.trusted_averages => {
+            (Outcome::Good, "enough for FRFs, few for the coherence")
+        }
+        _ => (Outcome::Good, "enough for FRFs and coherence"),
+    };
+    let happened = format!(
+        "{count} of {} taps are averaged: {meaning} (at least {}, {} for the coherence).",
+        recording.taps.len(),
+        settings.averages,
+        settings.trusted_averages
+    );
+    verdict.found(count as f64, outcome, happened)
+}
+
+/// Coherence at each resonance, of the sensor that sees it best.
+pub fn check_coherence(recording: &RecordingEvidence, settings: &QualitySettings) -> Vec<Verdict> {
+    let of_mode = |mode: &ResonanceEvidence| {
+        let verdict = of_mode(recording, Check::Coherence, (mode, settings.coherence));
+        let (sensor, value) = match coherence_at(recording, mode, settings) {
+            Ok(found) => found,
+            Err(why) => return verdict.missing(why),
+        };
+        let outcome = match value {
+            v if v >= settings.coherence => Outcome::Good,
+            v if v >= 0.5 => Outcome::Doubtful,
+            _ => Outcome::Bad,
+        };
+        let happened = format!(
+            "Coherence {value:.3} of sensor {sensor} over {} taps (limit {:.2}; trusted from {} taps).",
+            recording.averages(),
+            settings.coherence,
+            settings.trusted_averages
+        );
+        verdict.found(value, outcome, happened)
+    };
+    recording.resonances.iter().map(of_mode).collect()
+}
+
+/// Random error of the FRF's magnitude at each resonance.
+pub fn check_random_error(
+    recording: &RecordingEvidence,
+    settings: &QualitySettings,
+) -> Vec<Verdict> {
+    let of_mode = |mode: &ResonanceEvidence| {
+        let verdict = of_mode(recording, Check::RandomError, (mode, settings.random_error));
+        let (sensor, coherence) = match coherence_at(recording, mode, settings) {
+            Ok(found) => found,
+            Err(why) => return verdict.missing(why),
+        };
+        let Some(error) = random_error(coherence, recording.averages()) else {
+            return verdict.missing("Not applicable: the coherence is 0.");
+        };
+        let outcome = match error / settings.random_error {
+            e if e <= 1.0 => Outcome::Good,
+            e if e <= 4.0 => Outcome::Doubtful,
+            _ => Outcome::Bad,
+        };
+        let happened = format!(
+            "The FRF of sensor {sensor} has a random error of {:.1} % from {} taps (limit {:.0} %).",
+            100.0 * error,
+            recording.averages(),
+            100.0 * settings.random_error
+        );
+        verdict.found(error, outcome, happened)
+    };
+    recording.resonances.iter().map(of_mode).collect()
+}
+
+/// Normalised random error of an FRF's magnitude, sqrt((1 - g2)/(2 n g2)) (Bendat and Piersol, Random
+/// Data); `None` where the coherence g2 is 0 or n below 2.
+pub fn random_error(coherence: f64, averages: usize) -> Option<f64> {
+    let n = averages as f64;
+    (coherence > 0.0 && averages >= 2)
+        .then(|| ((1.0 - coherence).max(0.0) / (2.0 * n * coherence)).sqrt())
+}
+
+/// Name and coherence of the sensor that sees a resonance best, or why there is none.
+fn coherence_at<'a>(
+    recording: &'a RecordingEvidence,
+    mode: &ResonanceEvidence,
+    settings: &QualitySettings,
+) -> Result<(&'a str, f64), &'static str> {
+    if recording.force.is_none() {
+        return Err("Not applicable without a hammer: there is no coherence.");
+    }
+    match recording.averages() {
+        0 | 1 => {
+            return Err("Not applicable: the coherence of one tap is 1 whatever was measured.");
+        }
+        n if n < settings.averages => {
+            return Err("Not applicable: with two taps chance alone gives a coherence up to 0.95.");
+        }
+        _ => {}
+    }
+    let line = recording.lines.nearest(mode.frequency);
+    recording
+        .best_sensor(line)
+        .and_then(|sensor| Some((sensor.name.as_str(), *sensor.coherence.as_ref()?.get(line)?)))
+        .ok_or("Not applicable: no coherence was computed.")
+}
+
+/// Scatter of each frequency from tap to tap, against the limit and against what noise explains.
+pub fn check_frequency_scatter(
+    recording: &RecordingEvidence,
+    settings: &QualitySettings,
+) -> Vec<Verdict> {
+    let of_mode = |mode: &ResonanceEvidence| {
+        let limit = settings.frequency_scatter;
+        let verdict = of_mode(recording, Check::FrequencyScatter, (mode, limit));
+        let Some(scatter) = deviation(&mode.tap_frequencies) else {
+            return verdict.missing("Not applicable: fewer than two taps were read one by one.");
+        };
+        let relative = scatter / mode.frequency;
+        let explained = mode.tap_std.filter(|std| *std > 0.0);
+        let excess = explained.map(|std| scatter / std);
+        let largest = largest_ratio(mode.tap_frequencies.len());
+        let outcome = match excess {
+            _ if relative > limit => Outcome::Bad,
+            Some(excess) if excess > largest => Outcome::Doubtful,
+            _ => Outcome::Good,
+        };
+        let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {
+            format!("{excess:.1} times what noise explains, where {largest:.1} is chance")
+        });
+        let happened = format!(
+            "The frequency scatters by {:.4} % over {} taps, {noise} (limit {:.0} %).",
+            100.0 * relative,
+            mode.tap_frequencies.len(),
+            100.0 * limit
+        );
+        verdict.found(relative, outcome, happened)
+    };
+    recording.resonances.iter().map(of_mode).collect()
+}
+
+/// Sample standard deviation; `None` of fewer than two.
+fn deviation(values: &[f64]) -> Option<f64> {
+    if values.len() < 2 {
+        return None;
+    }
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let squares: f64 = values.iter().map(|x| (x - mean) * (x - mean)).sum();
+    Some((squares / (values.len() - 1) as f64).sqrt())
+}
+
+/// The ratio s/sigma that one in a hundred samples of `count` exceeds: sqrt(chi2_{0.99}(k)/k), k = count
+/// - 1, with chi2_p(k) = k (1 - 2/(9k) + z_p sqrt(2/(9k)))^3 (Wilson and Hilferty, 1931).
+fn largest_ratio(count: usize) -> f64 {
+    let k = count.saturating_sub(1).max(1) as f64;
+    let share = 2.0 / (9.0 * k);
+    (1.0 - share + ONE_IN_A_HUNDRED * share.sqrt()).powf(1.5)
+}
+
+/// An empty verdict on a mode.
+pub(super) fn of_mode(
+    recording: &RecordingEvidence,
+    check: Check,
+    (mode, limit): (&ResonanceEvidence, f64),
+) -> Verdict {
+    let subject = Subject::Mode {
+        file: recording.file.clone(),
+        frequency: mode.frequency,
+    };
+    Verdict::new(check, subject, limit)
+}

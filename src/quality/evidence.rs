@@ -1,0 +1,133 @@
+//! What the checks look at: plain data that the earlier stages produce.
+
+use num_complex::Complex64;
+
+use crate::spectral::{DecayCheck, Lines, Window};
+use crate::stats::median;
+use crate::taps::{Rejection, SecondHit, Tap};
+
+/// One tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapEvidence {
+    /// Peak of the force (N), or of the response (its unit).
+    pub peak: f64,
+    /// A second hit in its force, if any.
+    pub second_hit: Option<SecondHit>,
+    /// Why it was rejected; `None` = accepted.
+    pub rejection: Option<Rejection>,
+}
+
+impl From<&Tap> for TapEvidence {
+    fn from(tap: &Tap) -> Self {
+        TapEvidence {
+            peak: tap.peak,
+            second_hit: tap.second_hit,
+            rejection: tap.rejection.clone(),
+        }
+    }
+}
+
+/// The force's spectrum over the accepted taps, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForceEvidence {
+    /// Root mean square of the taps' transforms (N s).
+    pub spectrum: Vec<f64>,
+    /// What the channel's noise alone leaves (N s); `None` where it is not known.
+    pub noise: Option<Vec<f64>>,
+}
+
+/// What a response channel measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResponseForm {
+    /// Acceleration over force.
+    Accelerance,
+    /// Velocity over force.
+    Mobility,
+    /// Displacement over force.
+    Receptance,
+    /// Something whose phase to the force says nothing, as sound.
+    Other,
+}
+
+/// One sensor as placed in a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorEvidence {
+    /// Its name.
+    pub name: String,
+    /// Where it is (m); `None` where nobody said.
+    pub position: Option<f64>,
+    /// What it measures.
+    pub form: ResponseForm,
+    /// H1, line by line (unit of the response per N); `None` without a hammer.
+    pub frf: Option<Vec<Complex64>>,
+    /// Coherence, line by line; `None` where it does not exist.
+    pub coherence: Option<Vec<f64>>,
+}
+
+/// One resonance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResonanceEvidence {
+    /// Its frequency (Hz).
+    pub frequency: f64,
+    /// Standard deviation of that (Hz); `None` where it is not known.
+    pub std: Option<f64>,
+    /// Damping ratio as read under the window, the window's share still in it.
+    pub apparent_damping_ratio: Option<f64>,
+    /// Frequency of each tap alone (Hz); empty where they were not read.
+    pub tap_frequencies: Vec<f64>,
+    /// Standard deviation of one tap's frequency that the noise explains (Hz).
+    pub tap_std: Option<f64>,
+}
+
+/// One recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingEvidence {
+    /// Its name.
+    pub file: String,
+    /// Where the hammer strikes (m); `None` where nobody said.
+    pub tap_position: Option<f64>,
+    /// All taps, accepted and rejected, in order of time.
+    pub taps: Vec<TapEvidence>,
+    /// The axis of all that is given line by line.
+    pub lines: Lines,
+    /// The force; `None` without a hammer.
+    pub force: Option<ForceEvidence>,
+    /// The sensors.
+    pub sensors: Vec<SensorEvidence>,
+    /// The resonances, ascending.
+    pub resonances: Vec<ResonanceEvidence>,
+    /// How far the slowest response rings down without a window; `None` without an accepted tap.
+    pub decay: Option<DecayCheck>,
+    /// The window applied.
+    pub window: Window,
+}
+
+impl RecordingEvidence {
+    /// Number of taps averaged.
+    pub fn averages(&self) -> usize {
+        self.accepted().count()
+    }
+
+    /// The taps averaged.
+    pub(super) fn accepted(&self) -> impl Iterator<Item = &TapEvidence> {
+        self.taps.iter().filter(|tap| tap.rejection.is_none())
+    }
+
+    /// Median peak of the accepted taps; `None` without any.
+    pub(super) fn tap_level(&self) -> Option<f64> {
+        let mut peaks: Vec<f64> = self.accepted().map(|tap| tap.peak).collect();
+        (!peaks.is_empty()).then(|| median(&mut peaks))
+    }
+
+    /// The sensor that sees a line best: its index, by the largest response.
+    pub(super) fn best_sensor(&self, line: usize) -> Option<&SensorEvidence> {
+        let level = |sensor: &SensorEvidence| {
+            let frf = sensor.frf.as_ref()?;
+            frf.get(line).map(|h| h.norm())
+        };
+        self.sensors
+            .iter()
+            .filter(|sensor| sensor.coherence.is_some())
+            .max_by(|a, b| level(a).unwrap_or(0.0).total_cmp(&level(b).unwrap_or(0.0)))
+    }
+}

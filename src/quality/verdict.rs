@@ -1,0 +1,360 @@
+//! A verdict: what was checked, what came out, why it might be, what helps.
+
+use std::fmt;
+
+/// What is checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Check {
+    /// One impact per tap, by the force in time.
+    DoubleHit,
+    /// One impact per tap, by the ripple in the force spectrum.
+    ForceRipple,
+    /// No channel at its limit.
+    Overload,
+    /// A tap hard enough beside the others.
+    WeakTap,
+    /// Taps of about the same level.
+    TapLevels,
+    /// The force spectrum reaches over the band.
+    ForceFall,
+    /// The force stays above its noise.
+    ForceNoise,
+    /// Enough taps.
+    Averages,
+    /// Coherence at a resonance.
+    Coherence,
+    /// Random error of the FRF at a resonance.
+    RandomError,
+    /// The response has decayed at the record's end.
+    Decay,
+    /// An exponential window only where the structure decays by itself.
+    ExponentialWindow,
+    /// The window's share in a damping.
+    WindowDamping,
+    /// Scatter of a frequency from tap to tap.
+    FrequencyScatter,
+    /// Sign of the driving-point FRF at its resonances.
+    DrivingPoint,
+    /// Antiresonances between the resonances of the driving-point FRF.
+    Antiresonances,
+    /// H of tap at a, sensor at b equals that of tap at b, sensor at a.
+    Reciprocity,
+    /// Frequencies do not depend on the tap's level.
+    Linearity,
+    /// Frequencies do not depend on where the sensors are.
+    MassLoading,
+}
+
+/// Code, unit of value and limit, likely cause, remedy.
+type Words = (&'static str, &'static str, &'static str, &'static str);
+
+impl Check {
+    /// Short code for scripts.
+    pub fn code(self) -> &'static str {
+        self.words().0
+    }
+
+    /// Unit of value and limit; "1" for a ratio.
+    pub fn unit(self) -> &'static str {
+        self.words().1
+    }
+
+    /// Why it might fail.
+    pub fn cause(self) -> &'static str {
+        self.words().2
+    }
+
+    /// What helps.
+    pub fn remedy(self) -> &'static str {
+        self.words().3
+    }
+
+    fn words(self) -> Words {
+        match self {
+            Check::DoubleHit
+            | Check::ForceRipple
+            | Check::Overload
+            | Check::WeakTap
+            | Check::TapLevels
+            | Check::ForceFall
+            | Check::ForceNoise => self.words_of_taps(),
+            Check::Averages
+            | Check::Coherence
+            | Check::RandomError
+            | Check::Decay
+            | Check::ExponentialWindow
+            | Check::WindowDamping
+            | Check::FrequencyScatter => self.words_of_averages(),
+            _ => self.words_of_setup(),
+        }
+    }
+
+    fn words_of_taps(self) -> Words {
+        match self {
+            Check::DoubleHit => (
+                "double-hit",
+                "1",
+                "The structure came back and met the hammer again.",
+                "Hit shorter from a loose wrist, with a lighter hammer, or nearer to a support; never hide it under the force window.",
+            ),
+            Check::ForceRipple => (
+                "force-ripple",
+                "dB",
+                "Two blows interfere: where they cancel the structure is excited less.",
+                "Repeat the tap; lines in the valleys of the ripple are the least reliable.",
+            ),
+            Check::Overload => (
+                "overload",
+                "samples",
+                "The blow was harder than the range of an amplifier or converter allows.",
+                "Set a larger range or hit softer, and repeat the tap.",
+            ),
+            Check::WeakTap => (
+                "weak-tap",
+                "1",
+                "The hammer was laid down or touched the structure by accident, or the blow was a poor one.",
+                "Nothing needs to be done where it was no tap; else repeat it at the level of the others.",
+            ),
+            Check::TapLevels => (
+                "tap-levels",
+                "1",
+                "The blows were of different strength.",
+                "Repeat with even blows; keep a second level in a recording of its own, where it shows whether the joint is linear.",
+            ),
+            Check::ForceFall => (
+                "force-fall",
+                "dB",
+                "The pulse is too long for the band: a soft tip, a heavy hammer or a soft surface.",
+                "Take a harder tip or a lighter hammer, or end the band lower.",
+            ),
+            _ => (
+                "force-noise",
+                "Hz",
+                "There the pulse has no power left, and noise in the force makes H1 too small.",
+                "Take a harder tip, hit harder, use the force window, or end the band below.",
+            ),
+        }
+    }
+
+    fn words_of_averages(self) -> Words {
+        match self {
+            Check::Averages => (
+                "averages",
+                "taps",
+                "Too few taps were made, or too many of them were rejected.",
+                "Make 3 to 5 good taps; 5 where the coherence shall be trusted.",
+            ),
+            Check::Coherence => (
+                "coherence",
+                "1",
+                "Noise, leakage, uneven hits, or a joint that is not linear.",
+                "Record until the response has decayed, hit the same spot, take more taps, or move the sensor off the mode's node.",
+            ),
+            Check::RandomError => (
+                "random-error",
+                "1",
+                "The coherence is too low for so few taps.",
+                "Take more taps: the error falls with the square root of their number.",
+            ),
+            Check::Decay => (
+                "decay",
+                "1",
+                "The record ends before the structure has come to rest.",
+                "Leave more time between taps, or give a larger block.",
+            ),
+            Check::ExponentialWindow => (
+                "exponential-window",
+                "1",
+                "The window and not the structure ends the record.",
+                "Leave more time between taps until the response decays to a quarter by itself, and let the window do the rest.",
+            ),
+            Check::WindowDamping => (
+                "window-damping",
+                "1",
+                "The exponential window adds its own decay to every mode, most to the lowest.",
+                "Leave more time between taps and use a weaker window; do not quote this damping.",
+            ),
+            _ => (
+                "frequency-scatter",
+                "1",
+                "The taps are of different strength on a joint that is not linear, the support moves, or temperature or preload drifts.",
+                "Compare the taps' frequencies with their peaks and their order in time; even the blows, fasten what is loose.",
+            ),
+        }
+    }
+
+    fn words_of_setup(self) -> Words {
+        match self {
+            Check::DrivingPoint => (
+                "driving-point",
+                "resonances",
+                "Sensor and hammer do not point the same way, channels are swapped, or they are not at the same place.",
+                "Check wiring, the sign of the scales, and the positions in the description.",
+            ),
+            Check::Antiresonances => (
+                "antiresonance",
+                "gaps",
+                "The tap is not where the sensor is, or a channel holds something else.",
+                "Hit right behind the sensor, and check the positions in the description.",
+            ),
+            Check::Reciprocity => (
+                "reciprocity",
+                "1",
+                "A scale, a sign or a position is wrong, a sensor's mass loads the beam, or the joint is not linear.",
+                "Check scales and positions first, then compare two tap levels.",
+            ),
+            Check::Linearity => (
+                "linearity",
+                "1",
+                "The joint slips or opens with the level: its stiffness depends on the amplitude.",
+                "State the tap level with every frequency, and identify the joint at the lowest level that rises clear of the noise.",
+            ),
+            _ => (
+                "mass-loading",
+                "1",
+                "The sensor's mass lowers the modes that move where it sits.",
+                "State the sensor's mass in the description so that the model carries it, take a lighter sensor, or place it near the joint.",
+            ),
+        }
+    }
+}
+
+/// What a verdict is about.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Subject {
+    /// A recording.
+    Recording {
+        /// Its name.
+        file: String,
+    },
+    /// A tap.
+    Tap {
+        /// The recording.
+        file: String,
+        /// Its number, from 1.
+        tap: usize,
+    },
+    /// A mode.
+    Mode {
+        /// The recording.
+        file: String,
+        /// Its frequency (Hz).
+        frequency: f64,
+    },
+    /// A sensor.
+    Sensor {
+        /// The recording.
+        file: String,
+        /// Its name.
+        sensor: String,
+    },
+    /// The test as a whole.
+    Test,
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Subject::Recording { file } => f.write_str(file),
+            Subject::Tap { file, tap } => write!(f, "{file}, tap {tap}"),
+            Subject::Mode { file, frequency } => write!(f, "{file}, {frequency:.2} Hz"),
+            Subject::Sensor { file, sensor } => write!(f, "{file}, sensor {sensor}"),
+            Subject::Test => f.write_str("test"),
+        }
+    }
+}
+
+/// What came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Outcome {
+    /// The check does not apply: something that it needs is not there.
+    NotApplicable,
+    /// As good practice asks.
+    Good,
+    /// Usable with care.
+    Doubtful,
+    /// Not as a measurement should be.
+    Bad,
+}
+
+impl Outcome {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Outcome::NotApplicable => "not applicable",
+            Outcome::Good => "good",
+            Outcome::Doubtful => "doubtful",
+            Outcome::Bad => "bad",
+        }
+    }
+}
+
+/// The result of one check.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// What was checked.
+    pub check: Check,
+    /// On what.
+    pub subject: Subject,
+    /// What was found (unit: [`Verdict::unit`]); `None` where there is nothing to measure.
+    pub value: Option<f64>,
+    /// The limit it was held against (same unit).
+    pub limit: f64,
+    /// Unit of value and limit; "1" for a ratio.
+    pub unit: &'static str,
+    /// What came out.
+    pub outcome: Outcome,
+    /// What happened, with its numbers: a sentence.
+    pub happened: String,
+}
+
+impl Verdict {
+    pub(super) fn new(check: Check, subject: Subject, limit: f64) -> Self {
+        Verdict {
+            check,
+            subject,
+            value: None,
+            limit,
+            unit: check.unit(),
+            outcome: Outcome::NotApplicable,
+            happened: String::new(),
+        }
+    }
+
+    /// With its value, what came out, and what happened.
+    pub(super) fn found(mut self, value: f64, outcome: Outcome, happened: String) -> Self {
+        self.value = Some(value);
+        self.outcome = outcome;
+        self.happened = happened;
+        self
+    }
+
+    /// Nothing wrong, and nothing to measure.
+    pub(super) fn clear(mut self, happened: String) -> Self {
+        self.outcome = Outcome::Good;
+        self.happened = happened;
+        self
+    }
+
+    /// Not applicable, and why.
+    pub(super) fn missing(mut self, why: &str) -> Self {
+        self.happened = why.to_owned();
+        self
+    }
+
+    /// Whether a reader must be told.
+    pub fn is_doubt(&self) -> bool {
+        matches!(self.outcome, Outcome::Doubtful | Outcome::Bad)
+    }
+}
+
+impl fmt::Display for Verdict {
+    /// What happened; of a doubt also why it might be and what helps.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.subject, self.happened)?;
+        if self.is_doubt() {
+            write!(f, " {} {}", self.check.cause(), self.check.remedy())?;
+        }
+        Ok(())
+    }
+}

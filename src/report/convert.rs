@@ -11,7 +11,7 @@ use super::document::{
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::ModeReading;
 use crate::pipeline::{Analysis, ModeResult, RecordingResult, TestedStructure, Warning};
-use crate::recording::{Format, Separator};
+use crate::recording::{Format, Separator, UffCoding};
 use crate::spectral::Window;
 use crate::structure::{Assembly, BeamTheory, NaturalMode};
 
@@ -179,6 +179,10 @@ fn format_words(format: Format) -> String {
             };
             format!("CSV, {separator}{decimal}")
         }
+        Format::Uff58 {
+            coding: UffCoding::Ascii,
+        } => "UFF 58, text".to_owned(),
+        Format::Uff58 { .. } => "UFF 58b, binary".to_owned(),
         Format::Memory => "samples in memory".to_owned(),
     }
 }

@@ -11,6 +11,7 @@ mod modal;
 mod pipeline;
 mod real_data;
 mod recording;
+mod recording_uff;
 mod report;
 mod simulate;
 mod spectral;

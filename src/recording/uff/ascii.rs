@@ -35,6 +35,24 @@ pub(super) fn parse_line<'a>(
     parse_words(line, room, into)
 }
 
+/// A line without the number that its end may have cut: whole columns where they can be read, else
+/// everything before the last blank.
+pub(super) fn without_last_number<'a>(line: &'a [u8], widths: &[usize]) -> &'a [u8] {
+    let mut end = 0;
+    for width in widths {
+        if end + width >= line.len() {
+            break;
+        }
+        end += width;
+    }
+    let columns = line.get(..end).unwrap_or_default();
+    if parse_columns(columns, widths, usize::MAX, &mut Vec::new()).is_some() {
+        return columns;
+    }
+    let blank = line.iter().rposition(u8::is_ascii_whitespace);
+    line.get(..blank.unwrap_or(0)).unwrap_or_default()
+}
+
 /// Reads fixed columns; `None` where the line does not keep to them.
 ///
 /// Numbers stand at the right end of their columns, so a line ends where a column ends. Two digits
@@ -58,11 +76,57 @@ fn parse_columns(line: &[u8], widths: &[usize], room: usize, into: &mut Vec<f64>
                 return None;
             }
         }
-        into.push(parse_number(column)?);
+        into.push(parse_full_column(column).or_else(|| parse_number(column))?);
         taken += 1;
         start = end;
     }
     (taken == room || start == line.len()).then_some(())
+}
+
+/// Reads a column that is filled as the format prints it: "-1.23456E-02" at the right end of 13
+/// characters, or twelve decimals in 20. `None` for anything else; only speed depends on it.
+fn parse_full_column(column: &[u8]) -> Option<f64> {
+    match column.len() {
+        13 => parse_full::<5>(column),
+        20 => parse_full::<12>(column),
+        _ => None,
+    }
+}
+
+fn parse_full<const DECIMALS: usize>(column: &[u8]) -> Option<f64> {
+    let digit = |byte: u8| Some(u64::from(byte.wrapping_sub(b'0'))).filter(|digit| *digit < 10);
+    let (front, tail) = column.split_at_checked(column.len().checked_sub(4 + DECIMALS + 2)?)?;
+    let (head, exponent) = tail.split_at_checked(DECIMALS + 2)?;
+    let (&[leading, b'.'], decimals) = head.split_first_chunk::<2>()? else {
+        return None;
+    };
+    let &[b'E' | b'e', sign @ (b'+' | b'-'), tens, ones] = exponent else {
+        return None;
+    };
+    let (before, blanks) = front.split_last()?;
+    if !matches!(before, b' ' | b'-') || blanks.iter().any(|byte| *byte != b' ') {
+        return None;
+    }
+    let mut mantissa = digit(leading)?;
+    let mut all_digits = true;
+    for byte in decimals {
+        let next = byte.wrapping_sub(b'0');
+        all_digits &= next < 10;
+        mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(next));
+    }
+    let exponent = (10 * digit(tens)? + digit(ones)?) as i32;
+    let power = if sign == b'-' { -exponent } else { exponent } - DECIMALS as i32;
+    // Thirteen digits are below 2^53; see parse_number.
+    let scale = EXACT_POWERS
+        .get(power.unsigned_abs() as usize)
+        .filter(|_| all_digits)?;
+    let value = mantissa as f64;
+    let value = if power < 0 {
+        value / scale
+    } else {
+        value * scale
+    };
+    Some(if *before == b'-' { -value } else { value })
 }
 
 /// Reads numbers between blanks, tabs or commas; where they run together a sign that is not an
@@ -215,6 +279,31 @@ mod tests {
             "", "-", ".", "1.0-10", "1e", "1e+", "e5", "1.2.3", "0x10", "1 2",
         ] {
             assert_eq!(parse_number(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn limit_the_fast_way_reads_what_the_slow_way_reads() {
+        let mut digits = 12_345_u64;
+        for exponent in -99..=99 {
+            digits = digits
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let value = (digits >> 12) as f64 * 10_f64.powi(exponent % 40 - 15);
+            let texts = [format!("{value:13.5e}"), format!("{:20.12e}", -value)];
+            for text in texts {
+                // Rust prints no plus sign and no leading zero in exponents.
+                let (mantissa, power) = text.split_once('e').expect("an exponent");
+                let power: i32 = power.parse().expect("a number");
+                let width = text.len();
+                let text = format!("{mantissa}E{power:+03}");
+                let text = format!("{:>width$}", text.trim());
+                let fast = parse_full_column(text.as_bytes());
+                let slow: f64 = text.trim().parse().expect("a number");
+                assert_eq!(parse_number(text.as_bytes()), Some(slow), "{text}");
+                assert!(fast.is_none_or(|fast| fast == slow), "{text}");
+                assert!(fast.is_some() || power.abs() > 9, "{text} was not read");
+            }
         }
     }
 

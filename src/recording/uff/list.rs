@@ -39,6 +39,8 @@ pub(super) struct DataPlace {
     pub end: u64,
     /// Bytes of a stored abscissa in binary data.
     pub abscissa_bytes: u64,
+    /// Whether no mark follows: the file was cut here.
+    pub cut: bool,
 }
 
 /// What is in a universal file.
@@ -229,10 +231,12 @@ impl Listing {
             }
             _ => {
                 let mark = self.scanner.find_mark();
+                let mark = self.io(mark)?;
                 DataPlace {
                     start,
-                    end: self.io(mark)?.unwrap_or(self.scanner.length),
+                    end: mark.unwrap_or(self.scanner.length),
                     abscissa_bytes: 0,
+                    cut: mark.is_none(),
                 }
             }
         };
@@ -312,6 +316,7 @@ fn binary_place(
         start,
         end,
         abscissa_bytes,
+        cut: false,
     };
     let end_of = |abscissa| {
         let bytes = function

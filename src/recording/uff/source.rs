@@ -139,30 +139,38 @@ impl<'a> SampleReader<'a> {
     }
 }
 
-/// Reads every sample once: checks it, gathers the channels' health, and remembers where text can
-/// be read from. The shortest channel decides how many samples there are.
-pub(super) fn measure(
-    file: &str,
-    sample_rate: f64,
-    values: &mut [Values],
-) -> Result<(u64, Vec<HealthMeter>), RecordingError> {
-    let mut passes = Vec::with_capacity(values.len());
-    for (channel, values) in values.iter_mut().enumerate() {
-        passes.push(pass(file, sample_rate, (channel, values), u64::MAX)?);
-    }
-    let frames = passes.iter().map(|(count, _)| *count).min().unwrap_or(0);
-    let mut meters = Vec::with_capacity(values.len());
-    for (channel, ((count, meter), values)) in passes.into_iter().zip(values).enumerate() {
-        // What is beyond the shortest channel is no part of the recording's health.
-        meters.push(match count == frames {
-            true => meter,
-            false => pass(file, sample_rate, (channel, values), frames)?.1,
-        });
-    }
-    Ok((frames, meters))
+/// A time series that has been read once.
+#[derive(Debug)]
+pub(super) struct Measured<T> {
+    /// What the caller knows it by.
+    pub series: T,
+    pub values: Values,
+    /// Samples that are there.
+    pub count: u64,
+    pub meter: HealthMeter,
 }
 
-fn pass(
+/// Cuts all channels to the shortest and returns its length: what is beyond it is no part of the
+/// recording's health either.
+pub(super) fn cut_to_shortest<T>(
+    file: &str,
+    sample_rate: f64,
+    channels: &mut [Measured<T>],
+) -> Result<u64, RecordingError> {
+    let frames = channels.iter().map(|channel| channel.count).min();
+    let frames = frames.unwrap_or(0);
+    for (at, channel) in channels.iter_mut().enumerate() {
+        if channel.count > frames {
+            let values = &mut channel.values;
+            (channel.count, channel.meter) = pass(file, sample_rate, (at, values), frames)?;
+        }
+    }
+    Ok(frames)
+}
+
+/// Reads up to `frames` samples once: checks them, gathers their health, and remembers where text
+/// can be read from. How many there are is the first result.
+pub(super) fn pass(
     name: &str,
     sample_rate: f64,
     (channel, values): (usize, &mut Values),

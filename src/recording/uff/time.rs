@@ -4,17 +4,18 @@
 //! the same step, number of points and start. Where some were not (a slow tacho beside vibration,
 //! a second run), the largest set that was is the recording, the first of equally large ones, and a
 //! warning names each dataset that is left out. Where the file ends early, all channels end with
-//! the shortest.
+//! the shortest that has a value at all.
 
 use std::path::Path;
 
-use super::axis::channel_si;
+use super::axis::{UnitSystem, channel_si};
 use super::error::UffError;
 use super::header::{Function, FunctionType, Ordinate};
 use super::list::{Dataset, UniversalFile, describe, list_datasets};
-use super::source::{UffSource, measure};
+use super::source::{Measured, UffSource, cut_to_shortest, pass};
 use super::timing::{AbscissaUnit, EvenPoints, even_points, largest_group};
 use super::values::Values;
+use crate::recording::health::HealthMeter;
 use crate::recording::open::{check_rate, ignored_rate};
 use crate::recording::riff::MAX_CHANNELS;
 use crate::recording::text::short;
@@ -37,53 +38,42 @@ pub(in crate::recording) fn open_uff(
     let sample_rate = 1.0 / points.step;
     check_rate(&file, sample_rate)?;
     warnings.extend(ignored_rate(settings, sample_rate));
-    let mut values = Vec::with_capacity(channels.len());
-    for (dataset, function) in &channels {
-        values.push(Values::new(&listed, dataset, function)?);
+    let mut read = Vec::with_capacity(channels.len());
+    for (at, series) in channels.into_iter().enumerate() {
+        let mut values = Values::new(&listed, series.0, series.1)?;
+        let (count, meter) = pass(&file, sample_rate, (at, &mut values), u64::MAX)?;
+        if count > 0 {
+            read.push(Measured {
+                series,
+                values,
+                count,
+                meter,
+            });
+        } else {
+            let reason = "the file ends before its first value".to_owned();
+            warnings.push(left_out(series, reason));
+        }
     }
-    let (frames, healths) = measure(&file, sample_rate, &mut values)?;
-    if frames == 0 {
+    if read.is_empty() {
         return Err(RecordingError::NoSamples { file });
     }
+    let frames = cut_to_shortest(&file, sample_rate, &mut read)?;
     if frames < points.points {
         warnings.push(RecordingWarning::Truncated {
             present: frames,
             promised: points.points,
         });
     }
+    let (channels, (values, healths)): (Vec<Series<'_>>, (Vec<_>, Vec<_>)) = read
+        .into_iter()
+        .map(|read| (read.series, (read.values, read.meter)))
+        .unzip();
     let names = channel_names(&channels);
     let mut infos = Vec::with_capacity(channels.len());
-    for (at, (((_, function), health), name)) in channels.iter().zip(healths).zip(names).enumerate()
-    {
-        let unit = channel_si(
-            &function.numerator,
-            listed.units,
-            function.response.is_rotational(),
-        );
-        let label = || ChannelLabel {
-            number: at + 1,
-            name: name.clone(),
-        };
-        let header_unit = function.numerator.unit.clone();
-        if let (false, Some(unit)) = (unit.known, &header_unit) {
-            let (channel, unit) = (label(), unit.clone());
-            warnings.push(RecordingWarning::UnknownUnit { channel, unit });
-        }
-        if let Some(by_system) = unit.contradiction {
-            warnings.push(RecordingWarning::UnitsDisagree {
-                channel: label(),
-                unit: header_unit.clone().unwrap_or_default(),
-                used: unit.factor,
-                by_system,
-            });
-        }
-        infos.push(ChannelInfo {
-            name,
-            unit: unit.unit,
-            header_unit,
-            scale: unit.factor,
-            health: health.finish().scaled(unit.factor),
-        });
+    for (at, ((series, health), name)) in channels.iter().zip(healths).zip(names).enumerate() {
+        let (info, doubts) = channel_info(listed.units, (at, name), series.1, health);
+        infos.push(info);
+        warnings.extend(doubts);
     }
     warnings.extend(repeated_places(&channels, &infos));
     let coding = channels.first().map(|(_, function)| function.coding);
@@ -99,6 +89,46 @@ pub(in crate::recording) fn open_uff(
         warnings,
         source: Source::Uff(Box::new(UffSource { values, frames })),
     })
+}
+
+/// A channel, its values in SI where its unit is known, and the doubts about its unit.
+fn channel_info(
+    system: Option<UnitSystem>,
+    (at, name): (usize, Option<String>),
+    function: &Function,
+    health: HealthMeter,
+) -> (ChannelInfo, Vec<RecordingWarning>) {
+    let unit = channel_si(
+        &function.numerator,
+        system,
+        function.response.is_rotational(),
+    );
+    let channel = ChannelLabel {
+        number: at + 1,
+        name: name.clone(),
+    };
+    let header_unit = function.numerator.unit.clone();
+    let label = header_unit.clone().unwrap_or_default();
+    let mut warnings = Vec::new();
+    if let Some(by_system) = unit.contradiction {
+        warnings.push(RecordingWarning::UnitsDisagree {
+            channel,
+            unit: label,
+            used: unit.factor,
+            by_system,
+        });
+    } else if !unit.known {
+        let unit = label;
+        warnings.push(RecordingWarning::UnknownUnit { channel, unit });
+    }
+    let info = ChannelInfo {
+        name,
+        unit: unit.unit,
+        header_unit,
+        scale: unit.factor,
+        health: health.finish().scaled(unit.factor),
+    };
+    (info, warnings)
 }
 
 /// The time series that become channels, their timing, and what there is to say about the others.
@@ -142,16 +172,22 @@ fn choose(
         );
         (series, reason)
     });
-    let mut left_out: Vec<(Series<'_>, String)> = unusable.into_iter().chain(others).collect();
-    left_out.sort_by_key(|((dataset, _), _)| dataset.number);
-    warnings.extend(left_out.into_iter().map(|((dataset, function), reason)| {
-        RecordingWarning::DatasetLeftOut {
-            dataset: dataset.number,
-            name: describe(function),
-            reason,
-        }
-    }));
+    let mut unused: Vec<(Series<'_>, String)> = unusable.into_iter().chain(others).collect();
+    unused.sort_by_key(|((dataset, _), _)| dataset.number);
+    warnings.extend(
+        unused
+            .into_iter()
+            .map(|(series, reason)| left_out(series, reason)),
+    );
     Ok((kept, points, warnings))
+}
+
+fn left_out((dataset, function): Series<'_>, reason: String) -> RecordingWarning {
+    RecordingWarning::DatasetLeftOut {
+        dataset: dataset.number,
+        name: describe(function),
+        reason,
+    }
 }
 
 fn timing_words(points: &EvenPoints) -> String {

@@ -253,10 +253,14 @@ impl ValueReader<'_> {
     fn decode_lines(&mut self, widths: &[usize], at_end: bool) -> Result<usize, RecordingError> {
         let mut room = usize::try_from(self.missing()).unwrap_or(usize::MAX);
         let mut done = 0;
-        while room > 0 {
+        while room > 0 && done < self.bytes.len() {
             let rest = self.bytes.get(done..).unwrap_or_default();
             let (line, used) = match memchr(b'\n', rest) {
                 Some(end) => (rest.get(..end).unwrap_or_default(), end + 1),
+                // The last number of a file that was cut may have lost digits.
+                None if at_end && self.values.place.cut => {
+                    (ascii::without_last_number(rest, widths), rest.len())
+                }
                 None if at_end && !rest.is_empty() => (rest, rest.len()),
                 None => break,
             };

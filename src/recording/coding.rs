@@ -1,6 +1,7 @@
 //! How the samples of a WAV file are coded.
 
 use super::error::RecordingError;
+use super::wav_error::WavError;
 
 /// How the samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,11 +65,13 @@ pub(super) struct FormatFields {
 impl FormatFields {
     /// The coding, or why it cannot be read. `file` names the file in errors.
     pub(super) fn coding(&self, file: &str) -> Result<Coding, RecordingError> {
-        let unsupported = || RecordingError::UnsupportedCoding {
-            file: file.to_owned(),
-            tag: self.tag,
-            name: coding_name(self.tag),
-            bits: self.bits,
+        let unsupported = || {
+            RecordingError::from(WavError::UnsupportedCoding {
+                file: file.to_owned(),
+                tag: self.tag,
+                name: coding_name(self.tag),
+                bits: self.bits,
+            })
         };
         // Only of these two is it known how samples lie in a frame.
         if !matches!(self.tag, 1 | 3) {
@@ -102,12 +105,13 @@ impl FormatFields {
         }
         let bytes = self.frame_bytes / self.channels.max(1);
         if bytes < needed || !self.frame_bytes.is_multiple_of(self.channels.max(1)) {
-            return Err(RecordingError::BadHeader {
+            return Err(WavError::BadHeader {
                 file: file.to_owned(),
                 field: "bytes per frame",
                 value: u64::from(self.frame_bytes),
                 allowed: "channels times bytes per sample",
-            });
+            }
+            .into());
         }
         Ok(bytes)
     }

@@ -1,6 +1,9 @@
 //! What can go wrong so badly that a recording cannot be used.
 
+use super::responses::ResponseError;
 use super::text::short;
+use super::uff::UffError;
+use super::wav_error::WavError;
 use std::io;
 
 /// Why a recording cannot be opened, read or written: the file, and the line where there is one;
@@ -31,6 +34,15 @@ pub enum RecordingError {
         /// The file.
         file: String,
     },
+    /// A WAV file whose header cannot be used.
+    #[error(transparent)]
+    Wav(#[from] WavError),
+    /// A universal file that cannot be used.
+    #[error(transparent)]
+    Uff(#[from] UffError),
+    /// A file of frequency response functions that cannot be used.
+    #[error(transparent)]
+    Responses(#[from] ResponseError),
     /// A format that is known but not read.
     #[error("{file}: {format} is not read by this version; export as WAV or CSV")]
     UnsupportedFormat {
@@ -48,44 +60,6 @@ pub enum RecordingError {
         file: String,
         /// The first bytes, in hexadecimal.
         first_bytes: String,
-    },
-    /// A chunk without which the samples have no meaning.
-    #[error(
-        "{file}: no \"{chunk}\" chunk{place}: not a usable WAV file; record or export it again"
-    )]
-    MissingChunk {
-        /// The file.
-        file: String,
-        /// Its four-letter name.
-        chunk: &'static str,
-        /// Where it was expected, empty for "anywhere".
-        place: &'static str,
-    },
-    /// A header field that cannot be true.
-    #[error("{file}: the WAV header says {field} {value}; allowed: {allowed}; export it again")]
-    BadHeader {
-        /// The file.
-        file: String,
-        /// Name of the field.
-        field: &'static str,
-        /// Its value.
-        value: u64,
-        /// What is allowed.
-        allowed: &'static str,
-    },
-    /// Samples coded in a way that is not read.
-    #[error(
-        "{file}: WAV coding {name} (format tag 0x{tag:04x}, {bits} bits) is not read; allowed: integer of 8 to 32 bits, float of 32 or 64 bits; export as PCM or float"
-    )]
-    UnsupportedCoding {
-        /// The file.
-        file: String,
-        /// The format tag, of the subformat where the header is extensible.
-        tag: u16,
-        /// Its common name.
-        name: &'static str,
-        /// Bits per sample.
-        bits: u16,
     },
     /// A valid frame without samples.
     #[error("{file}: holds no samples; record or export it again")]

@@ -1,4 +1,5 @@
-//! Reading recordings: WAV and CSV time series as physical quantities.
+//! Reading recordings: time series (WAV, CSV, universal files) and frequency response functions
+//! (universal files, text) as physical quantities.
 //!
 //! [`Recording::open`] recognises the format by the first bytes, reads the file once in blocks,
 //! checks it and gathers the health of every channel. The [`Recording`] is a handle: samples are
@@ -23,23 +24,36 @@ mod header;
 mod health;
 mod layout;
 mod open;
+mod responses;
 mod riff;
 mod rows;
 mod sniff;
 mod source;
 mod text;
 mod time;
+mod uff;
 mod units;
 mod warning;
 mod wav;
+mod wav_error;
 mod write;
 
 pub use blocks::Blocks;
 pub use error::RecordingError;
 pub use health::{ChannelHealth, Dropout, FlatTop};
+pub use responses::{
+    FrequencyResponse, FrequencyResponses, ResponseError, ResponseForm, ResponseWarning,
+    open_frequency_responses,
+};
 pub use text::Separator;
+pub use uff::{
+    Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, Ordinate, Point, Precision,
+    UffCoding, UffError, UffFormat, UniversalFile, encode_frequency_responses_uff,
+    is_universal_file, list_datasets, read_function,
+};
 pub use units::{STANDARD_GRAVITY, channel_unit};
 pub use warning::{ChannelLabel, RecordingWarning};
+pub use wav_error::WavError;
 pub use write::{WavFormat, encode_wav, write_wav};
 
 use health::HealthMeter;
@@ -75,6 +89,11 @@ pub enum Format {
         decimal: char,
         /// Whether the sample rate comes from a time column.
         timed: Timing,
+    },
+    /// Universal file, datasets 58 or 58b.
+    Uff58 {
+        /// Text or binary, of the first channel.
+        coding: UffCoding,
     },
     /// Samples in memory.
     Memory,
@@ -211,7 +230,10 @@ impl Recording {
             .map_or(0.0, |info| info.scale.abs());
         match self.format {
             Format::WavInteger { bits } => scale * 2f64.powi(1 - i32::from(bits)),
-            Format::WavFloat { .. } | Format::Csv { .. } | Format::Memory => 0.0,
+            Format::WavFloat { .. }
+            | Format::Csv { .. }
+            | Format::Uff58 { .. }
+            | Format::Memory => 0.0,
         }
     }
 
@@ -286,7 +308,8 @@ impl Recording {
         };
         let overruled = |warning: &RecordingWarning| match warning {
             RecordingWarning::ScaleOverUnit { channel: label, .. }
-            | RecordingWarning::UnknownUnit { channel: label, .. } => label.number == channel + 1,
+            | RecordingWarning::UnknownUnit { channel: label, .. }
+            | RecordingWarning::UnitsDisagree { channel: label, .. } => label.number == channel + 1,
             _ => false,
         };
         self.warnings.retain(|warning| !overruled(warning));

@@ -9,10 +9,11 @@ use super::header::Column;
 use super::layout::CsvLayout;
 use super::sniff::{self, Kind};
 use super::text::LARGEST;
+use super::uff;
 use super::wav::WavSource;
 use super::{
     Channel, ChannelInfo, ChannelLabel, Format, HealthMeter, ReadSettings, Recording,
-    RecordingError, RecordingWarning, Source, Timing, channel_unit,
+    RecordingError, RecordingWarning, ResponseError, Source, Timing, channel_unit,
 };
 
 /// Samples handled at a time when a WAV file is checked, over all channels.
@@ -32,6 +33,7 @@ pub(super) fn open(path: &Path, settings: &ReadSettings) -> Result<Recording, Re
     match sniff::recognise(path, &file)? {
         Kind::Wav => open_wav(path, file, settings),
         Kind::Text => open_csv(path, file, settings),
+        Kind::Universal => uff::open_uff(path, file, settings),
     }
 }
 
@@ -39,7 +41,7 @@ pub(super) fn open(path: &Path, settings: &ReadSettings) -> Result<Recording, Re
 /// damaged time columns, whose lengths in samples no longer fit a number.
 const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 
-fn check_rate(file: &str, value: f64) -> Result<(), RecordingError> {
+pub(super) fn check_rate(file: &str, value: f64) -> Result<(), RecordingError> {
     match RATES.contains(&value) {
         true => Ok(()),
         false => Err(RecordingError::BadSampleRate {
@@ -101,7 +103,7 @@ fn open_wav(
     })
 }
 
-fn ignored_rate(settings: &ReadSettings, used: f64) -> Option<RecordingWarning> {
+pub(super) fn ignored_rate(settings: &ReadSettings, used: f64) -> Option<RecordingWarning> {
     let given = settings.sample_rate?;
     let differs = (given - used).abs() > SAME_RATE * used;
     differs.then_some(RecordingWarning::SampleRateIgnored { given, used })
@@ -123,6 +125,7 @@ fn open_csv(
         return Err(RecordingError::NoSamples { file });
     }
     let layout = &source.layout;
+    refuse_frequencies(&file, layout)?;
     let (sample_rate, mut warnings) = csv_rate(&file, layout, &rates, settings)?;
     let mut channels = Vec::new();
     for (at, (column, meter)) in layout.channel_columns().into_iter().zip(meters).enumerate() {
@@ -150,6 +153,24 @@ fn open_csv(
         warnings,
         source: Source::Csv(Box::new(source)),
     })
+}
+
+/// A first column of frequencies means a frequency response function.
+fn refuse_frequencies(file: &str, layout: &CsvLayout) -> Result<(), ResponseError> {
+    let Some(first) = layout.columns.first().filter(|_| layout.time.is_none()) else {
+        return Ok(());
+    };
+    let name = first.name.as_deref().unwrap_or_default();
+    let unit = first.unit.as_deref().unwrap_or_default();
+    let is_unit = |text: &str| ["hz", "khz"].contains(&text.to_lowercase().as_str());
+    match name.to_lowercase().starts_with("freq") || is_unit(name) || is_unit(unit) {
+        false => Ok(()),
+        true => Err(ResponseError::NotTimeSeries {
+            file: file.to_owned(),
+            line: layout.lines_before + 1,
+            column: [name, unit].join(" ").trim().to_owned(),
+        }),
+    }
 }
 
 /// The rate of a text file and what there is to say about it.
@@ -275,7 +296,7 @@ pub(super) fn check_samples(
 }
 
 /// Checks that samples of one channel, the first of them at `place.1`, are finite and not absurd.
-fn check_finite(
+pub(super) fn check_finite(
     name: &str,
     sample_rate: f64,
     place: (usize, u64),

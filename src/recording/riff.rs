@@ -9,6 +9,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use super::coding::{Coding, FormatFields};
 use super::error::RecordingError;
 use super::warning::RecordingWarning;
+use super::wav_error::WavError;
 
 /// More channels than this are taken for a damaged header; the largest front ends have hundreds.
 pub(super) const MAX_CHANNELS: usize = 4096;
@@ -263,20 +264,22 @@ impl<'a, R: Read + Seek> Walker<'a, R> {
     }
 
     fn missing(&self, chunk: &'static str, place: &'static str) -> RecordingError {
-        RecordingError::MissingChunk {
+        WavError::MissingChunk {
             file: self.file.to_owned(),
             chunk,
             place,
         }
+        .into()
     }
 
     fn bad_header(&self, field: &'static str, value: u64, allowed: &'static str) -> RecordingError {
-        RecordingError::BadHeader {
+        WavError::BadHeader {
             file: self.file.to_owned(),
             field,
             value,
             allowed,
         }
+        .into()
     }
 }
 

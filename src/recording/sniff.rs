@@ -5,12 +5,14 @@ use std::path::Path;
 
 use super::error::RecordingError;
 use super::riff::{read_fully, unreadable};
+use super::uff;
 
 /// Formats that are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Wav,
     Text,
+    Universal,
 }
 
 /// First bytes, where they stand, and what they mean. Known so that the message can name them.
@@ -70,7 +72,6 @@ fn recognise_head(head: &[u8], file: &str) -> Result<Kind, RecordingError> {
     let format = match unread {
         Some((_, _, format)) => Some(*format),
         None if riff => Some("a RIFF file without WAVE data"),
-        None if is_universal_file(head) => Some("a universal file (UFF 58)"),
         None => None,
     };
     if let Some(format) = format {
@@ -78,6 +79,9 @@ fn recognise_head(head: &[u8], file: &str) -> Result<Kind, RecordingError> {
             file: file.to_owned(),
             format,
         });
+    }
+    if uff::is_universal(head) {
+        return Ok(Kind::Universal);
     }
     if looks_like_text(head) {
         return Ok(Kind::Text);
@@ -87,14 +91,6 @@ fn recognise_head(head: &[u8], file: &str) -> Result<Kind, RecordingError> {
         file: file.to_owned(),
         first_bytes: first_bytes.join(" "),
     })
-}
-
-/// A universal file opens with -1 in columns 5 and 6 of a line of its own.
-fn is_universal_file(head: &[u8]) -> bool {
-    let mut lines = head
-        .split(|byte| *byte == b'\n')
-        .map(<[u8]>::trim_ascii_end);
-    lines.find(|line| !line.is_empty()) == Some(b"    -1")
 }
 
 /// Text has no control characters but tabs, line ends and form feeds; latin-1 letters may occur.

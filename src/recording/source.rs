@@ -1,9 +1,10 @@
-//! Where samples come from: a WAV file, a text file, memory. One way to read them all.
+//! Where samples come from: a WAV file, a text file, a universal file, memory. One way to read them all.
 
 use std::sync::Arc;
 
 use super::csv::{CsvCursor, CsvSource};
 use super::error::RecordingError;
+use super::uff::{UffCursor, UffSource};
 use super::wav::{WavCursor, WavSource};
 
 /// Where the samples of a recording are.
@@ -11,6 +12,7 @@ use super::wav::{WavCursor, WavSource};
 pub(super) enum Source {
     Wav(Box<WavSource>),
     Csv(Box<CsvSource>),
+    Uff(Box<UffSource>),
     Memory(Arc<Vec<Vec<f64>>>),
 }
 
@@ -20,6 +22,7 @@ impl Source {
         Ok(match self {
             Self::Wav(source) => Cursor::Wav(source.cursor(frame)?),
             Self::Csv(source) => Cursor::Csv(source.cursor(frame)?),
+            Self::Uff(source) => Cursor::Uff(source.cursor(frame)),
             Self::Memory(channels) => Cursor::Memory(MemoryCursor {
                 channels,
                 at: usize::try_from(frame).unwrap_or(usize::MAX),
@@ -33,6 +36,7 @@ impl Source {
 pub(super) enum Cursor<'a> {
     Wav(WavCursor<'a>),
     Csv(CsvCursor<'a>),
+    Uff(UffCursor<'a>),
     Memory(MemoryCursor<'a>),
 }
 
@@ -47,6 +51,7 @@ impl Cursor<'_> {
         match self {
             Self::Wav(cursor) => cursor.read(channels, limit, &mut samples)?,
             Self::Csv(cursor) => cursor.read(channels, limit, &mut samples)?,
+            Self::Uff(cursor) => cursor.read(channels, limit, &mut samples)?,
             Self::Memory(cursor) => cursor.read(channels, limit, &mut samples),
         }
         Ok(samples)

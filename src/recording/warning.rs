@@ -157,6 +157,52 @@ pub enum RecordingWarning {
         /// The file's own (Hz).
         used: f64,
     },
+    /// A universal file that ends within a header.
+    #[error(
+        "the file ends within the header of dataset {dataset}, which is left out; a copy was probably interrupted; export or copy it again"
+    )]
+    HeaderCut {
+        /// The dataset, 1-based.
+        dataset: usize,
+    },
+    /// A time series that was not sampled with the others of its file.
+    #[error(
+        "dataset {dataset} ({name}) is left out: {reason}; channels of a recording are sampled together, and their numbers count those kept; export it to a file of its own if it is needed"
+    )]
+    DatasetLeftOut {
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// Its place and description.
+        name: String,
+        /// What differs.
+        reason: String,
+    },
+    /// Two channels at one place.
+    #[error(
+        "{channel} has the same place and quantity ({place}) as {earlier}; the file probably holds several runs, which are not simultaneous; use channels of one run"
+    )]
+    RepeatedPlace {
+        /// The later channel.
+        channel: ChannelLabel,
+        /// The earlier one.
+        earlier: ChannelLabel,
+        /// The place as the file has it.
+        place: String,
+    },
+    /// A label and a unit system that contradict each other.
+    #[error(
+        "{channel}: the label says \"{unit}\" (times {used} to SI), the file's unit system means times {by_system}; the label is used; check the level, or give a scale"
+    )]
+    UnitsDisagree {
+        /// The channel.
+        channel: ChannelLabel,
+        /// The unit as the label has it.
+        unit: String,
+        /// Factor by the label.
+        used: f64,
+        /// Factor by the unit system.
+        by_system: f64,
+    },
     /// A rate taken as the whole number next to it.
     #[error(
         "the time column's mean step gives {mean:.4} Hz; its steps scatter enough for {used} Hz, which is used; the time was probably summed or printed with few digits"
@@ -185,6 +231,10 @@ impl RecordingWarning {
             Self::UnknownUnit { .. } => "unknown-unit",
             Self::SampleRateIgnored { .. } => "sample-rate-ignored",
             Self::RateRounded { .. } => "rate-rounded",
+            Self::HeaderCut { .. } => "header-cut",
+            Self::DatasetLeftOut { .. } => "dataset-left-out",
+            Self::RepeatedPlace { .. } => "repeated-place",
+            Self::UnitsDisagree { .. } => "units-disagree",
         }
     }
 }

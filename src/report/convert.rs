@@ -14,7 +14,7 @@ use crate::modal::{FrequencySource, ModeReading};
 use crate::pipeline::{
     Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure, Warning,
 };
-use crate::recording::{Format, Separator};
+use crate::recording::{Format, Separator, UffCoding};
 use crate::spectral::Window;
 use crate::structure::{Assembly, BeamTheory, NaturalMode};
 
@@ -189,6 +189,10 @@ fn format_words(format: Format) -> String {
             };
             format!("CSV, {separator}{decimal}")
         }
+        Format::Uff58 {
+            coding: UffCoding::Ascii,
+        } => "UFF 58, text".to_owned(),
+        Format::Uff58 { .. } => "UFF 58b, binary".to_owned(),
         Format::Memory => "samples in memory".to_owned(),
     }
 }

@@ -14,6 +14,7 @@ mod pipeline;
 mod quality;
 mod real_data;
 mod recording;
+mod recording_uff;
 mod report;
 mod simulate;
 mod spectral;

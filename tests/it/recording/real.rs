@@ -125,5 +125,8 @@ fn val_an_analysers_frequency_table_is_not_taken_for_time() {
     let path = PathBuf::from(folder).join("modelab_freefree_beam/Hxysv00001.txt");
     let error = Recording::open(&path, &ReadSettings::default()).expect_err("no time series");
     let message = error.to_string();
-    assert!(message.contains(".txt:10: no time column"), "{message}");
+    assert!(
+        message.contains(".txt:10: the first column is a frequency"),
+        "{message}"
+    );
 }

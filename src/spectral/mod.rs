@@ -20,6 +20,7 @@ pub use lines::{DISPLAY_RATIO, Lines};
 pub use noise::{line_amplitude, noise_power};
 pub use transform::transform_block;
 pub use window::{Window, apply_force_window};
+pub(crate) use zoom::mix_and_decimate;
 pub use zoom::{band_limited, chirp_z};
 
 /// What makes a spectrum impossible.

@@ -61,7 +61,7 @@ pub(super) fn decimation_factor(sample_rate: f64, width: f64) -> usize {
 
 /// A record mixed down by `centre`, filtered and decimated; sample m is at time
 /// (m * factor - delay)/sample_rate from the record's start.
-pub(super) struct Decimated {
+pub(crate) struct Decimated {
     pub samples: Vec<Complex64>,
     pub factor: usize,
     pub delay: usize,
@@ -71,7 +71,7 @@ pub(super) struct Decimated {
 ///
 /// The record is taken as zero outside its ends and the filter's tails are kept, so that the result
 /// has exactly the spectrum of the record times the filter's pass band.
-pub(super) fn mix_and_decimate(
+pub(crate) fn mix_and_decimate(
     samples: &[f64],
     sample_rate: f64,
     (centre, width): (f64, f64),

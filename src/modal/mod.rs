@@ -4,16 +4,21 @@
 //! a pole ([`interpolate_pole`]) and on the line nearest to that, with the half-line bound
 //! ([`read_peaks`]); mains lines are recognised, and the readings of several recordings are merged
 //! ([`merge_modes`]).
-//! Along a decay [`amplitude`] follows frequency and damping against amplitude.
+//!
+//! [`polyreference`] finds the poles of a whole band from several responses at once, also where two
+//! modes show as one peak; [`matrix_pencil`] does so for free decays in the time domain; [`fit`] refines
+//! poles to the greatest likelihood and says how well they are known; [`amplitude`] follows frequency and
+//! damping along a decay.
 
 pub mod amplitude;
-
 pub mod fit;
 mod interpolation;
 mod mains;
+pub mod matrix_pencil;
 mod merge;
 mod peaks;
 pub mod polyreference;
+mod projection;
 mod reading;
 
 pub use interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};

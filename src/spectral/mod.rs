@@ -28,6 +28,7 @@ pub use lines::{DISPLAY_RATIO, Lines};
 pub use noise::{line_amplitude, noise_power};
 pub use transform::{Transformer, Workspace, transform_block};
 pub use window::{Window, apply_force_window};
+pub(crate) use zoom::Decimator;
 pub use zoom::band_limited;
 
 /// What makes a spectrum impossible.

@@ -61,7 +61,7 @@ pub(super) fn decimation_factor(sample_rate: f64, width: f64) -> usize {
 /// Mixing, filtering and decimating as an analyser's zoom does it: what every record shares. Output m
 /// is at time (m * factor - delay)/sample_rate from the record's start.
 #[derive(Debug)]
-pub(super) struct Decimator {
+pub(crate) struct Decimator {
     /// e^{-j 2 pi centre t} at every sample.
     oscillator: Vec<Complex64>,
     filter: Vec<f64>,
@@ -71,7 +71,7 @@ pub(super) struct Decimator {
 impl Decimator {
     /// Mixes records of at most `length` samples down by `centre` (Hz) and decimates by `factor`, so
     /// that `width` (Hz) around it survives.
-    pub(super) fn new(
+    pub(crate) fn new(
         sample_rate: f64,
         (centre, width): (f64, f64),
         factor: usize,
@@ -87,7 +87,7 @@ impl Decimator {
     }
 
     /// Samples by which the first output lies before the record's start.
-    pub(super) fn delay(&self) -> usize {
+    pub(crate) fn delay(&self) -> usize {
         self.filter.len() / 2
     }
 
@@ -100,7 +100,7 @@ impl Decimator {
     ///
     /// It is taken as zero outside its ends and the filter's tails are kept, so that the result has
     /// exactly the spectrum of the record times the filter's pass band.
-    pub(super) fn run(&self, samples: &[f64]) -> Vec<Complex64> {
+    pub(crate) fn run(&self, samples: &[f64]) -> Vec<Complex64> {
         let mixed: Vec<Complex64> = samples
             .iter()
             .zip(&self.oscillator)

@@ -91,31 +91,35 @@ fn wilkinson_shift(h: &DMatrix<Complex64>, end: usize) -> Complex64 {
     }
 }
 
-/// One step H - s I = Q R, H' = R Q + s I on the rows and columns from `start` to `end`, each column
-/// turned in one go.
+/// One step H - s I = Q R, H' = R Q + s I on the rows and columns from `start` to `end`.
+///
+/// Every inner loop runs over elements that do not depend on each other, so that the processor can
+/// overlap them.
 fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex64) {
     let rows = h.nrows();
     let values = h.as_mut_slice();
-    let mut turns: Vec<(f64, Complex64)> = Vec::with_capacity(end - start);
-    for column in start..end {
-        let top = column * rows;
-        values[top + column] -= shift;
-        for (k, &(c, s)) in turns.iter().enumerate() {
-            turn(values, top + start + k, top + start + k + 1, (c, s));
-        }
-        if column + 1 < end {
-            let (c, s) = rotation(values[top + column], values[top + column + 1]);
-            turn(values, top + column, top + column + 1, (c, s));
-            turns.push((c, s));
-        }
+    for index in start..end {
+        values[index * rows + index] -= shift;
     }
-    for (k, &(c, s)) in turns.iter().enumerate() {
-        let (left, right) = ((start + k) * rows, (start + k + 1) * rows);
-        for row in start..=(start + k + 1) {
-            // R Q: the columns turn with the conjugate.
-            let (x, y) = (values[left + row], values[right + row]);
-            values[left + row] = x * c + y * s.conj();
-            values[right + row] = y * c - x * s;
+    let mut turns: Vec<(f64, Complex64)> = Vec::with_capacity(end - start);
+    for k in start..end - 1 {
+        let place = k * rows + k;
+        let (c, s) = rotation(values[place], values[place + 1]);
+        for column in values[k * rows..end * rows].chunks_exact_mut(rows) {
+            let (x, y) = (column[k], column[k + 1]);
+            column[k] = x * c + s * y;
+            column[k + 1] = y * c - s.conj() * x;
+        }
+        turns.push((c, s));
+    }
+    for (k, &(c, s)) in (start..).zip(&turns) {
+        // R Q: columns turn with the conjugate; R is zero below row k + 1 here.
+        let (left, right) = values[k * rows..(k + 2) * rows].split_at_mut(rows);
+        let (left, right) = (&mut left[start..k + 2], &mut right[start..k + 2]);
+        for (a, b) in left.iter_mut().zip(right) {
+            let (x, y) = (*a, *b);
+            *a = x * c + y * s.conj();
+            *b = y * c - x * s;
         }
     }
     for index in start..end {
@@ -126,7 +130,8 @@ fn qr_step(h: &mut DMatrix<Complex64>, start: usize, end: usize, shift: Complex6
 /// Cosine (real) and sine of the rotation [c s; -conj(s) c] that takes (a, b) to (r, 0).
 fn rotation(a: Complex64, b: Complex64) -> (f64, Complex64) {
     let length = (a.norm_sqr() + b.norm_sqr()).sqrt();
-    let size = a.norm();
+    // Companion matrices of a fit are of order one: no overflow to guard against.
+    let size = a.norm_sqr().sqrt();
     if length == 0.0 {
         (1.0, Complex64::ZERO)
     } else if size == 0.0 {
@@ -134,11 +139,4 @@ fn rotation(a: Complex64, b: Complex64) -> (f64, Complex64) {
     } else {
         (size / length, a / size * b.conj() / length)
     }
-}
-
-#[inline]
-fn turn(values: &mut [Complex64], upper: usize, lower: usize, (c, s): (f64, Complex64)) {
-    let (x, y) = (values[upper], values[lower]);
-    values[upper] = x * c + s * y;
-    values[lower] = y * c - s.conj() * x;
 }

@@ -20,6 +20,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::ResponseMatrix;
+use crate::modal::projection::conjugate_product;
 use crate::spectral::smallest_smooth_block;
 
 /// Share of the unit circle that the band covers. On a full circle the numerator would have to join
@@ -216,16 +217,6 @@ fn subtract_gram(reduced: &mut DMatrix<Complex64>, mixed: &DMatrix<Complex64>) {
             }
         }
     }
-}
-
-/// sum conj(a) b.
-pub(super) fn conjugate_product(a: &[Complex64], b: &[Complex64]) -> Complex64 {
-    let (mut re, mut im) = (0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        re += a.re * b.re + a.im * b.im;
-        im += a.re * b.im - a.im * b.re;
-    }
-    Complex64::new(re, im)
 }
 
 /// Hermitian Toeplitz matrix with entry (j, k) at lag k - j.

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 
 use super::ResponseMatrix;
-use super::normal_equations::conjugate_product;
+use crate::modal::projection::{Basis, conjugate_product, norm};
 
 /// Half-power widths to either side that take part: beyond, a mode is a background like the others.
 const WIDTHS: f64 = 4.0;
@@ -174,41 +174,4 @@ pub(super) fn contribution(
 /// Whether removing `removed` can change the contribution of `kept`.
 pub(super) fn near(matrix: &ResponseMatrix, kept: &SeenPole, removed: &SeenPole) -> bool {
     Window::around(matrix, kept.pole).is_some_and(|window| window.holds(removed.pole))
-}
-
-/// Orthonormal columns.
-#[derive(Default)]
-struct Basis {
-    columns: Vec<Vec<Complex64>>,
-}
-
-impl Basis {
-    /// What of a vector the columns leave. Twice, because once leaves rounding behind where the
-    /// columns are nearly dependent.
-    fn rest(&self, mut vector: Vec<Complex64>) -> Vec<Complex64> {
-        for _ in 0..2 {
-            for column in &self.columns {
-                let share = conjugate_product(column, &vector);
-                for (value, basis) in vector.iter_mut().zip(column) {
-                    *value -= share * basis;
-                }
-            }
-        }
-        vector
-    }
-
-    /// Adds a column, unless it depends on those that are there.
-    fn add(&mut self, column: Vec<Complex64>) {
-        let whole = norm(&column);
-        let rest = self.rest(column);
-        let length = norm(&rest);
-        if length > 1e-9 * whole {
-            self.columns
-                .push(rest.into_iter().map(|value| value / length).collect());
-        }
-    }
-}
-
-fn norm(values: &[Complex64]) -> f64 {
-    values.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt()
 }

@@ -6,8 +6,9 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::eigenvalues::inverse_roots;
-use super::normal_equations::{CircleMap, Denominators, conjugate_product};
+use super::normal_equations::{CircleMap, Denominators};
 use super::{PolyreferenceError, PolyreferenceSettings, ResponseMatrix, StabilityTolerances};
+use crate::modal::projection::conjugate_product;
 
 /// What of a pole the order before had already, in the classes of the usual diagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -32,9 +32,10 @@ impl Default for SubBandSettings {
             least_lines: 120,
             half_power_widths: 16.0,
             peaks: PeakSettings {
-                // 6 dB and not the 8 dB that count as a resonance unseen: a band without a mode costs
-                // time only.
+                // Less than the 8 dB and 15 dB that count as a resonance unseen: a band without a
+                // mode costs time only.
                 blind_prominence_db: 6.0,
+                above_noise_db: 10.0,
                 ..PeakSettings::default()
             },
         }
@@ -172,13 +173,13 @@ pub fn find_modes(
         core: ends,
     };
     let mut whole = search(matrix, whole_band, settings)?;
-    let parts = sub_bands(matrix, bands)
+    let mut parts = sub_bands(matrix, bands)
         .into_iter()
         .map(|band| search(matrix, band, settings))
         .collect::<Result<Vec<BandSearch>, PolyreferenceError>>()?;
-    whole
-        .modes
-        .retain(|mode| !parts.iter().any(|part| belongs_to(mode, part)));
+    for part in &mut parts {
+        share_modes(&mut whole.modes, part);
+    }
     Ok(std::iter::once(whole).chain(parts).collect())
 }
 
@@ -192,20 +193,37 @@ pub fn all_modes(searches: &[BandSearch]) -> Vec<PolyreferenceMode> {
     modes
 }
 
+/// Lines of a sub-band to each order at least. 5: over half the values are then left to average noise,
+/// with two outputs.
+const LINES_PER_ORDER: usize = 5;
 /// Widest mode that is left to a sub-band, in parts of the band's width.
 const WIDEST_SHARE: f64 = 0.125;
 
-/// Whether a mode of the whole band is the business of a sub-band.
-fn belongs_to(mode: &PolyreferenceMode, part: &BandSearch) -> bool {
-    let band = &part.band;
-    let (low, high) = band.core;
-    let width = 2.0 * mode.damping_ratio * mode.frequency;
-    let narrow = width < WIDEST_SHARE * (band.high - band.low);
-    let found = part
-        .modes
-        .iter()
-        .any(|other| (other.frequency - mode.frequency).abs() < width);
-    (low..=high).contains(&mode.frequency) && (narrow || found)
+/// Settles which search keeps a mode that lies in a sub-band's core.
+///
+/// A mode that both read as one goes to the one whose pole explains more: of a mode that decays within
+/// the lags of the whole band, a longer look only adds noise. Otherwise the sub-band decides, except
+/// on modes too wide for it.
+fn share_modes(whole: &mut Vec<PolyreferenceMode>, part: &mut BandSearch) {
+    let band = part.band;
+    let inside =
+        |mode: &PolyreferenceMode| (band.core.0..=band.core.1).contains(&(mode.pole.im / TAU));
+    let (rivals, mut kept): (Vec<_>, Vec<_>) = whole.drain(..).partition(inside);
+    for rival in rivals {
+        let width = 2.0 * rival.damping_ratio * rival.frequency;
+        let near: Vec<usize> = (0..part.modes.len())
+            .filter(|&k| (part.modes[k].frequency - rival.frequency).abs() < width)
+            .collect();
+        match near[..] {
+            [] if width > WIDEST_SHARE * (band.high - band.low) => kept.push(rival),
+            [one] if part.modes[one].above_noise_db < rival.above_noise_db => {
+                part.modes.remove(one);
+                kept.push(rival);
+            }
+            _ => {}
+        }
+    }
+    *whole = kept;
 }
 
 fn search(
@@ -214,7 +232,11 @@ fn search(
     settings: &PolyreferenceSettings,
 ) -> Result<BandSearch, PolyreferenceError> {
     let part = matrix.band(band.low, band.high);
-    let order = (1..=settings.order)
+    let most = match LINES_PER_ORDER {
+        _ if part.points() == matrix.points() => settings.order,
+        lines => settings.order.min(part.points() / lines),
+    };
+    let order = (1..=most)
         .rev()
         .find(|&order| least_lines(&part, order) <= part.points())
         .unwrap_or(settings.order);

@@ -11,6 +11,7 @@
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
 
+pub mod consistent;
 pub mod doubt;
 pub mod estimate;
 pub mod free_beam;
@@ -68,6 +69,32 @@ pub enum IdentifyError {
         /// What helps.
         remedy: &'static str,
     },
+    /// Fewer frequencies than unknowns.
+    #[error(
+        "{found} frequencies cannot determine {unknowns} unknowns; measure more modes, or estimate \
+         fewer parameters"
+    )]
+    TooFewFrequencies {
+        /// How many parameters are to be estimated.
+        unknowns: usize,
+        /// How many frequencies were given.
+        found: usize,
+    },
+    /// Measured weights without an uncertainty to weigh by.
+    #[error(
+        "mode {mode} has no standard uncertainty to weigh it by; state half_line, std or scatter, \
+         or take weights = \"relative\""
+    )]
+    NoUncertainty {
+        /// The mode's number.
+        mode: usize,
+    },
+    /// Nothing was asked for, or what the structure does not have.
+    #[error(
+        "there is nothing to estimate: name at least one parameter, and no joint stiffness of a \
+         free beam"
+    )]
+    NothingToEstimate,
     /// A frequency that is no frequency.
     #[error("mode {mode} has the frequency {value}, but it must be positive and finite")]
     Frequency {

@@ -315,7 +315,7 @@ pub fn interface_root(
         } else {
             lower + 1.5
         };
-        if upper - lower <= 4.0 * f64::EPSILON * upper {
+        if upper.is_finite() && upper - lower <= 4.0 * f64::EPSILON * upper {
             break;
         }
         at = body.functions(lambda);

@@ -18,7 +18,7 @@ const TABLE: &[(&str, &[&str])] = &[
     ("spectral", &["recording", "taps"]),
     ("modal", &["recording", "taps", "spectral", "stats"]),
     ("structure", &["quantity"]),
-    ("identify", &["modal", "structure"]),
+    ("identify", &["modal", "stats", "structure"]),
     (
         "simulate",
         &["quantity", "description", "recording", "structure", "stats"],

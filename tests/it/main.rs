@@ -6,6 +6,7 @@ mod cli;
 mod description;
 mod errors;
 mod identify;
+mod identify_consistent;
 mod layers;
 mod modal;
 mod pipeline;

@@ -81,6 +81,11 @@ impl Covariance {
         (std < NOTHING_KNOWN).then_some(std)
     }
 
+    /// The same, however large it is.
+    pub(super) fn std_or_infinite(&self, gradient: &Point) -> f64 {
+        self.between(gradient, gradient).sqrt()
+    }
+
     /// How much of each residual's freedom the fit takes: the diagonal of J (J^T J)^-1 J^T.
     pub(super) fn leverages(&self, jacobian: &[Point]) -> Vec<f64> {
         jacobian

@@ -300,8 +300,39 @@ impl ConsistentEstimator {
                 None => minima.push(end),
             }
         }
+        for minimum in &mut minima {
+            self.follow_to_the_limit(problem, minimum);
+        }
         minima.sort_by(|a, b| a.at.cost.total_cmp(&b.at.cost));
         minima
+    }
+
+    /// A stiffness that no frequency feels any more ends wherever the search lost interest; where
+    /// the limit itself is no worse, the estimate is there.
+    fn follow_to_the_limit(&self, problem: &Problem<'_>, minimum: &mut Minimum) {
+        // Relative change of every frequency per relative change of the stiffness.
+        const UNFELT: f64 = 1e-4;
+        for parameter in [Parameter::Kt, Parameter::Kr] {
+            let index = parameter.index();
+            let data = problem.data.iter().zip(&minimum.at.jacobian);
+            let felt = data
+                .map(|(datum, row)| (row[index] * datum.std / datum.frequency).abs())
+                .fold(0.0, f64::max);
+            if felt > UNFELT || !self.settings.fit.contains(&parameter) {
+                continue;
+            }
+            let free = self.directions();
+            let others: Vec<Point> = free.into_iter().filter(|d| d[index] == 0.0).collect();
+            for end in [-1e3, 1e3] {
+                let mut point = minimum.at.point;
+                point[index] += end;
+                let at = problem.evaluate(&problem.within_bounds(point), &minimum.at.lambdas);
+                let there = descend(problem, at, &others, Accuracy::MISFIT);
+                if there.at.cost <= minimum.at.cost {
+                    *minimum = there;
+                }
+            }
+        }
     }
 
     /// With relative weights a robust loss needs to know what a usual misfit is: that of the least

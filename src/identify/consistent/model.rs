@@ -218,7 +218,7 @@ impl FrequencyModel {
             _ => {
                 let elements = match structure.route {
                     Route::FiniteElements(elements) => elements,
-                    Route::Automatic => elements_for(highest, &pieces),
+                    Route::Automatic => elements_for(structure.theory, highest, &pieces),
                 };
                 let attached = (&masses[..], &structure.springs[..]);
                 JointedBody::Elements(Box::new(InterfaceModes::new(
@@ -397,7 +397,7 @@ fn nominal_point(beam: &Beam) -> Point {
     point
 }
 
-fn beam_at(beam: &Beam, point: &Point) -> Beam {
+pub(super) fn beam_at(beam: &Beam, point: &Point) -> Beam {
     let at = |parameter: Parameter| point[parameter.index()].exp();
     Beam {
         modulus: at(Parameter::Modulus),
@@ -433,11 +433,16 @@ fn free_lambdas(body: &JointedBody, highest: usize) -> Result<Vec<f64>, Structur
     }
 }
 
-/// Elements of each piece for this highest mode: the relative error of a frequency is about
-/// (k h)^4/1440 for the wave number k and the element length h (1), so that 0.18 leaves 7e-7.
-fn elements_for(highest: usize, pieces: &[Beam]) -> usize {
+/// Elements of each piece for this highest mode, so that its frequency is right to about 1e-6. By
+/// Euler's theory the relative error is (k h)^4/1440 for the wave number k and the element length
+/// h; with shear and rotary inertia it falls as h^2 only.
+fn elements_for(theory: BeamTheory, highest: usize, pieces: &[Beam]) -> usize {
+    let size = match theory {
+        BeamTheory::Euler => 0.18,
+        BeamTheory::Timoshenko => 0.09,
+    };
     let total: f64 = pieces.iter().map(|piece| piece.length).sum();
     let longest = pieces.iter().map(|piece| piece.length).fold(0.0, f64::max);
     let wave = (highest as f64 + 0.5) * PI * longest / total;
-    ((wave / 0.18).ceil() as usize).max(8)
+    ((wave / size).ceil() as usize).max(8)
 }

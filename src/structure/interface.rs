@@ -93,6 +93,12 @@ impl InterfaceFunctions {
         (self.values.equation(joint), self.slopes.equation(joint))
     }
 
+    /// Newton's step of lambda towards a root: on lambda^4 G, which has no pole at zero frequency
+    /// and is nearly linear in omega^2 where the springs are soft.
+    pub fn newton_step(&self, (value, slope): (f64, f64)) -> f64 {
+        -value / (slope + 4.0 * value / self.lambda)
+    }
+
     /// Natural frequencies below lambda with this joint (Wittrick & Williams 1971): those of the
     /// free body, less the negative eigenvalues of compliance plus receptance.
     pub fn count(&self, joint: &JointCompliance, value: f64) -> usize {
@@ -300,7 +306,7 @@ pub fn interface_root(
             upper = lambda;
         }
         let near = count == number || count + 1 == number;
-        let newton = lambda - value / slope;
+        let newton = lambda + at.newton_step((value, slope));
         let inside = newton > lower && newton < upper;
         // On the root itself rounding decides on which side the count is.
         let step = (newton - lambda).abs();

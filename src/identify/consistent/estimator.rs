@@ -5,7 +5,7 @@ use super::least_squares::{Accuracy, Minimum, StopReason, descend};
 use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
 use super::problem::{Datum, Evaluation, Loss, Prior, Problem, along};
 use super::settings::{ConsistentSettings, ResidualWeights};
-use super::starts::promising;
+use super::starts::{everywhere, promising};
 use crate::identify::pairs::{ModeLambda, PairsModel, estimate_pairs};
 use crate::identify::{IdentifyError, MeasuredMode};
 use crate::structure::joint::StiffnessUnits;
@@ -217,6 +217,12 @@ impl ConsistentEstimator {
         let starts = self.starts(&problem);
         self.rescale(&mut problem, &starts);
         let mut minima = self.valleys(&problem, &starts);
+        if !self.is_good(&problem, &minima) {
+            // A bad fit may be the wrong valley: now no effort is spared.
+            let mut all = everywhere(&self.base, &self.settings.fit);
+            all.extend(minima.iter().map(|minimum| minimum.at.point));
+            minima = self.valleys(&problem, &all);
+        }
         let mut renewed = None;
         for _ in 0..RENEWALS {
             let Some(best) = minima.first().map(|best| best.at.point) else {
@@ -237,6 +243,20 @@ impl ConsistentEstimator {
             renewed = Some(model);
         }
         (renewed, minima)
+    }
+
+    /// Whether the misfit is so small that no other valley can matter: below three times what it
+    /// should be, or, without stated uncertainties, below what any reading achieves.
+    fn is_good(&self, problem: &Problem<'_>, minima: &[Minimum]) -> bool {
+        const READING: f64 = 1e-4;
+        let Some(best) = minima.first() else {
+            return false;
+        };
+        let allowed = match self.settings.weights {
+            ResidualWeights::Measured => 9.0,
+            ResidualWeights::Relative => READING * READING,
+        };
+        best.at.cost < allowed * problem.data.len() as f64
     }
 
     fn starts(&self, problem: &Problem<'_>) -> Vec<Point> {

@@ -5,9 +5,11 @@ pub const DOUBTFUL: f64 = 0.01;
 /// Below this one no usual slip in the uncertainties saves the model: with three degrees of
 /// freedom it asks for misfits of more than three standard deviations in every direction.
 pub const HOPELESS: f64 = 1e-6;
-/// Root-mean-square misfit (1, relative, per degree of freedom) beyond which a model explains
-/// nothing where no uncertainty is stated: a beam's dimensions usually leave 1 % open.
-pub const LARGE_MISFIT: f64 = 0.01;
+/// Root-mean-square misfit (1, relative, per degree of freedom) beyond which a model is in doubt
+/// where no uncertainty is stated: a beam's dimensions usually leave 1 % open.
+pub const NOTABLE_MISFIT: f64 = 0.01;
+/// The same beyond which it explains nothing: twice that, and ten times what tap tests repeat to.
+pub const LARGE_MISFIT: f64 = 0.02;
 
 /// What the misfit says of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +57,7 @@ impl Goodness {
             (Some(p), _) if p < HOPELESS => Verdict::CannotExplain,
             (Some(p), _) if p < DOUBTFUL => Verdict::Doubtful,
             (None, Some(misfit)) if misfit > LARGE_MISFIT => Verdict::CannotExplain,
+            (None, Some(misfit)) if misfit > NOTABLE_MISFIT => Verdict::Doubtful,
             _ => Verdict::Explains,
         };
         Self {
@@ -88,6 +91,9 @@ impl Goodness {
         };
         match self.verdict {
             Verdict::Explains => format!("this model explains the frequencies ({test})"),
+            Verdict::Doubtful if self.chi_squared.is_none() => {
+                format!("the misfit is larger than a beam's dimensions usually leave open ({test})")
+            }
             Verdict::Doubtful => format!(
                 "the misfit is larger than the stated uncertainties allow: they are too small, or \
                  the model lacks something ({test})"

@@ -20,6 +20,20 @@ const BEAM_FACTORS: [f64; 3] = [1.0, 0.75, 1.33];
 /// So many of the most promising places are followed down.
 const FOLLOWED: usize = 4;
 
+/// A place for every valley there may be: every second of the grid's.
+pub(super) fn everywhere(nominal: &Point, fit: &[Parameter]) -> Vec<Point> {
+    let axes = axes(nominal, fit);
+    let mut found = Vec::new();
+    for_each([axes[0].len(), axes[1].len(), axes[2].len()], |[i, j, k]| {
+        if (i + j) % 2 == 0 || axes[0].len() * axes[1].len() < 10 {
+            let mut point = *nominal;
+            (point[0], point[1], point[2]) = (axes[0][i], axes[1][j], axes[2][k]);
+            found.push(point);
+        }
+    });
+    found
+}
+
 /// The most promising places of the grid, the best first; no two of them neighbours.
 pub(super) fn promising(problem: &Problem<'_>, nominal: &Point, fit: &[Parameter]) -> Vec<Point> {
     let beam = [Parameter::Modulus, Parameter::Density];
@@ -49,23 +63,7 @@ fn grid_minima(problem: &Problem<'_>, at: &Point, fit: &[Parameter]) -> Vec<(f64
         .iter()
         .map(|lambda| problem.model.body.functions(*lambda))
         .collect();
-    let [log_kx, log_ky] = log_nondimensional(at);
-    let units = [at[0] - log_kx, at[1] - log_ky];
-    let decades = |decades: &[f64], unit: f64| -> Vec<f64> {
-        decades.iter().map(|d| d * LN_10 + unit).collect()
-    };
-    let values = |parameter: Parameter, grid: Vec<f64>| {
-        if fit.contains(&parameter) {
-            grid
-        } else {
-            vec![at[parameter.index()]]
-        }
-    };
-    let axes = [
-        values(Parameter::Kt, decades(&TRANSLATION_DECADES, units[0])),
-        values(Parameter::Kr, decades(&ROTATION_DECADES, units[1])),
-        values(Parameter::Coupling, COUPLINGS.to_vec()),
-    ];
+    let axes = axes(at, fit);
     let place = |index: [usize; 3]| {
         let mut point = *at;
         for axis in 0..3 {
@@ -88,6 +86,27 @@ fn grid_minima(problem: &Problem<'_>, at: &Point, fit: &[Parameter]) -> Vec<(f64
         }
     });
     minima
+}
+
+/// Values tried of Kt, Kr and the coupling: one alone where it is held.
+fn axes(at: &Point, fit: &[Parameter]) -> [Vec<f64>; 3] {
+    let [log_kx, log_ky] = log_nondimensional(at);
+    let units = [at[0] - log_kx, at[1] - log_ky];
+    let decades = |decades: &[f64], unit: f64| -> Vec<f64> {
+        decades.iter().map(|d| d * LN_10 + unit).collect()
+    };
+    let values = |parameter: Parameter, grid: Vec<f64>| {
+        if fit.contains(&parameter) {
+            grid
+        } else {
+            vec![at[parameter.index()]]
+        }
+    };
+    [
+        values(Parameter::Kt, decades(&TRANSLATION_DECADES, units[0])),
+        values(Parameter::Kr, decades(&ROTATION_DECADES, units[1])),
+        values(Parameter::Coupling, COUPLINGS.to_vec()),
+    ]
 }
 
 fn for_each(sizes: [usize; 3], mut visit: impl FnMut([usize; 3])) {
@@ -133,7 +152,8 @@ fn approximate_cost(
 
 /// About how far (1, relative) a predicted frequency is from the place of these functions.
 fn approximate_miss(at: &InterfaceFunctions, joint: &JointCompliance, number: usize) -> f64 {
-    let (value, slope) = at.equation(joint);
+    let equation = at.equation(joint);
+    let (value, _) = equation;
     let count = at.count(joint, value);
     // Neighbouring roots are about pi apart in lambda; f grows as its square.
     let spacing = 2.0 * PI / at.lambda;
@@ -142,6 +162,6 @@ fn approximate_miss(at: &InterfaceFunctions, joint: &JointCompliance, number: us
     } else {
         number - 1 - count
     };
-    let newton = 2.0 * (value / slope / at.lambda).abs();
+    let newton = 2.0 * (at.newton_step(equation) / at.lambda).abs();
     newton.min(0.5 * spacing) + modes_off as f64 * spacing
 }

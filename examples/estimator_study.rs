@@ -141,7 +141,9 @@ struct Sample {
 
 fn noisy_case(model: PairsModel, noise: f64, index: usize) -> Option<[Option<Sample>; 3]> {
     let mut case = draw(model, 2, index)?;
-    let at_truth = estimator(&case.frequencies, &settings(model), noise).ok()?.fit();
+    let at_truth = estimator(&case.frequencies, &settings(model), noise)
+        .ok()?
+        .fit();
     let noisy: Vec<f64> = case
         .frequencies
         .iter()
@@ -150,7 +152,10 @@ fn noisy_case(model: PairsModel, noise: f64, index: usize) -> Option<[Option<Sam
             frequency * (1.0 + noise * normal)
         })
         .collect();
-    let estimate = estimator(&noisy, &settings(model), noise).ok()?.estimate().ok()?;
+    let estimate = estimator(&noisy, &settings(model), noise)
+        .ok()?
+        .estimate()
+        .ok()?;
     let lambdas: Vec<f64> = noisy.iter().map(|f| strip().lambda_of(*f)).collect();
     let pairs = estimate_pairs(model, &ModeLambda::numbered(&lambdas)).ok();
     let pairs = pairs.and_then(|pairs| pairs.joint());
@@ -160,9 +165,18 @@ fn noisy_case(model: PairsModel, noise: f64, index: usize) -> Option<[Option<Sam
     for (index, quantity) in quantities.into_iter().enumerate() {
         let std = at_truth.stds.get(index).copied().flatten();
         samples[index] = std.and_then(|std| {
-            let scale = if index == 2 { 1.0 - truth[2].powi(2) } else { 1.0 };
+            let scale = if index == 2 {
+                1.0 - truth[2].powi(2)
+            } else {
+                1.0
+            };
             let pairs = pairs.as_ref().map(|joint| value(joint, index));
-            sample(&estimate, quantity, (value(&case.joint, index), pairs), std * scale)
+            sample(
+                &estimate,
+                quantity,
+                (value(&case.joint, index), pairs),
+                std * scale,
+            )
         });
     }
     Some(samples)
@@ -180,7 +194,11 @@ fn sample(
 ) -> Option<Sample> {
     let found = estimate.quantity(quantity)?;
     // Stiffnesses by their relative error, the coupling by its own.
-    let scale = if quantity == Quantity::Coupling { 1.0 } else { truth };
+    let scale = if quantity == Quantity::Coupling {
+        1.0
+    } else {
+        truth
+    };
     let above = found.low.is_none_or(|low| low <= truth);
     let below = found.high.is_none_or(|high| truth <= high);
     let at_least = found.at_least.map(|limit| truth >= limit);
@@ -237,9 +255,15 @@ fn noisy_study(model: PairsModel, noise: f64, cases: usize) {
             "{model:>15} {:>6.2} {name:>9} {count:>6} {bias:>+7.3} {:>6} {:>6} {:>5} {:>6} {:>10.2e} {:>10.2e} {:>8.1} {:>8.1}",
             100.0 * noise,
             percent(region().filter(|sample| sample.covered).count(), count),
-            percent(all.iter().filter(|sample| sample.covered).count(), all.len()),
+            percent(
+                all.iter().filter(|sample| sample.covered).count(),
+                all.len()
+            ),
             one_sided.len(),
-            percent(one_sided.iter().filter(|right| **right).count(), one_sided.len()),
+            percent(
+                one_sided.iter().filter(|right| **right).count(),
+                one_sided.len()
+            ),
             rms(both().map(|sample| sample.error)),
             rms(both().map(pairs)),
             rms(both().map(pairs)) / rms(both().map(|sample| sample.error)),
@@ -259,8 +283,19 @@ fn main() {
     }
     println!(
         "\n{:>15} {:>6} {:>9} {:>6} {:>7} {:>6} {:>6} {:>5} {:>6} {:>10} {:>10} {:>8} {:>8}",
-        "model", "noise%", "of", "cases", "bias/s", "cover%", "all%", "one-s", "right%", "rms", "rms pairs",
-        "rms x", "median x"
+        "model",
+        "noise%",
+        "of",
+        "cases",
+        "bias/s",
+        "cover%",
+        "all%",
+        "one-s",
+        "right%",
+        "rms",
+        "rms pairs",
+        "rms x",
+        "median x"
     );
     for model in [PairsModel::TwoParameter, PairsModel::ThreeParameter] {
         for noise in NOISE {

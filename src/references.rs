@@ -16,3 +16,5 @@
 //! - **Bathe**: "Finite Element Procedures", 11.6. Subspace iteration.
 //! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
 //!   the beam element with shear and rotary inertia.
+//! - **Madsen, Nielsen & Tingleff 2004**: "Methods for Non-Linear Least Squares Problems",
+//!   Technical University of Denmark. Levenberg and Marquardt's method and its damping rule.

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
+//!                         consistent  least squares on the frequencies themselves
 //!                         free_beam  modulus and density of a beam without a joint
 //!                      -> estimate   with uncertainty, in SI units, with what speaks against it
 //!                      -> predict    frequencies of the estimate beside the measured ones

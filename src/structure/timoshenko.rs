@@ -259,8 +259,7 @@ pub(super) fn slopes(lambda: f64, slenderness: &Slenderness) -> EndSlopes {
                 * (dw.b2 * p.cos_cosh_less_one + w.b2 * dp.cos_cosh_less_one)
                 + coupling * p.sin_sinh
                 + w.coupling_coefficient(s2) * dp.sin_sinh),
-        f3: dp.cos_cosh_less_one
-            + 0.5 * (free * p.sin_sinh + w.free_coefficient(s2) * dp.sin_sinh),
+        f3: dp.cos_cosh_less_one + 0.5 * (free * p.sin_sinh + w.free_coefficient(s2) * dp.sin_sinh),
         f4: 0.5 * (ratio_slope * (1.0 - ratio.powi(-2)) * p.cos_cosh)
             + 0.5 * (ratio + 1.0 / ratio) * dp.cos_cosh
             - 0.5 * (dw.difference * p.sin_sinh + w.difference * dp.sin_sinh),

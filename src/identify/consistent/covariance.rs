@@ -122,4 +122,3 @@ fn inverse_of_triangle(rows: &[f64], scales: &[f64]) -> Vec<Vec<f64>> {
     }
     inverse
 }
-

@@ -112,7 +112,12 @@ impl Finished<'_> {
             let quantity = Quantity::of(parameter).first()?;
             Some((parameter, limit_of(*quantity, point)?))
         };
-        self.estimator.settings.fit.iter().filter_map(limit).collect()
+        self.estimator
+            .settings
+            .fit
+            .iter()
+            .filter_map(limit)
+            .collect()
     }
 
     fn measured(&self) -> bool {
@@ -130,7 +135,11 @@ impl Finished<'_> {
 
     fn quantities(&self) -> Vec<EstimatedQuantity> {
         let settings = &self.estimator.settings;
-        let nuisances = self.estimator.nuisances.iter().map(|(parameter, _)| *parameter);
+        let nuisances = self
+            .estimator
+            .nuisances
+            .iter()
+            .map(|(parameter, _)| *parameter);
         let parameters = settings.fit.iter().copied().chain(nuisances);
         parameters
             .flat_map(|parameter| Quantity::of(parameter).iter())
@@ -170,7 +179,11 @@ impl Finished<'_> {
         result
     }
 
-    fn add_interval(&self, result: &mut EstimatedQuantity, (gradient, unit): (&Point, Option<f64>)) {
+    fn add_interval(
+        &self,
+        result: &mut EstimatedQuantity,
+        (gradient, unit): (&Point, Option<f64>),
+    ) {
         let quantity = result.quantity;
         let back = |coordinate: f64| match quantity {
             Quantity::Coupling => coordinate.tanh(),

@@ -159,24 +159,30 @@ fn flat(values: &[f64], directions: &[Vec<f64>], fit: &[Parameter]) -> Vec<FlatD
     found
 }
 
-/// "only kx * ky^0.3 is determined".
+/// "only kt * kr^0.30 is determined".
 fn determined_words(direction: &[f64], fit: &[Parameter], std: f64) -> String {
     let largest = largest_part(direction);
-    let factors: Vec<String> = fit
-        .iter()
-        .zip(direction)
-        .map(|(parameter, part)| (parameter, part / largest))
-        .filter(|(_, exponent)| exponent.abs() > NEGLIGIBLE)
-        .map(|(parameter, exponent)| power(*parameter, exponent))
-        .collect();
+    let mut product = String::new();
+    for (parameter, part) in fit.iter().zip(direction) {
+        let exponent = part / largest;
+        if exponent.abs() > NEGLIGIBLE {
+            let sign = match (product.is_empty(), exponent > 0.0) {
+                (true, true) => "",
+                (true, false) => "1 / ",
+                (false, true) => " * ",
+                (false, false) => " / ",
+            };
+            product += sign;
+            product += &power(*parameter, exponent.abs());
+        }
+    }
     format!(
-        "only {} is determined; across it the estimate is open by {}",
-        factors.join(" * "),
+        "only {product} is determined; across it the estimate is open by {}",
         factor_words(std)
     )
 }
 
-/// "raising kx by 10 % with ky lowered by 3 % changes hardly any frequency".
+/// "kt +10 % with kr -3 % together change hardly any frequency".
 fn flat_words(direction: &[f64], fit: &[Parameter], std: f64) -> String {
     let largest = largest_part(direction);
     let changes: Vec<String> = fit
@@ -193,13 +199,11 @@ fn flat_words(direction: &[f64], fit: &[Parameter], std: f64) -> String {
     )
 }
 
-/// The part of largest size, with its sign.
+/// The part of largest size, with its sign; of nearly equal ones the first.
 fn largest_part(direction: &[f64]) -> f64 {
-    direction
-        .iter()
-        .copied()
-        .max_by(|a, b| a.abs().total_cmp(&b.abs()))
-        .unwrap_or(1.0)
+    let size = direction.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    let first = direction.iter().find(|part| part.abs() >= 0.999 * size);
+    first.copied().unwrap_or(1.0)
 }
 
 fn power(parameter: Parameter, exponent: f64) -> String {

@@ -134,7 +134,9 @@ fn expand(
         }
         // A straight profile is met at once; a flat one is walked in growing strides.
         let straight = offset * wanted / (wanted + far.excess).max(0.1 * wanted);
-        offset = (1.05 * straight).clamp(1.1 * offset, offset + 3.0).min(furthest);
+        offset = (1.05 * straight)
+            .clamp(1.1 * offset, offset + 3.0)
+            .min(furthest);
         near = far;
     }
 }

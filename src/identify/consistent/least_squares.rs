@@ -1,4 +1,5 @@
-//! Levenberg's and Marquardt's damped least squares for a handful of unknowns.
+//! Levenberg's and Marquardt's damped least squares for a handful of unknowns (Madsen, Nielsen &
+//! Tingleff 2004).
 //!
 //! Each step solves the linearised problem by Householder's reflections, never by its normal
 //! equations, which would square the condition number: stiffnesses that the frequencies hardly
@@ -131,12 +132,7 @@ pub(super) fn descend(
 }
 
 /// The point one step on, within bounds, and the longest change of a parameter.
-fn moved(
-    problem: &Problem<'_>,
-    from: &Point,
-    directions: &[Point],
-    step: &[f64],
-) -> (Point, f64) {
+fn moved(problem: &Problem<'_>, from: &Point, directions: &[Point], step: &[f64]) -> (Point, f64) {
     let mut change = [0.0; PARAMETERS];
     for (direction, length) in directions.iter().zip(step) {
         for (change, part) in change.iter_mut().zip(direction) {

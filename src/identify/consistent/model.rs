@@ -253,66 +253,20 @@ impl FrequencyModel {
 
     /// The mode's frequency at a point, its root looked for from `guess` (lambda) on.
     pub fn response(&self, point: &Point, mode: usize, guess: f64) -> ModeResponse {
-        let beam = beam_at(&self.structure.beam, point);
-        let (lambda, springs, attached) = match &self.free {
-            Some(lambdas) => self.free_mode(lambdas, mode),
-            None => self.jointed_mode(point, mode, guess),
-        };
-        let [by_kt, by_kr, by_coupling] = springs;
-        let [by_masses, by_supports] = attached;
-        // Degree 1/2 in all stiffnesses, -1/2 in all masses.
-        let by_modulus = 0.5 - by_kt - by_kr - by_supports;
-        let by_density = -0.5 - by_masses;
-        let (mass, support) = self.attachment_ratios(point);
-        let correction = by_masses * mass + by_supports * support;
-        ModeResponse {
-            frequency: beam.frequency_of(lambda) * correction.exp(),
-            lambda,
-            sensitivity: [
-                by_kt,
-                by_kr,
-                by_coupling,
-                by_modulus,
-                by_density,
-                // f = L^-2 g(Kt L^3, Kr L, k L^3, m/L).
-                -2.0 + 3.0 * (by_kt + by_supports) + by_kr - by_masses,
-                by_modulus + by_density,
-                3.0 * by_modulus + by_density,
-            ],
-        }
+        self.at(point).response(mode, guess)
     }
 
-    fn free_mode(&self, lambdas: &[f64], mode: usize) -> (f64, [f64; 3], [f64; 2]) {
-        let attached = match &self.body {
-            JointedBody::Elements(modes) => modes.free_attachment_sensitivity(mode - 1),
-            _ => [0.0; 2],
-        };
-        (lambdas[mode - 1], [0.0; 3], attached)
-    }
-
-    /// d ln f = 2 d ln lambda, with a = 1/Kx, b = 1/Ky and c = coupling sqrt(ab).
-    fn jointed_mode(
-        &self,
-        point: &Point,
-        mode: usize,
-        guess: f64,
-    ) -> (f64, [f64; 3], [f64; 2]) {
+    /// The model at a point: what all modes share.
+    pub(super) fn at(&self, point: &Point) -> ModelAt<'_> {
         let joint = self.compliance(point);
-        let root = interface_root(&self.body, &joint, mode, guess);
-        let [by_a, by_b, by_c] = root.by_compliance;
-        let scale = 2.0 / root.lambda;
         let coupling = point[Parameter::Coupling.index()].tanh();
-        let crossed = (joint.a * joint.b).sqrt();
-        let springs = [
-            -scale * (by_a * joint.a + 0.5 * by_c * joint.c),
-            -scale * (by_b * joint.b + 0.5 * by_c * joint.c),
-            scale * by_c * crossed * (1.0 - coupling * coupling),
-        ];
-        let attached = match &self.body {
-            JointedBody::Elements(modes) => modes.attachment_sensitivity(root.lambda, root.load),
-            _ => [0.0; 2],
-        };
-        (root.lambda, springs, attached)
+        ModelAt {
+            model: self,
+            unit_frequency: beam_at(&self.structure.beam, point).unit_frequency(),
+            joint,
+            by_coupling: (joint.a * joint.b).sqrt() * (1.0 - coupling * coupling),
+            ratios: self.attachment_ratios(point),
+        }
     }
 
     pub(super) fn compliance(&self, point: &Point) -> JointCompliance {
@@ -370,12 +324,82 @@ impl FrequencyModel {
     }
 }
 
+/// A model at one point.
+pub(super) struct ModelAt<'a> {
+    model: &'a FrequencyModel,
+    /// Frequency (Hz) at lambda = 1.
+    unit_frequency: f64,
+    joint: JointCompliance,
+    /// Derivative of the cross compliance with the coupling's atanh.
+    by_coupling: f64,
+    /// Logarithms by which the shares of attached masses and springs have moved.
+    ratios: (f64, f64),
+}
+
+impl ModelAt<'_> {
+    /// The mode's frequency, its root looked for from `guess` (lambda) on.
+    pub(super) fn response(&self, mode: usize, guess: f64) -> ModeResponse {
+        let (lambda, springs, attached) = match &self.model.free {
+            Some(lambdas) => self.free_mode(lambdas, mode),
+            None => self.jointed_mode(mode, guess),
+        };
+        let [by_kt, by_kr, by_coupling] = springs;
+        let [by_masses, by_supports] = attached;
+        // Degree 1/2 in all stiffnesses, -1/2 in all masses.
+        let by_modulus = 0.5 - by_kt - by_kr - by_supports;
+        let by_density = -0.5 - by_masses;
+        let (mass, support) = self.ratios;
+        let correction = (by_masses * mass + by_supports * support).exp();
+        ModeResponse {
+            frequency: lambda * lambda * self.unit_frequency * correction,
+            lambda,
+            sensitivity: [
+                by_kt,
+                by_kr,
+                by_coupling,
+                by_modulus,
+                by_density,
+                // f = L^-2 g(Kt L^3, Kr L, k L^3, m/L).
+                -2.0 + 3.0 * (by_kt + by_supports) + by_kr - by_masses,
+                by_modulus + by_density,
+                3.0 * by_modulus + by_density,
+            ],
+        }
+    }
+
+    fn free_mode(&self, lambdas: &[f64], mode: usize) -> (f64, [f64; 3], [f64; 2]) {
+        let attached = match &self.model.body {
+            JointedBody::Elements(modes) => modes.free_attachment_sensitivity(mode - 1),
+            _ => [0.0; 2],
+        };
+        (lambdas[mode - 1], [0.0; 3], attached)
+    }
+
+    /// d ln f = 2 d ln lambda, with a = 1/Kx, b = 1/Ky and c = coupling sqrt(ab).
+    fn jointed_mode(&self, mode: usize, guess: f64) -> (f64, [f64; 3], [f64; 2]) {
+        let (joint, body) = (&self.joint, &self.model.body);
+        let root = interface_root(body, joint, mode, guess);
+        let [by_a, by_b, by_c] = root.by_compliance;
+        let scale = 2.0 / root.lambda;
+        let springs = [
+            -scale * (by_a * joint.a + 0.5 * by_c * joint.c),
+            -scale * (by_b * joint.b + 0.5 * by_c * joint.c),
+            scale * by_c * self.by_coupling,
+        ];
+        let attached = match body {
+            JointedBody::Elements(modes) => modes.attachment_sensitivity(root.lambda, root.load),
+            _ => [0.0; 2],
+        };
+        (root.lambda, springs, attached)
+    }
+}
+
 /// ln Kx and ln Ky at a point: Kx = Kt L^3/(E I), Ky = Kr L/(E I), I = b h^3/12.
 pub(super) fn log_nondimensional(point: &Point) -> [f64; 2] {
     let at = |parameter: Parameter| point[parameter.index()];
     let length = at(Parameter::Length);
-    let stiffness = at(Parameter::Modulus) + at(Parameter::Width) + 3.0 * at(Parameter::Thickness)
-        - 12f64.ln();
+    let stiffness =
+        at(Parameter::Modulus) + at(Parameter::Width) + 3.0 * at(Parameter::Thickness) - 12f64.ln();
     [
         at(Parameter::Kt) + 3.0 * length - stiffness,
         at(Parameter::Kr) + length - stiffness,
@@ -415,12 +439,7 @@ fn free_lambdas(body: &JointedBody, highest: usize) -> Result<Vec<f64>, Structur
             natural_lambdas(Assembly::Free, &JointStiffness::FREE, highest)
         }
         JointedBody::Rooted(slenderness) => {
-            let modes = natural_modes(
-                Assembly::Free,
-                &JointStiffness::FREE,
-                slenderness,
-                highest,
-            )?;
+            let modes = natural_modes(Assembly::Free, &JointStiffness::FREE, slenderness, highest)?;
             Ok(modes.iter().map(|mode| mode.lambda).collect())
         }
         JointedBody::Elements(modes) if modes.free_squares().len() >= highest => {

@@ -90,8 +90,9 @@ impl Problem<'_> {
             lambdas: Vec::with_capacity(self.data.len()),
             frequencies: Vec::with_capacity(self.data.len()),
         };
+        let model = self.model.at(point);
         for (datum, guess) in self.data.iter().zip(guesses) {
-            let response = self.model.response(point, datum.mode, *guess);
+            let response = model.response(datum.mode, *guess);
             let residual = (response.frequency - datum.frequency) / datum.std;
             let (cost, weight) = self.loss.of(residual);
             let (root, scale) = (weight.sqrt(), response.frequency / datum.std);

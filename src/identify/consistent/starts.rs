@@ -24,13 +24,16 @@ const FOLLOWED: usize = 4;
 pub(super) fn everywhere(nominal: &Point, fit: &[Parameter]) -> Vec<Point> {
     let axes = axes(nominal, fit);
     let mut found = Vec::new();
-    for_each([axes[0].len(), axes[1].len(), axes[2].len()], |[i, j, k]| {
-        if (i + j) % 2 == 0 || axes[0].len() * axes[1].len() < 10 {
-            let mut point = *nominal;
-            (point[0], point[1], point[2]) = (axes[0][i], axes[1][j], axes[2][k]);
-            found.push(point);
-        }
-    });
+    for_each(
+        [axes[0].len(), axes[1].len(), axes[2].len()],
+        |[i, j, k]| {
+            if (i + j) % 2 == 0 || axes[0].len() * axes[1].len() < 10 {
+                let mut point = *nominal;
+                (point[0], point[1], point[2]) = (axes[0][i], axes[1][j], axes[2][k]);
+                found.push(point);
+            }
+        },
+    );
     found
 }
 
@@ -132,11 +135,7 @@ fn neighbours(index: [usize; 3], sizes: [usize; 3]) -> impl Iterator<Item = [usi
     })
 }
 
-fn approximate_cost(
-    problem: &Problem<'_>,
-    functions: &[InterfaceFunctions],
-    point: &Point,
-) -> f64 {
+fn approximate_cost(problem: &Problem<'_>, functions: &[InterfaceFunctions], point: &Point) -> f64 {
     let joint = problem.model.compliance(point);
     let uncounted = problem.model.body.uncounted();
     problem

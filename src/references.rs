@@ -22,3 +22,5 @@
 //!   model biases what a larger one estimates less precisely.
 //! - **DerSimonian & Laird 1986**, Controlled Clinical Trials 7, 177-188, and **Hartung & Knapp 2001**,
 //!   Statistics in Medicine 20, 3875-3889. Mean of values that scatter beyond their own uncertainty.
+//! - **Madsen, Nielsen & Tingleff 2004**: "Methods for Non-Linear Least Squares Problems",
+//!   Technical University of Denmark. Levenberg and Marquardt's method and its damping rule.

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
+//!                         consistent  least squares on the frequencies themselves
 //!                         free_beam  modulus and density of a beam without a joint
 //!                      -> estimate   with uncertainty, in SI units, with what speaks against it
 //!                      -> predict    frequencies of the estimate beside the measured ones
@@ -11,6 +12,7 @@
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
 
+pub mod consistent;
 pub mod doubt;
 pub mod estimate;
 pub mod free_beam;
@@ -68,6 +70,32 @@ pub enum IdentifyError {
         /// What helps.
         remedy: &'static str,
     },
+    /// Fewer frequencies than unknowns.
+    #[error(
+        "{found} frequencies cannot determine {unknowns} unknowns; measure more modes, or estimate \
+         fewer parameters"
+    )]
+    TooFewFrequencies {
+        /// How many parameters are to be estimated.
+        unknowns: usize,
+        /// How many frequencies were given.
+        found: usize,
+    },
+    /// Measured weights without an uncertainty to weigh by.
+    #[error(
+        "mode {mode} has no standard uncertainty to weigh it by; state half_line, std or scatter, \
+         or take weights = \"relative\""
+    )]
+    NoUncertainty {
+        /// The mode's number.
+        mode: usize,
+    },
+    /// Nothing was asked for, or what the structure does not have.
+    #[error(
+        "there is nothing to estimate: name at least one parameter, and no joint stiffness of a \
+         free beam"
+    )]
+    NothingToEstimate,
     /// A frequency that is no frequency.
     #[error("mode {mode} has the frequency {value}, but it must be positive and finite")]
     Frequency {

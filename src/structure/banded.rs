@@ -51,6 +51,18 @@ impl BandedSymmetric {
         sum
     }
 
+    /// With all its zeros.
+    fn dense(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.size, self.size, |row, column| {
+            let (row, column) = (row.max(column), row.min(column));
+            if row - column > self.half_band {
+                0.0
+            } else {
+                self.get(row, column)
+            }
+        })
+    }
+
     fn first_column(&self, row: usize) -> usize {
         row.saturating_sub(self.half_band)
     }
@@ -96,6 +108,12 @@ impl BandedSymmetric {
 
     /// Solves (factor factor^T) x = b in place, for each column, self being the factor.
     fn solve_in_place(&self, columns: &mut DMatrix<f64>) {
+        self.solve_lower(columns);
+        self.solve_upper(columns);
+    }
+
+    /// Solves factor x = b in place, for each column, self being the factor.
+    fn solve_lower(&self, columns: &mut DMatrix<f64>) {
         for mut x in columns.column_iter_mut() {
             for row in 0..self.size {
                 let sum: f64 = (self.first_column(row)..row)
@@ -103,6 +121,12 @@ impl BandedSymmetric {
                     .sum();
                 x[row] = (x[row] - sum) / self.get(row, row);
             }
+        }
+    }
+
+    /// Solves factor^T x = b in place, for each column, self being the factor.
+    fn solve_upper(&self, columns: &mut DMatrix<f64>) {
+        for mut x in columns.column_iter_mut() {
             for row in (0..self.size).rev() {
                 x[row] /= self.get(row, row);
                 let value = x[row];
@@ -159,6 +183,49 @@ pub(super) fn lowest_eigenvectors(
     }
     // What still moves in the eleventh digit after all steps is rounding, not convergence.
     Ok(vectors.columns(0, count).into_owned())
+}
+
+/// All eigenvalues of (K - shift M) x = mu M x, ascending, and their vectors of unit modal mass;
+/// `shifted` is K, positive definite.
+///
+/// With L L^T = K the matrix L^-1 M L^-T has the eigenvalues 1/(mu + shift): the lowest modes are
+/// its largest and most exact.
+pub(super) fn all_modes(
+    shifted: &BandedSymmetric,
+    mass: &BandedSymmetric,
+    shift: f64,
+) -> Result<(Vec<f64>, DMatrix<f64>), StructureError> {
+    let failure = |reason: &str| StructureError::FiniteElements {
+        reason: reason.to_owned(),
+    };
+    let factor = shifted
+        .cholesky()
+        .ok_or_else(|| failure("the stiffness matrix is not positive definite"))?;
+    let mut half = mass.dense();
+    factor.solve_lower(&mut half);
+    let mut inverse = half.transpose();
+    factor.solve_lower(&mut inverse);
+    if !inverse.iter().all(|entry| entry.is_finite()) {
+        return Err(failure("the stiffness matrix is nearly singular"));
+    }
+    let inverse = 0.5 * (&inverse + inverse.transpose());
+    let eigen = SymmetricEigen::try_new(inverse, f64::EPSILON, 10_000)
+        .ok_or_else(|| failure("its eigenvalues did not settle"))?;
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len())
+        .filter(|&i| eigen.eigenvalues[i] > 0.0)
+        .collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let mut vectors = eigen.eigenvectors.select_columns(order.iter());
+    factor.solve_upper(&mut vectors);
+    // y^T M' y = 1/(mu + shift) for a unit vector y of M' = L^-1 M L^-T, and x = L^-T y.
+    for (mut column, &i) in vectors.column_iter_mut().zip(&order) {
+        column /= eigen.eigenvalues[i].sqrt();
+    }
+    let squares = order
+        .iter()
+        .map(|&i| 1.0 / eigen.eigenvalues[i] - shift)
+        .collect();
+    Ok((squares, vectors))
 }
 
 /// Waves of growing number: close to the mode shapes of any beam, and independent.

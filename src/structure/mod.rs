@@ -11,13 +11,16 @@
 //! Beam, JointStiffness -> natural_lambdas / natural_frequencies -> mode_shapes
 //!                          (closed form, counted so that no root is missed)
 //! finite_elements          the same structures by an independent route
+//! interface                either of both seen from the joint, with exact derivatives
 //! ```
 //!
 //! This module must not import anything about measurements.
 
 pub mod beam;
+pub mod end_slopes;
 pub mod finite_elements;
 pub mod frequency_equation;
+pub mod interface;
 pub mod joint;
 pub mod mode_shape;
 pub mod receptance;

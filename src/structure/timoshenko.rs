@@ -16,6 +16,7 @@
 //! turn into cos and sin; everything below depends on alpha^2 alone and stays real.
 
 use super::Slenderness;
+use super::end_slopes::EndSlopes;
 use super::receptance::EndFunctions;
 use std::f64::consts::PI;
 
@@ -202,4 +203,115 @@ fn assemble(lambda: f64, slenderness: &Slenderness, w: &Waves, p: &Products) -> 
         f6: 0.5 * w.sum / w.b2 * (w.mb * p.cos_sinh + w.ma * p.sin_cosh),
         pinned_pinned_count: w.pinned_pinned_count(),
     }
+}
+
+/// Derivatives of the wave numbers and amplitudes with lambda.
+struct WaveSlopes {
+    b2: f64,
+    difference: f64,
+    sum: f64,
+    below_onset: f64,
+    alpha2: f64,
+    beta2: f64,
+    ma: f64,
+    mb: f64,
+}
+
+impl WaveSlopes {
+    fn new(lambda: f64, slenderness: &Slenderness, w: &Waves) -> Self {
+        let (r2, s2) = (slenderness.rotary, slenderness.shear);
+        let b2 = 4.0 * lambda.powi(3);
+        let difference = b2 * w.both;
+        // From sum^2 = b^4 (r^2 - s^2)^2 + 4 b^2.
+        let sum = (w.b2 * (r2 - s2).powi(2) + 2.0) * b2 / w.sum;
+        let ma = 0.5 * (b2 * (s2 - r2) + sum);
+        Self {
+            b2,
+            difference,
+            sum,
+            below_onset: -b2 * r2 * s2,
+            alpha2: 0.5 * (sum - difference),
+            beta2: 0.5 * (difference + sum),
+            ma,
+            mb: (b2 - w.mb * ma) / w.ma,
+        }
+    }
+}
+
+/// Derivatives of the end functions with lambda, scaled as [`closed_form`] scales the functions.
+pub(super) fn slopes(lambda: f64, slenderness: &Slenderness) -> EndSlopes {
+    let w = Waves::new(lambda, slenderness);
+    let dw = WaveSlopes::new(lambda, slenderness, &w);
+    let s2 = slenderness.shear;
+    let (p, dp) = products_and_slopes(&w, &dw);
+    let free = w.both * dw.difference;
+    let free = -w.both * (free + 3.0 * dw.below_onset) + 2.0 * s2 * (free + 2.0 * dw.below_onset)
+        - s2 * s2 * dw.difference;
+    let coupling = w.both * dw.difference + 2.0 * dw.below_onset - s2 * dw.difference;
+    let ratio = w.ma / w.mb;
+    let ratio_slope = (dw.ma - ratio * dw.mb) / w.mb;
+    let turned = w.mb * p.cos_sinh + w.ma * p.sin_cosh;
+    let turned_slope =
+        dw.mb * p.cos_sinh + w.mb * dp.cos_sinh + dw.ma * p.sin_cosh + w.ma * dp.sin_cosh;
+    EndSlopes {
+        f1: 0.5
+            * ((slenderness.rotary - s2)
+                * (dw.b2 * p.cos_cosh_less_one + w.b2 * dp.cos_cosh_less_one)
+                + coupling * p.sin_sinh
+                + w.coupling_coefficient(s2) * dp.sin_sinh),
+        f3: dp.cos_cosh_less_one + 0.5 * (free * p.sin_sinh + w.free_coefficient(s2) * dp.sin_sinh),
+        f4: 0.5 * (ratio_slope * (1.0 - ratio.powi(-2)) * p.cos_cosh)
+            + 0.5 * (ratio + 1.0 / ratio) * dp.cos_cosh
+            - 0.5 * (dw.difference * p.sin_sinh + w.difference * dp.sin_sinh),
+        f5: 0.5 * (dw.sum * p.pinned + w.sum * dp.pinned),
+        f6: 0.5 / w.b2 * ((dw.sum - w.sum * dw.b2 / w.b2) * turned + w.sum * turned_slope),
+    }
+}
+
+/// The products of [`closed_form`] and their derivatives.
+fn products_and_slopes(w: &Waves, dw: &WaveSlopes) -> (Products, Products) {
+    let beta = w.beta2.sqrt();
+    let (sine, cosine) = beta.sin_cos();
+    let sine = sine / beta;
+    let (one, cosh, sinh) = hyperbolic(w.alpha2);
+    // d(cos b) = -(sin b / b) d(b^2)/2 and d(sin b / b) = (cos b - sin b / b) d(b^2)/(2 b^2).
+    let cosine_slope = -0.5 * sine * dw.beta2;
+    let sine_slope = 0.5 * (cosine - sine) / w.beta2 * dw.beta2;
+    let cosh_slope = 0.5 * sinh * dw.alpha2;
+    let sinh_slope = dw.alpha2
+        * if w.alpha2.abs() < 1e-6 {
+            one / 6.0
+        } else {
+            0.5 * (cosh - sinh) / w.alpha2
+        };
+    let (cos_sinh, sin_cosh) = (cosine * sinh, sine * cosh);
+    let less_one = (cosine * cosh - one) / w.b2;
+    let cos_cosh_slope = cosine_slope * cosh + cosine * cosh_slope;
+    let cos_sinh_slope = cosine_slope * sinh + cosine * sinh_slope;
+    let sin_cosh_slope = sine_slope * cosh + sine * cosh_slope;
+    let b4 = w.b2 * w.b2;
+    let pinned = (w.ma * w.alpha2 * cos_sinh - w.mb * w.beta2 * sin_cosh) / b4;
+    let pinned_slope = (dw.ma * w.alpha2 + w.ma * dw.alpha2) * cos_sinh
+        + w.ma * w.alpha2 * cos_sinh_slope
+        - (dw.mb * w.beta2 + w.mb * dw.beta2) * sin_cosh
+        - w.mb * w.beta2 * sin_cosh_slope;
+    let values = Products {
+        one,
+        cos_cosh: cosine * cosh,
+        cos_cosh_less_one: less_one,
+        sin_sinh: sine * sinh,
+        cos_sinh,
+        sin_cosh,
+        pinned,
+    };
+    let slopes = Products {
+        one: 0.0,
+        cos_cosh: cos_cosh_slope,
+        cos_cosh_less_one: (cos_cosh_slope - less_one * dw.b2) / w.b2,
+        sin_sinh: sine_slope * sinh + sine * sinh_slope,
+        cos_sinh: cos_sinh_slope,
+        sin_cosh: sin_cosh_slope,
+        pinned: pinned_slope / b4 - 2.0 * pinned * dw.b2 / w.b2,
+    };
+    (values, slopes)
 }

@@ -22,7 +22,7 @@ const TABLE: &[(&str, &[&str])] = &[
         &["recording", "taps", "spectral", "modal", "stats"],
     ),
     ("structure", &["quantity"]),
-    ("identify", &["modal", "structure"]),
+    ("identify", &["modal", "stats", "structure"]),
     (
         "simulate",
         &["quantity", "description", "recording", "structure", "stats"],

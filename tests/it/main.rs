@@ -7,6 +7,7 @@ mod cli_frf;
 mod description;
 mod errors;
 mod identify;
+mod identify_consistent;
 mod layers;
 mod modal;
 mod modal_fit;

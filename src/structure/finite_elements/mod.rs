@@ -1,5 +1,5 @@
 //! Finite-element models of the same structures: independent of the closed form, and able to
-//! carry what it cannot, point masses and a lap joint of unequal halves.
+//! carry what it cannot, point masses and support springs.
 //!
 //! Lengths are in units of the structure's, stiffness and mass in those of its first beam, so that
 //! all numbers stay near 1.
@@ -9,6 +9,12 @@ use super::element::Element;
 use super::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
+
+mod attachments;
+mod interface_modes;
+
+use attachments::Place;
+pub use interface_modes::{InterfaceModes, PointAttachment};
 
 /// A model ready to be solved.
 #[derive(Debug, Clone)]
@@ -212,41 +218,6 @@ impl FiniteElementModel {
             matrix: *matrix,
             ends: ends.to_vec(),
         });
-    }
-
-    /// Adds a mass (kg) at a position (m) from the joint or the left end, anywhere on an element.
-    /// Of a lap joint, the joint's own place belongs to the right half.
-    ///
-    /// # Errors
-    /// [`StructureError::OffBeam`] for a position outside, [`StructureError::NotPositive`] for a
-    /// negative mass.
-    pub fn with_point_mass(mut self, position: f64, mass: f64) -> Result<Self, StructureError> {
-        let place = position / self.units.length;
-        // A sensor at the very end may have been rounded beyond it.
-        if !(0.0..=1.0 + 1e-9).contains(&place) {
-            return Err(StructureError::OffBeam {
-                position,
-                length: self.units.length,
-            });
-        }
-        if !(mass >= 0.0 && mass.is_finite()) {
-            return Err(StructureError::NotPositive {
-                quantity: "point mass",
-                value: mass,
-            });
-        }
-        let found = self.pieces.iter().rev().find(|piece| piece.start <= place);
-        if let Some(piece) = found.copied() {
-            let along = (place - piece.start) / piece.element.length;
-            let index = (along.max(0.0) as usize).min(piece.elements - 1);
-            let shape = piece.element.displacement(along - index as f64);
-            let mass = mass / self.units.mass;
-            let matrix =
-                std::array::from_fn(|i| std::array::from_fn(|j| mass * shape[i] * shape[j]));
-            let nodes = self.element_equations(&piece, index);
-            scatter(&mut self.mass, &nodes, &matrix);
-        }
-        Ok(self)
     }
 
     /// The lowest `count` natural frequencies (Hz), ascending, without rigid-body motions.

@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""The consistent estimate beside scipy.optimize.least_squares on the same frequencies.
+
+    cargo build --release --example estimator_speed
+    python3 scripts/compare_estimator.py [target/release/examples/estimator_speed]
+
+Both estimate Kx, Ky and the coupling of a three-parameter joint from five noisy frequencies of an
+Euler cantilever, residuals over their standard deviation. The frequency equation is coded here
+anew, its roots by a scan and Brent's method; scipy starts once, at the true joint, where ours looks
+for its starts itself. Needs numpy and scipy.
+"""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+from scipy.optimize import brentq, least_squares
+
+LENGTH, THICKNESS, MODULUS, DENSITY = 0.423, 0.005, 207e9, 7850.0
+UNIT = np.sqrt(MODULUS * THICKNESS**2 / 12 / DENSITY) / (2 * np.pi * LENGTH**2)
+TRUTH = np.array([np.log(1386.0), np.log(4.715), np.arctanh(np.sqrt(1386.0 * 4.715) / 993.0)])
+NOISE = 1e-3
+GRID = np.linspace(0.3, 18.0, 400)
+
+
+def equation(lam, joint):
+    """(ab - c^2) F3 + a F6/lambda - b F5/lambda^3 - 2c F1/lambda^2 - F4/lambda^4, over e^lambda."""
+    a, b = np.exp(-joint[0]), np.exp(-joint[1])
+    c = np.tanh(joint[2]) * np.sqrt(a * b)
+    small = np.exp(-lam)
+    cosh, sinh = 0.5 * (1 + small**2), 0.5 * (1 - small**2)
+    sin, cos = np.sin(lam), np.cos(lam)
+    f1, f3, f4 = sin * sinh, cos * cosh - small, cos * cosh + small
+    f5, f6 = cos * sinh - sin * cosh, cos * sinh + sin * cosh
+    return (a * b - c * c) * f3 + a * f6 / lam - b * f5 / lam**3 - 2 * c * f1 / lam**2 - f4 / lam**4
+
+
+def frequencies(joint):
+    values = equation(GRID, joint)
+    places = np.flatnonzero(values[:-1] * values[1:] < 0)[:5]
+    roots = [brentq(equation, GRID[i], GRID[i + 1], args=(joint,), xtol=1e-13) for i in places]
+    return UNIT * np.array(roots) ** 2
+
+
+def main():
+    program = sys.argv[1] if len(sys.argv) > 1 else "target/release/examples/estimator_speed"
+    output = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    lines = [line.split() for line in output.splitlines()]
+    timings = [line for line in lines if line[0] != "estimate"]
+    ours = np.array([line[1:] for line in lines if line[0] == "estimate"], dtype=float)
+    std = NOISE * frequencies(TRUTH)
+    start = time.perf_counter()
+    theirs = [least_squares(lambda p: (frequencies(p) - f) / std, TRUTH, x_scale="jac") for f in ours[:, :5]]
+    seconds = (time.perf_counter() - start) / len(ours)
+    points = np.array([solution.x for solution in theirs])
+    errors = {
+        "kx": np.abs(np.exp(points[:, 0]) / ours[:, 5] - 1).max(),
+        "ky": np.abs(np.exp(points[:, 1]) / ours[:, 6] - 1).max(),
+        "coupling": np.abs(np.tanh(points[:, 2]) - ours[:, 7]).max(),
+        "chi-squared": np.abs(2 * np.array([s.cost for s in theirs]) - ours[:, 8]).max(),
+    }
+    for name, error in errors.items():
+        print(f"largest difference of {name}: {error:.1e}")
+    fit = next(float(line[1]) for line in timings if line[0] == "fit")
+    full = next(float(line[1]) for line in timings if line[0] == "full")
+    print(f"one estimate with covariance: tapjoint {1e6 * fit:.0f} us, scipy {1e6 * seconds:.0f} us, ratio {seconds / fit:.0f}")
+    print(f"with profile intervals and identifiability: tapjoint {1e6 * full:.0f} us")
+    answers = set()
+    for _, threads, elapsed, converged, low, high in (line for line in timings if line[0] == "monte-carlo"):
+        print(f"Monte Carlo, {converged} estimates on {threads} thread(s): {elapsed} s, Kx {low} to {high}")
+        answers.add((low, high))
+    same = "the same" if len(answers) == 1 else "DIFFERENT"
+    print(f"answers of one and two threads: {same}")
+    return 0 if len(answers) == 1 and max(errors.values()) < 1e-4 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,359 @@
+//! The whole estimate: the fit, its uncertainty, its test, and what it cannot tell.
+
+use super::covariance::Covariance;
+use super::estimator::ConsistentEstimator;
+use super::goodness::Goodness;
+use super::identifiability::identifiability;
+use super::intervals::{End, ONE_SIDED_95, Profile, TWO_SIDED_95};
+use super::least_squares::{LOG_STIFFNESS, Minimum};
+use super::model::{JointedStructure, Parameter, Point, beam_at, log_nondimensional};
+use super::problem::{Problem, along};
+use super::quantities::{Quantity, joint_at};
+use super::result::{
+    ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, Limit, OtherMinimum,
+};
+use super::settings::{ConsistentSettings, Intervals, ResidualWeights};
+use crate::identify::{IdentifyError, MeasuredMode};
+use crate::stats::root_mean_square;
+
+/// Half width of a 95 % interval of a normal distribution, in standard deviations.
+const NORMAL_95: f64 = 1.959_964;
+
+/// Estimates a joint from the frequencies of these modes.
+///
+/// # Errors
+/// As [`ConsistentEstimator::new`].
+pub fn estimate_consistently(
+    structure: &JointedStructure,
+    modes: &[MeasuredMode],
+    settings: &ConsistentSettings,
+) -> Result<ConsistentEstimate, IdentifyError> {
+    ConsistentEstimator::new(structure, modes, settings)?.estimate()
+}
+
+/// A finished fit with what its report needs.
+pub(super) struct Finished<'a> {
+    pub(super) estimator: &'a ConsistentEstimator,
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) best: &'a Minimum,
+    pub(super) directions: &'a [Point],
+    pub(super) covariance: &'a Covariance,
+    pub(super) goodness: Goodness,
+}
+
+impl ConsistentEstimator {
+    /// The estimate with all that is known of it.
+    ///
+    /// # Errors
+    /// [`IdentifyError::NothingToEstimate`] where no start has finite frequencies.
+    pub fn estimate(&self) -> Result<ConsistentEstimate, IdentifyError> {
+        let frequencies = self.frequencies();
+        let (renewed, minima) = self.solve(&frequencies);
+        let model = renewed.as_ref().unwrap_or(&self.model);
+        let problem = self.problem(model, &frequencies);
+        let (best, others) = minima
+            .split_first()
+            .ok_or(IdentifyError::NothingToEstimate)?;
+        let directions = self.directions();
+        let covariance = Covariance::of(&best.at, &directions);
+        let finished = Finished {
+            estimator: self,
+            problem: &problem,
+            best,
+            directions: &directions,
+            covariance: &covariance,
+            goodness: self.goodness(&problem, best, directions.len()),
+        };
+        Ok(ConsistentEstimate {
+            modes_used: self.modes.iter().map(|mode| mode.mode).collect(),
+            fit: self.settings.fit.clone(),
+            quantities: finished.quantities(),
+            covariance: finished.covariance_matrix(),
+            correlations: finished.correlations(),
+            goodness: finished.goodness,
+            modes: finished.modes(),
+            other_minima: others.iter().map(|other| finished.other(other)).collect(),
+            stop: best.stop,
+            identifiability: identifiability(&finished),
+            joint: joint_at(&best.at.point),
+            beam: beam_at(&self.model.structure().beam, &best.at.point),
+        })
+    }
+
+    fn goodness(&self, problem: &Problem<'_>, best: &Minimum, free: usize) -> Goodness {
+        let pairs = problem.data.iter().zip(&best.at.frequencies);
+        let misfits: Vec<f64> = pairs
+            .clone()
+            .map(|(datum, found)| (found - datum.frequency) / datum.frequency)
+            .collect();
+        // The plain sum of squares, whatever the loss: only its distribution is known.
+        let modes: f64 = pairs
+            .map(|(datum, found)| ((found - datum.frequency) / datum.std).powi(2))
+            .sum();
+        let priors: f64 = best.at.residuals[problem.data.len()..]
+            .iter()
+            .map(|residual| residual * residual)
+            .sum();
+        let measured = self.settings.weights == ResidualWeights::Measured;
+        let known = problem.data.len() + problem.priors.len();
+        Goodness::new(
+            &misfits,
+            measured.then_some(modes + priors),
+            known.saturating_sub(free),
+        )
+    }
+}
+
+impl Finished<'_> {
+    /// Parameters at the end of their range.
+    pub(super) fn limits(&self) -> Vec<(Parameter, Limit)> {
+        let point = &self.best.at.point;
+        let limit = |&parameter: &Parameter| {
+            let quantity = Quantity::of(parameter).first()?;
+            Some((parameter, limit_of(*quantity, point)?))
+        };
+        self.estimator
+            .settings
+            .fit
+            .iter()
+            .filter_map(limit)
+            .collect()
+    }
+
+    fn measured(&self) -> bool {
+        self.estimator.settings.weights == ResidualWeights::Measured
+    }
+
+    /// Factor from the covariance's unit to standard uncertainties scaled by the misfit.
+    fn scale(&self) -> Option<f64> {
+        if self.measured() {
+            self.goodness.uncertainty_factor()
+        } else {
+            self.goodness.misfit_per_freedom
+        }
+    }
+
+    fn quantities(&self) -> Vec<EstimatedQuantity> {
+        let settings = &self.estimator.settings;
+        let nuisances = self
+            .estimator
+            .nuisances
+            .iter()
+            .map(|(parameter, _)| *parameter);
+        let parameters = settings.fit.iter().copied().chain(nuisances);
+        parameters
+            .flat_map(|parameter| Quantity::of(parameter).iter())
+            .map(|quantity| match quantity {
+                Quantity::Kz | Quantity::Ktr => self.cross_stiffness(*quantity),
+                _ => self.quantity(*quantity),
+            })
+            .collect()
+    }
+
+    /// A quantity that is the exponential, or the coupling that is the tanh, of its coordinate.
+    fn quantity(&self, quantity: Quantity) -> EstimatedQuantity {
+        let point = &self.best.at.point;
+        let value = quantity.value(point);
+        // d value per d coordinate.
+        let slope = match (quantity, value) {
+            (Quantity::Coupling, Some(coupling)) => Some(1.0 - coupling * coupling),
+            (_, value) => value,
+        };
+        let gradient = quantity.gradient();
+        let unit = self.covariance.std(&gradient);
+        let std = unit.zip(slope).map(|(std, slope)| std * slope);
+        let mut result = EstimatedQuantity {
+            quantity,
+            value,
+            std: std.filter(|_| self.measured()),
+            std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
+            low: None,
+            high: None,
+            at_least: None,
+            at_most: None,
+            limit: limit_of(quantity, point),
+        };
+        if self.measured() {
+            self.add_interval(&mut result, (&gradient, unit));
+        }
+        result
+    }
+
+    fn add_interval(
+        &self,
+        result: &mut EstimatedQuantity,
+        (gradient, unit): (&Point, Option<f64>),
+    ) {
+        let quantity = result.quantity;
+        let back = |coordinate: f64| match quantity {
+            Quantity::Coupling => coordinate.tanh(),
+            _ => self.value_at(quantity, gradient, coordinate),
+        };
+        match self.estimator.settings.intervals {
+            Intervals::Linear => {
+                let now = self.coordinate(gradient);
+                result.low = unit.map(|std| back(now - NORMAL_95 * std));
+                result.high = unit.map(|std| back(now + NORMAL_95 * std));
+            }
+            Intervals::Profile => {
+                let profile = Profile {
+                    problem: self.problem,
+                    best: self.best,
+                    directions: self.directions,
+                    covariance: self.covariance,
+                };
+                let end = |end: End, rise: f64| profile.end(quantity, end, rise).map(back);
+                result.low = end(End::Low, TWO_SIDED_95);
+                result.high = end(End::High, TWO_SIDED_95);
+                if result.high.is_none() {
+                    result.at_least = end(End::Low, ONE_SIDED_95);
+                }
+                if result.low.is_none() {
+                    result.at_most = end(End::High, ONE_SIDED_95);
+                }
+            }
+        }
+    }
+
+    fn coordinate(&self, gradient: &Point) -> f64 {
+        let terms = gradient.iter().zip(&self.best.at.point);
+        terms.filter(|(g, _)| **g != 0.0).map(|(g, x)| g * x).sum()
+    }
+
+    /// The quantity's value where its coordinate has this value.
+    fn value_at(&self, quantity: Quantity, gradient: &Point, coordinate: f64) -> f64 {
+        let now = self.coordinate(gradient);
+        let value = quantity.value(&self.best.at.point).unwrap_or(f64::INFINITY);
+        value * (coordinate - now).exp()
+    }
+
+    /// Kz and Ktr, whose sign is that of the coupling: with an interval, of the logarithm to first
+    /// order, only where the coupling's own has one sign.
+    fn cross_stiffness(&self, quantity: Quantity) -> EstimatedQuantity {
+        let point = &self.best.at.point;
+        let coupling = self.quantity(Quantity::Coupling);
+        let value = quantity.value(point);
+        let mut gradient = quantity.gradient();
+        // d ln tanh z/dz = (1 - c^2)/c.
+        let c = coupling.value.unwrap_or(0.0);
+        gradient[Parameter::Coupling.index()] = -(1.0 - c * c) / c;
+        let unit = if c == 0.0 {
+            None
+        } else {
+            self.covariance.std(&gradient)
+        };
+        let one_sign = coupling
+            .low
+            .zip(coupling.high)
+            .is_some_and(|(low, high)| low * high > 0.0);
+        let end = |sign: f64| {
+            let (value, unit) = value.zip(unit).filter(|_| one_sign)?;
+            Some(value * (sign * value.signum() * NORMAL_95 * unit).exp())
+        };
+        let std = value.zip(unit).map(|(value, unit)| value.abs() * unit);
+        EstimatedQuantity {
+            quantity,
+            value,
+            std: std.filter(|_| self.measured()),
+            std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
+            low: end(-1.0),
+            high: end(1.0),
+            at_least: None,
+            at_most: None,
+            limit: coupling.limit,
+        }
+    }
+
+    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
+        let factor = if self.measured() {
+            1.0
+        } else {
+            self.scale()?.powi(2)
+        };
+        let fit = &self.estimator.settings.fit;
+        let row = |first: &Parameter| {
+            let entry = |second: &Parameter| {
+                factor * self.covariance.between(&along(*first), &along(*second))
+            };
+            fit.iter().map(entry).collect()
+        };
+        Some(fit.iter().map(row).collect())
+    }
+
+    fn correlations(&self) -> Vec<Correlation> {
+        let fit = &self.estimator.settings.fit;
+        let mut found = Vec::new();
+        for (index, &first) in fit.iter().enumerate() {
+            for &second in &fit[index + 1..] {
+                let (a, b) = (along(first), along(second));
+                let size = self.covariance.between(&a, &a) * self.covariance.between(&b, &b);
+                found.push(Correlation {
+                    first,
+                    second,
+                    value: (self.covariance.between(&a, &b) / size.sqrt()).clamp(-1.0, 1.0),
+                });
+            }
+        }
+        found
+    }
+
+    fn modes(&self) -> Vec<FittedMode> {
+        let leverages = self.covariance.leverages(&self.best.at.jacobian);
+        let rows = self.problem.data.iter().zip(&self.best.at.frequencies);
+        rows.zip(leverages)
+            .map(|((datum, &predicted), leverage)| FittedMode {
+                mode: datum.mode,
+                measured: datum.frequency,
+                predicted,
+                error_percent: 100.0 * (predicted - datum.frequency) / datum.frequency,
+                standardised: self
+                    .measured()
+                    .then_some((predicted - datum.frequency) / datum.std),
+                leverage,
+            })
+            .collect()
+    }
+
+    fn other(&self, other: &Minimum) -> OtherMinimum {
+        let fit = self.estimator.settings.fit.iter();
+        let quantities = fit.flat_map(|parameter| Quantity::of(*parameter).iter());
+        let errors: Vec<f64> = self
+            .problem
+            .data
+            .iter()
+            .zip(&other.at.frequencies)
+            .map(|(datum, found)| 100.0 * (found - datum.frequency) / datum.frequency)
+            .collect();
+        OtherMinimum {
+            values: quantities
+                .filter_map(|quantity| Some((*quantity, quantity.value(&other.at.point)?)))
+                .collect(),
+            misfit: other.at.cost,
+            rms_percent: root_mean_square(&errors),
+        }
+    }
+}
+
+/// Where a coordinate is at the end of its range but for rounding.
+fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
+    // Within a factor e^3 of the end no frequency differs from that at the end.
+    const NEAR: f64 = 3.0;
+    let [log_kx, log_ky] = log_nondimensional(point);
+    let log = match quantity.lead() {
+        Parameter::Kt => log_kx,
+        Parameter::Kr => log_ky,
+        Parameter::Coupling => {
+            let full = 1.0 - point[2].tanh().abs() < 1e-6;
+            return full.then_some(Limit::FullCoupling);
+        }
+        _ => return None,
+    };
+    let (low, high) = LOG_STIFFNESS;
+    if log > high - NEAR {
+        Some(Limit::Rigid)
+    } else if log < low + NEAR {
+        Some(Limit::Absent)
+    } else {
+        None
+    }
+}

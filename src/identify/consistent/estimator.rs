@@ -1,0 +1,439 @@
+//! From frequencies to the point of least misfit, and to every other valley there is.
+
+use super::covariance::Covariance;
+use super::least_squares::{Accuracy, Minimum, StopReason, descend};
+use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
+use super::problem::{Datum, Evaluation, Loss, Prior, Problem, along};
+use super::settings::{ConsistentSettings, ResidualWeights};
+use super::starts::{everywhere, promising};
+use crate::identify::pairs::{ModeLambda, PairsModel, estimate_pairs};
+use crate::identify::{IdentifyError, MeasuredMode};
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::{Assembly, JointStiffness};
+
+/// Two valleys nearer than this in every estimated coordinate (1, logarithms) are one.
+const SAME_VALLEY: f64 = 0.05;
+/// The attached masses' share is followed to first order; this many renewals make it exact.
+const RENEWALS: usize = 6;
+
+/// A joint to be estimated from the frequencies of these modes, as often as wanted.
+#[derive(Debug, Clone)]
+pub struct ConsistentEstimator {
+    pub(super) model: FrequencyModel,
+    pub(super) settings: ConsistentSettings,
+    pub(super) modes: Vec<MeasuredMode>,
+    pub(super) base: Point,
+    /// Parameters estimated along with the joint, with their prior.
+    pub(super) nuisances: Vec<(Parameter, f64)>,
+}
+
+/// A fit without its intervals: what the repetitions of a Monte Carlo need.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointFit {
+    /// Where the misfit is least.
+    pub point: Point,
+    /// Sum of the loss over all residuals there.
+    pub misfit: f64,
+    /// Standard deviations of the estimated coordinates (1, logarithms and atanh), in the order of
+    /// the fit; `None` where nothing is known.
+    pub stds: Vec<Option<f64>>,
+    /// Predicted frequencies (Hz).
+    pub frequencies: Vec<f64>,
+    /// Why it stopped.
+    pub stop: StopReason,
+    /// Other valleys: misfit and place.
+    pub others: Vec<(f64, Point)>,
+}
+
+impl PointFit {
+    /// Non-dimensional joint; a direction that is held rigid is infinite.
+    pub fn joint(&self) -> JointStiffness {
+        super::quantities::joint_at(&self.point)
+    }
+}
+
+impl ConsistentEstimator {
+    /// For these modes of a structure.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Frequency`], [`IdentifyError::TooFewFrequencies`],
+    /// [`IdentifyError::NoUncertainty`] where measured weights are asked for and a mode has none,
+    /// [`IdentifyError::NothingToEstimate`] and [`IdentifyError::Structure`].
+    pub fn new(
+        structure: &JointedStructure,
+        modes: &[MeasuredMode],
+        settings: &ConsistentSettings,
+    ) -> Result<Self, IdentifyError> {
+        check(structure, modes, settings)?;
+        // One mode above the highest is asked about in the report on identifiability.
+        let highest = modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
+        let model = FrequencyModel::new(structure, highest)?;
+        let mut base = model.nominal();
+        if structure.assembly != Assembly::Free {
+            let held = settings.held;
+            base[Parameter::Kt.index()] = held.kt.map_or(f64::INFINITY, f64::ln);
+            base[Parameter::Kr.index()] = held.kr.map_or(f64::INFINITY, f64::ln);
+            base[Parameter::Coupling.index()] = held.coupling.unwrap_or(0.0).atanh();
+        }
+        let units = StiffnessUnits::of(&structure.beam);
+        for (parameter, unit) in [(Parameter::Kt, units.kt), (Parameter::Kr, units.kr)] {
+            if settings.fit.contains(&parameter) {
+                base[parameter.index()] = unit.ln();
+            }
+        }
+        Ok(Self {
+            nuisances: nuisances(settings),
+            model,
+            settings: settings.clone(),
+            modes: modes.to_vec(),
+            base,
+        })
+    }
+
+    /// The measured frequencies (Hz).
+    pub fn frequencies(&self) -> Vec<f64> {
+        self.modes.iter().map(|mode| mode.frequency).collect()
+    }
+
+    /// What is free: first what is estimated, then the beam's uncertain properties.
+    pub(super) fn directions(&self) -> Vec<Point> {
+        let nuisances = self.nuisances.iter().map(|(parameter, _)| *parameter);
+        let free = self.settings.fit.iter().copied().chain(nuisances);
+        free.map(along).collect()
+    }
+
+    pub(super) fn problem<'a>(
+        &'a self,
+        model: &'a FrequencyModel,
+        frequencies: &[f64],
+    ) -> Problem<'a> {
+        let datum = |(mode, &frequency): (&MeasuredMode, &f64)| Datum {
+            mode: mode.mode,
+            frequency,
+            std: match self.settings.weights {
+                ResidualWeights::Measured => mode.std.unwrap_or(frequency),
+                ResidualWeights::Relative => frequency,
+            },
+        };
+        Problem {
+            model,
+            data: self.modes.iter().zip(frequencies).map(datum).collect(),
+            priors: self.priors(),
+            loss: self.settings.loss,
+        }
+    }
+
+    fn priors(&self) -> Vec<Prior> {
+        let nominal = self.model.nominal();
+        let mut priors: Vec<Prior> = self
+            .nuisances
+            .iter()
+            .map(|&(parameter, std)| Prior {
+                gradient: along(parameter),
+                value: nominal[parameter.index()],
+                std,
+            })
+            .collect();
+        if let Some((mass, std)) = self.settings.weighed_mass {
+            let mut gradient = [0.0; PARAMETERS];
+            for part in [
+                Parameter::Density,
+                Parameter::Length,
+                Parameter::Width,
+                Parameter::Thickness,
+            ] {
+                gradient[part.index()] = 1.0;
+            }
+            priors.push(Prior {
+                gradient,
+                value: mass.ln(),
+                std: std / mass,
+            });
+        }
+        priors
+    }
+
+    /// The least misfit over all joints, from the pair regression's estimate and from wherever the
+    /// frequency equation nearly holds.
+    pub fn fit(&self) -> PointFit {
+        self.fit_frequencies(&self.frequencies())
+    }
+
+    /// The same for other frequencies (Hz) of the same modes.
+    pub fn fit_frequencies(&self, frequencies: &[f64]) -> PointFit {
+        let (model, minima) = self.solve(frequencies);
+        let model = model.as_ref().unwrap_or(&self.model);
+        self.summary(&self.problem(model, frequencies), minima)
+    }
+
+    /// The least misfit downhill of known places: for repetitions near a first fit.
+    pub fn refit(&self, frequencies: &[f64], starts: &[Point]) -> PointFit {
+        let mut problem = self.problem(&self.model, frequencies);
+        self.rescale(&mut problem, starts);
+        let minima = self.valleys(&problem, starts);
+        self.summary(&problem, minima)
+    }
+
+    fn summary(&self, problem: &Problem<'_>, mut minima: Vec<Minimum>) -> PointFit {
+        let rest = minima.split_off(1.min(minima.len()));
+        let Some(best) = minima.pop() else {
+            return self.nothing(problem);
+        };
+        let directions = self.directions();
+        let covariance = Covariance::of(&best.at, &directions);
+        PointFit {
+            point: best.at.point,
+            misfit: best.at.cost,
+            stds: directions
+                .iter()
+                .take(self.settings.fit.len())
+                .map(|direction| covariance.std(direction))
+                .collect(),
+            frequencies: best.at.frequencies,
+            stop: best.stop,
+            others: rest
+                .iter()
+                .map(|other| (other.at.cost, other.at.point))
+                .collect(),
+        }
+    }
+
+    /// Without a single start there is the nominal point.
+    fn nothing(&self, problem: &Problem<'_>) -> PointFit {
+        let at = problem.evaluate(&self.base, &problem.measured_lambdas(&self.base));
+        PointFit {
+            point: at.point,
+            misfit: at.cost,
+            stds: Vec::new(),
+            frequencies: at.frequencies,
+            stop: StopReason::NothingFree,
+            others: Vec::new(),
+        }
+    }
+
+    /// All valleys, the deepest first, and the model renewed where the beam has moved far.
+    pub(super) fn solve(&self, frequencies: &[f64]) -> (Option<FrequencyModel>, Vec<Minimum>) {
+        let mut problem = self.problem(&self.model, frequencies);
+        let starts = self.starts(&problem);
+        self.rescale(&mut problem, &starts);
+        let mut minima = self.valleys(&problem, &starts);
+        if !self.is_good(&problem, &minima) {
+            // A bad fit may be the wrong valley: now no effort is spared.
+            let mut all = everywhere(&self.base, &self.settings.fit);
+            all.extend(minima.iter().map(|minimum| minimum.at.point));
+            minima = self.valleys(&problem, &all);
+        }
+        let mut renewed = None;
+        for _ in 0..RENEWALS {
+            let Some(best) = minima.first().map(|best| best.at.point) else {
+                break;
+            };
+            let current = renewed.as_ref().unwrap_or(&self.model);
+            if !current.is_far(&best) {
+                break;
+            }
+            let highest = self.modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
+            let Ok(model) = self.model.rebuilt(&best, highest) else {
+                break;
+            };
+            let starts: Vec<Point> = minima.iter().map(|minimum| minimum.at.point).collect();
+            let mut problem = self.problem(&model, frequencies);
+            self.rescale(&mut problem, &starts);
+            minima = self.valleys(&problem, &starts);
+            renewed = Some(model);
+        }
+        (renewed, minima)
+    }
+
+    /// Whether the misfit is so small that no other valley can matter: below three times what it
+    /// should be, or, without stated uncertainties, below what any reading achieves.
+    fn is_good(&self, problem: &Problem<'_>, minima: &[Minimum]) -> bool {
+        const READING: f64 = 1e-4;
+        let Some(best) = minima.first() else {
+            return false;
+        };
+        let allowed = match self.settings.weights {
+            ResidualWeights::Measured => 9.0,
+            ResidualWeights::Relative => READING * READING,
+        };
+        best.at.cost < allowed * problem.data.len() as f64
+    }
+
+    fn starts(&self, problem: &Problem<'_>) -> Vec<Point> {
+        let mut starts = promising(problem, &self.base, &self.settings.fit);
+        starts.extend(self.pairs_start(problem));
+        starts
+    }
+
+    /// The pair regression's estimate, where it applies and is a joint.
+    fn pairs_start(&self, problem: &Problem<'_>) -> Option<Point> {
+        let structure = self.model.structure();
+        let halves = structure.lap.position.is_none() && structure.lap.right.is_none();
+        let model = match (structure.assembly, &self.settings.fit[..]) {
+            (Assembly::Lap, [Parameter::Kt, Parameter::Kr]) if halves => PairsModel::Lap,
+            (Assembly::Cantilever, [Parameter::Kt, Parameter::Kr]) => PairsModel::TwoParameter,
+            (Assembly::Cantilever, [Parameter::Kt, Parameter::Kr, Parameter::Coupling]) => {
+                PairsModel::ThreeParameter
+            }
+            _ => return None,
+        };
+        let modes = problem
+            .data
+            .iter()
+            .map(|datum| datum.mode)
+            .zip(problem.measured_lambdas(&self.base));
+        let modes: Vec<ModeLambda> = modes
+            .map(|(mode, lambda)| ModeLambda { mode, lambda })
+            .collect();
+        let joint = estimate_pairs(model, &modes).ok()?.joint()?;
+        joint.check().ok()?;
+        let units = StiffnessUnits::of(&structure.beam);
+        let mut start = self.base;
+        start[Parameter::Kt.index()] = (joint.kx * units.kt).ln();
+        start[Parameter::Kr.index()] = (joint.ky * units.kr).ln();
+        start[Parameter::Coupling.index()] = joint.coupling().atanh();
+        let usable = start[..3].iter().all(|coordinate| coordinate.is_finite());
+        usable.then(|| problem.within_bounds(start))
+    }
+
+    /// Follows every start down roughly, keeps different valleys, and finishes each.
+    fn valleys(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
+        let directions = self.directions();
+        let mut found: Vec<Evaluation> = Vec::new();
+        for start in starts {
+            let guesses = problem.measured_lambdas(start);
+            let at = problem.evaluate(&problem.within_bounds(*start), &guesses);
+            let end = descend(problem, at, &directions, Accuracy::ROUGH).at;
+            if end.cost.is_finite() && !found.iter().any(|other| same(other, &end, &directions)) {
+                found.push(end);
+            }
+        }
+        let mut minima: Vec<Minimum> = Vec::new();
+        for rough in found {
+            let end = descend(problem, rough, &directions, ConsistentSettings::ACCURACY);
+            let known = minima
+                .iter_mut()
+                .find(|other| same(&other.at, &end.at, &directions));
+            match known {
+                Some(other) if end.at.cost < other.at.cost => *other = end,
+                Some(_) => {}
+                None => minima.push(end),
+            }
+        }
+        for minimum in &mut minima {
+            self.follow_to_the_limit(problem, minimum);
+        }
+        minima.sort_by(|a, b| a.at.cost.total_cmp(&b.at.cost));
+        minima
+    }
+
+    /// A stiffness that no frequency feels any more ends wherever the search lost interest; where
+    /// the limit itself is no worse, the estimate is there.
+    fn follow_to_the_limit(&self, problem: &Problem<'_>, minimum: &mut Minimum) {
+        // Relative change of every frequency per relative change of the stiffness.
+        const UNFELT: f64 = 1e-4;
+        for parameter in [Parameter::Kt, Parameter::Kr] {
+            let index = parameter.index();
+            let data = problem.data.iter().zip(&minimum.at.jacobian);
+            let felt = data
+                .map(|(datum, row)| (row[index] * datum.std / datum.frequency).abs())
+                .fold(0.0, f64::max);
+            if felt > UNFELT || !self.settings.fit.contains(&parameter) {
+                continue;
+            }
+            let free = self.directions();
+            let others: Vec<Point> = free.into_iter().filter(|d| d[index] == 0.0).collect();
+            for end in [-1e3, 1e3] {
+                let mut point = minimum.at.point;
+                point[index] += end;
+                let at = problem.evaluate(&problem.within_bounds(point), &minimum.at.lambdas);
+                let there = descend(problem, at, &others, Accuracy::MISFIT);
+                if there.at.cost <= minimum.at.cost {
+                    *minimum = there;
+                }
+            }
+        }
+    }
+
+    /// With relative weights a robust loss needs to know what a usual misfit is: that of the least
+    /// squares, by its median, for as many misfits as there is freedom.
+    fn rescale(&self, problem: &mut Problem<'_>, starts: &[Point]) {
+        let relative = self.settings.weights == ResidualWeights::Relative;
+        if !relative || problem.loss == Loss::Squares {
+            return;
+        }
+        let loss = std::mem::take(&mut problem.loss);
+        let (data, free) = (problem.data.len(), self.settings.fit.len());
+        if let Some(best) = self.valleys(problem, starts).first() {
+            let mut sizes: Vec<f64> = best.at.residuals.iter().map(|r| r.abs()).collect();
+            sizes.sort_by(f64::total_cmp);
+            let median = sizes[(data - 1) / 2];
+            let share = (data as f64 / (data.saturating_sub(free)).max(1) as f64).sqrt();
+            // 1.4826 median = standard deviation of a normal distribution. Exact frequencies have
+            // no usual misfit; rounding is the least there is.
+            let scale = (1.4826 * median * share).max(1e-12);
+            for datum in &mut problem.data {
+                datum.std = scale * datum.frequency;
+            }
+        }
+        problem.loss = loss;
+    }
+}
+
+fn same(first: &Evaluation, second: &Evaluation, directions: &[Point]) -> bool {
+    directions.iter().all(|direction| {
+        let free = first.point.iter().zip(&second.point).zip(direction);
+        free.filter(|(_, part)| **part != 0.0)
+            .all(|((a, b), _)| (a - b).abs() < SAME_VALLEY)
+    })
+}
+
+/// The beam's uncertain properties: only where the frequencies' uncertainties are known can the two
+/// be weighed against each other.
+fn nuisances(settings: &ConsistentSettings) -> Vec<(Parameter, f64)> {
+    if settings.weights == ResidualWeights::Relative {
+        return Vec::new();
+    }
+    Parameter::ALL
+        .into_iter()
+        .filter(|parameter| !settings.fit.contains(parameter))
+        .filter_map(|parameter| Some((parameter, settings.tolerances.of(parameter)?)))
+        .filter(|(_, std)| *std > 0.0)
+        .collect()
+}
+
+fn check(
+    structure: &JointedStructure,
+    modes: &[MeasuredMode],
+    settings: &ConsistentSettings,
+) -> Result<(), IdentifyError> {
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    if let Some(mode) = modes
+        .iter()
+        .find(|mode| !positive(mode.frequency) || mode.mode == 0)
+    {
+        return Err(IdentifyError::Frequency {
+            mode: mode.mode,
+            value: mode.frequency,
+        });
+    }
+    let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
+    let no_joint = structure.assembly == Assembly::Free;
+    let stray = |parameter: &&Parameter| no_joint && joint.contains(parameter);
+    if settings.fit.is_empty() || settings.fit.iter().any(|p| stray(&p)) {
+        return Err(IdentifyError::NothingToEstimate);
+    }
+    let known = modes.len() + usize::from(settings.weighed_mass.is_some());
+    if known < settings.fit.len() {
+        return Err(IdentifyError::TooFewFrequencies {
+            unknowns: settings.fit.len(),
+            found: modes.len(),
+        });
+    }
+    let measured = settings.weights == ResidualWeights::Measured;
+    let unknown = |mode: &&MeasuredMode| !mode.std.is_some_and(positive);
+    if let Some(mode) = modes.iter().find(unknown).filter(|_| measured) {
+        return Err(IdentifyError::NoUncertainty { mode: mode.mode });
+    }
+    Ok(())
+}

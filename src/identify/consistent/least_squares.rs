@@ -1,0 +1,300 @@
+//! Levenberg's and Marquardt's damped least squares for a handful of unknowns (Madsen, Nielsen &
+//! Tingleff 2004).
+//!
+//! Each step solves the linearised problem by Householder's reflections, never by its normal
+//! equations, which would square the condition number: stiffnesses that the frequencies hardly
+//! feel are what this is for.
+
+use super::model::{PARAMETERS, Point};
+use super::problem::{Evaluation, Problem};
+
+/// Why an estimate stopped where it did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// The next step would not move any parameter noticeably.
+    SmallStep,
+    /// No step can lower the misfit noticeably.
+    Minimum,
+    /// Rounding lets no step lower the misfit any more.
+    Rounding,
+    /// The steps ran out: the result is the best so far.
+    StepLimit,
+    /// Nothing was free to be estimated.
+    NothingFree,
+}
+
+impl StopReason {
+    /// Whether it is a minimum.
+    pub fn converged(self) -> bool {
+        self != Self::StepLimit
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::SmallStep => "the last step moved nothing noticeably",
+            Self::Minimum => "no step lowers the misfit noticeably",
+            Self::Rounding => "rounding lets no step lower the misfit",
+            Self::StepLimit => "the steps ran out",
+            Self::NothingFree => "nothing was free to be estimated",
+        }
+    }
+}
+
+/// How exact a minimum is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Accuracy {
+    /// Steps smaller than this end the search (1, in logarithms).
+    pub(super) step: f64,
+    /// So does a predicted relative gain smaller than this.
+    pub(super) gain: f64,
+    /// At most so many steps.
+    pub(super) limit: usize,
+}
+
+impl Accuracy {
+    /// To the last digits.
+    pub(super) const FULL: Self = Self {
+        step: 1e-11,
+        gain: 1e-15,
+        limit: 200,
+    };
+    /// Where only the size of the misfit is wanted: its error is the gain.
+    pub(super) const MISFIT: Self = Self {
+        step: 1e-6,
+        gain: 1e-8,
+        limit: 60,
+    };
+    /// To tell the valleys apart.
+    pub(super) const ROUGH: Self = Self {
+        step: 1e-2,
+        gain: 1e-3,
+        limit: 25,
+    };
+}
+
+/// Where a search ended.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Minimum {
+    pub(super) at: Evaluation,
+    pub(super) stop: StopReason,
+}
+
+/// Stiffnesses beyond these differ from none and from rigid in no frequency (logarithms of Kx and
+/// Ky); beyond the last the coupling is 1 to nine digits.
+pub(super) const LOG_STIFFNESS: (f64, f64) = (-16.0, 21.0);
+const COUPLING_LIMIT: f64 = 10.5;
+/// No step moves a parameter by more than this factor e^2, wherever a linear model points.
+const LONGEST_STEP: f64 = 2.0;
+
+/// The nearest minimum downhill of a place, along these directions.
+pub(super) fn descend(
+    problem: &Problem<'_>,
+    start: Evaluation,
+    directions: &[Point],
+    accuracy: Accuracy,
+) -> Minimum {
+    let mut at = start;
+    if directions.is_empty() {
+        let stop = StopReason::NothingFree;
+        return Minimum { at, stop };
+    }
+    let mut search = Search::new(directions.len());
+    for _ in 0..accuracy.limit {
+        search.linearise(&at, directions);
+        loop {
+            let step = search.damped_step();
+            let gain = search.predicted_gain(&step);
+            if !gain.is_finite() || gain <= accuracy.gain * at.cost || at.cost == 0.0 {
+                let stop = StopReason::Minimum;
+                return Minimum { at, stop };
+            }
+            let (point, longest) = moved(problem, &at.point, directions, &step);
+            let trial = problem.evaluate(&point, &at.lambdas);
+            let ratio = (at.cost - trial.cost) / gain;
+            search.adjust(ratio);
+            if trial.cost < at.cost {
+                at = trial;
+                if longest < accuracy.step {
+                    let stop = StopReason::SmallStep;
+                    return Minimum { at, stop };
+                }
+                break;
+            }
+            if longest < accuracy.step || search.damping > 1e15 {
+                let stop = StopReason::Rounding;
+                return Minimum { at, stop };
+            }
+        }
+    }
+    let stop = StopReason::StepLimit;
+    Minimum { at, stop }
+}
+
+/// The point one step on, within bounds, and the longest change of a parameter.
+fn moved(problem: &Problem<'_>, from: &Point, directions: &[Point], step: &[f64]) -> (Point, f64) {
+    let mut change = [0.0; PARAMETERS];
+    for (direction, length) in directions.iter().zip(step) {
+        for (change, part) in change.iter_mut().zip(direction) {
+            *change += length * part;
+        }
+    }
+    let longest = change.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    let factor = (LONGEST_STEP / longest).min(1.0);
+    let mut point = *from;
+    for (coordinate, change) in point.iter_mut().zip(change) {
+        *coordinate += factor * change;
+    }
+    (problem.within_bounds(point), factor * longest)
+}
+
+/// Keeps a stiffness between none and rigid, and the coupling from its limits.
+pub(super) fn bounded(mut point: Point, log_units: [f64; 2]) -> Point {
+    let (low, high) = LOG_STIFFNESS;
+    for (coordinate, unit) in point.iter_mut().zip(log_units) {
+        if coordinate.is_finite() {
+            *coordinate = coordinate.clamp(low + unit, high + unit);
+        }
+    }
+    point[2] = point[2].clamp(-COUPLING_LIMIT, COUPLING_LIMIT);
+    point
+}
+
+/// The linearised problem: rows of slopes along the directions with the residual last.
+struct Search {
+    unknowns: usize,
+    rows: Vec<f64>,
+    triangle: Vec<f64>,
+    scales: Vec<f64>,
+    damping: f64,
+    growth: f64,
+    work: Vec<f64>,
+}
+
+impl Search {
+    fn new(unknowns: usize) -> Self {
+        Self {
+            unknowns,
+            rows: Vec::new(),
+            triangle: Vec::new(),
+            scales: vec![0.0; unknowns],
+            damping: 1e-3,
+            growth: 2.0,
+            work: Vec::new(),
+        }
+    }
+
+    /// Triangle of the linearised problem at a place.
+    fn linearise(&mut self, at: &Evaluation, directions: &[Point]) {
+        let width = self.unknowns + 1;
+        self.rows.clear();
+        for (residual, slopes) in at.residuals.iter().zip(&at.jacobian) {
+            self.rows
+                .extend(directions.iter().map(|direction| dot(slopes, direction)));
+            self.rows.push(-residual);
+        }
+        for column in 0..self.unknowns {
+            let squares = self.rows.iter().skip(column).step_by(width);
+            let norm = squares.map(|x| x * x).sum::<f64>().sqrt();
+            // A parameter that nothing feels here keeps the scale it had elsewhere.
+            self.scales[column] = self.scales[column].max(norm);
+        }
+        triangularise(&mut self.rows, width);
+        self.triangle.clone_from(&self.rows);
+        self.triangle.resize(width * width, 0.0);
+    }
+
+    /// min |R d - b|^2 + damping |D d|^2, D the largest column norms so far.
+    fn damped_step(&mut self) -> Vec<f64> {
+        let (n, width) = (self.unknowns, self.unknowns + 1);
+        let largest = self.scales.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
+        self.work.clear();
+        self.work.extend_from_slice(&self.triangle[..n * width]);
+        for (column, scale) in self.scales.iter().enumerate() {
+            let weight = self.damping.sqrt() * scale.max(1e-12 * largest);
+            let start = self.work.len();
+            self.work.resize(start + width, 0.0);
+            self.work[start + column] = weight;
+        }
+        triangularise(&mut self.work, width);
+        back_substitute(&self.work, n)
+    }
+
+    /// Loss of squares that the linear model promises, |b|^2 - |R d - b|^2.
+    fn predicted_gain(&self, step: &[f64]) -> f64 {
+        let width = self.unknowns + 1;
+        let mut gain = 0.0;
+        for row in self.triangle.chunks(width).take(self.unknowns) {
+            let moved: f64 = row.iter().zip(step).map(|(a, b)| a * b).sum();
+            let right = row[self.unknowns];
+            gain += moved * (2.0 * right - moved);
+        }
+        gain
+    }
+
+    /// Nielsen's rule: a good step lowers the damping by up to 3, a bad one raises it ever faster.
+    fn adjust(&mut self, ratio: f64) {
+        if ratio > 0.0 {
+            self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
+            self.growth = 2.0;
+        } else {
+            self.damping *= self.growth;
+            self.growth *= 2.0;
+        }
+        self.damping = self.damping.max(1e-18);
+    }
+}
+
+/// Inner product of a row of slopes and a direction.
+pub(super) fn dot(slopes: &Point, direction: &Point) -> f64 {
+    slopes.iter().zip(direction).map(|(a, b)| a * b).sum()
+}
+
+/// Upper triangle of a matrix of rows of this width by Householder's reflections; what falls below
+/// the last row of the triangle is the residual.
+pub(super) fn triangularise(rows: &mut [f64], width: usize) {
+    let count = rows.len() / width;
+    for column in 0..width.min(count) {
+        let norm = (column..count)
+            .map(|row| rows[row * width + column].powi(2))
+            .sum::<f64>()
+            .sqrt();
+        if norm == 0.0 {
+            continue;
+        }
+        let pivot = rows[column * width + column];
+        let diagonal = if pivot > 0.0 { -norm } else { norm };
+        let head = pivot - diagonal;
+        for other in column + 1..width {
+            let mut product = head * rows[column * width + other];
+            for row in column + 1..count {
+                product += rows[row * width + column] * rows[row * width + other];
+            }
+            // 2/(v.v) = 1/(norm (norm + |pivot|)) = -1/(diagonal head).
+            let factor = product / (diagonal * head);
+            rows[column * width + other] += factor * head;
+            for row in column + 1..count {
+                rows[row * width + other] += factor * rows[row * width + column];
+            }
+        }
+        rows[column * width + column] = diagonal;
+        for row in column + 1..count {
+            rows[row * width + column] = 0.0;
+        }
+    }
+}
+
+/// Solves the triangle of `n` unknowns whose last column is the right-hand side.
+fn back_substitute(triangle: &[f64], n: usize) -> Vec<f64> {
+    let width = n + 1;
+    let mut solution = vec![0.0; n];
+    for row in (0..n).rev() {
+        let known: f64 = (row + 1..n)
+            .map(|column| triangle[row * width + column] * solution[column])
+            .sum();
+        let pivot = triangle[row * width + row];
+        let rest = triangle[row * width + n] - known;
+        solution[row] = if pivot == 0.0 { 0.0 } else { rest / pivot };
+    }
+    solution
+}

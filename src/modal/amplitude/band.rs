@@ -52,9 +52,8 @@ impl Band {
     /// sum h(m) e^{p (m - (M-1)/2)/rate}.
     pub fn gain(&self, pole: Complex64) -> Complex64 {
         let middle = (self.taps.len() - 1) as f64 / 2.0;
-        let gain = |(m, h): (usize, &f64)| {
-            (pole * ((m as f64 - middle) / self.sample_rate)).exp() * *h
-        };
+        let gain =
+            |(m, h): (usize, &f64)| (pole * ((m as f64 - middle) / self.sample_rate)).exp() * *h;
         self.taps.iter().enumerate().map(gain).sum()
     }
 

@@ -21,6 +21,8 @@
 //! frequencies; a drift by 1 % within a decay shifts damping by less than 1 % of itself when measured
 //! as acceleration, which is left in.
 
+use rayon::prelude::*;
+
 use crate::stats::median;
 
 mod band;
@@ -199,6 +201,7 @@ pub fn follow_amplitude(
     settings: &AmplitudeSettings,
 ) -> Vec<AmplitudeCurve> {
     (0..modes.len())
+        .into_par_iter()
         .map(|mode| follow_mode(decays, modes, mode, settings))
         .collect()
 }

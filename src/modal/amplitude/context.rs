@@ -188,7 +188,8 @@ impl Whole<'_> {
         let unknowns = 2.0 * model.parameters() as f64;
         let fit = fit_exponentials(&self.times, self.series, model, &priors)?;
         let values = 2.0 * count as f64;
-        let criterion = values * (fit.squares / values).ln() + unknowns * values.ln();
+        let squares = fit.squares.max(f64::MIN_POSITIVE);
+        let criterion = values * (squares / values).ln() + unknowns * values.ln();
         criterion
             .is_finite()
             .then_some(Candidate { fit, criterion })
@@ -315,9 +316,11 @@ impl Context {
             let frequency = band.frequency(*pole);
             return Some(AmplitudeVerdict::Unresolved { frequency });
         }
+        let mode = band.frequency(self.model.pole(0.0));
         let strongest = self
             .companions(band)
             .into_iter()
+            .filter(|companion| TAU * (companion.frequency - mode).abs() < -NEAR * band.decay)
             .max_by(|a, b| a.share.total_cmp(&b.share))?;
         let frequency = strongest.frequency;
         self.unchanging()

@@ -229,7 +229,7 @@ fn follow_mode(
         return curve;
     };
     curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
-    let mut doubts = Vec::new();
+    let (mut doubts, mut followed) = (Vec::new(), 0);
     for band in &bands {
         let Some(series) = sensors::combine(band, sensor) else {
             continue;
@@ -240,7 +240,10 @@ fn follow_mode(
             .points
             .extend(walk::walk_decay(&series, band, &context, settings));
         doubts.extend(context.doubt(band));
+        followed += 1;
     }
+    // One decay without a doubt settles it for all.
+    doubts.truncate(if doubts.len() == followed { 1 } else { 0 });
     judge(&mut curve, &doubts, settings);
     curve
 }

@@ -39,9 +39,9 @@ pub struct Trend {
     /// Scatter of the points about the curve over their own uncertainties; above 1 they differ by more
     /// than noise (between taps: the structure changed).
     pub scatter: f64,
-    /// Value at the first point of the loudest tap, at the largest amplitude.
+    /// Value at the largest amplitude: the first usable time of the hardest tap.
     pub first: f64,
-    /// Value at the smallest amplitude.
+    /// Value at the smallest amplitude: the last usable time of some tap.
     pub last: f64,
     /// Last less first.
     pub change: f64,

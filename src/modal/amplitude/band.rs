@@ -14,6 +14,8 @@ const PASS: f64 = 0.3;
 const PARTS: f64 = 4.0;
 /// Decay times that are followed: 104 dB.
 const REACH: f64 = 12.0;
+/// Least damping ratio taken for granted: no structure with a joint has less.
+const LEAST_DAMPING: f64 = 1e-6;
 /// Neighbours are kept this far beyond the stop edge.
 const MARGIN: f64 = 0.95;
 /// Share of the distance to 0 Hz and to half the sample rate that the stop edge leaves: beyond them
@@ -86,7 +88,7 @@ fn extract_band(
     let mode = modes.get(index)?;
     let samples = decay.responses.iter().map(Vec::len).min()?;
     let omega = TAU * mode.frequency;
-    let sigma = mode.damping_ratio.max(1e-6) * omega;
+    let sigma = mode.damping_ratio.max(LEAST_DAMPING) * omega;
     let rate = decay.sample_rate;
     let usable = omega.is_finite() && omega > 0.0 && omega < PI * rate;
     let scale = (1.0 / sigma).min(samples as f64 / rate / PARTS);
@@ -94,6 +96,9 @@ fn extract_band(
         return None;
     }
     let stop = stop_edge(modes, index, (scale, rate), settings);
+    if filter_half(stop, rate) > samples as f64 {
+        return None;
+    }
     let taps = low_pass(stop, rate);
     // Stop and pass edge fold onto each other at this rate, so nothing reaches the pass band.
     let stride = (rate / ((1.0 + PASS) * stop)).floor().max(1.0) as usize;
@@ -155,10 +160,15 @@ fn kaiser_length() -> f64 {
     (ATTENUATION - 7.95) / 14.36
 }
 
+/// Half the length of the filter (samples).
+fn filter_half(stop: f64, rate: f64) -> f64 {
+    let transition = (1.0 - PASS) * stop;
+    (kaiser_length() * rate / transition / 2.0).ceil().max(2.0)
+}
+
 /// Low-pass filter with Kaiser's window, odd in length, gain 1 at 0 Hz.
 fn low_pass(stop: f64, rate: f64) -> Vec<f64> {
-    let transition = (1.0 - PASS) * stop;
-    let half = (kaiser_length() * rate / transition / 2.0).ceil().max(2.0);
+    let half = filter_half(stop, rate);
     let cutoff = 0.5 * (1.0 + PASS) * stop / rate;
     // beta = 0.1102 (A - 8.7) above 50 dB (Oppenheim & Schafer).
     let beta = 0.1102 * (ATTENUATION - 8.7);
@@ -225,7 +235,7 @@ fn neighbours(modes: &[KnownMode], index: usize, stop: f64) -> Vec<Complex64> {
         .enumerate()
         .filter(|(other, mode)| *other != index && (mode.frequency - frequency).abs() < stop)
         .map(|(_, mode)| {
-            let sigma = TAU * mode.frequency * mode.damping_ratio;
+            let sigma = TAU * mode.frequency * mode.damping_ratio.max(LEAST_DAMPING);
             Complex64::new(-sigma, TAU * (mode.frequency - frequency))
         })
         .collect()

@@ -2,15 +2,19 @@
 
 use num_complex::Complex64;
 
-/// x(t) = c e^{q1 t + q2 t^2 + ...} + sum over k of c_k e^{p_k t}.
+/// x(t) = c e^{q1 t + q2 v + q3 v^2 + ...} + sum over k of c_k e^{p_k t}, v(t) = 1 - e^{-rate t}.
 ///
-/// The parameters enter analytically, so least squares may treat them as complex numbers.
+/// A frequency that changes with a power of the amplitude changes exponentially in time, so powers of
+/// v describe it with few terms where powers of t would not. The parameters enter analytically: least
+/// squares may treat them as complex numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Exponentials {
     /// Amplitude of the mode.
     pub amplitude: Complex64,
-    /// Its exponents q1, q2, ... (1/s, 1/s^2, ...); one alone is a pole that does not change.
+    /// Its exponents q1 (1/s), q2, q3, ... (1); the first alone is a pole that does not change.
     pub exponents: Vec<Complex64>,
+    /// Rate of v (1/s).
+    pub rate: f64,
     /// Amplitude and pole (rad/s) of everything else.
     pub others: Vec<(Complex64, Complex64)>,
 }
@@ -21,19 +25,35 @@ impl Exponentials {
         1 + self.exponents.len() + 2 * self.others.len()
     }
 
-    /// The mode alone.
-    pub fn mode(&self, t: f64) -> Complex64 {
-        self.amplitude * self.growth(t)
+    /// The pole at a time: the derivative of the mode's exponent.
+    pub fn pole(&self, t: f64) -> Complex64 {
+        let fall = (-self.rate * t).exp();
+        let v = 1.0 - fall;
+        let mut power = self.rate * fall;
+        let mut sum = self.exponents.first().copied().unwrap_or_default();
+        for (k, q) in self.exponents.iter().skip(1).enumerate() {
+            // d/dt of q v^(k+1).
+            sum += q * power * (k + 1) as f64;
+            power *= v;
+        }
+        sum
+    }
+
+    /// The mode's exponent at `t + s` without its value and slope at t, for a short s: what bends.
+    pub fn bend(&self, t: f64, s: f64) -> Complex64 {
+        self.exponent(t + s) - self.exponent(t) - self.pole(t) * s
     }
 
     fn growth(&self, t: f64) -> Complex64 {
-        // Horner's scheme for t (q1 + t (q2 + ...)).
-        let exponent = self
-            .exponents
-            .iter()
-            .rev()
-            .fold(Complex64::ZERO, |sum, q| (sum + q) * t);
-        exponent.exp()
+        self.exponent(t).exp()
+    }
+
+    /// q1 t + q2 v + q3 v^2 + ..., the powers by Horner's scheme.
+    fn exponent(&self, t: f64) -> Complex64 {
+        let v = 1.0 - (-self.rate * t).exp();
+        let drift = self.exponents.iter().skip(1).rev();
+        let drift = drift.fold(Complex64::ZERO, |sum, q| (sum + q) * v);
+        self.exponents.first().copied().unwrap_or_default() * t + drift
     }
 
     /// The value at a time, and its derivatives: amplitude, exponents, then amplitude and pole of
@@ -43,9 +63,11 @@ impl Exponentials {
         let growth = self.growth(t);
         let mut sum = self.amplitude * growth;
         derivatives.push(growth);
-        let mut power = self.amplitude * growth;
-        for _ in &self.exponents {
-            power *= t;
+        derivatives.push(sum * t);
+        let v = 1.0 - (-self.rate * t).exp();
+        let mut power = sum;
+        for _ in self.exponents.iter().skip(1) {
+            power *= v;
             derivatives.push(power);
         }
         for (amplitude, pole) in &self.others {
@@ -64,6 +86,7 @@ impl Exponentials {
         Exponentials {
             amplitude: self.amplitude + next(),
             exponents: self.exponents.iter().map(|q| q + next()).collect(),
+            rate: self.rate,
             others: self
                 .others
                 .iter()

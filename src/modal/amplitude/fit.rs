@@ -24,9 +24,9 @@ pub(super) struct Fit {
     pub residuals: Vec<Complex64>,
 }
 
-const ITERATIONS: usize = 40;
+const ITERATIONS: usize = 25;
 /// Change of the sum of squares at which a fit has settled, relative.
-const SETTLED: f64 = 1e-10;
+const SETTLED: f64 = 1e-7;
 /// Values beyond this are no amplitude any more.
 const LARGEST: f64 = 1e100;
 
@@ -100,7 +100,7 @@ fn normal_equations(
     priors: &[Prior],
 ) -> Option<State> {
     let size = model.parameters();
-    let mut left = DMatrix::zeros(size, size);
+    let mut products = vec![Complex64::ZERO; size * size];
     let mut right = DVector::zeros(size);
     let mut cost = 0.0;
     let mut row = Vec::with_capacity(size);
@@ -109,19 +109,22 @@ fn normal_equations(
         let residual = value - model.value(*t, &mut row);
         cost += residual.norm_sqr();
         residuals.push(residual);
-        for (i, a) in row.iter().enumerate() {
-            right[i] += a.conj() * residual;
-            for (k, b) in row.iter().enumerate().take(i + 1) {
-                left[(i, k)] += a.conj() * b;
+        for ((i, a), sums) in row.iter().enumerate().zip(products.chunks_mut(size)) {
+            let a = a.conj();
+            right[i] += a * residual;
+            for (sum, b) in sums.iter_mut().zip(&row[..=i]) {
+                *sum += a * b;
             }
         }
     }
-    for i in 0..size {
-        for k in 0..i {
-            let value: Complex64 = left[(i, k)];
-            left[(k, i)] = value.conj();
+    // Only the lower triangle was summed; the matrix is Hermitian.
+    let mut left = DMatrix::from_fn(size, size, |i, k| {
+        if k <= i {
+            products[i * size + k]
+        } else {
+            products[k * size + i].conj()
         }
-    }
+    });
     let current = flat(model);
     for prior in priors {
         let away = prior.value - current[prior.parameter];

@@ -21,6 +21,8 @@
 //! frequencies; a drift by 1 % within a decay shifts damping by less than 1 % of itself when measured
 //! as acceleration, which is left in.
 
+use rayon::prelude::*;
+
 use crate::stats::median;
 
 mod band;
@@ -199,6 +201,7 @@ pub fn follow_amplitude(
     settings: &AmplitudeSettings,
 ) -> Vec<AmplitudeCurve> {
     (0..modes.len())
+        .into_par_iter()
         .map(|mode| follow_mode(decays, modes, mode, settings))
         .collect()
 }
@@ -226,7 +229,7 @@ fn follow_mode(
         return curve;
     };
     curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
-    let mut doubts = Vec::new();
+    let (mut doubts, mut followed) = (Vec::new(), 0);
     for band in &bands {
         let Some(series) = sensors::combine(band, sensor) else {
             continue;
@@ -237,7 +240,10 @@ fn follow_mode(
             .points
             .extend(walk::walk_decay(&series, band, &context, settings));
         doubts.extend(context.doubt(band));
+        followed += 1;
     }
+    // One decay without a doubt settles it for all.
+    doubts.truncate(if doubts.len() == followed { 1 } else { 0 });
     judge(&mut curve, &doubts, settings);
     curve
 }

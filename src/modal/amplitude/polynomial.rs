@@ -48,15 +48,8 @@ impl Polynomial {
         })
     }
 
-    /// Of all degrees up to `most` the one with the least chi^2 + 2 x coefficients (Akaike).
-    pub fn best(points: &[(f64, f64, f64)], most: usize) -> Option<Polynomial> {
-        (0..=most)
-            .filter_map(|degree| Polynomial::fit(points, degree))
-            .filter(|fit| fit.freedom >= 1.0)
-            .min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
-    }
-
-    fn criterion(&self) -> f64 {
+    /// chi^2 + 2 x coefficients (Akaike), to choose among polynomials.
+    pub fn criterion(&self) -> f64 {
         self.chi_squared + 2.0 * self.coefficients.len() as f64
     }
 
@@ -85,10 +78,5 @@ impl Polynomial {
         let variance = (weights.transpose() * &self.covariance * weights)[(0, 0)];
         let value = weights.dot(&self.coefficients);
         (value, variance.max(0.0).sqrt() * self.scatter())
-    }
-
-    /// Whether `x` lies in the range of the points or at most `share` of its half beyond.
-    pub fn reaches(&self, x: f64, share: f64) -> bool {
-        (x - self.middle).abs() <= (1.0 + share) * self.half
     }
 }

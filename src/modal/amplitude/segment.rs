@@ -35,28 +35,34 @@ pub(super) fn fit_segment(
     pole: Complex64,
     context: &Context,
 ) -> Option<Segment> {
-    let middle = 0.5 * (times.first()? + times.last()?);
-    let local: Vec<f64> = times.iter().map(|t| t - middle).collect();
+    let reference = effective_time(times, pole.re);
+    let local: Vec<f64> = times.iter().map(|t| t - reference).collect();
+    // How the drift bends within the segment is taken from the whole decay, so that the pole is that of
+    // the reference time.
+    let straight: Vec<Complex64> = local
+        .iter()
+        .zip(values)
+        .map(|(s, value)| value * (-context.bend(reference, *s)).exp())
+        .collect();
     let others: Vec<(Complex64, Complex64)> = context
         .model
         .others
         .iter()
-        .map(|(c, p)| (c * (p * middle).exp(), *p))
+        .map(|(c, p)| (c * (p * reference).exp(), *p))
         .collect();
     let start = Exponentials {
-        amplitude: first_amplitude(&local, values, pole, &others),
+        amplitude: first_amplitude(&local, &straight, pole, &others),
         exponents: vec![pole],
+        rate: context.model.rate,
         others,
     };
     let priors = priors(&start, context.noise, pole.re);
-    let fit = fit_exponentials(&local, values, start, &priors)?;
-    let found = *fit.model.exponents.first()?;
-    let centre = effective_time(&local, found.re);
+    let fit = fit_exponentials(&local, &straight, start, &priors)?;
     let pairs = fit.residuals.windows(2);
     Some(Segment {
-        time: middle + centre,
-        amplitude: fit.model.mode(centre).norm(),
-        pole: found,
+        time: reference,
+        amplitude: fit.model.amplitude.norm(),
+        pole: *fit.model.exponents.first()?,
         inverse: fit.inverse[(1, 1)].re,
         squares: fit.squares,
         products: pairs.map(|r| (r[0].conj() * r[1]).re).sum(),
@@ -106,7 +112,9 @@ fn priors(start: &Exponentials, noise: f64, decay: f64) -> Vec<Prior> {
 /// mean + mu3/(2 mu2). Log amplitude and phase are weighted with the amplitude squared,
 /// w = e^{2 decay t}, so that an estimate from a drifting pole is that of this time.
 fn effective_time(times: &[f64], decay: f64) -> f64 {
-    let weights: Vec<f64> = times.iter().map(|t| (2.0 * decay * t).exp()).collect();
+    let first = times.first().copied().unwrap_or(0.0);
+    let weight = |t: &f64| (2.0 * decay * (t - first)).exp();
+    let weights: Vec<f64> = times.iter().map(weight).collect();
     let total: f64 = weights.iter().sum();
     let moment = |about: f64, power: i32| {
         let terms = times.iter().zip(&weights);

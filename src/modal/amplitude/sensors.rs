@@ -5,6 +5,9 @@ use num_complex::Complex64;
 use super::band::Band;
 use super::median_of;
 
+/// Least noise variance over the mean power: 200 dB.
+const FLOOR: f64 = 1e-20;
+
 /// The sensor with the largest amplitude at the start of the decays; `None` without any.
 pub(super) fn strongest(bands: &[Band]) -> Option<usize> {
     let count = bands.iter().map(|band| band.sensors.len()).min()?;
@@ -37,18 +40,10 @@ pub(super) fn combine(band: &Band, reference: usize) -> Option<Vec<Complex64>> {
     }
     let mut sum = vec![Complex64::ZERO; main.len()];
     let mut total = 0.0;
-    let floor = 1e-12;
     for values in &band.sensors {
         let products = main.iter().zip(values).take(early(band));
         let ratio = products.map(|(m, y)| m.conj() * y).sum::<Complex64>() / main_energy;
-        // A sensor without noise would take all the weight: relative to what it measures, no
-        // converter does better than the floor.
-        let own: f64 = values
-            .iter()
-            .take(early(band))
-            .map(Complex64::norm_sqr)
-            .sum();
-        let noise = noise_variance(values, band).max(floor * own);
+        let noise = noise_variance(values, band);
         if noise.is_nan() || noise <= 0.0 {
             continue;
         }
@@ -62,11 +57,13 @@ pub(super) fn combine(band: &Band, reference: usize) -> Option<Vec<Complex64>> {
 
 /// Noise variance of a sensor's values, from what the neighbours in time do not predict:
 /// y(n) - (z y(n-1) + y(n+1)/z)/2 with z = e^{p step} has 1.5 times the variance of white noise, and
-/// the median of an exponentially distributed square is ln 2 of its mean.
+/// the median of an exponentially distributed square is ln 2 of its mean. Not below what no converter
+/// undercuts, so that simulated signals without noise divide nothing by zero.
 pub(super) fn noise_variance(values: &[Complex64], band: &Band) -> f64 {
     let z = (band.decay * band.step).exp();
     let squares = values
         .windows(3)
         .map(|y| (y[1] - 0.5 * (z * y[0] + y[2] / z)).norm_sqr());
-    median_of(squares) / (1.5 * std::f64::consts::LN_2)
+    let power = values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len().max(1) as f64;
+    (median_of(squares) / (1.5 * std::f64::consts::LN_2)).max(FLOOR * power)
 }

@@ -1,12 +1,20 @@
 //! Frequency and damping against log amplitude.
 
+use std::f64::consts::TAU;
+
 use super::polynomial::Polynomial;
 use super::student;
 use super::{AmplitudeCurve, AmplitudePoint};
 
-/// Highest degree of the curve through the points: a joint's curve bends once, or levels off at
-/// either end.
-const MOST_DEGREE: usize = 4;
+/// Powers q of the amplitude in which the curve is a polynomial (0: its logarithm): slip in a joint
+/// changes frequencies with a power between 1/2 and 1, a cubic spring with the square.
+const POWERS: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
+/// Highest degree of that polynomial: the curve may bend, and level off at either end.
+const MOST_DEGREE: usize = 6;
+/// Weight over that of the best model below which a model is left out.
+const LEAST_WEIGHT: f64 = 0.01;
+/// Points for every degree, at least.
+const LEAST_SHARE: usize = 3;
 /// Degrees of freedom that the curve leaves at least.
 const LEAST_FREEDOM: usize = 2;
 /// Probability outside the stated bounds.
@@ -14,6 +22,10 @@ const OUTSIDE: f64 = 0.05;
 /// How far beyond the outermost points the curve is read (shares of half their range): the first and
 /// last segments reach that far.
 const BEYOND: f64 = 0.15;
+
+/// How far beyond the first and last point of a decay it is read in time (shares of the step): the half
+/// of a segment.
+const BEYOND_TIME: f64 = 0.5;
 
 /// One quantity (frequency in Hz, or damping ratio) against log amplitude.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,15 +39,119 @@ pub struct Trend {
     /// Scatter of the points about the curve over their own uncertainties; above 1 they differ by more
     /// than noise (between taps: the structure changed).
     pub scatter: f64,
-    /// Value at the first point of the loudest tap, at the largest amplitude.
+    /// Value at the largest amplitude: the first usable time of the hardest tap.
     pub first: f64,
-    /// Value at the smallest amplitude.
+    /// Value at the smallest amplitude: the last usable time of some tap.
     pub last: f64,
     /// Last less first.
     pub change: f64,
     /// 95 % bound of the change.
     pub change_bound: f64,
-    curve: Polynomial,
+    curve: Curve,
+}
+
+/// Polynomials in powers of the amplitude, over its logarithm, each with its weight: which of them
+/// holds is not known, and the uncertainty has to say so.
+#[derive(Debug, Clone, PartialEq)]
+struct Curve {
+    /// Weight, power of the amplitude, polynomial; the best one first.
+    models: Vec<(f64, f64, Polynomial)>,
+    /// Range of the log amplitudes.
+    low: f64,
+    high: f64,
+}
+
+impl Curve {
+    /// All powers and degrees, weighted with e^{-(A - A_least)/2} after Akaike's criterion A (Burnham &
+    /// Anderson).
+    fn through(values: &[(f64, f64, f64)]) -> Option<Curve> {
+        let (low, high) = extent(values);
+        let most = MOST_DEGREE
+            .min(values.len() / LEAST_SHARE)
+            .min(values.len().saturating_sub(1 + LEAST_FREEDOM));
+        let mut models: Vec<(f64, f64, Polynomial)> = Vec::new();
+        for power in POWERS {
+            let mapped: Vec<(f64, f64, f64)> = values
+                .iter()
+                .map(|(x, value, std)| (variable(*x, high, power), *value, *std))
+                .collect();
+            let degrees = (1..=most).filter_map(|degree| Polynomial::fit(&mapped, degree));
+            models.extend(degrees.map(|fit| (fit.criterion(), power, fit)));
+        }
+        models.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let least = models.first()?.0;
+        for model in &mut models {
+            model.0 = (-0.5 * (model.0 - least)).exp();
+        }
+        models.retain(|model| model.0 > LEAST_WEIGHT);
+        let total: f64 = models.iter().map(|model| model.0).sum();
+        for model in &mut models {
+            model.0 /= total;
+        }
+        Some(Curve { models, low, high })
+    }
+
+    /// Value and standard uncertainty.
+    fn at(&self, x: f64) -> (f64, f64) {
+        self.averaged(|power, polynomial| polynomial.at(variable(x, self.high, power)))
+    }
+
+    /// Difference of the values at two places, and its standard uncertainty.
+    fn between(&self, from: f64, to: f64) -> (f64, f64) {
+        self.averaged(|power, polynomial| {
+            let variable = |x| variable(x, self.high, power);
+            polynomial.between(variable(from), variable(to))
+        })
+    }
+
+    /// Mean over the models, and sqrt(sum w (s^2 + (v - mean)^2)): their own uncertainties and how far
+    /// they disagree (Burnham & Anderson).
+    fn averaged(&self, of: impl Fn(f64, &Polynomial) -> (f64, f64)) -> (f64, f64) {
+        let models = self.models.iter();
+        let values: Vec<(f64, (f64, f64))> = models.map(|(w, q, p)| (*w, of(*q, p))).collect();
+        let mean = values.iter().map(|(w, (v, _))| w * v).sum::<f64>();
+        let variance = values
+            .iter()
+            .map(|(w, (v, s))| w * (s * s + (v - mean).powi(2)))
+            .sum::<f64>();
+        (mean, variance.sqrt())
+    }
+
+    /// 95 % quantile for the best model's degrees of freedom.
+    fn quantile(&self) -> f64 {
+        let best = self.models.first();
+        student::quantile(OUTSIDE, best.map_or(1.0, |(_, _, fit)| fit.freedom))
+    }
+
+    /// sqrt(chi^2/freedom) about the best model.
+    fn scatter(&self) -> f64 {
+        let best = self.models.first();
+        best.map_or(0.0, |(_, _, fit)| (fit.chi_squared / fit.freedom).sqrt())
+    }
+
+    /// Whether `x` lies in the range of the points, or a little beyond.
+    fn reaches(&self, x: f64) -> bool {
+        let beyond = BEYOND * 0.5 * (self.high - self.low);
+        (self.low - beyond..=self.high + beyond).contains(&x)
+    }
+}
+
+/// Least and largest log amplitude.
+fn extent(values: &[(f64, f64, f64)]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(v.0), high.max(v.0))
+        })
+}
+
+/// (a/a0)^q over log amplitude x with a0 the largest; the logarithm itself for q = 0.
+fn variable(x: f64, high: f64, power: f64) -> f64 {
+    if power == 0.0 {
+        x
+    } else {
+        (power * (x - high)).exp()
+    }
 }
 
 /// Frequency and damping at one amplitude or time, with 95 % bounds.
@@ -71,22 +187,20 @@ fn trend(points: &[AmplitudePoint], of: fn(&AmplitudePoint) -> (f64, f64)) -> Op
             (point.amplitude.ln(), value, std)
         })
         .collect();
-    let low = values.iter().map(|v| v.0).fold(f64::INFINITY, f64::min);
-    let high = values.iter().map(|v| v.0).fold(f64::NEG_INFINITY, f64::max);
+    let (low, high) = extent(&values);
     let line = Polynomial::fit(&values, 1)?;
     let (slope, slope_std) = line.between(0.0, 1.0);
-    let most = MOST_DEGREE.min(values.len().saturating_sub(1 + LEAST_FREEDOM));
-    let curve = Polynomial::best(&values, most)?;
+    let curve = Curve::through(&values)?;
     let (change, change_std) = curve.between(high, low);
     Some(Trend {
         slope,
         slope_std,
         p_value: student::two_sided(slope / slope_std, line.freedom),
-        scatter: (curve.chi_squared / curve.freedom).sqrt(),
+        scatter: curve.scatter(),
         first: curve.at(high).0,
         last: curve.at(low).0,
         change,
-        change_bound: student::quantile(OUTSIDE, curve.freedom) * change_std,
+        change_bound: curve.quantile() * change_std,
         curve,
     })
 }
@@ -95,12 +209,11 @@ impl Trend {
     /// Value and 95 % bound at an amplitude; `None` outside the points' range and a little beyond.
     pub fn at_amplitude(&self, amplitude: f64) -> Option<(f64, f64)> {
         let x = amplitude.ln();
-        if !self.curve.reaches(x, BEYOND) {
+        if !self.curve.reaches(x) {
             return None;
         }
         let (value, std) = self.curve.at(x);
-        let bound = student::quantile(OUTSIDE, self.curve.freedom) * std;
-        Some((value, bound))
+        Some((value, self.curve.quantile() * std))
     }
 }
 
@@ -116,8 +229,8 @@ pub(super) fn reading_at(curve: &AmplitudeCurve, amplitude: f64) -> Option<Ampli
     })
 }
 
-/// The amplitude at a time lies on the line of log amplitude over time through the two points beside
-/// it; beyond the ends through the two outermost.
+/// The amplitude at a time is that of the cubic through the log amplitudes of the two points beside
+/// it, with their decays as its slopes (Hermite); beyond the ends of the two outermost.
 pub(super) fn reading_at_time(
     curve: &AmplitudeCurve,
     tap: usize,
@@ -127,7 +240,16 @@ pub(super) fn reading_at_time(
     let later = points.partition_point(|p| p.time < time);
     let from = later.saturating_sub(1).min(points.len().checked_sub(2)?);
     let (a, b) = (points[from], points[from + 1]);
-    let share = (time - a.time) / (b.time - a.time);
-    let log = a.amplitude.ln() + share * (b.amplitude / a.amplitude).ln();
+    let step = b.time - a.time;
+    let u = (time - a.time) / step;
+    if u < -BEYOND_TIME || u > 1.0 + BEYOND_TIME {
+        return None;
+    }
+    // d ln a/dt = -zeta omega.
+    let slope = |p: &AmplitudePoint| -p.damping_ratio * TAU * p.frequency * step;
+    let log = a.amplitude.ln() * (1.0 + 2.0 * u) * (1.0 - u).powi(2)
+        + b.amplitude.ln() * (3.0 - 2.0 * u) * u * u
+        + slope(a) * u * (1.0 - u).powi(2)
+        - slope(b) * (1.0 - u) * u * u;
     reading_at(curve, log.exp())
 }

@@ -22,7 +22,7 @@ pub(super) fn walk_decay(
     settings: &AmplitudeSettings,
 ) -> Vec<AmplitudePoint> {
     let mut segments: Vec<Segment> = Vec::new();
-    let mut pole = context.model.exponents.first().copied().unwrap_or_default();
+    let mut pole = context.model.pole(0.0);
     pole.re = pole.re.min(0.3 * band.decay);
     let mut amplitude = context.model.amplitude.norm();
     let mut from = 0;
@@ -90,7 +90,9 @@ fn noise(segments: &[Segment]) -> f64 {
     let sum = |part: fn(&Segment) -> f64| segments.iter().map(part).sum::<f64>();
     let squares = sum(|s| s.squares);
     let agreement = sum(|s| s.products) / squares.max(f64::MIN_POSITIVE);
-    let agreement = agreement.clamp(0.0, 0.9);
+    // One standard deviation of a correlation by chance: 1/sqrt(2n) with n complex values.
+    let chance = 1.0 / (2.0 * sum(|s| s.freedom)).sqrt();
+    let agreement = (agreement - chance).clamp(0.0, 0.9);
     squares / sum(|s| s.freedom) * (1.0 + agreement) / (1.0 - agreement)
 }
 

@@ -16,7 +16,7 @@ const STEPS: i32 = 4;
 
 /// A weaker copy of a pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Copy {
+pub(super) struct PulseCopy {
     /// Where its crest is (samples from the start, with a fraction).
     pub place: f64,
     /// Its height over the pulse's; negative where it points downwards.
@@ -58,7 +58,7 @@ impl<'a> Template<'a> {
     }
 
     /// The copy near `place`; `None` where the force there has another shape or width.
-    pub(super) fn fit(&self, place: usize) -> Option<Copy> {
+    pub(super) fn fit(&self, place: usize) -> Option<PulseCopy> {
         // The first search runs over all widths with a coarse delay, the second over the best alone.
         let coarse = (self.width / 8.0).max(0.25);
         let mut best: Option<(Fit, f64)> = None;
@@ -73,7 +73,7 @@ impl<'a> Template<'a> {
         let (best, width) = best?;
         let fit = self.refine(place, best, (width, coarse));
         let is_copy = LIKE_THE_FIRST.contains(&width) && self.explains(&fit);
-        is_copy.then_some(Copy {
+        is_copy.then_some(PulseCopy {
             place: place as f64 + fit.offset,
             ratio: fit.ratio,
             base: fit.base,

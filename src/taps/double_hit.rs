@@ -6,7 +6,7 @@
 //! depth (1 + r)/(1 - r) in the force spectrum, for |1 + r e^{-j omega d}| swings between 1 + r and
 //! 1 - r, but without the spectrum's trouble to tell a ripple of long period from the pulse's own fall.
 
-use super::copy::{Copy, Template, reach};
+use super::copy::{PulseCopy, Template, reach};
 use super::force::{Force, half_width};
 use super::{Event, TapSettings};
 use crate::stats::median;
@@ -70,7 +70,7 @@ pub(super) fn second_hit(
     let excursion = excursion(&main, force.noise, (own, settings));
     // A copy has been fitted where an excursion has only been looked at.
     let excursion = excursion.filter(|other| {
-        let same = |copy: &Copy| (copy.place - other.place).abs() <= main.width + 1.0;
+        let same = |copy: &PulseCopy| (copy.place - other.place).abs() <= main.width + 1.0;
         !copies.iter().any(same)
     });
     copies
@@ -109,12 +109,12 @@ impl<'a> Pulse<'a> {
 }
 
 /// Copies of the pulse, at least `least` of its height.
-fn copies(main: &Pulse, least: f64) -> Vec<Copy> {
+fn copies(main: &Pulse, least: f64) -> Vec<PulseCopy> {
     let crests = crests(main);
     let own = crests.get(main.crest).copied().unwrap_or(0.0);
     let limit = (CANDIDATE * least * own).max(OVER_NOISE * disturbance(main, &crests));
     let template = Template::new(main.samples, main.crest, main.width);
-    let fitted = |sign: f64| -> Vec<Copy> {
+    let fitted = |sign: f64| -> Vec<PulseCopy> {
         candidates(main, (&crests, sign), limit)
             .into_iter()
             .filter_map(|place| template.fit(place))
@@ -209,7 +209,11 @@ fn candidates(main: &Pulse, (crests, sign): (&[f64], f64), limit: f64) -> Vec<us
 
 /// The largest second excursion above `double_hit` of the peak after the force has fallen below
 /// `rearm` of it.
-fn excursion(main: &Pulse, noise: f64, (own, settings): (usize, &TapSettings)) -> Option<Copy> {
+fn excursion(
+    main: &Pulse,
+    noise: f64,
+    (own, settings): (usize, &TapSettings),
+) -> Option<PulseCopy> {
     let limit = (settings.double_hit * main.peak).max(OVER_NOISE * noise);
     let rearm = (settings.rearm * main.peak).max(3.0 * noise);
     let samples = main.samples.get(..own)?;
@@ -222,7 +226,7 @@ fn excursion(main: &Pulse, noise: f64, (own, settings): (usize, &TapSettings)) -
             width <= OTHER_WIDTH * main.width + 2.0 && OTHER_WIDTH * width + 2.0 >= main.width
         })
         .max_by(|a, b| a.peak.total_cmp(&b.peak))
-        .map(|other| Copy {
+        .map(|other| PulseCopy {
             place: other.place as f64,
             ratio: other.peak / main.peak,
             base: 0.0,

@@ -11,6 +11,9 @@ use crate::stats::median;
 
 /// A record shorter than this share of the median one is not worth shortening all others for.
 const SHORT_OF_MEDIAN: f64 = 0.5;
+/// A second hit is looked for so long after the first (s): longer than records usually last, and a bound
+/// on memory.
+const SEARCHED: f64 = 10.0;
 /// The last record may be cut to this share of the shortest other one.
 const CUT_OF_SHORTEST: f64 = 0.8;
 
@@ -130,7 +133,8 @@ fn force_of(
     if end < recording.frames() {
         end = end.saturating_sub(least).max(end.min(trigger + least));
     }
-    let mut force = hammer.force(first..end)?;
+    let longest = (SEARCHED * recording.sample_rate()) as u64;
+    let mut force = hammer.force(first..end.min(trigger + longest))?;
     let others = events.iter().zip(answered).enumerate();
     for (_, (other, _)) in others.filter(|(other, (_, answered))| *other != index && !**answered) {
         let range = force.index(other.trigger.saturating_sub(least / 100))

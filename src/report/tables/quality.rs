@@ -127,7 +127,7 @@ mod tests {
         ];
         let table = quality(&verdicts).expect("two checks");
         assert_eq!(table.rows.len(), 2);
-        assert_eq!(table.rows[0][..4], ["double-hit", "bad", "1 of 3", "0.3"]);
+        assert_eq!(table.rows[0][..4], ["double-hit", "bad", "1 of 3", "0.300"]);
         assert_eq!(
             table.rows[1][..3],
             ["force-fall", "not applicable", MISSING]

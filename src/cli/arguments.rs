@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tapjoint::description::{ChannelRef, JointKind, SensorKind, WindowKind};
 use tapjoint::quantity::{Dimension, parse_quantity};
+use tapjoint::recording::ResponseForm;
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
-use tapjoint::spectral::{FrfEstimator, ResponseForm};
+use tapjoint::spectral::FrfEstimator;
 
 /// Arguments of every command.
 #[derive(Debug, Args)]

@@ -8,6 +8,7 @@ use super::warning::Warning;
 use crate::identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
 use crate::identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
 use crate::modal::ModeReading;
+use crate::quality::Verdict;
 use crate::recording::{ChannelInfo, Format};
 
 /// A finished analysis.
@@ -24,6 +25,8 @@ pub struct Analysis {
     pub modes: Vec<ModeResult>,
     /// What the modes say about the joint; `None` for a bare recording.
     pub identification: Option<Identification>,
+    /// How well the test was made: good practice, check by check.
+    pub verdicts: Vec<Verdict>,
     /// What a reader has to know.
     pub warnings: Vec<Warning>,
 }

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use super::decays::FreeDecays;
 use crate::modal::amplitude::{AmplitudeSettings, KnownMode, follow_amplitude};
 use crate::modal::fit::{
-    ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, ResponseKind, fit_modes,
+    ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, fit_modes,
     modal_constants, test_extra_mode,
 };
 use crate::modal::polyreference::{
@@ -17,6 +17,7 @@ use crate::modal::polyreference::{
     all_modes, find_modes,
 };
 use crate::modal::{FittedReading, FrequencySource, ModeReading, PeakLabel};
+use crate::recording::ResponseForm;
 use crate::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
@@ -233,7 +234,7 @@ fn is_mode(test: &ExtraMode, accepted: &[PoleStart]) -> bool {
 pub(super) fn complete(
     readings: &mut [ModeReading],
     decays: &FreeDecays,
-    kinds: &[Option<ResponseKind>],
+    kinds: &[Option<ResponseForm>],
 ) {
     let fitted: Vec<&mut FittedReading> = readings
         .iter_mut()
@@ -249,9 +250,9 @@ pub(super) fn complete(
     let curves = follow_amplitude(&decays.decays, &known, &AmplitudeSettings::default());
     for (fit, curve) in fitted.into_iter().zip(curves) {
         fit.amplitude = Some(curve);
-        let assumed: Vec<ResponseKind> = kinds
+        let assumed: Vec<ResponseForm> = kinds
             .iter()
-            .map(|kind| kind.unwrap_or(ResponseKind::Acceleration))
+            .map(|kind| kind.unwrap_or(ResponseForm::Accelerance))
             .collect();
         let mut constants = modal_constants(&fit.mode, &decays.forces, &assumed);
         constants.retain(|constant| kinds.get(constant.sensor).is_some_and(Option::is_some));

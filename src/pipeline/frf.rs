@@ -6,7 +6,8 @@ use num_complex::Complex64;
 use super::analysis::{RecordingResult, Response};
 use super::measure::MeasuredSpectra;
 use crate::description::SensorKind;
-use crate::spectral::{FrfEstimator, LineQuality, Lines, ResponseForm, Window, random_error};
+use crate::recording::ResponseForm;
+use crate::spectral::{FrfEstimator, LineQuality, Lines, Window, random_error};
 
 /// How frequency response functions are given.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

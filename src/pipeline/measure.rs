@@ -4,8 +4,8 @@ use super::fits::Stabilisation;
 use super::stage::Stage;
 use super::warning::Warning;
 use crate::description::{ReadingMethod, WindowKind};
-use crate::modal::fit::ResponseKind;
 use crate::modal::{MainsSettings, ModeReading, PeakSettings};
+use crate::recording::ResponseForm;
 use crate::recording::{Recording, RecordingError};
 use crate::spectral::{
     AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, SpectralError,
@@ -28,7 +28,7 @@ pub struct MeasureSettings {
     pub reading: ReadingMethod,
     /// What each response measures, for modal constants; `None` where nobody said, or it is no motion in
     /// SI units over a force in N.
-    pub kinds: Vec<Option<ResponseKind>>,
+    pub kinds: Vec<Option<ResponseForm>>,
     /// How taps are judged.
     pub taps: TapSettings,
     /// What counts as a resonance.
@@ -76,6 +76,9 @@ pub struct MeasuredSpectra {
     pub decay: DecayCheck,
     /// Resonances and mains lines, ascending.
     pub readings: Vec<ModeReading>,
+    /// What the noise of the force channel leaves in its windowed transforms, line by line (N s); `None`
+    /// without a hammer or a quiet stretch before the first tap.
+    pub force_noise: Option<Vec<f64>>,
     /// What the polyreference fit found.
     pub stabilisation: Stabilisation,
 }
@@ -141,7 +144,6 @@ pub fn measure(
     let stage = Stage::new(recording, settings, &taps, lines);
     let spectra = stage.spectra()?;
     warnings.extend(super::warning::of_spectra(recording.name(), &spectra));
-    warnings.extend(super::doubts::of_readings(recording.name(), &spectra));
     Ok(Measurement {
         taps,
         spectra: Some(spectra),

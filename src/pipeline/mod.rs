@@ -11,7 +11,7 @@
 
 mod analysis;
 mod decays;
-mod doubts;
+mod evidence;
 mod fits;
 mod force;
 mod frf;
@@ -93,12 +93,15 @@ pub fn run_test(
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
     warnings.extend(doubts);
+    let (verdicts, doubts) = evidence::judge(&recordings);
+    warnings.extend(doubts);
     Ok(Analysis {
         name: test.name.clone(),
         structure: Some(structure),
         recordings,
         modes,
         identification: Some(identification),
+        verdicts,
         warnings,
     })
 }

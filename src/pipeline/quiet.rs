@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use crate::modal::{LineAmplitudes, MainsSettings, PeakLabel, mains_harmonic, near_mains};
-use crate::spectral::{AveragedSpectra, Window, line_amplitude, noise_power};
+use crate::spectral::{AveragedSpectra, Lines, Window, line_amplitude, noise_power};
 
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
 pub(super) struct Quiet {
@@ -54,6 +54,14 @@ impl Quiet {
                 Some(power.collect())
             })
             .collect()
+    }
+
+    /// What the noise of the force channel leaves in the transforms of its windowed pulses (N s), on
+    /// each line; `None` without a hammer, or where the stretch is too short to tell.
+    pub fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
+        let power = noise_power(self.force.clone()?, self.sample_rate, lines)?;
+        let amplitude = |power: f64| (power * self.force_window).sqrt();
+        Some(power.into_iter().map(amplitude).collect())
     }
 
     /// The label of a peak on line `index` that is hum, judged on the response in which it is

@@ -7,7 +7,7 @@ use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
 use crate::description::{
     ChannelRef, RecordingDescription, Scale, SensorDescription, SensorKind, TestDescription,
 };
-use crate::modal::fit::ResponseKind;
+use crate::recording::ResponseForm;
 use crate::recording::{ReadSettings, Recording, RecordingError};
 use crate::spectral::SpectralError;
 use crate::taps::{TapSettings, TapSource, find_taps};
@@ -121,11 +121,11 @@ pub(super) fn measure_described(
 }
 
 /// What the sensors measure, where the hammer's force makes modal constants of it.
-fn response_kinds(test: &TestDescription) -> Vec<Option<ResponseKind>> {
+fn response_kinds(test: &TestDescription) -> Vec<Option<ResponseForm>> {
     let kind = |sensor: &SensorDescription| match sensor.kind {
-        SensorKind::Acceleration => Some(ResponseKind::Acceleration),
-        SensorKind::Velocity => Some(ResponseKind::Velocity),
-        SensorKind::Displacement => Some(ResponseKind::Displacement),
+        SensorKind::Acceleration => Some(ResponseForm::Accelerance),
+        SensorKind::Velocity => Some(ResponseForm::Mobility),
+        SensorKind::Displacement => Some(ResponseForm::Receptance),
         SensorKind::Sound => None,
     };
     match &test.hammer {

@@ -117,6 +117,7 @@ impl<'a> Stage<'a> {
             window,
             decay,
             readings,
+            force_noise: quiet.force_noise(&self.lines),
             stabilisation,
         })
     }

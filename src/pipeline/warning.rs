@@ -23,6 +23,13 @@ pub enum Warning {
         /// What happened, why, what helps.
         text: String,
     },
+    /// A check of good practice that raises a doubt.
+    Quality {
+        /// Short code of the check.
+        code: &'static str,
+        /// What happened, why, what helps.
+        text: String,
+    },
     /// Something about the test description.
     Description {
         /// What happened, why, what helps.
@@ -113,7 +120,7 @@ impl Warning {
     /// Short code that scripts may look for.
     pub fn code(&self) -> &'static str {
         match self {
-            Warning::Recording { code, .. } => code,
+            Warning::Recording { code, .. } | Warning::Quality { code, .. } => code,
             Warning::Description { .. } => "description",
             Warning::RejectedTaps { .. } => "rejected-taps",
             Warning::TapsTooShort { .. } => "taps-too-short",
@@ -136,7 +143,9 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Warning::Recording { file, text, .. } => write!(f, "{file}: {text}"),
-            Warning::Description { text } | Warning::Neglected { text } => f.write_str(text),
+            Warning::Description { text }
+            | Warning::Neglected { text }
+            | Warning::Quality { text, .. } => f.write_str(text),
             Warning::RejectedTaps {
                 file,
                 rejected,

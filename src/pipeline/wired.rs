@@ -1,6 +1,7 @@
 //! A bare recording of which the caller says what its channels are.
 
 use super::analysis::{Analysis, RecordingResult, Response};
+use super::evidence;
 use super::measure::MeasureSettings;
 use super::modes::modes_of_bare;
 use super::recordings::{PipelineError, finish};
@@ -51,10 +52,14 @@ pub fn run_wired(
 /// The analysis of a recording about which nothing is described.
 pub(super) fn analysis_of(mut recording: RecordingResult) -> Analysis {
     let modes = modes_of_bare(&mut recording);
+    let (verdicts, doubts) = evidence::judge(std::slice::from_ref(&recording));
+    let mut warnings = recording.measurement.warnings.clone();
+    warnings.extend(doubts);
     Analysis {
         name: recording.file.clone(),
         structure: None,
-        warnings: recording.measurement.warnings.clone(),
+        verdicts,
+        warnings,
         modes,
         identification: None,
         recordings: vec![recording],

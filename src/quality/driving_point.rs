@@ -3,9 +3,10 @@
 use num_complex::Complex64;
 
 use super::{
-    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, ResponseForm,
-    SensorEvidence, Subject, Verdict,
+    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject,
+    Verdict,
 };
+use crate::recording::ResponseForm;
 
 /// Lines to either side of a resonance over which its sign is taken.
 const ABOUT: usize = 2;
@@ -156,10 +157,10 @@ fn receptance(recording: &RecordingEvidence, sensor: &SensorEvidence) -> Option<
     let convert = |(line, h): (usize, &Complex64)| {
         let omega = recording.lines.frequency(line).max(f64::MIN_POSITIVE);
         match sensor.form {
-            ResponseForm::Accelerance => Some(-h / (omega * omega)),
-            ResponseForm::Mobility => Some(h / Complex64::new(0.0, omega)),
-            ResponseForm::Receptance => Some(*h),
-            ResponseForm::Other => None,
+            Some(ResponseForm::Accelerance) => Some(-h / (omega * omega)),
+            Some(ResponseForm::Mobility) => Some(h / Complex64::new(0.0, omega)),
+            Some(ResponseForm::Receptance) => Some(*h),
+            None => None,
         }
     };
     frf.iter().enumerate().map(convert).collect()

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use crate::recording::ResponseForm;
 use crate::spectral::{DecayCheck, Lines, Window};
 use crate::stats::median;
 use crate::taps::{Rejection, SecondHit, Tap};
@@ -36,19 +37,6 @@ pub struct ForceEvidence {
     pub noise: Option<Vec<f64>>,
 }
 
-/// What a response channel measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResponseForm {
-    /// Acceleration over force.
-    Accelerance,
-    /// Velocity over force.
-    Mobility,
-    /// Displacement over force.
-    Receptance,
-    /// Something whose phase to the force says nothing, as sound.
-    Other,
-}
-
 /// One sensor as placed in a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorEvidence {
@@ -56,8 +44,9 @@ pub struct SensorEvidence {
     pub name: String,
     /// Where it is (m); `None` where nobody said.
     pub position: Option<f64>,
-    /// What it measures.
-    pub form: ResponseForm,
+    /// What it measures over the force; `None` of something whose phase to the force says nothing, as
+    /// sound.
+    pub form: Option<ResponseForm>,
     /// H1, line by line (unit of the response per N); `None` without a hammer.
     pub frf: Option<Vec<Complex64>>,
     /// Coherence, line by line; `None` where it does not exist.

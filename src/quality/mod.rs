@@ -22,7 +22,7 @@ pub use averages::{
 pub use decay::{check_decay, check_exponential_window, check_window_damping, corrected_damping};
 pub use driving_point::{check_antiresonances, check_driving_point};
 pub use evidence::{
-    ForceEvidence, RecordingEvidence, ResonanceEvidence, ResponseForm, SensorEvidence, TapEvidence,
+    ForceEvidence, RecordingEvidence, ResonanceEvidence, SensorEvidence, TapEvidence,
 };
 pub use force::{check_force_fall, check_force_noise};
 pub use levels::check_tap_levels;

@@ -252,6 +252,19 @@ pub enum Subject {
     Test,
 }
 
+impl Subject {
+    /// The recording it belongs to; `None` of the test as a whole.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Subject::Recording { file }
+            | Subject::Tap { file, .. }
+            | Subject::Mode { file, .. }
+            | Subject::Sensor { file, .. } => Some(file),
+            Subject::Test => None,
+        }
+    }
+}
+
 impl fmt::Display for Subject {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -8,7 +8,6 @@ mod average;
 mod block;
 mod chirp;
 mod decay;
-mod form;
 mod frf;
 mod lines;
 mod noise;
@@ -22,7 +21,6 @@ pub use chirp::chirp_z;
 pub use decay::{
     DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay, window_share,
 };
-pub use form::ResponseForm;
 pub use frf::{FrfEstimator, LinePowers, LineQuality, random_error};
 pub use lines::{DISPLAY_RATIO, Lines};
 pub use noise::{line_amplitude, noise_power};

@@ -61,7 +61,7 @@ const TABLE: &[(&str, &[&str])] = &[
     ),
 ];
 
-const MEASUREMENT: &[&str] = &["recording", "taps", "spectral", "modal"];
+const MEASUREMENT: &[&str] = &["recording", "taps", "spectral", "modal", "quality"];
 const THEORY: &[&str] = &["structure"];
 
 /// Modules above the library, which may do everything.

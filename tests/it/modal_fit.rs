@@ -9,9 +9,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint::modal::fit::{
     Basis, Column, ExtraVerdict, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, ResponseKind, TapForce, UncertaintySource, Unfit, bands_for, fit_modes,
-    modal_constants, modal_constants_of_frf, test_extra_mode,
+    PoleStart, TapForce, UncertaintySource, Unfit, bands_for, fit_modes, modal_constants,
+    modal_constants_of_frf, test_extra_mode,
 };
+use tapjoint::recording::ResponseForm;
 use tapjoint::simulate::{SimulatedMode, TapTestSettings, simulate_tap_test};
 
 /// A mode: natural frequency (Hz), damping ratio.
@@ -396,7 +397,7 @@ fn recover_modal_constants_with_their_signs() {
         .iter()
         .map(|mode| start((mode.frequency, mode.damping_ratio), 0.2))
         .collect();
-    let kinds = [ResponseKind::Acceleration; 2];
+    let kinds = [ResponseForm::Accelerance; 2];
     for (fit, mode) in all_fitted(&data, &starts).iter().zip(&modes) {
         let constants = modal_constants(fit, &forces, &kinds);
         assert_eq!(constants.len(), 2);
@@ -459,7 +460,7 @@ fn recover_frequency_response_functions_with_modes_beyond_the_band() {
             let (f, z) = covers(fit, *mode);
             covered += usize::from(f) + usize::from(z);
             all += 2;
-            let found = modal_constants_of_frf(fit, &[ResponseKind::Acceleration; 2]);
+            let found = modal_constants_of_frf(fit, &[ResponseForm::Accelerance; 2]);
             assert_eq!(found.len(), 2);
             let error = (found[0].value - constant).abs();
             // 90 constants: beyond four deviations one in 10000.

@@ -48,7 +48,7 @@ fn sensor(name: &str, position: f64, residues: [f64; 3]) -> SensorEvidence {
     SensorEvidence {
         name: name.to_owned(),
         position: Some(position),
-        form: ResponseForm::Accelerance,
+        form: Some(ResponseForm::Accelerance),
         frf: Some(accelerance(residues)),
         coherence: Some(vec![0.99; lines().points()]),
     }
@@ -457,13 +457,13 @@ fn val_velocity_and_displacement_at_the_driving_point() {
                 // Integrated once or twice: divided by j omega.
                 *h /= Complex64::new(0.0, TAU * frequency).powi(power);
             }
-            r.sensors[0].form = form;
+            r.sensors[0].form = Some(form);
         });
         for check in [Check::DrivingPoint, Check::Antiresonances] {
             assert_eq!(judged(&recording, check).outcome, Outcome::Good, "{form:?}");
         }
     }
-    let sound = changed(|r| r.sensors[0].form = ResponseForm::Other);
+    let sound = changed(|r| r.sensors[0].form = None);
     assert_missing(&judged(&sound, Check::DrivingPoint), "no FRF");
 }
 

@@ -7,10 +7,11 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use tapjoint::recording::ResponseForm;
 use tapjoint::spectral::{
-    AveragedSpectra, DecayCheck, FrfEstimator, LinePowers, Lines, ResponseForm, SpectralAverager,
-    TapRecord, Transformer, Window, apply_force_window, average_records, choose_window,
-    random_error, transform_block, window_share,
+    AveragedSpectra, DecayCheck, FrfEstimator, LinePowers, Lines, SpectralAverager, TapRecord,
+    Transformer, Window, apply_force_window, average_records, choose_window, random_error,
+    transform_block, window_share,
 };
 
 const RATE: f64 = 2048.0;

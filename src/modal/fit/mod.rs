@@ -27,7 +27,7 @@ pub use collector::FreeDecayCollector;
 pub use data::{Basis, Column, ModalData};
 pub use extra::{ExtraMode, ExtraVerdict, test_extra_mode};
 pub use kernel::StopReason;
-pub use residue::{ModalConstant, ResponseKind, TapForce, modal_constants, modal_constants_of_frf};
+pub use residue::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
 pub use result::{ColumnAmplitude, ModeFit, fit_modes};
 pub use uncertainty::{FittedValue, TapFit, UncertaintySource};
 

@@ -4,17 +4,7 @@ use nalgebra::Vector2;
 use num_complex::Complex64;
 
 use super::result::{ColumnAmplitude, ModeFit};
-
-/// Quantity that a sensor measures, or that stands over force in a frequency response function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResponseKind {
-    /// Displacement; over force: receptance.
-    Displacement,
-    /// Velocity; over force: mobility.
-    Velocity,
-    /// Acceleration; over force: accelerance.
-    Acceleration,
-}
+use crate::recording::ResponseForm;
 
 /// The force of one tap.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +52,7 @@ struct Uncertain {
 pub fn modal_constants(
     mode: &ModeFit,
     forces: &[TapForce],
-    kinds: &[ResponseKind],
+    kinds: &[ResponseForm],
 ) -> Vec<ModalConstant> {
     (0..kinds.len())
         .filter_map(|sensor| {
@@ -85,7 +75,7 @@ pub fn modal_constants(
 
 /// Modal constants of every column where the columns are frequency response functions: those of one
 /// sensor for the same `tap` place. `kinds` are the functions' quantities over force, by sensor.
-pub fn modal_constants_of_frf(mode: &ModeFit, kinds: &[ResponseKind]) -> Vec<ModalConstant> {
+pub fn modal_constants_of_frf(mode: &ModeFit, kinds: &[ResponseForm]) -> Vec<ModalConstant> {
     mode.amplitudes
         .iter()
         .filter_map(|amplitude| {
@@ -135,13 +125,13 @@ fn residue_of_tap(
 fn constant(
     mode: &ModeFit,
     sensor: usize,
-    kind: ResponseKind,
+    kind: ResponseForm,
     residues: &[(Uncertain, f64)],
 ) -> Option<ModalConstant> {
     let derivatives = match kind {
-        ResponseKind::Displacement => 0,
-        ResponseKind::Velocity => 1,
-        ResponseKind::Acceleration => 2,
+        ResponseForm::Receptance => 0,
+        ResponseForm::Mobility => 1,
+        ResponseForm::Accelerance => 2,
     };
     let pole = mode.pole;
     let factor = Complex64::new(0.0, 2.0 * pole.im) / pole.powi(derivatives);

@@ -14,42 +14,13 @@ use super::sniff::{self, Kind};
 use super::uff::Point;
 
 mod error;
+mod form;
 mod text;
 mod unit;
 mod universal;
 
 pub use error::{ResponseError, ResponseWarning};
-
-/// Form of a frequency response function: what is divided by the force.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ResponseForm {
-    /// Acceleration per force ((m/s2)/N).
-    Accelerance,
-    /// Velocity per force ((m/s)/N).
-    Mobility,
-    /// Displacement per force (m/N).
-    Receptance,
-}
-
-impl ResponseForm {
-    /// Its name, as test descriptions write it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Accelerance => "accelerance",
-            Self::Mobility => "mobility",
-            Self::Receptance => "receptance",
-        }
-    }
-
-    /// Its SI unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Accelerance => "(m/s2)/N",
-            Self::Mobility => "(m/s)/N",
-            Self::Receptance => "m/N",
-        }
-    }
-}
+pub use form::ResponseForm;
 
 /// Frequency response functions on the same lines.
 #[derive(Debug, Clone, PartialEq)]

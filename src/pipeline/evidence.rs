@@ -1,0 +1,137 @@
+//! What the checks of good practice look at, from finished recordings, and what a reader is told of it.
+
+use std::f64::consts::TAU;
+
+use super::analysis::RecordingResult;
+use super::frf::form_of;
+use super::measure::MeasuredSpectra;
+use super::warning::Warning;
+use crate::modal::{FrequencySource, ModeReading};
+use crate::quality::{
+    Check, ForceEvidence, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence,
+    TapEvidence, Verdict, judge_test,
+};
+use crate::stats::median;
+
+/// The verdicts on all recordings of a test, and the warnings that follow from them.
+pub(super) fn judge(recordings: &[RecordingResult]) -> (Vec<Verdict>, Vec<Warning>) {
+    let evidence: Vec<RecordingEvidence> = recordings.iter().filter_map(evidence).collect();
+    let verdicts = judge_test(&evidence, &QualitySettings::default());
+    let warnings = warnings(&verdicts);
+    (verdicts, warnings)
+}
+
+/// `None` for a recording without spectra: what is wrong with it its taps say.
+fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
+    let spectra = recording.measurement.spectra.as_ref()?;
+    let averages = &spectra.averages;
+    let force = averages.force.as_ref().map(|spectrum| ForceEvidence {
+        spectrum: spectrum.clone(),
+        noise: spectra.force_noise.clone(),
+    });
+    let resonances = spectra
+        .readings
+        .iter()
+        .filter(|reading| reading.label.is_none())
+        .map(|reading| resonance(reading, spectra))
+        .collect();
+    Some(RecordingEvidence {
+        file: recording.file.clone(),
+        tap_position: recording.conditions.tap,
+        taps: recording
+            .measurement
+            .taps
+            .taps
+            .iter()
+            .map(TapEvidence::from)
+            .collect(),
+        lines: averages.lines,
+        force,
+        sensors: sensors(recording, spectra),
+        resonances,
+        decay: Some(spectra.decay),
+        window: spectra.window,
+    })
+}
+
+fn sensors(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<SensorEvidence> {
+    let averages = &spectra.averages;
+    let force_unit = recording.tap_unit.as_deref();
+    let sensor = |(index, response): (usize, &super::analysis::Response)| SensorEvidence {
+        name: response.name.clone(),
+        position: recording
+            .conditions
+            .sensor_positions
+            .get(&response.name)
+            .copied(),
+        form: form_of(response, force_unit),
+        frf: averages
+            .h1
+            .as_ref()
+            .and_then(|functions| functions.get(index).cloned()),
+        coherence: averages.coherence(index).map(|values| {
+            let of = |value: Option<f64>| value.unwrap_or(0.0);
+            values.into_iter().map(of).collect()
+        }),
+    };
+    recording.responses.iter().enumerate().map(sensor).collect()
+}
+
+/// A fit reads the record without its window, whose share is then in no damping.
+fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvidence {
+    let added = spectra.window.added_decay() / (TAU * reading.frequency);
+    let windowed = reading.source != FrequencySource::Fit;
+    let taps = reading
+        .fit
+        .as_deref()
+        .map_or(&[][..], |fit| fit.mode.taps.as_slice());
+    let mut stds: Vec<f64> = taps.iter().map(|tap| tap.frequency_std).collect();
+    ResonanceEvidence {
+        frequency: reading.frequency,
+        std: reading.std,
+        apparent_damping_ratio: reading
+            .damping_ratio
+            .filter(|_| windowed)
+            .map(|own| own + added),
+        tap_frequencies: taps.iter().map(|tap| tap.frequency).collect(),
+        tap_std: (!stds.is_empty()).then(|| median(&mut stds)),
+    }
+}
+
+/// Doubts of one check in one recording are one warning: the first in full, the others counted. What
+/// the taps' own reasons and the warnings of the spectra say already is left out.
+fn warnings(verdicts: &[Verdict]) -> Vec<Warning> {
+    let said = |check: Check| {
+        matches!(
+            check,
+            Check::DoubleHit | Check::Overload | Check::WeakTap | Check::Averages | Check::Decay
+        )
+    };
+    let doubts: Vec<&Verdict> = verdicts
+        .iter()
+        .filter(|verdict| verdict.is_doubt() && !said(verdict.check))
+        .collect();
+    let same =
+        |a: &Verdict, b: &Verdict| a.check == b.check && a.subject.file() == b.subject.file();
+    let mut warnings = Vec::new();
+    for (index, verdict) in doubts.iter().enumerate() {
+        if doubts[..index].iter().any(|earlier| same(earlier, verdict)) {
+            continue;
+        }
+        let more = doubts[index + 1..]
+            .iter()
+            .filter(|later| same(later, verdict))
+            .count();
+        let mut text = verdict.to_string();
+        if more > 0 {
+            text.push_str(&format!(
+                " (And {more} more; the table of checks has them all.)"
+            ));
+        }
+        warnings.push(Warning::Quality {
+            code: verdict.check.code(),
+            text,
+        });
+    }
+    warnings
+}

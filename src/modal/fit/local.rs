@@ -244,6 +244,11 @@ impl<'a> Local<'a> {
         }
     }
 
+    /// Whether the lines bear `terms` terms of background beside the poles: half of them are left.
+    pub fn has_room(&self, poles: &[Complex64], terms: usize) -> bool {
+        self.lines.count() >= 2 * (terms + 2 * poles.len()) + 2
+    }
+
     /// Noise of each column as the residual of its sensor shows it.
     pub fn noise_of(&self, fit: &GroupFit) -> Vec<f64> {
         let linear = fit.fixed.rank() + fit.at.amplitudes.nrows();
@@ -260,6 +265,15 @@ impl<'a> Local<'a> {
 }
 
 impl GroupFit {
+    /// Noise of every column of the data; zero where a column was not used.
+    pub fn noise_by_column(&self, columns: usize) -> Vec<f64> {
+        let mut all = vec![0.0; columns];
+        for (&column, noise) in self.used.iter().zip(&self.noise) {
+            all[column] = noise * self.variance.sqrt();
+        }
+        all
+    }
+
     /// Amplitude of the pole at `place` in every column of the data (its unit); zero where a column
     /// was not used.
     pub fn amplitudes(&self, place: usize, columns: usize) -> Vec<Complex64> {

@@ -10,6 +10,7 @@
 //! standard deviation from the noise that remains, or from the scatter of the taps where that is
 //! larger. Columns come from a [`FreeDecayCollector`], or are frequency response functions.
 
+mod background;
 mod band;
 mod collector;
 mod data;

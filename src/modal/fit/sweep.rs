@@ -1,8 +1,8 @@
 //! Sweeps over the groups until the poles stay.
 
 use num_complex::Complex64;
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
+use super::background::settled_fit;
 use super::data::ModalData;
 use super::local::{GroupFit, Local, Neighbour};
 use super::{PoleStart, Unfit, band};
@@ -13,12 +13,6 @@ const MOST_SWEEPS: usize = 8;
 const STILL: f64 = 0.02;
 /// Terms of the background while neighbours have not been fitted.
 const FIRST_TERMS: usize = 2;
-/// Most terms of the background: constant, slope, curvature.
-const MOST_TERMS: usize = 3;
-/// A term of background is taken when the residual or the pole asks for it on this level. 5 %: the
-/// price of a term not needed is a standard deviation some percent larger, that of one left out a bias.
-const TERM_LEVEL: f64 = 0.05;
-
 /// State of one mode between the sweeps.
 #[derive(Debug, Clone)]
 pub(super) struct Mode {
@@ -27,6 +21,8 @@ pub(super) struct Mode {
     pub damping_known: bool,
     pub pole: Complex64,
     pub amplitudes: Option<Vec<Complex64>>,
+    /// Noise of every column in its band; 0 where a column was not used.
+    noise: Vec<f64>,
     pub failed: Option<Unfit>,
 }
 
@@ -153,6 +149,7 @@ impl<'a> Sweeper<'a> {
                 .max(change.re.abs() / of_decay);
             mode.pole = pole;
             mode.amplitudes = Some(fit.amplitudes(place, self.data.columns().len()));
+            mode.noise = fit.noise_by_column(self.data.columns().len());
         }
         // Of several doubtful poles the one whose start came last goes: two poles for one resonance
         // make each other doubtful.
@@ -178,8 +175,23 @@ impl<'a> Sweeper<'a> {
         if members.iter().any(new) {
             self.first_fit(&local, members, poles)
         } else {
-            settled_fit(&local, &poles)
+            let noise = self.noise_before(&local, members);
+            let noise = match noise {
+                Some(noise) => noise,
+                None => local.noise_of(&local.fit(&poles, 0, &local.scale())?),
+            };
+            settled_fit(&local, &poles, &noise)
         }
+    }
+
+    /// Noise of the columns in the sweep before, where all of them had one.
+    fn noise_before(&self, local: &Local, members: &[usize]) -> Option<Vec<f64>> {
+        let known = &self.modes[*members.first()?].noise;
+        local
+            .used
+            .iter()
+            .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
+            .collect()
     }
 
     /// The band of these modes as their present poles have it.
@@ -239,6 +251,7 @@ fn mode(data: &ModalData, start: &PoleStart, added: f64) -> Mode {
         damping_known: start.damping_ratio.is_some(),
         pole,
         amplitudes: None,
+        noise: Vec::new(),
         failed: (!within).then_some(Unfit::OutsideBand),
     }
 }
@@ -268,65 +281,7 @@ fn refusal(data: &ModalData, mode: &Mode, (of_position, of_decay): (f64, f64)) -
     })
 }
 
-/// From poles of the sweep before: background as the data ask for it, noise from the residual.
-fn settled_fit(local: &Local, poles: &[Complex64]) -> Result<GroupFit, Unfit> {
-    let rough = local.fit(poles, 0, &local.scale())?;
-    let noise = local.noise_of(&rough);
-    let mut fit = local.fit(&rough.at.poles, 0, &noise)?;
-    for terms in 1..=MOST_TERMS {
-        if !local.has_room(poles, terms) {
-            break;
-        }
-        let noise = local.noise_of(&fit);
-        let (Ok(fewer), Ok(more)) = (
-            local.fit(&fit.at.poles, terms - 1, &noise),
-            local.fit(&fit.at.poles, terms, &noise),
-        ) else {
-            break;
-        };
-        if !asked_for(&fewer, &more) {
-            return Ok(fewer);
-        }
-        fit = more;
-    }
-    let noise = local.noise_of(&fit);
-    local.fit(&fit.at.poles, fit.terms, &noise)
-}
-
-/// Whether the data ask for the background of `more`: by the residual (F test), or because the poles
-/// move by more than what the term costs in precision explains (Hausman 1978).
-fn asked_for(fewer: &GroupFit, more: &GroupFit) -> bool {
-    let terms = fewer.freedom - more.freedom;
-    let gain = (fewer.at.square_sum - more.at.square_sum) / terms / more.variance;
-    let by_residual = FisherSnedecor::new(terms, more.freedom)
-        .is_ok_and(|f| gain > 0.0 && f.sf(gain) < TERM_LEVEL);
-    by_residual || poles_differ(fewer, more)
-}
-
-fn poles_differ(fewer: &GroupFit, more: &GroupFit) -> bool {
-    let covariance = |fit: &GroupFit| fit.slopes.information.clone().try_inverse();
-    let (Some(efficient), Some(robust)) = (covariance(fewer), covariance(more)) else {
-        return false;
-    };
-    let parameters = efficient.nrows();
-    let level = TERM_LEVEL / parameters as f64;
-    let Ok(chi_squared) = ChiSquared::new(1.0) else {
-        return false;
-    };
-    (0..parameters).any(|i| {
-        let change = more.at.poles[i / 2] - fewer.at.poles[i / 2];
-        let change = if i % 2 == 0 { change.im } else { change.re };
-        let explained = (robust[(i, i)] - efficient[(i, i)]) * more.variance;
-        explained > 0.0 && chi_squared.sf(change * change / explained) < level
-    })
-}
-
 impl Local<'_> {
-    /// Whether the lines bear `terms` terms of background beside the poles: half of them are left.
-    fn has_room(&self, poles: &[Complex64], terms: usize) -> bool {
-        self.lines.count() >= 2 * (terms + 2 * poles.len()) + 2
-    }
-
     /// Tries some dampings, some places and some dampings again for one pole, and keeps the best: a start
     /// half a line off lies outside the valley of a resonance narrower than a line.
     fn look_about(

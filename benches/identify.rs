@@ -6,9 +6,13 @@ use std::hint::black_box;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use tapjoint::identify::MeasuredMode;
+use tapjoint::identify::consistent::{ConsistentEstimator, ConsistentSettings, JointedStructure};
 use tapjoint::identify::pairs::{ModeLambda, estimate_three_parameter, estimate_two_parameter};
 use tapjoint::structure::frequency_equation::RootedBeam;
-use tapjoint::structure::{Assembly, JointStiffness, Slenderness, natural_lambdas};
+use tapjoint::structure::{
+    Assembly, Beam, BeamTheory, JointStiffness, Slenderness, natural_lambdas,
+};
 
 const MODES: usize = 5;
 /// The first joint of Ingole & Chatterjee's table 1a.
@@ -122,11 +126,54 @@ fn backward(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// The consistent estimator for these lambdas on some beam; readings good to 0.1 %.
+fn consistent(lambdas: &[f64], settings: &ConsistentSettings) -> ConsistentEstimator {
+    let beam = Beam {
+        length: 0.423,
+        width: 0.05,
+        thickness: 0.005,
+        modulus: 207e9,
+        density: 7850.0,
+        poisson: 0.3,
+    };
+    let modes: Vec<MeasuredMode> = lambdas
+        .iter()
+        .enumerate()
+        .map(|(index, &lambda)| MeasuredMode {
+            mode: index + 1,
+            frequency: beam.frequency_of(lambda),
+            std: Some(1e-3 * beam.frequency_of(lambda)),
+        })
+        .collect();
+    let structure = JointedStructure::new(BeamTheory::Euler, beam, Assembly::Cantilever);
+    ConsistentEstimator::new(&structure, &modes, settings).unwrap()
+}
+
+fn consistently(criterion: &mut Criterion) {
+    let lambdas = exact(KX, KY);
+    let two = consistent(&lambdas, &ConsistentSettings::two_parameter());
+    let three = consistent(&lambdas, &ConsistentSettings::three_parameter());
+    let found = two.fit().joint();
+    // Exact frequencies, rounded in the last digits.
+    assert!((found.kx / KX - 1.0).abs() < 1e-9 && (found.ky / KY - 1.0).abs() < 1e-9);
+    let mut group = criterion.benchmark_group("consistent estimate from five frequencies");
+    group.bench_function("2 parameters, with covariance, from many starts", |b| {
+        b.iter(|| black_box(&two).fit());
+    });
+    group.bench_function("3 parameters, with covariance, from many starts", |b| {
+        b.iter(|| black_box(&three).fit());
+    });
+    group.bench_function("3 parameters, with profile intervals and report", |b| {
+        b.iter(|| black_box(&three).estimate().unwrap());
+    });
+    group.finish();
+}
+
 criterion_group! {
     name = identify;
     config = Criterion::default()
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(2));
-    targets = forward, backward
+    targets = forward, backward, consistently
 }
 criterion_main!(identify);

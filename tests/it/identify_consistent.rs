@@ -852,10 +852,7 @@ fn limit_what_cannot_be_estimated_is_said() {
     );
     let found = estimate(&modes_of(&TABLE_4, |_| None), &three);
     assert_eq!(found, IdentifyError::NoUncertainty { mode: 1 });
-    let found = estimate(
-        &modes_of(&TABLE_4, |f| Some(f)),
-        &ConsistentSettings::fitting(&[]),
-    );
+    let found = estimate(&modes_of(&TABLE_4, Some), &ConsistentSettings::fitting(&[]));
     assert_eq!(found, IdentifyError::NothingToEstimate);
 }
 

@@ -102,18 +102,24 @@ impl Covariance {
     }
 }
 
-/// Rows of D^-1 R^-1 for the scaled triangle R.
+/// Rows of D^-1 R^-1 for the scaled triangle R, from the last row up: row i of R^-1 is that of the
+/// unit matrix less the rows below it times row i of R, over the diagonal.
 fn inverse_of_triangle(rows: &[f64], scales: &[f64]) -> Vec<Vec<f64>> {
     let n = scales.len();
-    let mut inverse = vec![vec![0.0; n]; n];
-    for column in 0..n {
-        for row in (0..=column).rev() {
-            let unit = if row == column { 1.0 } else { 0.0 };
-            let known: f64 = (row + 1..=column)
-                .map(|k| rows[row * n + k] * inverse[k][column])
-                .sum();
-            inverse[row][column] = (unit - known) / rows[row * n + row];
+    let mut inverse: Vec<Vec<f64>> = vec![Vec::new(); n];
+    for row in (0..n).rev() {
+        let mut found = vec![0.0; n];
+        found[row] = 1.0;
+        for (below, known) in inverse.iter().enumerate().skip(row + 1) {
+            let factor = rows[row * n + below];
+            for (entry, known) in found.iter_mut().zip(known) {
+                *entry -= factor * known;
+            }
         }
+        for entry in &mut found {
+            *entry /= rows[row * n + row];
+        }
+        inverse[row] = found;
     }
     for (row, scale) in inverse.iter_mut().zip(scales) {
         for entry in row {

@@ -5,8 +5,9 @@ use super::estimator::ConsistentEstimator;
 use super::goodness::Goodness;
 use super::identifiability::identifiability;
 use super::intervals::{End, ONE_SIDED_95, Profile, TWO_SIDED_95};
+use super::layout::JointedStructure;
 use super::least_squares::{LOG_STIFFNESS, Minimum};
-use super::model::{JointedStructure, Parameter, Point, beam_at, log_nondimensional};
+use super::model::{Parameter, Point, beam_at, log_nondimensional};
 use super::problem::{Problem, along};
 use super::quantities::{Quantity, joint_at};
 use super::result::{

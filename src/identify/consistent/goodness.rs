@@ -114,7 +114,7 @@ impl Goodness {
 /// erfc(sqrt x) in the place of the rest of the sum.
 pub fn exceedance(chi_squared: f64, freedom: usize) -> f64 {
     let x = 0.5 * chi_squared.max(0.0);
-    let (mut sum, mut term, mut order) = if freedom % 2 == 0 {
+    let (mut sum, mut term, mut order) = if freedom.is_multiple_of(2) {
         (0.0, (-x).exp(), 1.0)
     } else {
         // x^(1/2) e^-x / Gamma(3/2) begins the half-integer powers.

@@ -18,6 +18,7 @@ pub mod estimator;
 pub mod goodness;
 pub mod identifiability;
 pub mod intervals;
+pub mod layout;
 pub mod least_squares;
 pub mod model;
 pub mod monte_carlo;
@@ -28,15 +29,15 @@ pub mod settings;
 
 mod covariance;
 mod starts;
+mod valleys;
 
 pub use estimate::estimate_consistently;
 pub use estimator::{ConsistentEstimator, PointFit};
 pub use goodness::{Goodness, Verdict, exceedance};
 pub use identifiability::{ExtraMode, FlatDirection, Identifiability, NeededAccuracy};
+pub use layout::{JointedStructure, LapLayout, Route};
 pub use least_squares::StopReason;
-pub use model::{
-    FrequencyModel, JointedStructure, LapLayout, ModeResponse, PARAMETERS, Parameter, Point, Route,
-};
+pub use model::{FrequencyModel, ModeResponse, PARAMETERS, Parameter, Point};
 pub use monte_carlo::{ConsistentMonteCarlo, QuantitySpread};
 pub use problem::Loss;
 pub use quantities::Quantity;

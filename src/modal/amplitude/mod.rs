@@ -257,7 +257,8 @@ fn judge(curve: &mut AmplitudeCurve, doubts: &[AmplitudeVerdict], settings: &Amp
     let changes = [&curve.frequency, &curve.damping]
         .into_iter()
         .flatten()
-        .any(|trend| trend.p_value < settings.level);
+        // Two tests share the level (Bonferroni).
+        .any(|trend| trend.p_value < 0.5 * settings.level);
     curve.verdict = match (changes, doubts.first()) {
         (false, _) => AmplitudeVerdict::Steady,
         (true, None) => AmplitudeVerdict::Changes,

@@ -9,7 +9,7 @@ use super::{AmplitudeCurve, AmplitudePoint};
 /// Powers q of the amplitude in which the curve is a polynomial (0: its logarithm), and the highest
 /// degree of that polynomial. Slip in a joint changes frequencies with a power between 1/2 and 1, a
 /// cubic spring with the square; the higher the power, the fewer points lie away from zero.
-const POWERS: [(f64, usize); 4] = [(0.0, 6), (0.5, 4), (1.0, 3), (2.0, 2)];
+const POWERS: [(f64, usize); 4] = [(0.0, 8), (0.5, 6), (1.0, 4), (2.0, 2)];
 /// Weight over that of the best model below which a model is left out.
 const LEAST_WEIGHT: f64 = 0.01;
 /// Points for every degree, at least.
@@ -248,7 +248,7 @@ pub(super) fn reading_at_time(
     let (a, b) = (points[from], points[from + 1]);
     let step = b.time - a.time;
     let u = (time - a.time) / step;
-    if u < -BEYOND_TIME || u > 1.0 + BEYOND_TIME {
+    if !(-BEYOND_TIME..=1.0 + BEYOND_TIME).contains(&u) {
         return None;
     }
     // d ln a/dt = -zeta omega.

@@ -27,6 +27,8 @@ const BAND: Color = Color(200, 229, 247);
 /// Points up to this many times the median uncertainty decide the vertical range; bars of others may
 /// leave the panel.
 const TELLING: f64 = 4.0;
+/// Standard uncertainties by which a point lies apart from the others: chance does not reach that far.
+const APART: f64 = 4.0;
 /// From this many taps on all points have one colour.
 const MOST_COLOURS: usize = 4;
 /// Half length of a bar: 95 % of a normal distribution.
@@ -226,7 +228,7 @@ fn draw_panel(
 }
 
 /// Values of the points that are known well enough to tell something, and of those that differ from them
-/// by more than their own uncertainty, with some room.
+/// by far more than their own uncertainty, with some room.
 fn range(curve: &AmplitudeCurve, quantity: &Quantity) -> (f64, f64) {
     let values: Vec<(f64, f64)> = curve.points.iter().map(quantity.value).collect();
     let mut stds: Vec<f64> = values.iter().map(|(_, std)| *std).collect();
@@ -235,10 +237,9 @@ fn range(curve: &AmplitudeCurve, quantity: &Quantity) -> (f64, f64) {
     let bar = |(value, std): &(f64, f64)| [value - BAR * std, value + BAR * std];
     let telling = values.iter().filter(|(_, std)| *std <= limit);
     let (low, high) = extent(telling.flat_map(bar)).unwrap_or((0.0, 1.0));
-    let apart = values.iter().filter(|value| {
-        let [lower, upper] = bar(value);
-        upper < low || lower > high
-    });
+    let apart = values
+        .iter()
+        .filter(|(value, std)| value + APART * std < low || value - APART * std > high);
     let ends = extent(apart.flat_map(bar).chain([low, high]));
     padded(ends.unwrap_or((low, high)), 0.12)
 }

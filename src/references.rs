@@ -16,3 +16,7 @@
 //! - **Bathe**: "Finite Element Procedures", 11.6. Subspace iteration.
 //! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
 //!   the beam element with shear and rotary inertia.
+//! - **Burnham & Anderson**: "Model Selection and Multimodel Inference". Weights of models after
+//!   Akaike's criterion; the criterion under overdispersion.
+//! - **Schwarz 1978**: "Estimating the dimension of a model", Annals of Statistics 6, 461-464.
+//! - **Abramowitz & Stegun**: "Handbook of Mathematical Functions". Incomplete beta function.

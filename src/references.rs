@@ -24,3 +24,7 @@
 //!   Statistics in Medicine 20, 3875-3889. Mean of values that scatter beyond their own uncertainty.
 //! - **Madsen, Nielsen & Tingleff 2004**: "Methods for Non-Linear Least Squares Problems",
 //!   Technical University of Denmark. Levenberg and Marquardt's method and its damping rule.
+//! - **Burnham & Anderson**: "Model Selection and Multimodel Inference". Weights of models after
+//!   Akaike's criterion; the criterion under overdispersion.
+//! - **Schwarz 1978**: "Estimating the dimension of a model", Annals of Statistics 6, 461-464.
+//! - **Abramowitz & Stegun**: "Handbook of Mathematical Functions". Incomplete beta function.

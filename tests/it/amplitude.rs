@@ -8,6 +8,9 @@ use rand_distr::{Distribution, StandardNormal};
 use tapjoint::modal::amplitude::{
     AmplitudeCurve, AmplitudeSettings, AmplitudeVerdict, Decay, KnownMode, follow_amplitude,
 };
+use tapjoint::report::plot::amplitude::{AmplitudeFigure, draw_amplitude};
+use tapjoint::report::plot::drawing::Shape;
+use tapjoint::report::plot::render_png;
 
 const RATE: f64 = 2048.0;
 
@@ -427,4 +430,58 @@ fn limit_nothing_to_follow_gives_no_points() {
             .points
             .is_empty()
     );
+}
+
+#[test]
+fn prop_the_picture_shows_every_curve_and_what_it_says() {
+    let (samples, _) = SLIP.ring(3.0, 1.0);
+    let slipping = follow(with_noise(&samples, 50.0, 1), &[mode(99.8, 0.002)]);
+    let steady = linear(3.0, (100.0, 0.003), (1.0, 0.0));
+    let steady = follow(with_noise(&steady, 50.0, 2), &[mode(100.1, 0.003)]);
+    let silent = follow(vec![0.0; 4096], &[mode(100.0, 0.003)]);
+    let points = slipping.points.len() + steady.points.len();
+    let figure = AmplitudeFigure {
+        file: "low.wav".to_owned(),
+        amplitude: "amplitude (m/s\u{b2})".to_owned(),
+        modes: vec![(1, slipping), (2, silent.clone()), (3, steady)],
+    };
+    let drawing = draw_amplitude(&figure).expect("two modes have curves");
+    let words = drawing.words().join("\n");
+    for wanted in [
+        "low.wav",
+        "mode 1",
+        "change from loud to soft: frequency +0.2",
+        "mode 3",
+        "no change beyond its uncertainty",
+        "amplitude (m/s\u{b2})",
+        "damping ratio (%)",
+    ] {
+        assert!(words.contains(wanted), "{wanted}: {words}");
+    }
+    assert!(!words.contains("mode 2"), "{words}");
+    let dots = drawing
+        .shapes
+        .iter()
+        .filter(|shape| matches!(shape, Shape::Dot { .. }));
+    // Two panels; a point or two that tell nothing may lie outside, and the legend has a dot.
+    let dots = dots.count();
+    assert!(dots > 2 * points - 5 && dots <= 2 * points + 1, "{dots}");
+    let held = |(x, y): &(f64, f64)| {
+        (0.0..=1200.0).contains(x) && (0.0..=f64::from(drawing.height)).contains(y)
+    };
+    for shape in &drawing.shapes {
+        let inside = match shape {
+            Shape::Line { points, .. } => points.iter().all(held),
+            Shape::Rectangle { from, to, .. } => held(from) && held(to),
+            Shape::Dot { center, .. } => held(center),
+            Shape::Text(text) => held(&text.at),
+        };
+        assert!(inside, "{shape:?}");
+    }
+    assert!(render_png(&drawing).is_ok());
+    let nothing = AmplitudeFigure {
+        modes: vec![(2, silent)],
+        ..figure
+    };
+    assert!(draw_amplitude(&nothing).is_none());
 }

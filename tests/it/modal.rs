@@ -6,8 +6,8 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tapjoint::modal::{
-    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings,
-    find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
+    CompositeLevel, FrequencySource, LineAmplitudes, MainsSettings, ModeReading, PeakLabel,
+    PeakSettings, find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
 };
 use tapjoint::spectral::{Lines, Window, transform_block};
 
@@ -230,6 +230,9 @@ fn reading(frequency: f64, half_line: f64) -> ModeReading {
         prominence_db: 20.0,
         above_noise_db: None,
         label: None,
+        source: FrequencySource::Line,
+        interval: (frequency - half_line, frequency + half_line),
+        fit: None,
     }
 }
 

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use tapjoint::quality::*;
+use tapjoint::recording::ResponseForm;
 use tapjoint::spectral::{DecayCheck, Lines, Window};
 use tapjoint::taps::{Rejection, SecondHit};
 

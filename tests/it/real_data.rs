@@ -6,6 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tapjoint::description::{ChannelRef, TestDescription};
+use tapjoint::modal::amplitude::{
+    AmplitudeSettings, AmplitudeVerdict, Decay, KnownMode, follow_amplitude,
+};
 use tapjoint::pipeline::{Analysis, Estimate, IdentifySettings, run_recording, run_test};
 use tapjoint::recording::{ReadSettings, Recording};
 use tapjoint::taps::{Rejection, Tap};
@@ -197,6 +200,41 @@ fit_modes = 4
     for code in ["unphysical", "closure"] {
         assert!(codes.contains(&code), "{code}: {:?}", analysis.warnings);
     }
+}
+
+#[test]
+fn val_the_bolted_beam_softens_with_amplitude() {
+    let Some(path) = data(BOLTED) else { return };
+    let recording = Recording::open(&path, &ReadSettings::default()).unwrap();
+    let all = 0..recording.frames();
+    let decay = Decay {
+        start: 0.0,
+        sample_rate: recording.sample_rate(),
+        responses: (0..3)
+            .map(|channel| recording.read(channel, all.clone()).unwrap())
+            .collect(),
+    };
+    let peaks = [80.47, 297.66, 458.4, 580.66, 845.7, 1526.8];
+    let modes = peaks.map(|frequency| KnownMode {
+        frequency,
+        damping_ratio: 0.0015,
+    });
+    let curves = follow_amplitude(&[decay], &modes, &AmplitudeSettings::default());
+    let change = |mode: usize| {
+        assert_eq!(curves[mode].verdict, AmplitudeVerdict::Changes);
+        let early = curves[mode].at_time(0, 0.1).expect("the decay's start");
+        let late = curves[mode].at_time(0, 3.0).expect("visible for 3 s");
+        let rise = late.frequency - early.frequency;
+        let bound = early.frequency_bound.hypot(late.frequency_bound);
+        (rise, bound, late.damping_ratio / early.damping_ratio)
+    };
+    // By other programs from the same file: 80.29 Hz, 0.0025 at 0.1 s, 80.54 Hz, 0.0015 at 3 s.
+    let (rise, bound, damping) = change(0);
+    assert!((0.20..0.30).contains(&rise) && bound < 0.03, "{rise} Hz");
+    assert!((0.45..0.75).contains(&damping), "{damping}");
+    // Least squares of 0.15 s each by another program: 297.45 Hz about 0.1 s, 297.74 Hz about 3 s.
+    let (rise, bound, _) = change(1);
+    assert!((0.15..0.33).contains(&rise) && bound < 0.06, "{rise} Hz");
 }
 
 #[test]

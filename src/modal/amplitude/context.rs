@@ -31,7 +31,7 @@ const NEAREST: f64 = 1.2;
 /// Up to this distance (decays of the mode) a line that nobody listed may beat with a mode whose pole
 /// does not change, but is not looked for beside one that drifts: what the drift's model misses lies
 /// there as well. Hum, which does not decay, is exempt.
-const NEAR: f64 = 10.0;
+const NEAR: f64 = 20.0;
 /// Lines farther away than this (decays of the mode) are left alone: over a segment they average out.
 const FAR: f64 = 100.0;
 /// A line that decays less than this (decays of the mode) is hum.

@@ -2,24 +2,26 @@
 //!
 //! A joint that slips softens and dissipates more the harder it is driven: frequency and damping of a
 //! mode then drift along every decay. Five steps:
-//! 1. *Band* ([`band`]): every response is mixed down to the mode's frequency and low-pass filtered by
+//! 1. *Band* (`band`): every response is mixed down to the mode's frequency and low-pass filtered by
 //!    a finite filter of length M that is only ever laid over samples that exist. An exponential stays
 //!    an exponential that way, so the abrupt start of the decay leaves no transient; the price is that
 //!    the first value belongs to the time M/2 after the start.
-//! 2. *Sensors* ([`sensors`]): their bands are added with the weights of best signal to noise.
-//! 3. *Context* ([`context`]): whatever else lies in the band (neighbouring modes, hum, lines nobody
+//! 2. *Sensors* (`sensors`): their bands are added with the weights of best signal to noise.
+//! 3. *Context* (`context`): whatever else lies in the band (neighbouring modes, hum, lines nobody
 //!    listed) is found by fits to the whole decay; the same fits say whether poles that do not change
 //!    explain the decay as well as one pole that does. Two close modes beat, and a beat is no
 //!    amplitude dependence.
-//! 4. *Segments* ([`walk`]): pieces that do not overlap, each fitted by the mode's pole with the
+//! 4. *Segments* (`walk`): pieces that do not overlap, each fitted by the mode's pole with the
 //!    context held near what the whole decay says.
-//! 5. *Trend* ([`trend`]): points of all segments and taps against log amplitude.
+//! 5. *Trend* (`trend`): points of all segments and taps against log amplitude.
 //!
-//! What to know: a point is an average over its segment; it is attributed to the time at which a
-//! linear drift has the same value, so only what is curved within a segment (at most
-//! [`AmplitudeSettings::longest`] of the decay time) is biased. Frequencies are undamped natural
-//! frequencies; a drift by 1 % within a decay shifts damping by less than 1 % of itself when measured
-//! as acceleration, which is left in.
+//! What to know: a point is an average over its segment, attributed to the time at which a linear drift
+//! has the same value; how the drift bends within the segment is taken from the fit to the whole decay.
+//! What that fit misses within a segment (at most [`AmplitudeSettings::longest`] of the decay time)
+//! remains as bias. Frequencies are undamped natural frequencies. Damping is the rate at which the
+//! measured quantity falls: for an acceleration that contains omega squared, whose own drift is a few
+//! thousandths of it and is left in. A neighbour that nobody listed nearer than about the half-power width
+//! cannot be told from a drift by one decay.
 
 use rayon::prelude::*;
 
@@ -257,7 +259,8 @@ fn judge(curve: &mut AmplitudeCurve, doubts: &[AmplitudeVerdict], settings: &Amp
     let changes = [&curve.frequency, &curve.damping]
         .into_iter()
         .flatten()
-        .any(|trend| trend.p_value < settings.level);
+        // Two tests share the level (Bonferroni).
+        .any(|trend| trend.p_value < 0.5 * settings.level);
     curve.verdict = match (changes, doubts.first()) {
         (false, _) => AmplitudeVerdict::Steady,
         (true, None) => AmplitudeVerdict::Changes,

@@ -48,9 +48,9 @@ impl Polynomial {
         })
     }
 
-    /// chi^2 + 2 x coefficients (Akaike), to choose among polynomials.
-    pub fn criterion(&self) -> f64 {
-        self.chi_squared + 2.0 * self.coefficients.len() as f64
+    /// chi^2/inflation + 2 x coefficients (Akaike), to choose among polynomials.
+    pub fn criterion(&self, inflation: f64) -> f64 {
+        self.chi_squared / inflation + 2.0 * self.coefficients.len() as f64
     }
 
     /// Factor on all uncertainties where the points scatter more than they say: sqrt(chi^2/freedom),

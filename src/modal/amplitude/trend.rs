@@ -6,11 +6,10 @@ use super::polynomial::Polynomial;
 use super::student;
 use super::{AmplitudeCurve, AmplitudePoint};
 
-/// Powers q of the amplitude in which the curve is a polynomial (0: its logarithm): slip in a joint
-/// changes frequencies with a power between 1/2 and 1, a cubic spring with the square.
-const POWERS: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
-/// Highest degree of that polynomial: the curve may bend, and level off at either end.
-const MOST_DEGREE: usize = 6;
+/// Powers q of the amplitude in which the curve is a polynomial (0: its logarithm), and the highest
+/// degree of that polynomial. Slip in a joint changes frequencies with a power between 1/2 and 1, a
+/// cubic spring with the square; the higher the power, the fewer points lie away from zero.
+const POWERS: [(f64, usize); 4] = [(0.0, 8), (0.5, 6), (1.0, 4), (2.0, 2)];
 /// Weight over that of the best model below which a model is left out.
 const LEAST_WEIGHT: f64 = 0.01;
 /// Points for every degree, at least.
@@ -19,10 +18,9 @@ const LEAST_SHARE: usize = 3;
 const LEAST_FREEDOM: usize = 2;
 /// Probability outside the stated bounds.
 const OUTSIDE: f64 = 0.05;
-/// How far beyond the outermost points the curve is read (shares of half their range): the first and
-/// last segments reach that far.
-const BEYOND: f64 = 0.15;
-
+/// How far beyond the outermost points the curve is read (log amplitude): as far as the shortest
+/// segment reaches to either side of its point, and a little more.
+const BEYOND: f64 = 0.1;
 /// How far beyond the first and last point of a decay it is read in time (shares of the step): the half
 /// of a segment.
 const BEYOND_TIME: f64 = 0.5;
@@ -62,27 +60,21 @@ struct Curve {
 }
 
 impl Curve {
-    /// All powers and degrees, weighted with e^{-(A - A_least)/2} after Akaike's criterion A (Burnham &
+    /// All powers and degrees, weighted with e^{-(A - A_least)/2} by Akaike's criterion A (Burnham &
     /// Anderson).
     fn through(values: &[(f64, f64, f64)]) -> Option<Curve> {
         let (low, high) = extent(values);
-        let most = MOST_DEGREE
-            .min(values.len() / LEAST_SHARE)
-            .min(values.len().saturating_sub(1 + LEAST_FREEDOM));
+        let most = (values.len() / LEAST_SHARE).min(values.len().checked_sub(1 + LEAST_FREEDOM)?);
         let mut models: Vec<(f64, f64, Polynomial)> = Vec::new();
-        for power in POWERS {
+        for (power, highest) in POWERS {
             let mapped: Vec<(f64, f64, f64)> = values
                 .iter()
                 .map(|(x, value, std)| (variable(*x, high, power), *value, *std))
                 .collect();
-            let degrees = (1..=most).filter_map(|degree| Polynomial::fit(&mapped, degree));
-            models.extend(degrees.map(|fit| (fit.criterion(), power, fit)));
+            let degrees = (1..=most.min(highest)).filter_map(|d| Polynomial::fit(&mapped, d));
+            models.extend(degrees.map(|fit| (0.0, power, fit)));
         }
-        models.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let least = models.first()?.0;
-        for model in &mut models {
-            model.0 = (-0.5 * (model.0 - least)).exp();
-        }
+        weigh(&mut models);
         models.retain(|model| model.0 > LEAST_WEIGHT);
         let total: f64 = models.iter().map(|model| model.0).sum();
         for model in &mut models {
@@ -131,9 +123,23 @@ impl Curve {
 
     /// Whether `x` lies in the range of the points, or a little beyond.
     fn reaches(&self, x: f64) -> bool {
-        let beyond = BEYOND * 0.5 * (self.high - self.low);
-        (self.low - beyond..=self.high + beyond).contains(&x)
+        (self.low - BEYOND..=self.high + BEYOND).contains(&x)
     }
+}
+
+/// Weights of models, not yet normalised, the best model first. Where even the best scatters more than
+/// its points say, chi^2 counts in units of that scatter (Burnham & Anderson, quasi-likelihood):
+/// otherwise bends would be fitted to it.
+fn weigh(models: &mut [(f64, f64, Polynomial)]) {
+    let scatter = |fit: &Polynomial| fit.chi_squared / fit.freedom;
+    let least = models.iter().map(|model| scatter(&model.2));
+    let inflation = least.fold(f64::INFINITY, f64::min).max(1.0);
+    let criteria = models.iter().map(|model| model.2.criterion(inflation));
+    let least = criteria.fold(f64::INFINITY, f64::min);
+    for model in models.iter_mut() {
+        model.0 = (-0.5 * (model.2.criterion(inflation) - least)).exp();
+    }
+    models.sort_by(|a, b| b.0.total_cmp(&a.0));
 }
 
 /// Least and largest log amplitude.
@@ -242,7 +248,7 @@ pub(super) fn reading_at_time(
     let (a, b) = (points[from], points[from + 1]);
     let step = b.time - a.time;
     let u = (time - a.time) / step;
-    if u < -BEYOND_TIME || u > 1.0 + BEYOND_TIME {
+    if !(-BEYOND_TIME..=1.0 + BEYOND_TIME).contains(&u) {
         return None;
     }
     // d ln a/dt = -zeta omega.

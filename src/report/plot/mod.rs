@@ -1,5 +1,6 @@
 //! Pictures: each is drawn once as a list of shapes and written as PNG or as SVG.
 
+pub mod amplitude;
 pub mod axis;
 pub mod cloud;
 pub mod comparison;

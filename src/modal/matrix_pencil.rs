@@ -58,6 +58,9 @@ pub struct MatrixPencilSettings {
     pub above_noise_db: f64,
     /// Least decay over the record (sigma T): 0.02 tells a mode from a steady tone.
     pub least_decay: f64,
+    /// Least amplitude over that of the strongest pole, all records together. 1e-4: modes beyond the
+    /// band, which the filter folds back by its 100 dB, stay ten times below.
+    pub least_level: f64,
     /// Damping ratio from which on a pole is no mode. 0.2.
     pub most_damping: f64,
 }
@@ -69,6 +72,7 @@ impl Default for MatrixPencilSettings {
             added_decay: 0.0,
             above_noise_db: 13.0,
             least_decay: 0.02,
+            least_level: 1e-4,
             most_damping: 0.2,
         }
     }
@@ -139,8 +143,8 @@ pub fn pencil_poles(
         decays && inside && -pole.re < settings.most_damping * pole.norm()
     };
     let mut shifts = subspace_poles(&data, settings.most_poles);
-    // A pole outside the band, or one that grows, still describes what is there: it is dropped after
-    // the others were refined beside it only if it is needed.
+    // A pole outside the band, or one that grows a little, still describes what is there: the others
+    // are refined beside it, and it is left out at the end.
     shifts.retain(|shift| shift.is_finite() && shift.re * duration < 3.0);
     shifts = needed(&data, shifts, settings);
     let mut covariance = None;
@@ -160,6 +164,9 @@ pub fn pencil_poles(
             Some(pole_of(shifts[index] + centre, variance, part, settings))
         })
         .collect();
+    let level = |pole: &PencilPole| norm(&pole.amplitudes);
+    let strongest = found.iter().map(level).fold(0.0, f64::max);
+    found.retain(|pole| level(pole) >= settings.least_level * strongest);
     found.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     Ok(found)
 }
@@ -321,9 +328,14 @@ fn explained(
         let left = loose.rest(column.clone());
         let share = conjugate_product(&alone, &left).norm_sqr() / norm(&alone).powi(2);
         let variance = (norm(&left).powi(2) - share).max(0.0) / degrees.max(1) as f64;
-        ratio += share / variance.max(f64::MIN_POSITIVE);
+        ratio += share / variance.max(rounding_of(column)).max(f64::MIN_POSITIVE);
     }
     Some((amplitudes, ratio / data.columns.len() as f64))
+}
+
+/// Variance that rounding alone leaves.
+fn rounding_of(column: &[Complex64]) -> f64 {
+    (f64::EPSILON * norm(column)).powi(2) / column.len().max(1) as f64
 }
 
 /// Drops the pole that explains least, as long as one explains less than the limit.

@@ -8,6 +8,8 @@ mod errors;
 mod identify;
 mod layers;
 mod modal;
+mod modal_matrix_pencil;
+mod modal_polyreference;
 mod pipeline;
 mod real_data;
 mod recording;

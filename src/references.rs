@@ -28,3 +28,17 @@
 //!   Akaike's criterion; the criterion under overdispersion.
 //! - **Schwarz 1978**: "Estimating the dimension of a model", Annals of Statistics 6, 461-464.
 //! - **Abramowitz & Stegun**: "Handbook of Mathematical Functions". Incomplete beta function.
+//! - **Guillaume et al. 2003**: "A poly-reference implementation of the least-squares complex
+//!   frequency-domain estimator", IMAC XXI. Reduced normal equations of the right matrix fraction.
+//! - **Peeters et al. 2004**: "The PolyMAX frequency-domain method: a new standard for modal parameter
+//!   estimation?", Shock and Vibration 11, 395-409. Stabilisation diagrams from one factorisation.
+//! - **Cauberghe 2004**: "Applied frequency-domain system identification in the field of experimental
+//!   and operational modal analysis", thesis, Vrije Universiteit Brussel. Which coefficient to fix.
+//! - **Golub & Van Loan**: "Matrix Computations". The shifted QR algorithm.
+//! - **Hua & Sarkar 1990**: "Matrix pencil method for estimating parameters of exponentially
+//!   damped/undamped sinusoids in noise", IEEE Transactions on Acoustics, Speech, and Signal
+//!   Processing 38, 814-824.
+//! - **Wax & Kailath 1985**: "Detection of signals by information theoretic criteria", IEEE
+//!   Transactions on Acoustics, Speech, and Signal Processing 33, 387-392.
+//! - **Golub & Pereyra 1973**: "The differentiation of pseudo-inverses and nonlinear least squares
+//!   problems whose variables separate", SIAM Journal on Numerical Analysis 10, 413-432.

@@ -6,13 +6,16 @@
 //! only those samples are used, so that no transient enters. The rest of the record's start is lost:
 //! two over the bandwidth, in seconds.
 
+mod subspace;
+
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::projection::{Basis, conjugate_product, norm};
 use crate::spectral::Decimator;
+use subspace::subspace_poles;
 
 /// What makes a matrix pencil impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -58,6 +61,9 @@ pub struct MatrixPencilSettings {
     pub above_noise_db: f64,
     /// Least decay over the record (sigma T): 0.02 tells a mode from a steady tone.
     pub least_decay: f64,
+    /// Least amplitude over that of the strongest pole, all records together. 1e-4: modes beyond the
+    /// band, which the filter folds back by its 100 dB, stay ten times below.
+    pub least_level: f64,
     /// Damping ratio from which on a pole is no mode. 0.2.
     pub most_damping: f64,
 }
@@ -69,6 +75,7 @@ impl Default for MatrixPencilSettings {
             added_decay: 0.0,
             above_noise_db: 13.0,
             least_decay: 0.02,
+            least_level: 1e-4,
             most_damping: 0.2,
         }
     }
@@ -95,8 +102,6 @@ pub struct PencilPole {
 
 /// Least samples at the band's own rate: a pencil a third as long still holds several poles.
 const LEAST_SAMPLES: usize = 24;
-/// Most columns of the Hankel matrix; beyond, cost grows and accuracy does not.
-const MOST_COLUMNS: usize = 80;
 /// Complex rate of the decimated samples over the bandwidth. 2.5: the filter then settles within two
 /// over the bandwidth, and noise in its transition, folded, stays nearly white.
 const OVERSAMPLING: f64 = 2.5;
@@ -139,8 +144,8 @@ pub fn pencil_poles(
         decays && inside && -pole.re < settings.most_damping * pole.norm()
     };
     let mut shifts = subspace_poles(&data, settings.most_poles);
-    // A pole outside the band, or one that grows, still describes what is there: it is dropped after
-    // the others were refined beside it only if it is needed.
+    // A pole outside the band, or one that grows a little, still describes what is there: the others
+    // are refined beside it, and it is left out at the end.
     shifts.retain(|shift| shift.is_finite() && shift.re * duration < 3.0);
     shifts = needed(&data, shifts, settings);
     let mut covariance = None;
@@ -160,6 +165,9 @@ pub fn pencil_poles(
             Some(pole_of(shifts[index] + centre, variance, part, settings))
         })
         .collect();
+    let level = |pole: &PencilPole| norm(&pole.amplitudes);
+    let strongest = found.iter().map(level).fold(0.0, f64::max);
+    found.retain(|pole| level(pole) >= settings.least_level * strongest);
     found.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     Ok(found)
 }
@@ -234,60 +242,6 @@ fn demodulate(
     })
 }
 
-/// Poles from the signal subspace, relative to the band's centre (1/s).
-///
-/// Rows of the Hankel matrices of all records are sums of (1, z, ..., z^L); the leading eigenvectors of
-/// H^H H span their conjugates, and shifting them by one row turns them by conj(z).
-fn subspace_poles(data: &Demodulated, most: usize) -> Vec<Complex64> {
-    let count = data.times.len();
-    let size = (count / 3).min(MOST_COLUMNS) + 1;
-    let gram = DMatrix::from_fn(size, size, |i, j| {
-        let rows = count + 1 - size;
-        data.columns
-            .iter()
-            .map(|column| conjugate_product(&column[i..i + rows], &column[j..j + rows]))
-            .sum::<Complex64>()
-    });
-    let eigen = SymmetricEigen::new(gram);
-    let mut order: Vec<usize> = (0..size).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let values: Vec<f64> = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
-    let rows = data.columns.len() * (count + 1 - size);
-    let poles = description_order(&values, rows).min(most).min(size - 2);
-    if poles == 0 {
-        return Vec::new();
-    }
-    let basis = DMatrix::from_fn(size, poles, |row, k| eigen.eigenvectors[(row, order[k])]);
-    let (upper, lower) = (basis.rows(0, size - 1), basis.rows(1, size - 1));
-    let square = upper.ad_mul(&upper);
-    let Some(shift) = square.lu().solve(&upper.ad_mul(&lower)) else {
-        return Vec::new();
-    };
-    shift.eigenvalues().map_or_else(Vec::new, |roots| {
-        roots.iter().map(|z| z.conj().ln() * data.rate).collect()
-    })
-}
-
-/// Number of signals k with the least description length
-/// -n (m - k) ln(geometric/arithmetic mean of the m - k smallest) + k (2m - k)/2 ln n.
-fn description_order(values: &[f64], rows: usize) -> usize {
-    let size = values.len();
-    // Rounding of the sums stands below all noise.
-    let floor = values.first().copied().unwrap_or(0.0) * 1e-15;
-    let length = |signals: usize| {
-        let rest = &values[signals..];
-        let count = rest.len() as f64;
-        let mean = rest.iter().map(|v| v.max(floor)).sum::<f64>() / count;
-        let logarithm = rest.iter().map(|v| v.max(floor).ln()).sum::<f64>() / count;
-        let samples = rows as f64;
-        let k = signals as f64;
-        samples * count * (mean.ln() - logarithm) + 0.5 * k * (2.0 * size as f64 - k) * samples.ln()
-    };
-    (0..size - 1)
-        .min_by(|&a, &b| length(a).total_cmp(&length(b)))
-        .unwrap_or(0)
-}
-
 /// e^{qt}, or its derivative t e^{qt}.
 fn oscillation(data: &Demodulated, shift: Complex64, power: i32) -> Vec<Complex64> {
     let times = data.times.iter();
@@ -323,9 +277,14 @@ fn explained(
         let left = loose.rest(column.clone());
         let share = conjugate_product(&alone, &left).norm_sqr() / norm(&alone).powi(2);
         let variance = (norm(&left).powi(2) - share).max(0.0) / degrees.max(1) as f64;
-        ratio += share / variance.max(f64::MIN_POSITIVE);
+        ratio += share / variance.max(rounding_of(column)).max(f64::MIN_POSITIVE);
     }
     Some((amplitudes, ratio / data.columns.len() as f64))
+}
+
+/// Variance that rounding alone leaves.
+fn rounding_of(column: &[Complex64]) -> f64 {
+    (f64::EPSILON * norm(column)).powi(2) / column.len().max(1) as f64
 }
 
 /// Drops the pole that explains least, as long as one explains less than the limit.

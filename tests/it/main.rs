@@ -12,6 +12,8 @@ mod identify_consistent;
 mod layers;
 mod modal;
 mod modal_fit;
+mod modal_matrix_pencil;
+mod modal_polyreference;
 mod pipeline;
 mod quality;
 mod real_data;

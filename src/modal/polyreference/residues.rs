@@ -149,13 +149,15 @@ pub(super) fn contribution(
     for output in 0..matrix.outputs() {
         let values = window.values(matrix, output);
         peak += values.iter().map(Complex64::norm_sqr).fold(0.0, f64::max);
+        // Rounding stands for the noise where there is none.
+        let rounding = (f64::EPSILON * norm(&values)).powi(2) / values.len() as f64;
         let left = basis.rest(values);
         // psi = r^H y/|r|^2, explained sum of squares |r^H y|^2/|r|^2.
         let factor = conjugate_product(&rest, &left) / (length * length);
         let explained = factor.norm_sqr() * length * length;
         let unexplained = (norm(&left).powi(2) - explained).max(0.0);
         let variance = unexplained / degrees as f64;
-        above_noise += explained / variance.max(f64::MIN_POSITIVE);
+        above_noise += explained / variance.max(rounding).max(f64::MIN_POSITIVE);
         let strongest = own
             .participation
             .iter()

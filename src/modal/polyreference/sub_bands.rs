@@ -159,8 +159,10 @@ fn half_power_lines(level_db: &[f64], peak: &Peak) -> usize {
 /// Modes of the whole matrix, ascending: sub-bands for what a narrow band can hold, the whole band for
 /// what lies outside them or is too wide for them. The first of the searches is the whole band's.
 ///
+/// A band with too few lines for the order is searched at the order that they allow.
+///
 /// # Errors
-/// As [`stabilise_poles`], for the whole band; sub-bands take the order that their lines allow.
+/// As [`stabilise_poles`]; [`PolyreferenceError::TooFewLines`] only below some 16 lines.
 pub fn find_modes(
     matrix: &ResponseMatrix,
     settings: &PolyreferenceSettings,
@@ -232,9 +234,11 @@ fn search(
     settings: &PolyreferenceSettings,
 ) -> Result<BandSearch, PolyreferenceError> {
     let part = matrix.band(band.low, band.high);
-    let most = match LINES_PER_ORDER {
-        _ if part.points() == matrix.points() => settings.order,
-        lines => settings.order.min(part.points() / lines),
+    let is_whole = part.points() == matrix.points();
+    let most = if is_whole {
+        settings.order
+    } else {
+        settings.order.min(part.points() / LINES_PER_ORDER)
     };
     let order = (1..=most)
         .rev()

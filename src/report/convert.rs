@@ -24,6 +24,7 @@ pub fn document(analysis: &Analysis) -> Document {
         version: VERSION,
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
         recordings: (!given).then(|| analysis.recordings.iter().map(recording_section).collect()),
+        datasets: None,
         modes: Some(analysis.modes.iter().map(mode_section).collect()),
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),

@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use super::document_datasets::DatasetSection;
+
 /// Version of the document's layout.
 pub const VERSION: u32 = 1;
 
@@ -21,6 +23,9 @@ pub struct Document {
     /// Each recording: taps, spectra, its own readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recordings: Option<Vec<RecordingSection>>,
+    /// Datasets of universal files, by their headers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub datasets: Option<Vec<DatasetSection>>,
     /// Resonances merged over the recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<Vec<ModeSection>>,

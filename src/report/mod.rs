@@ -3,9 +3,11 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 mod convert;
+mod convert_datasets;
 mod convert_estimate;
 mod convert_figures;
 pub mod document;
+mod document_datasets;
 pub mod figures;
 pub mod format;
 pub mod html;
@@ -22,6 +24,7 @@ pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
     prediction as prediction_of,
 };
+pub use convert_datasets::datasets as datasets_of;
 pub use convert_figures::figures as figures_of;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use html::render_html;

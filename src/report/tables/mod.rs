@@ -1,11 +1,13 @@
 //! The report's tables as words, for the page and for the terminal.
 
+mod datasets;
 mod joint;
 mod measured;
 mod modes;
 mod taps;
 mod uncertainty;
 
+pub use datasets::datasets;
 pub use joint::{Parameter, estimated, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};

@@ -7,7 +7,7 @@ mod convert_datasets;
 mod convert_estimate;
 mod convert_figures;
 pub mod document;
-mod document_datasets;
+mod document_contents;
 pub mod figures;
 pub mod format;
 pub mod html;

@@ -1,4 +1,5 @@
-//! The datasets of a universal file as data: a part of the document.
+//! What files hold, as data: channels of recordings, datasets of universal files. A part of the
+//! document.
 
 use serde::Serialize;
 
@@ -43,4 +44,29 @@ pub struct DatasetSection {
     pub date: Option<String>,
     /// Bytes of its values, of other datasets of all.
     pub bytes: u64,
+}
+
+/// One channel of a recording, in the unit that its values have.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ChannelSection {
+    /// Number, from 1.
+    pub channel: usize,
+    /// Name, where the file gives one.
+    pub name: Option<String>,
+    /// Unit, where known.
+    pub unit: Option<String>,
+    /// Units per unit of the file.
+    pub scale: f64,
+    /// Mean (DC offset).
+    pub mean: f64,
+    /// Root mean square about the mean.
+    pub rms: f64,
+    /// Largest magnitude.
+    pub peak: f64,
+    /// Samples at the format's full scale.
+    pub full_scale_samples: u64,
+    /// Flat tops.
+    pub flat_tops: u64,
+    /// Samples in runs that repeat one value.
+    pub dropped_samples: u64,
 }

@@ -40,6 +40,12 @@ pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::R
     for file in &arguments.files {
         let listed = list(file, arguments.headers)?;
         let samples = listed.as_ref().map(time_samples);
+        if let Some(listed) = listed.iter().find(|l| l.functions().next().is_none()) {
+            let (file, found) = (file.display(), listed.contents());
+            terminal.warn(&format!(
+                "{file}: holds no function (dataset 58), only {found}"
+            ));
+        }
         datasets.extend(
             listed
                 .iter()

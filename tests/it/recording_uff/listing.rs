@@ -76,6 +76,16 @@ fn val_responses_alone_are_listed_and_headers_want_a_universal_file() {
     let (code, json, error) = inspect(&tested.path, &[]);
     assert_eq!(code, 0, "{error}");
     assert_eq!(json["datasets"][1]["kind"], "coherence");
+    let units = crate::recording::file("units.uff", "    -1\n   151\nmodel\n    -1\n");
+    let (code, json, error) = inspect(&units.path, &[]);
+    assert_eq!(
+        (code, &json["datasets"][0]["kind"]),
+        (0, &Value::from("header (dataset 151)"))
+    );
+    assert!(
+        error.contains("holds no function (dataset 58), only 1 x header"),
+        "{error}"
+    );
     let text = crate::recording::file("taps.csv", "t,a\n0,1\n0.1,2\n0.2,1\n");
     let (code, _, error) = inspect(&text.path, &["--headers"]);
     assert_eq!(code, 2);

@@ -21,7 +21,7 @@ use tapjoint::report::{document_of, figures_of, render_spectrum_png, render_text
     after_help = "Example:\n  tapjoint spectrum taps.wav --hammer 1 --zoom 0:200 --block 2048 --png spectrum.png"
 )]
 pub(super) struct SpectrumArguments {
-    /// A recording (WAV, CSV)
+    /// A recording (WAV, CSV, UFF 58)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Block size (samples); default: what fits the shortest tap

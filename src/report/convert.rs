@@ -35,6 +35,7 @@ pub fn document(analysis: &Analysis) -> Document {
                 .collect(),
         ),
         frfs: None,
+        datasets: None,
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
         prediction: identification

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use super::document_contents::{ChannelSection, DatasetSection};
 pub use super::document_fit::{
     AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection, TapFitSection,
     TrendSection,
@@ -28,6 +29,9 @@ pub struct Document {
     /// Each recording: taps, spectra, its own readings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recordings: Option<Vec<RecordingSection>>,
+    /// Datasets of universal files, by their headers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub datasets: Option<Vec<DatasetSection>>,
     /// Resonances merged over the recordings.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modes: Option<Vec<ModeSection>>,
@@ -134,31 +138,6 @@ pub struct RecordingSection {
     pub remaining_at_end: Option<f64>,
     /// This recording's own readings.
     pub modes: Vec<ModeSection>,
-}
-
-/// One channel of a recording, in the unit that its values have.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct ChannelSection {
-    /// Number, from 1.
-    pub channel: usize,
-    /// Name, where the file gives one.
-    pub name: Option<String>,
-    /// Unit, where known.
-    pub unit: Option<String>,
-    /// Units per unit of the file.
-    pub scale: f64,
-    /// Mean (DC offset).
-    pub mean: f64,
-    /// Root mean square about the mean.
-    pub rms: f64,
-    /// Largest magnitude.
-    pub peak: f64,
-    /// Samples at the format's full scale.
-    pub full_scale_samples: u64,
-    /// Flat tops.
-    pub flat_tops: u64,
-    /// Samples in runs that repeat one value.
-    pub dropped_samples: u64,
 }
 
 /// One tap.

@@ -3,10 +3,12 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 mod convert;
+mod convert_datasets;
 mod convert_estimate;
 mod convert_figures;
 mod convert_fit;
 pub mod document;
+mod document_contents;
 mod document_fit;
 mod document_frf;
 mod document_resolution;
@@ -27,6 +29,7 @@ pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
     prediction as prediction_of,
 };
+pub use convert_datasets::datasets as datasets_of;
 pub use convert_figures::{figures as figures_of, frf_figure};
 pub use convert_frf::{frf_document, render_frf_csv};
 pub use csv::{render_modes_csv, render_parameters_csv};

@@ -20,7 +20,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
 }
 
 fn taps(document: &Document) -> Option<String> {
-    let recordings = document.recordings.as_deref()?;
+    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
     let all: Vec<_> = recordings.iter().flat_map(|r| &r.taps).collect();
     let used = all.iter().filter(|tap| tap.accepted).count();
     let files = counted(recordings.len(), "recording");

@@ -19,6 +19,7 @@ const MOST_ROWS: usize = 40;
 /// Everything the document holds.
 pub fn render_text(document: &Document) -> String {
     let sections = [
+        table_or_nothing(tables::datasets(document)),
         recordings(document),
         taps(document),
         modes(document),

@@ -65,7 +65,7 @@ fn choose(
     }
     let (kept, others) = largest_group(usable);
     let Some(points) = kept.first().map(|(_, points)| *points) else {
-        return Err(nothing_usable(file, unusable.first()).into());
+        return Err(nothing_usable(file, unusable.first()));
     };
     let first = kept.first().map_or(0, |((dataset, _), _)| dataset.number);
     let others = others.into_iter().map(|(entry, other)| {

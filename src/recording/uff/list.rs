@@ -153,7 +153,7 @@ enum Next {
 
 impl Listing {
     fn run(&mut self) -> Result<(), RecordingError> {
-        while self.found.datasets.len() < MAX_DATASETS && self.to_mark()? {
+        while self.found.datasets.len() < MAX_DATASETS && self.pass_mark()? {
             match self.type_line()? {
                 Next::End => return Ok(()),
                 Next::Nothing => {}
@@ -177,7 +177,7 @@ impl Listing {
     }
 
     /// Reads lines up to and with the next one that is a mark.
-    fn to_mark(&mut self) -> Result<bool, RecordingError> {
+    fn pass_mark(&mut self) -> Result<bool, RecordingError> {
         while let Some(line) = self.line()? {
             if is_mark(&line) {
                 return Ok(true);

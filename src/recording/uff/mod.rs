@@ -13,9 +13,9 @@
 //! - Axis labels win over the file's unit system (dataset 164), which wins over no unit.
 //! - Dataset numbers are 1-based and count every dataset of the file, whatever its type.
 //!
-//! [`list_datasets`] reads headers only and jumps over the values. Values are read in blocks; text
-//! is parsed again whenever it is asked for, with a place remembered every 64 kB, so that no file
-//! has to fit into memory.
+//! [`list_datasets`] reads headers only and jumps over the values. Values are read in blocks. Of text
+//! the first 16 million samples are kept in memory; beyond, it is parsed again whenever it is asked
+//! for, from places remembered every 64 kB. No file has to fit into memory.
 
 use std::fs::File;
 use std::path::Path;

@@ -11,6 +11,10 @@ use crate::recording::open::check_finite;
 /// Samples handled at a time when the file is checked.
 const PASS_SAMPLES: u64 = 1 << 16;
 
+/// Samples of text kept in memory, over all channels (128 MB): parsing them again at each reading
+/// costs more than everything that is done with them. Beyond, text is parsed again.
+pub(super) const KEPT_SAMPLES: usize = 1 << 24;
+
 /// The time series of a universal file that are channels.
 #[derive(Debug, Clone)]
 pub(in crate::recording) struct UffSource {
@@ -53,6 +57,12 @@ impl UffCursor<'_> {
             let Some(values) = self.source.values.get(*channel) else {
                 continue;
             };
+            if let Some(kept) = &values.kept {
+                let place = |at: u64| usize::try_from(at).unwrap_or(usize::MAX);
+                let part = kept.get(place(self.at)..place(self.at + count));
+                samples.extend_from_slice(part.unwrap_or_default());
+                continue;
+            }
             let file = match &mut self.file {
                 Some(file) => file,
                 none => none.insert(values.open()?),
@@ -162,20 +172,23 @@ pub(super) fn cut_to_shortest<T>(
     for (at, channel) in channels.iter_mut().enumerate() {
         if channel.count > frames {
             let values = &mut channel.values;
-            (channel.count, channel.meter) = pass(file, sample_rate, (at, values), frames)?;
+            (channel.count, channel.meter) = pass(file, sample_rate, (at, values), frames, &mut 0)?;
         }
     }
     Ok(frames)
 }
 
 /// Reads up to `frames` samples once: checks them, gathers their health, and remembers where text
-/// can be read from. How many there are is the first result.
+/// can be read from. Text is kept where `room` (samples) has room for it. How many samples there are
+/// is the first result.
 pub(super) fn pass(
     name: &str,
     sample_rate: f64,
     (channel, values): (usize, &mut Values),
     frames: u64,
+    room: &mut usize,
 ) -> Result<(u64, HealthMeter), RecordingError> {
+    let mut kept = values.is_text().then(Vec::new);
     let mut meter = HealthMeter::new(None);
     let mut places: Vec<Checkpoint> = Vec::new();
     let mut file = values.open()?;
@@ -194,10 +207,75 @@ pub(super) fn pass(
         }
         check_finite(name, sample_rate, (channel, at), &samples)?;
         meter.add(&samples);
+        kept = kept.filter(|kept: &Vec<f64>| kept.len() + samples.len() <= *room);
+        if let Some(kept) = &mut kept {
+            kept.extend_from_slice(&samples);
+        }
     }
     let count = reader.at;
     if !places.is_empty() {
         values.checkpoints = Arc::new(places);
     }
+    if let Some(kept) = kept {
+        *room -= kept.len();
+        values.kept = Some(Arc::new(kept));
+    }
     Ok((count, meter))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::list_datasets;
+
+    /// A file with one time series of six digits, 13 characters each, six a line.
+    fn text(samples: &[f64]) -> String {
+        let axis = |kind: u32| format!("{kind:10}    0    0    0 NONE                 NONE\n");
+        let point = format!(" NONE      {:10}{:4}", 1, 3);
+        let mut text = format!(
+            "    -1\n    58\nNONE\nNONE\nNONE\nNONE\nNONE\n    1{:10}{:5}{:10}{point}{point}\n{:10}{:10}{:10}  0.00000E+00  1.00000E-03  0.00000E+00\n",
+            0,
+            0,
+            0,
+            2,
+            samples.len(),
+            1
+        );
+        text += &[axis(17), axis(12), axis(0), axis(0)].concat();
+        for row in samples.chunks(6) {
+            text.extend(row.iter().map(|x| format!("{:>13}", format!("{x:.5e}"))));
+            text.push('\n');
+        }
+        text + "    -1\n"
+    }
+
+    #[test]
+    fn regress_text_that_is_not_kept_is_read_from_remembered_places() {
+        let samples: Vec<f64> = (0..50_000).map(|n| f64::from(n * 7 % 1999)).collect();
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text(&samples)).unwrap();
+        let listed = list_datasets(file.path()).unwrap();
+        let (dataset, function) = listed.functions().next().unwrap();
+        let mut values = Values::new(&listed, dataset, function).unwrap();
+        let (count, _) = pass("file", 1000.0, (0, &mut values), u64::MAX, &mut 0).unwrap();
+        assert_eq!(count, 50_000);
+        // 660 kB of text in blocks of 64 kB.
+        assert_eq!(
+            (values.kept.is_some(), values.checkpoints.len()),
+            (false, 11)
+        );
+        let source = UffSource {
+            values: vec![values],
+            frames: count,
+        };
+        for start in [0, 1, 4999, 5041, 25_000, 49_990, 49_999, 50_000] {
+            let mut cursor = source.cursor(start as u64);
+            let mut read = [Vec::new()];
+            // Twice, so that the second goes on where the first ended.
+            cursor.read(&[0], 7, &mut read).unwrap();
+            cursor.read(&[0], 9000, &mut read).unwrap();
+            let end = samples.len().min(start + 9007);
+            assert_eq!(read[0], samples[start..end], "from {start}");
+        }
+    }
 }

@@ -12,7 +12,7 @@ use super::axis::{UnitSystem, channel_si};
 use super::error::UffError;
 use super::header::{Function, FunctionType, Ordinate};
 use super::list::{Dataset, UniversalFile, describe, list_datasets};
-use super::source::{Measured, UffSource, cut_to_shortest, pass};
+use super::source::{KEPT_SAMPLES, Measured, UffSource, cut_to_shortest, pass};
 use super::timing::{AbscissaUnit, EvenPoints, even_points, largest_group};
 use super::values::Values;
 use crate::recording::health::HealthMeter;
@@ -39,9 +39,10 @@ pub(in crate::recording) fn open_uff(
     check_rate(&file, sample_rate)?;
     warnings.extend(ignored_rate(settings, sample_rate));
     let mut read = Vec::with_capacity(channels.len());
+    let mut room = KEPT_SAMPLES;
     for (at, series) in channels.into_iter().enumerate() {
         let mut values = Values::new(&listed, series.0, series.1)?;
-        let (count, meter) = pass(&file, sample_rate, (at, &mut values), u64::MAX)?;
+        let (count, meter) = pass(&file, sample_rate, (at, &mut values), u64::MAX, &mut room)?;
         if count > 0 {
             read.push(Measured {
                 series,

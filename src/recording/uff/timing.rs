@@ -196,11 +196,12 @@ fn printed(abscissa: f64) -> String {
     }
 }
 
+/// Functions, or what the caller knows them by, and where their points lie.
+type Timed<T> = Vec<(T, EvenPoints)>;
+
 /// The largest set of functions on the same points, the first of several equally large ones, and
 /// the rest.
-pub(in crate::recording) fn largest_group<T>(
-    all: Vec<(T, EvenPoints)>,
-) -> (Vec<(T, EvenPoints)>, Vec<(T, EvenPoints)>) {
+pub(in crate::recording) fn largest_group<T>(all: Timed<T>) -> (Timed<T>, Timed<T>) {
     let size = |of: &EvenPoints| all.iter().filter(|(_, other)| of.matches(other)).count();
     let sizes: Vec<usize> = all.iter().map(|(_, points)| size(points)).collect();
     let most = sizes.iter().copied().max().unwrap_or(0);

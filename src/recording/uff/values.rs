@@ -60,6 +60,8 @@ pub(super) struct Values {
     point_bytes: u64,
     /// Where reading can start in text; one at least.
     pub checkpoints: Arc<Vec<Checkpoint>>,
+    /// Samples of a text channel that is kept in memory, all of them.
+    pub kept: Option<Arc<Vec<f64>>>,
 }
 
 impl Values {
@@ -107,7 +109,13 @@ impl Values {
             promised: function.points,
             point_bytes: point_bytes(function, dataset.place.abscissa_bytes).max(1),
             checkpoints: Arc::new(vec![first]),
+            kept: None,
         })
+    }
+
+    /// Whether the values are text, which is slow to read twice.
+    pub(super) fn is_text(&self) -> bool {
+        matches!(self.layout, Layout::Ascii { .. })
     }
 
     /// Opens the file; readers of several functions share it.

@@ -1,5 +1,6 @@
 //! The report's tables as words, for the page and for the terminal.
 
+mod datasets;
 mod frfs;
 mod joint;
 mod measured;
@@ -8,6 +9,7 @@ mod quality;
 mod taps;
 mod uncertainty;
 
+pub use datasets::datasets;
 pub use frfs::frfs;
 pub use joint::{Parameter, estimated, pairs, parameters, prediction};
 pub use measured::{channels, recordings};

@@ -25,6 +25,7 @@ pub fn document() -> Document {
             recording("low.wav", [0.0, 200.0], 0..2),
             recording("full.wav", [0.0, 2000.0], 0..5),
         ]),
+        datasets: None,
         modes: Some(modes()),
         estimate: Some(Some(estimate())),
         estimate_reason: None,

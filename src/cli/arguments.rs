@@ -4,7 +4,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tapjoint::description::{ChannelRef, JointKind, SensorKind, WindowKind};
+use tapjoint::description::{ChannelRef, JointKind, ReadingMethod, SensorKind, WindowKind};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::ResponseForm;
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
@@ -357,6 +357,28 @@ impl FromStr for ChannelScale {
             Ok(value) if value.is_finite() && value != 0.0 => Ok(Self(value)),
             Ok(value) => Err(format!("{value} is no scale; {wanted}")),
             Err(_) => Err(format!("\"{text}\" is not a number; {wanted}")),
+        }
+    }
+}
+
+/// How frequencies are read, as the command line names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum ReadingArgument {
+    /// By a fit of the decays, with a standard deviation
+    #[default]
+    Fit,
+    /// Between the lines about each peak
+    Interpolated,
+    /// On the spectral line, with the half-line bound
+    Line,
+}
+
+impl From<ReadingArgument> for ReadingMethod {
+    fn from(reading: ReadingArgument) -> Self {
+        match reading {
+            ReadingArgument::Fit => Self::Fit,
+            ReadingArgument::Interpolated => Self::Interpolated,
+            ReadingArgument::Line => Self::Line,
         }
     }
 }

@@ -16,7 +16,10 @@ use tapjoint::description::{ChannelRef, WindowKind};
 use tapjoint::pipeline::{
     Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_test, run_wired,
 };
-use tapjoint::report::{frf_document, frf_figure, render_frf_csv, render_frf_png, render_text};
+use tapjoint::recording::UffFormat;
+use tapjoint::report::{
+    frf_document, frf_figure, render_frf_csv, render_frf_png, render_frf_uff, render_text,
+};
 
 /// Frequency response functions (H1, H2, Hv) with coherence and random error.
 ///
@@ -73,6 +76,12 @@ pub(super) struct FrfArguments {
     /// Write all functions into this file, one row for each line
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the functions and coherences as a universal file, datasets 58 (text)
+    #[arg(long, value_name = "FILE")]
+    uff58: Option<PathBuf>,
+    /// The same as datasets 58b (binary: every bit is kept)
+    #[arg(long, value_name = "FILE")]
+    uff58b: Option<PathBuf>,
 }
 
 /// What is to be transformed.
@@ -88,6 +97,8 @@ struct Request {
     /// One for each recording, or none.
     pngs: Vec<OutputFile>,
     csv: Option<OutputFile>,
+    /// Universal files with their formats.
+    universal: Vec<(OutputFile, UffFormat)>,
 }
 
 fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Request> {
@@ -115,6 +126,15 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Requ
         None => Vec::new(),
     };
     let csv = arguments.csv.as_deref().map(OutputFile::prepare);
+    let wanted = [
+        (&arguments.uff58, UffFormat::Ascii),
+        (&arguments.uff58b, UffFormat::Binary),
+    ];
+    let universal = wanted
+        .into_iter()
+        .filter_map(|(path, format)| Some((path.as_deref()?, format)))
+        .map(|(path, format)| Ok((OutputFile::prepare(path)?, format)))
+        .collect::<anyhow::Result<_>>()?;
     Ok(Request {
         subject,
         settings: FrfSettings {
@@ -123,6 +143,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Requ
         },
         pngs,
         csv: csv.transpose()?,
+        universal,
     })
 }
 
@@ -207,7 +228,13 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
             file.write(render_frf_csv(&all)?.as_bytes())?;
         }
     }
-    // Further forms of the functions (`all`) are written here, each beside its own argument.
+    for (file, format) in request.universal {
+        if all.is_empty() {
+            terminal.warn("no tap was accepted, so there is no function to write");
+        } else {
+            file.write(&render_frf_uff(&all, format)?)?;
+        }
+    }
     let document = frf_document(&analysis, &all);
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;

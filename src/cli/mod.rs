@@ -4,6 +4,7 @@
 //! writes. Exit codes: 0 the question was answered, 1 it has no answer, 2 bad usage or bad input.
 
 mod arguments;
+mod bare;
 mod input;
 mod output;
 mod terminal;

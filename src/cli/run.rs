@@ -1,14 +1,15 @@
 //! `tapjoint run`: from recordings to the joint, with a report.
 
 use super::Outcome;
-use super::arguments::RecordingArguments;
+use super::arguments::{ReadingArgument, RecordingArguments};
+use super::bare::{BareSettings, analyse};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
-use tapjoint::pipeline::{Analysis, IdentifySettings, run_recording, run_test};
+use tapjoint::pipeline::{Analysis, IdentifySettings, run_test};
 use tapjoint::report::{document_of, figures_of, render_run, render_text};
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
@@ -25,6 +26,9 @@ pub(super) struct RunArguments {
     /// Folder of the report; default: <name>-report beside FILE
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// How frequencies are read; default: as the description says, else fit
+    #[arg(long, value_enum, value_name = "R")]
+    reading: Option<ReadingArgument>,
     #[command(flatten)]
     recording: RecordingArguments,
 }
@@ -55,7 +59,10 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Requ
                 "--hammer and --sample-rate are for bare recordings; a test description says both: `channel` in [hammer], `sample_rate` in [[recording]]"
             );
         }
-        let file = read_test(&arguments.file, terminal)?;
+        let mut file = read_test(&arguments.file, terminal)?;
+        if let Some(reading) = arguments.reading {
+            file.test.analysis.reading = reading.into();
+        }
         file.test.check_has_data(&file.name)?;
         file.check_recordings()?;
         let name = file.test.name.clone();
@@ -98,8 +105,11 @@ pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Resul
             &IdentifySettings::default(),
         )?,
         Subject::Recording(path) => {
-            let recording = arguments.recording.open(path)?;
-            run_recording(recording, arguments.recording.hammer.as_ref(), |_| {})?
+            let settings = BareSettings {
+                reading: arguments.reading.unwrap_or_default().into(),
+                ..BareSettings::default()
+            };
+            analyse(path, &arguments.recording, &settings)?
         }
     };
     let document = document_of(&analysis);

@@ -1,7 +1,8 @@
 //! `tapjoint spectrum`: the averaged spectrum of one recording and its peaks.
 
 use super::Outcome;
-use super::arguments::{Band, RecordingArguments, WindowArgument, block_size};
+use super::arguments::{Band, ReadingArgument, RecordingArguments, WindowArgument, block_size};
+use super::bare::{BareSettings, analyse};
 use super::input::check_file;
 use super::output::OutputFile;
 use super::run::outcome;
@@ -9,7 +10,6 @@ use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::WindowKind;
-use tapjoint::pipeline::run_recording;
 use tapjoint::report::{document_of, figures_of, render_spectrum_png, render_text};
 
 /// Show the averaged spectrum of a recording and its peaks with their resolution bounds.
@@ -33,6 +33,9 @@ pub(super) struct SpectrumArguments {
     /// Window; default: rectangular where the taps ring down to 1 % in the block, else exponential
     #[arg(long, value_enum, value_name = "W")]
     window: Option<WindowArgument>,
+    /// How frequencies are read
+    #[arg(long, value_enum, value_name = "R", default_value_t)]
+    reading: ReadingArgument,
     /// Draw the spectrum into this file
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
@@ -43,9 +46,7 @@ pub(super) struct SpectrumArguments {
 /// The arguments, checked.
 #[derive(Debug)]
 struct Request {
-    block: Option<usize>,
-    band: Option<(f64, f64)>,
-    window: Option<WindowKind>,
+    settings: BareSettings,
     png: Option<OutputFile>,
 }
 
@@ -57,21 +58,19 @@ fn resolve(arguments: &SpectrumArguments) -> anyhow::Result<Request> {
         .map(OutputFile::prepare)
         .transpose()?;
     Ok(Request {
-        block: arguments.block,
-        band: arguments.zoom.map(|band| (band.low, band.high)),
-        window: arguments.window.map(WindowKind::from),
+        settings: BareSettings {
+            block: arguments.block,
+            band: arguments.zoom.map(|band| (band.low, band.high)),
+            window: arguments.window.map(WindowKind::from),
+            reading: arguments.reading.into(),
+        },
         png,
     })
 }
 
 pub(super) fn run(arguments: &SpectrumArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let request = resolve(arguments)?;
-    let recording = arguments.recording.open(&arguments.file)?;
-    let analysis = run_recording(recording, arguments.recording.hammer.as_ref(), |settings| {
-        settings.block = request.block;
-        settings.band = request.band;
-        settings.window = request.window;
-    })?;
+    let analysis = analyse(&arguments.file, &arguments.recording, &request.settings)?;
     let document = document_of(&analysis);
     if let Some(file) = request.png {
         let picture = figures_of(&analysis)

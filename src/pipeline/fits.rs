@@ -7,6 +7,7 @@
 use num_complex::Complex64;
 
 use super::decays::FreeDecays;
+use crate::description::ReadingMethod;
 use crate::modal::amplitude::{AmplitudeSettings, KnownMode, follow_amplitude};
 use crate::modal::fit::{
     ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, fit_modes,
@@ -29,6 +30,15 @@ const APART: f64 = 3.0;
 const UNLIKE: f64 = 0.9;
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
+
+/// What a description's way of reading asks for.
+pub(super) fn source_of(reading: ReadingMethod) -> FrequencySource {
+    match reading {
+        ReadingMethod::Fit => FrequencySource::Fit,
+        ReadingMethod::Interpolated => FrequencySource::BetweenLines,
+        ReadingMethod::Line => FrequencySource::Line,
+    }
+}
 
 /// What the polyreference fit over the band found.
 #[derive(Debug, Clone, PartialEq, Default)]

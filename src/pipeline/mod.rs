@@ -15,6 +15,7 @@ mod evidence;
 mod fits;
 mod force;
 mod frf;
+mod functions;
 mod identification;
 mod measure;
 mod model;
@@ -34,6 +35,7 @@ pub use analysis::{
     Perturbation, RecordingResult, Response,
 };
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
+pub use functions::{FunctionSettings, run_functions};
 pub use identification::{IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};

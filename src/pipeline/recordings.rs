@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use super::analysis::{Conditions, Overview, RecordingResult, Response};
+use super::functions::{FunctionSettings, form_of_description, measure_functions};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
 use crate::description::{
-    ChannelRef, RecordingDescription, Scale, SensorDescription, SensorKind, TestDescription,
+    ChannelRef, FrfForm, RecordingDescription, Scale, SensorDescription, SensorKind,
+    TestDescription,
 };
 use crate::recording::ResponseForm;
-use crate::recording::{ReadSettings, Recording, RecordingError};
+use crate::recording::{ReadSettings, Recording, RecordingError, open_frequency_responses};
 use crate::spectral::SpectralError;
 use crate::taps::{TapSettings, TapSource, find_taps};
 
@@ -24,18 +26,13 @@ pub enum PipelineError {
     /// A recording could not be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// A recording file of a kind this version cannot read.
-    #[error(
-        "{file}:{line}: {recording} is described as frequency response functions, which this version \
-         does not read; give the time series of hammer and sensors (WAV or CSV)"
-    )]
-    FrequencyResponses {
-        /// The description.
-        file: String,
-        /// Its line.
-        line: usize,
+    /// A band that does not fit a file of frequency response functions.
+    #[error("{file}: {problem}")]
+    Functions {
         /// The recording.
-        recording: String,
+        file: String,
+        /// What does not fit.
+        problem: SpectralError,
     },
     /// A band or block of the description that does not fit its recording.
     #[error("{file}:{line}: {recording}: {problem}")]
@@ -67,13 +64,8 @@ pub(super) fn measure_described(
     (folder, test_file): (&Path, &str),
 ) -> Result<RecordingResult, PipelineError> {
     let file = description.file.display().to_string();
-    if description.form.is_some() {
-        let (test_file, line) = (test_file.to_string(), description.line);
-        return Err(PipelineError::FrequencyResponses {
-            file: test_file,
-            line,
-            recording: file,
-        });
+    if let Some(form) = description.form {
+        return described_functions(test, description, (folder, form));
     }
     if test.sensors.is_empty() {
         return Err(PipelineError::NoSensors {
@@ -117,6 +109,29 @@ pub(super) fn measure_described(
             info.unit.get_or_insert_with(|| unit.to_string());
         }
     }
+    Ok(result)
+}
+
+/// Opens and reads a described file of frequency response functions.
+fn described_functions(
+    test: &TestDescription,
+    description: &RecordingDescription,
+    (folder, form): (&Path, FrfForm),
+) -> Result<RecordingResult, PipelineError> {
+    let mut functions = open_frequency_responses(&folder.join(&description.file))?;
+    functions.file = description.file.display().to_string();
+    let only = |sensors: &[SensorDescription]| match sensors {
+        [one] => Some(one.name.clone()),
+        _ => None,
+    };
+    let settings = FunctionSettings {
+        form: Some(form_of_description(form)),
+        sensor: description.sensor.clone().or_else(|| only(&test.sensors)),
+        band: description.band,
+        reading: test.analysis.reading,
+    };
+    let mut result = measure_functions(&functions, &settings)?;
+    result.conditions = conditions(test, description);
     Ok(result)
 }
 

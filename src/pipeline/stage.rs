@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::decays::FreeDecays;
-use super::fits::{Candidates, Stabilisation, complete, stabilisation};
+use super::fits::{Candidates, Stabilisation, complete, source_of, stabilisation};
 use super::force::{PulseWindow, pulse_window, remove_offset};
 use super::measure::{MeasureSettings, MeasuredSpectra};
 use super::quiet::Quiet;
-use crate::description::{ReadingMethod, WindowKind};
+use crate::description::WindowKind;
 use crate::modal::{
     CompositeLevel, FrequencySource, ModeReading, PeakLabel, find_peaks, read_peaks,
 };
@@ -105,11 +105,7 @@ impl<'a> Stage<'a> {
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = self.fit(&mut readings)?;
         for reading in &mut readings {
-            reading.prefer(match self.settings.reading {
-                ReadingMethod::Fit => FrequencySource::Fit,
-                ReadingMethod::Interpolated => FrequencySource::BetweenLines,
-                ReadingMethod::Line => FrequencySource::Line,
-            });
+            reading.prefer(source_of(self.settings.reading));
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {

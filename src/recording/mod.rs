@@ -95,6 +95,8 @@ pub enum Format {
         /// Text or binary, of the first channel.
         coding: UffCoding,
     },
+    /// Frequency response functions, in text or a universal file.
+    FrequencyResponses,
     /// Samples in memory.
     Memory,
 }
@@ -233,6 +235,7 @@ impl Recording {
             Format::WavFloat { .. }
             | Format::Csv { .. }
             | Format::Uff58 { .. }
+            | Format::FrequencyResponses
             | Format::Memory => 0.0,
         }
     }

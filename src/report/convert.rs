@@ -194,6 +194,7 @@ fn format_words(format: Format) -> String {
             coding: UffCoding::Ascii,
         } => "UFF 58, text".to_owned(),
         Format::Uff58 { .. } => "UFF 58b, binary".to_owned(),
+        Format::FrequencyResponses => "frequency response functions".to_owned(),
         Format::Memory => "samples in memory".to_owned(),
     }
 }

@@ -22,6 +22,7 @@ pub mod text;
 
 mod convert_frf;
 mod csv;
+mod frf_uff;
 mod json;
 mod run;
 
@@ -33,6 +34,7 @@ pub use convert_datasets::datasets as datasets_of;
 pub use convert_figures::{figures as figures_of, frf_figure};
 pub use convert_frf::{frf_document, render_frf_csv};
 pub use csv::{render_modes_csv, render_parameters_csv};
+pub use frf_uff::render_frf_uff;
 pub use html::render_html;
 pub use json::render_json;
 pub use run::{render_frf_png, render_run, render_spectrum_png};

@@ -30,6 +30,7 @@ pub fn render_text(document: &Document) -> String {
         estimate(document),
         prediction(document),
         perturbation(document),
+        quality(document),
         warnings(document),
         ending(document),
     ];
@@ -139,6 +140,11 @@ pub fn perturbation(document: &Document) -> String {
     ];
     let texts: Vec<String> = texts.into_iter().filter(|text| !text.is_empty()).collect();
     texts.join("\n")
+}
+
+/// The checks of good practice that leave a doubt; empty without any. The ending counts them all.
+pub fn quality(document: &Document) -> String {
+    table_or_nothing(tables::quality_doubts(document))
 }
 
 /// The warnings; empty without any.

@@ -12,8 +12,8 @@ use crate::pipeline::analysis::RecordingResult;
 const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
 /// The same of the damping: 5 %, about what one repeats of a joint's damping.
 const LEAST_DAMPING_CHANGE: f64 = 0.05;
-/// Most modes named in one warning.
-const MOST_NAMED: usize = 3;
+/// Most modes named in one warning; the findings of the report name them all.
+const MOST_NAMED: usize = 1;
 
 /// What a mode does along its decays: values at the largest and at the smallest amplitude.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +118,12 @@ pub(super) fn write_dependence(
     write!(f, "{file}: {}", named.join("; "))?;
     let more = changes.len().saturating_sub(MOST_NAMED);
     if more > 0 {
-        write!(f, "; so do {more} more, as the list of modes shows")?;
+        let modes = if more == 1 {
+            "mode changes"
+        } else {
+            "modes change"
+        };
+        write!(f, "; {more} more {modes} with it")?;
     }
     f.write_str(
         "; a joint or support that slips softens and damps more the harder it is driven, and so may a \

@@ -69,7 +69,9 @@ fn amplitude_section(curve: &AmplitudeCurve, change: Option<AmplitudeChange>) ->
             amplitude: change.amplitude,
             unit: change.unit,
             frequency: change.frequency,
+            frequency_bound: change.frequency_bound,
             damping: change.damping_ratio,
+            damping_bound: change.damping_bound,
         }),
         points: curve
             .points

@@ -74,7 +74,7 @@ pub struct AmplitudeSection {
     pub points: Vec<AmplitudePointSection>,
 }
 
-/// Values at the largest and at the smallest amplitude.
+/// Values at the largest and at the smallest amplitude at which the curve is well known.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct AmplitudeEndsSection {
     /// Amplitude (`unit`).
@@ -83,8 +83,12 @@ pub struct AmplitudeEndsSection {
     pub unit: Option<String>,
     /// Frequency (Hz).
     pub frequency: [f64; 2],
+    /// Its 95 % bounds (Hz).
+    pub frequency_bound: [f64; 2],
     /// Damping ratio.
     pub damping: [f64; 2],
+    /// Its 95 % bounds.
+    pub damping_bound: [f64; 2],
 }
 
 /// A change from the largest to the smallest amplitude.

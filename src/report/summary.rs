@@ -30,7 +30,9 @@ fn amplitudes(document: &Document) -> Vec<String> {
             amplitude: ends.amplitude,
             unit: ends.unit.clone(),
             frequency: ends.frequency,
+            frequency_bound: ends.frequency_bound,
             damping_ratio: ends.damping,
+            damping_bound: ends.damping_bound,
         };
         Some(format!("Caution: mode {} {change}.", mode.mode?))
     };

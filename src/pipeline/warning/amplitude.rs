@@ -4,18 +4,22 @@ use std::fmt;
 
 use super::Warning;
 use crate::modal::ModeReading;
-use crate::modal::amplitude::{AmplitudeVerdict, Trend};
+use crate::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
 use crate::pipeline::analysis::RecordingResult;
+use crate::stats::median;
 
 /// A change of the frequency below this share is not worth a word: 0.01 %, a fifth of the smallest
 /// change that Ingole & Chatterjee perturb frequencies by.
 const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
 /// The same of the damping: 5 %, about what one repeats of a joint's damping.
 const LEAST_DAMPING_CHANGE: f64 = 0.05;
+/// Bounds of a curve up to this many times their median count as well known.
+const USUAL: f64 = 3.0;
 /// Most modes named in one warning; the findings of the report name them all.
 const MOST_NAMED: usize = 1;
 
-/// What a mode does along its decays: values at the largest and at the smallest amplitude.
+/// What a mode does along its decays: values at the largest and at the smallest amplitude at which its
+/// curve is well known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AmplitudeChange {
     /// Peak amplitude of the strongest sensor (`unit`).
@@ -24,8 +28,12 @@ pub struct AmplitudeChange {
     pub unit: Option<String>,
     /// Frequency (Hz).
     pub frequency: [f64; 2],
+    /// Its 95 % bounds (Hz).
+    pub frequency_bound: [f64; 2],
     /// Damping ratio.
     pub damping_ratio: [f64; 2],
+    /// Its 95 % bounds.
+    pub damping_bound: [f64; 2],
 }
 
 impl AmplitudeChange {
@@ -35,25 +43,56 @@ impl AmplitudeChange {
         if curve.verdict != AmplitudeVerdict::Changes {
             return None;
         }
-        let ends = |trend: &Trend| [trend.first, trend.last];
-        let amplitudes = || curve.points.iter().map(|point| point.amplitude);
+        let known = well_known(curve);
+        let ends = [known.first()?, known.last()?];
         let response = curve
             .sensor
             .and_then(|sensor| recording.responses.get(sensor));
         let change = AmplitudeChange {
-            amplitude: [
-                amplitudes().max_by(f64::total_cmp)?,
-                amplitudes().min_by(f64::total_cmp)?,
-            ],
+            amplitude: ends.map(|end| end.amplitude),
             unit: response.and_then(|response| response.unit.clone()),
-            frequency: ends(curve.frequency.as_ref()?),
-            damping_ratio: ends(curve.damping.as_ref()?),
+            frequency: ends.map(|end| end.frequency),
+            frequency_bound: ends.map(|end| end.frequency_bound),
+            damping_ratio: ends.map(|end| end.damping_ratio),
+            damping_bound: ends.map(|end| end.damping_bound),
         };
-        let share = |[first, last]: [f64; 2]| ((last - first) / first).abs();
-        let matters = share(change.frequency) > LEAST_FREQUENCY_CHANGE
-            || share(change.damping_ratio) > LEAST_DAMPING_CHANGE;
-        matters.then_some(change)
+        change.matters().then_some(change)
     }
+
+    fn matters(&self) -> bool {
+        let beyond = |values: [f64; 2], bounds: [f64; 2], least: f64| {
+            let share = ((values[1] - values[0]) / values[0]).abs();
+            differs(values, bounds) && share > least
+        };
+        beyond(self.frequency, self.frequency_bound, LEAST_FREQUENCY_CHANGE)
+            || beyond(self.damping_ratio, self.damping_bound, LEAST_DAMPING_CHANGE)
+    }
+}
+
+/// The curve at its points, the largest amplitude first, without those at which its bounds are far
+/// beyond the usual ones: at a curve's ends a polynomial says little.
+fn well_known(curve: &AmplitudeCurve) -> Vec<AmplitudeReading> {
+    let points = curve.points.iter();
+    let mut all: Vec<AmplitudeReading> = points
+        .filter_map(|point| curve.at_amplitude(point.amplitude))
+        .collect();
+    all.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+    if all.is_empty() {
+        return all;
+    }
+    let usual = |of: fn(&AmplitudeReading) -> f64| {
+        let mut bounds: Vec<f64> = all.iter().map(of).collect();
+        USUAL * median(&mut bounds)
+    };
+    let frequency = usual(|reading| reading.frequency_bound);
+    let damping = usual(|reading| reading.damping_bound);
+    all.retain(|r| r.frequency_bound <= frequency && r.damping_bound <= damping);
+    all
+}
+
+/// Whether two values differ by more than both their bounds.
+fn differs(values: [f64; 2], bounds: [f64; 2]) -> bool {
+    (values[1] - values[0]).abs() > bounds[0] + bounds[1]
 }
 
 impl fmt::Display for AmplitudeChange {
@@ -61,11 +100,12 @@ impl fmt::Display for AmplitudeChange {
     /// 33 to 2.3 m/s\u{b2}".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = self.unit.as_deref().unwrap_or("of the file's unit");
+        let percent = |ratios: [f64; 2]| ratios.map(|ratio| 100.0 * ratio);
         write!(
             f,
             "{} Hz and its damping {} % as the amplitude falls from {} to {} {}",
-            moves(self.frequency),
-            moves(self.damping_ratio.map(|ratio| 100.0 * ratio)),
+            moves(self.frequency, self.frequency_bound),
+            moves(percent(self.damping_ratio), percent(self.damping_bound)),
             two_digits(self.amplitude[0]),
             two_digits(self.amplitude[1]),
             unit.replace("m/s2", "m/s\u{b2}")
@@ -73,8 +113,13 @@ impl fmt::Display for AmplitudeChange {
     }
 }
 
-/// "rises from 80.28 to 80.54", with the decimals that show the change's two leading digits.
-fn moves([first, last]: [f64; 2]) -> String {
+/// "rises from 80.28 to 80.54", with the decimals that show the change's two leading digits, or "stays
+/// near 80.4".
+fn moves([first, last]: [f64; 2], bounds: [f64; 2]) -> String {
+    if !differs([first, last], bounds) {
+        let decimals = decimals(bounds[0] + bounds[1]).saturating_sub(1);
+        return format!("stays near {:.decimals$}", 0.5 * (first + last));
+    }
     let decimals = decimals(last - first);
     let verb = if last > first { "rises" } else { "falls" };
     format!("{verb} from {first:.decimals$} to {last:.decimals$}")
@@ -142,12 +187,19 @@ mod tests {
             amplitude: [33.2, 2.31],
             unit: Some("m/s2".into()),
             frequency: [80.281, 80.543],
+            frequency_bound: [0.01, 0.02],
             damping_ratio: [0.00285, 0.00149],
+            damping_bound: [0.0001, 0.0001],
         };
         assert_eq!(
             change.to_string(),
             "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude \
              falls from 33 to 2.3 m/s\u{b2}"
         );
+        let steady = AmplitudeChange {
+            damping_bound: [0.001, 0.001],
+            ..change
+        };
+        assert!(steady.to_string().contains("its damping stays near 0.2 %"));
     }
 }

@@ -25,9 +25,12 @@ const MOST: usize = 8;
 const COLUMNS: usize = 4;
 /// Height of a narrow band's panel, and of its row with heading and labels (pixels).
 const BAND_HEIGHT: f64 = 150.0;
-const ROW: f64 = 222.0;
+const ROW: f64 = 208.0;
 /// Share of a panel's height that the level behind fills.
 const LEVEL_SHARE: f64 = 0.96;
+/// Radius of a pole in the wide panel and in a narrow one (pixels).
+const WIDE_RADIUS: f64 = 3.2;
+const NARROW_RADIUS: f64 = 2.6;
 /// The level is drawn faint: the poles are what matters.
 const FAINT: Color = Color(178, 186, 196);
 
@@ -64,7 +67,7 @@ pub fn draw_stabilisation(figure: &RecordingFigure) -> Option<Drawing> {
     let mut drawing = Drawing::new(name.as_str(), WIDTH, height as u32);
     draw_title(&mut drawing, &name, &below(found));
     draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &legend(found));
-    draw_whole(&mut drawing, spectra, whole);
+    draw_whole(&mut drawing, (spectra, found), whole);
     if rows > 0 {
         draw_heading(&mut drawing, (shown, narrow.len()), axis_bottom + 14.0);
     }
@@ -74,7 +77,7 @@ pub fn draw_stabilisation(figure: &RecordingFigure) -> Option<Drawing> {
         let top = axis_bottom + 56.0 + (index / COLUMNS) as f64 * ROW;
         draw_narrow(
             &mut drawing,
-            spectra,
+            (spectra, found),
             band,
             (left, left + width - 40.0, top),
         );
@@ -100,7 +103,7 @@ fn legend(found: &StabilisationFigure) -> Vec<(Sample, String)> {
         .collect();
     entries.push((Sample::Line(FAINT), "level (log)".to_owned()));
     entries.push((Sample::Dashed(BLUE), "mode".to_owned()));
-    entries.push((Sample::Line(INK), "selected".to_owned()));
+    entries.push((Sample::Line(INK), "selected (lower edge)".to_owned()));
     entries
 }
 
@@ -114,7 +117,11 @@ fn sample(class: PoleStability) -> Sample {
     }
 }
 
-fn draw_whole(drawing: &mut Drawing, spectra: &SpectraFigure, band: &StabilisationBand) {
+fn draw_whole(
+    drawing: &mut Drawing,
+    (spectra, found): (&SpectraFigure, &StabilisationFigure),
+    band: &StabilisationBand,
+) {
     let panel = Panel {
         x: frequency_axis(spectra),
         y: order_axis(band, (TOP + HEIGHT, TOP)),
@@ -123,7 +130,8 @@ fn draw_whole(drawing: &mut Drawing, spectra: &SpectraFigure, band: &Stabilisati
     panel.draw_y_ticks(drawing, &whole_numbers(&panel.y, 40.0));
     draw_level(drawing, &panel, spectra);
     draw_marks(drawing, &panel, &spectra.peaks);
-    draw_poles(drawing, &panel, band);
+    draw_selected(drawing, &panel, found);
+    draw_poles(drawing, &panel, band, WIDE_RADIUS);
     panel.draw_frame(drawing);
     panel.draw_x_title(drawing, "frequency (Hz)");
     panel.draw_y_title(drawing, "order");
@@ -141,7 +149,7 @@ fn draw_heading(drawing: &mut Drawing, (shown, all): (usize, usize), y: f64) {
 /// One narrow band over the part of it from which modes are taken.
 fn draw_narrow(
     drawing: &mut Drawing,
-    spectra: &SpectraFigure,
+    (spectra, found): (&SpectraFigure, &StabilisationFigure),
     band: &StabilisationBand,
     (left, right, top): (f64, f64, f64),
 ) {
@@ -149,7 +157,7 @@ fn draw_narrow(
         x: Axis::linear(band.core, (left, right)),
         y: order_axis(band, (top + BAND_HEIGHT, top)),
     };
-    panel.draw_x_ticks(drawing, &panel.x.ticks(72.0));
+    panel.draw_x_ticks(drawing, &panel.x.ticks(48.0));
     panel.draw_y_ticks(drawing, &whole_numbers(&panel.y, 34.0));
     draw_level(drawing, &panel, spectra);
     for peak in spectra
@@ -166,7 +174,8 @@ fn draw_narrow(
             Stroke::new(color, 1.0),
         );
     }
-    draw_poles(drawing, &panel, band);
+    draw_selected(drawing, &panel, found);
+    draw_poles(drawing, &panel, band, NARROW_RADIUS);
     panel.draw_frame(drawing);
     let words = fitted(&named(spectra, band), TICK_SIZE, right - left);
     let at = (0.5 * (left + right), top - 12.0);
@@ -256,33 +265,35 @@ fn composite(curves: &[&[f64]]) -> Vec<f64> {
     level
 }
 
-/// The poles, the best class last and so on top, and the frequencies selected as short lines at the
-/// lower edge.
-fn draw_poles(drawing: &mut Drawing, panel: &Panel, band: &StabilisationBand) {
-    for frequency in &band.selected {
-        if panel.x.holds(*frequency) {
-            let x = crisp(panel.x.place(*frequency));
-            let stroke = Stroke::new(INK, 2.0);
-            drawing.line(vec![(x, panel.y.from), (x, panel.y.from - 12.0)], stroke);
-        }
+/// The frequencies that any band selected, as short lines at the lower edge.
+fn draw_selected(drawing: &mut Drawing, panel: &Panel, found: &StabilisationFigure) {
+    let selected = found.bands.iter().flat_map(|band| &band.selected);
+    for frequency in selected.filter(|frequency| panel.x.holds(**frequency)) {
+        let x = crisp(panel.x.place(*frequency));
+        let ends = vec![(x, panel.y.from), (x, panel.y.from - 10.0)];
+        drawing.line(ends, Stroke::new(INK, 1.6));
     }
+}
+
+/// The poles, the best class last and so on top.
+fn draw_poles(drawing: &mut Drawing, panel: &Panel, band: &StabilisationBand, radius: f64) {
     for (class, _) in CLASSES.iter().rev() {
         let of_class = band.poles.iter().filter(|pole| pole.stability == *class);
         for pole in of_class.filter(|pole| panel.x.holds(pole.frequency)) {
-            draw_pole(drawing, panel, pole);
+            draw_pole(drawing, panel, pole, radius);
         }
     }
 }
 
-fn draw_pole(drawing: &mut Drawing, panel: &Panel, pole: &PoleMark) {
+fn draw_pole(drawing: &mut Drawing, panel: &Panel, pole: &PoleMark, radius: f64) {
     let at = panel.place(pole.frequency, pole.order as f64);
     match sample(pole.stability) {
-        Sample::Dot(color) => drawing.dot(at, 3.2, color),
-        Sample::Ring(color) => drawing.ring(at, 3.2, color),
+        Sample::Dot(color) => drawing.dot(at, radius, color),
+        Sample::Ring(color) => drawing.ring(at, radius, color),
         _ => {
             let mut stroke = Stroke::new(SOFT, 1.0);
             stroke.opacity = 0.7;
-            drawing.cross(at, 2.4, stroke);
+            drawing.cross(at, 0.75 * radius, stroke);
         }
     }
 }

@@ -34,6 +34,9 @@ fn amplitudes(document: &Document) -> Vec<String> {
             damping_ratio: ends.damping,
             damping_bound: ends.damping_bound,
         };
+        let change = change.to_string();
+        // A number stays on the line of its unit.
+        let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
         Some(format!("Caution: mode {} {change}.", mode.mode?))
     };
     modes.iter().filter_map(sentence).collect()

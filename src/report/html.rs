@@ -232,7 +232,7 @@ fn quality_section<'a>(document: &Document) -> Option<Section<'a>> {
         tables::quality(document),
     ]);
     if let Some(last) = tables.last_mut() {
-        last.note = format!("{} In all {count}.", last.note);
+        last.note = format!("{} All {count}.", last.note);
     }
     Some(Section {
         id: "quality",

@@ -41,7 +41,7 @@ pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, m
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use recordings::{PipelineError, inspect_bare, measure_bare, si_unit};
-pub use warning::Warning;
+pub use warning::{AmplitudeChange, Warning};
 pub use wired::{Wiring, run_wired};
 
 use crate::description::{ChannelRef, TestDescription};
@@ -88,6 +88,7 @@ pub fn run_test(
             found
         }
     };
+    warnings.extend(warning::of_amplitude(&recordings));
     warnings.extend(warning::of_neglect(test, &structure));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),

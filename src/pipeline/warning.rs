@@ -2,6 +2,12 @@
 
 use std::fmt;
 
+mod amplitude;
+mod estimate;
+
+pub use amplitude::AmplitudeChange;
+pub(super) use amplitude::of_amplitude;
+
 use super::measure::MeasuredSpectra;
 use super::model::TestedStructure;
 use crate::description::{SensorKind, TestDescription};
@@ -79,6 +85,13 @@ pub enum Warning {
         /// What it is.
         label: PeakLabel,
     },
+    /// Frequency or damping changes along the decays.
+    AmplitudeDependent {
+        /// The recording.
+        file: String,
+        /// Number of every mode that changes, and how.
+        changes: Vec<(usize, AmplitudeChange)>,
+    },
     /// The pair regression contradicts its own frequency equation.
     Closure {
         /// Product implied over product of the estimates, minus 1.
@@ -128,6 +141,7 @@ impl Warning {
             Warning::NotRungDown { .. } => "not-rung-down",
             Warning::HannOnTaps { .. } => "hann-on-taps",
             Warning::Mains { .. } => "mains",
+            Warning::AmplitudeDependent { .. } => "amplitude-dependent",
             Warning::Closure { .. } => "closure",
             Warning::CouplingNotEstablished => "coupling-not-established",
             Warning::NumberedInOrder => "numbered-in-order",
@@ -184,43 +198,14 @@ impl fmt::Display for Warning {
             Warning::Unpaired { count, text } => {
                 write!(f, "{count} peak(s) belong to no mode: {text}")
             }
-            Warning::Misfit {
-                mode,
-                error_percent,
-                deviations,
-            } => write_misfit(f, *mode, *error_percent, *deviations),
-            Warning::Closure { .. }
+            Warning::AmplitudeDependent { file, changes } => {
+                amplitude::write_dependence(f, file, changes)
+            }
+            Warning::Misfit { .. }
+            | Warning::Closure { .. }
             | Warning::CouplingNotEstablished
             | Warning::UnphysicalEstimate { .. }
             | Warning::NumberedInOrder => self.write_estimate_doubt(f),
-        }
-    }
-}
-
-impl Warning {
-    fn write_estimate_doubt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Warning::Closure { closure } => write!(
-                f,
-                "the pair regression does not satisfy its own frequency equation: the product it \
-                 implies differs from the product of its estimates by {:+.0} %; the eliminated product \
-                 is left free by the method, and an error of this size means that the stiffnesses are \
-                 not to be trusted singly",
-                100.0 * closure
-            ),
-            Warning::CouplingNotEstablished => f.write_str(
-                "the interval of the cross coupling contains zero: these frequencies do not show one, \
-                 and Kz has no interval; the two-parameter model may do",
-            ),
-            Warning::UnphysicalEstimate { what } => write!(
-                f,
-                "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
-                 mode, a wrong model or readings too coarse for it are the usual causes"
-            ),
-            _ => f.write_str(
-                "no peak lies near a natural frequency of the described free beam, so the peaks were \
-                 numbered in ascending order; check the beam's dimensions and modulus",
-            ),
         }
     }
 }
@@ -248,28 +233,6 @@ fn write_not_rung_down(
              apart",
         ),
     }
-}
-
-fn write_misfit(
-    f: &mut fmt::Formatter<'_>,
-    mode: usize,
-    error_percent: f64,
-    deviations: Option<f64>,
-) -> fmt::Result {
-    write!(
-        f,
-        "with the estimated joint the model misses mode {mode} by {error_percent:+.2} %"
-    )?;
-    if let Some(deviations) = deviations {
-        write!(
-            f,
-            " ({:.0} standard deviations of its reading)",
-            deviations.abs()
-        )?;
-    }
-    f.write_str(
-        "; the estimator, a mode numbered wrongly, or something the model lacks may be the cause",
-    )
 }
 
 /// Doubts about a recording and its taps.

@@ -54,6 +54,9 @@ pub(super) fn analysis_of(mut recording: RecordingResult) -> Analysis {
     let modes = modes_of_bare(&mut recording);
     let (verdicts, doubts) = evidence::judge(std::slice::from_ref(&recording));
     let mut warnings = recording.measurement.warnings.clone();
+    warnings.extend(super::warning::of_amplitude(std::slice::from_ref(
+        &recording,
+    )));
     warnings.extend(doubts);
     Analysis {
         name: recording.file.clone(),

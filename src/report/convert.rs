@@ -5,6 +5,7 @@ use super::convert_estimate::{
     prediction_section, span_section,
 };
 use super::convert_fit::fit_section;
+use super::convert_quality::verdict_section;
 use super::document::{
     ChannelSection, Document, ModeSection, PredictionSection, RecordingSection, TapSection,
     TestSection, VERSION, WarningSection,
@@ -12,7 +13,8 @@ use super::document::{
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::{FrequencySource, ModeReading};
 use crate::pipeline::{
-    Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure, Warning,
+    AmplitudeChange, Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure,
+    Warning,
 };
 use crate::recording::{Format, Separator, UffCoding};
 use crate::spectral::Window;
@@ -50,6 +52,8 @@ pub fn document(analysis: &Analysis) -> Document {
         resolution_span: perturbation
             .and_then(|found| found.bounds.as_ref())
             .map(span_section),
+        quality: (!analysis.verdicts.is_empty())
+            .then(|| analysis.verdicts.iter().map(verdict_section).collect()),
         warnings: analysis.warnings.iter().map(warning_section).collect(),
     }
 }
@@ -134,7 +138,7 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
             .map(|(reading, &mode)| ModeSection {
                 mode,
                 recording: Some(recording.file.clone()),
-                ..with_quality(reading_section(reading), spectra)
+                ..with_quality(reading_section(reading, Some(recording)), spectra)
             })
             .collect()
     });
@@ -237,7 +241,8 @@ fn tap_sections(recording: &RecordingResult) -> Vec<TapSection> {
         .collect()
 }
 
-fn reading_section(reading: &ModeReading) -> ModeSection {
+fn reading_section(reading: &ModeReading, recording: Option<&RecordingResult>) -> ModeSection {
+    let change = recording.and_then(|recording| AmplitudeChange::of(reading, recording));
     let method = match reading.source {
         FrequencySource::Fit => "fit",
         FrequencySource::BetweenLines => "interpolated",
@@ -256,7 +261,7 @@ fn reading_section(reading: &ModeReading) -> ModeSection {
         high: Some(reading.interval.1),
         damping: reading.damping_ratio,
         damping_std: reading.damping_std,
-        fit: reading.fit.as_deref().map(fit_section),
+        fit: reading.fit.as_deref().map(|fit| fit_section(fit, change)),
         coherence: None,
         random_error: None,
         lambda: None,
@@ -278,14 +283,14 @@ fn with_quality(section: ModeSection, spectra: &MeasuredSpectra) -> ModeSection 
 }
 
 fn mode_section(mode: &ModeResult, recordings: &[RecordingResult]) -> ModeSection {
-    let spectra = recordings
+    let recording = recordings
         .iter()
-        .find(|recording| mode.recording.as_ref() == Some(&recording.file))
-        .and_then(|recording| recording.measurement.spectra.as_ref());
+        .find(|recording| mode.recording.as_ref() == Some(&recording.file));
+    let spectra = recording.and_then(|recording| recording.measurement.spectra.as_ref());
     let reading = match &mode.reading {
         Some(reading) => match spectra {
-            Some(spectra) => with_quality(reading_section(reading), spectra),
-            None => reading_section(reading),
+            Some(spectra) => with_quality(reading_section(reading, recording), spectra),
+            None => reading_section(reading, recording),
         },
         None => ModeSection {
             method: "given".to_string(),

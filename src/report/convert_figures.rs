@@ -3,12 +3,17 @@
 use num_complex::Complex64;
 
 use super::figures::{
-    Curve, FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TapMark, TimeOverview,
+    Curve, FrfCurve, PeakMark, PoleMark, RecordingFigure, SpectraFigure, StabilisationBand,
+    StabilisationFigure, TapMark, TimeOverview,
 };
 use super::format::unit_words;
+use super::plot::amplitude::AmplitudeFigure;
 use crate::description::SensorKind;
+use crate::modal::amplitude::AmplitudeCurve;
+use crate::modal::polyreference::BandSearch;
 use crate::pipeline::{
-    Analysis, Frf, FrfSettings, MeasuredSpectra, RecordingResult, Response, frfs_of,
+    AmplitudeChange, Analysis, Frf, FrfSettings, MeasuredSpectra, RecordingResult, Response,
+    frfs_of,
 };
 use crate::spectral::FrfEstimator;
 
@@ -48,6 +53,74 @@ fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
             .spectra
             .as_ref()
             .map(|spectra| spectra_figure(recording, spectra)),
+        stabilisation: recording
+            .measurement
+            .spectra
+            .as_ref()
+            .and_then(|spectra| stabilisation_figure(&spectra.stabilisation.searches)),
+        amplitude: amplitude_figure(recording),
+    }
+}
+
+/// `None` where no band was searched.
+fn stabilisation_figure(searches: &[BandSearch]) -> Option<StabilisationFigure> {
+    let band = |search: &BandSearch| StabilisationBand {
+        core: search.band.core,
+        order: search.order,
+        poles: search
+            .diagram
+            .iter()
+            .map(|pole| PoleMark {
+                order: pole.order,
+                frequency: pole.frequency,
+                stability: pole.stability,
+            })
+            .collect(),
+        selected: search.modes.iter().map(|mode| mode.frequency).collect(),
+    };
+    (!searches.is_empty()).then(|| StabilisationFigure {
+        bands: searches.iter().map(band).collect(),
+    })
+}
+
+/// The curves of all numbered modes; `None` where none of them changes enough to matter.
+fn amplitude_figure(recording: &RecordingResult) -> Option<AmplitudeFigure> {
+    let spectra = recording.measurement.spectra.as_ref()?;
+    let numbered = || spectra.readings.iter().zip(&recording.mode_numbers);
+    numbered().find(|(reading, mode)| {
+        mode.is_some() && AmplitudeChange::of(reading, recording).is_some()
+    })?;
+    let modes: Vec<(usize, AmplitudeCurve)> = numbered()
+        .filter_map(|(reading, &mode)| {
+            Some((mode?, reading.fit.as_ref()?.amplitude.as_ref()?.clone()))
+        })
+        .collect();
+    Some(AmplitudeFigure {
+        file: recording.file.clone(),
+        amplitude: amplitude_words(recording, &modes),
+        modes,
+    })
+}
+
+/// "peak amplitude of A (m/s\u{b2})", or of the strongest sensor where the modes differ in it.
+fn amplitude_words(recording: &RecordingResult, modes: &[(usize, AmplitudeCurve)]) -> String {
+    let mut sensors: Vec<usize> = modes.iter().filter_map(|(_, curve)| curve.sensor).collect();
+    sensors.sort_unstable();
+    sensors.dedup();
+    let responses: Vec<&Response> = sensors
+        .iter()
+        .filter_map(|&sensor| recording.responses.get(sensor))
+        .collect();
+    let unit = responses.first().and_then(|first| first.unit.clone());
+    let same = responses.iter().all(|response| response.unit == unit);
+    let unit = if same {
+        words_of(&unit)
+    } else {
+        "each sensor's unit".to_string()
+    };
+    match responses.as_slice() {
+        [one] => format!("peak amplitude of {} ({unit})", one.name),
+        _ => format!("peak amplitude of the mode's strongest sensor ({unit})"),
     }
 }
 

@@ -1,15 +1,16 @@
 //! Fitted modes in the document.
 
 use super::document_fit::{
-    AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection, TapFitSection,
-    TrendSection,
+    AmplitudeEndsSection, AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection,
+    TapFitSection, TrendSection,
 };
 use crate::modal::FittedReading;
 use crate::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict, Trend};
 use crate::modal::fit::UncertaintySource;
+use crate::pipeline::AmplitudeChange;
 
 /// The fit of one mode.
-pub(super) fn fit_section(fit: &FittedReading) -> FitSection {
+pub(super) fn fit_section(fit: &FittedReading, change: Option<AmplitudeChange>) -> FitSection {
     let mode = &fit.mode;
     FitSection {
         damping_low: mode.damping_ratio.low,
@@ -44,11 +45,14 @@ pub(super) fn fit_section(fit: &FittedReading) -> FitSection {
                 phase_deviation: constant.phase_deviation,
             })
             .collect(),
-        amplitude: fit.amplitude.as_ref().map(amplitude_section),
+        amplitude: fit
+            .amplitude
+            .as_ref()
+            .map(|curve| amplitude_section(curve, change)),
     }
 }
 
-fn amplitude_section(curve: &AmplitudeCurve) -> AmplitudeSection {
+fn amplitude_section(curve: &AmplitudeCurve, change: Option<AmplitudeChange>) -> AmplitudeSection {
     AmplitudeSection {
         verdict: match curve.verdict {
             AmplitudeVerdict::Changes => "changes",
@@ -60,6 +64,15 @@ fn amplitude_section(curve: &AmplitudeCurve) -> AmplitudeSection {
         .to_string(),
         frequency: curve.frequency.as_ref().map(trend_section),
         damping: curve.damping.as_ref().map(trend_section),
+        sensor: curve.sensor.map(|sensor| sensor + 1),
+        ends: change.map(|change| AmplitudeEndsSection {
+            amplitude: change.amplitude,
+            unit: change.unit,
+            frequency: change.frequency,
+            frequency_bound: change.frequency_bound,
+            damping: change.damping_ratio,
+            damping_bound: change.damping_bound,
+        }),
         points: curve
             .points
             .iter()

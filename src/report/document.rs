@@ -9,10 +9,11 @@ use serde::Serialize;
 
 pub use super::document_contents::{ChannelSection, DatasetSection};
 pub use super::document_fit::{
-    AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection, TapFitSection,
-    TrendSection,
+    AmplitudeEndsSection, AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection,
+    TapFitSection, TrendSection,
 };
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
+pub use super::document_quality::VerdictSection;
 pub use super::document_resolution::{ResolutionSpanSection, SensitivitySection};
 
 /// Version of the document's layout.
@@ -60,6 +61,9 @@ pub struct Document {
     /// contributes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution_span: Option<ResolutionSpanSection>,
+    /// How well the test was made: every check of good practice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<Vec<VerdictSection>>,
     /// What a reader has to know.
     pub warnings: Vec<WarningSection>,
 }

@@ -65,8 +65,30 @@ pub struct AmplitudeSection {
     pub frequency: Option<TrendSection>,
     /// Change of the damping ratio; null with too few points.
     pub damping: Option<TrendSection>,
+    /// Response whose amplitude is given, from 1; null without points.
+    pub sensor: Option<usize>,
+    /// From the largest to the smallest amplitude; null where the change is within its uncertainty or too
+    /// small to matter.
+    pub ends: Option<AmplitudeEndsSection>,
     /// The points, by tap and time.
     pub points: Vec<AmplitudePointSection>,
+}
+
+/// Values at the largest and at the smallest amplitude at which the curve is well known.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct AmplitudeEndsSection {
+    /// Amplitude (`unit`).
+    pub amplitude: [f64; 2],
+    /// Unit of the amplitude; null where nobody said.
+    pub unit: Option<String>,
+    /// Frequency (Hz).
+    pub frequency: [f64; 2],
+    /// Its 95 % bounds (Hz).
+    pub frequency_bound: [f64; 2],
+    /// Damping ratio.
+    pub damping: [f64; 2],
+    /// Its 95 % bounds.
+    pub damping_bound: [f64; 2],
 }
 
 /// A change from the largest to the smallest amplitude.

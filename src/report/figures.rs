@@ -1,5 +1,7 @@
 //! The data that pictures are drawn from.
 
+use super::plot::amplitude::AmplitudeFigure;
+use crate::modal::polyreference::PoleStability;
 use crate::spectral::Lines;
 
 /// What the pictures of one recording need.
@@ -11,6 +13,41 @@ pub struct RecordingFigure {
     pub overview: Option<TimeOverview>,
     /// The spectra; `None` when no tap was accepted.
     pub spectra: Option<SpectraFigure>,
+    /// Poles over the orders; `None` where none were looked for or found.
+    pub stabilisation: Option<StabilisationFigure>,
+    /// Frequency and damping against amplitude; `None` where no mode changes.
+    pub amplitude: Option<AmplitudeFigure>,
+}
+
+/// Poles over the orders of a polyreference fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StabilisationFigure {
+    /// The whole band, then the bands about groups of peaks.
+    pub bands: Vec<StabilisationBand>,
+}
+
+/// One band's stabilisation diagram.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StabilisationBand {
+    /// Between these (Hz) modes are taken from this band.
+    pub core: (f64, f64),
+    /// Highest order.
+    pub order: usize,
+    /// Poles of all orders.
+    pub poles: Vec<PoleMark>,
+    /// Frequencies selected as modes (Hz).
+    pub selected: Vec<f64>,
+}
+
+/// A pole in a stabilisation diagram.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoleMark {
+    /// Order it was found at.
+    pub order: usize,
+    /// Frequency (Hz).
+    pub frequency: f64,
+    /// What of it the order before had.
+    pub stability: PoleStability,
 }
 
 /// Smallest and largest value in equal pieces of a recording.

@@ -54,6 +54,8 @@ struct Section<'a> {
     title: &'static str,
     missing: String,
     tables: Vec<Table>,
+    /// Long tables that open on demand.
+    folded: Vec<Table>,
     figures: &'a [InlineFigure],
 }
 
@@ -156,6 +158,7 @@ fn sections<'a>(document: &Document, figures: &'a PageFigures) -> Vec<Section<'a
         joint_section(document, figures),
         uncertainty_section(document, figures),
         Some(modes_section(document, figures)),
+        quality_section(document),
         recordings_section(document, figures),
     ];
     all.into_iter().flatten().collect()
@@ -183,6 +186,7 @@ fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Se
             tables::prediction(document),
             tables::pairs(document),
         ]),
+        folded: Vec::new(),
         figures: &figures.comparison,
     })
 }
@@ -200,6 +204,7 @@ fn uncertainty_section<'a>(document: &Document, figures: &'a PageFigures) -> Opt
         title: "How sure is the stiffness",
         missing: String::new(),
         tables,
+        folded: Vec::new(),
         figures: &figures.cloud,
     };
     (!section.is_empty()).then_some(section)
@@ -215,8 +220,28 @@ fn modes_section<'a>(document: &Document, figures: &'a PageFigures) -> Section<'
         },
         missing: "No resonances were found.".to_owned(),
         tables: found(vec![tables::modes(document), tables::readings(document)]),
+        folded: Vec::new(),
         figures: &figures.spectra,
     }
+}
+
+fn quality_section<'a>(document: &Document) -> Option<Section<'a>> {
+    let count = tables::quality_count(document)?;
+    let mut tables = found(vec![
+        tables::quality_doubts(document),
+        tables::quality(document),
+    ]);
+    if let Some(last) = tables.last_mut() {
+        last.note = format!("{} All {count}.", last.note);
+    }
+    Some(Section {
+        id: "quality",
+        title: "How well it was measured",
+        missing: String::new(),
+        tables,
+        folded: found(vec![tables::quality_all(document)]),
+        figures: &[],
+    })
 }
 
 fn recordings_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Section<'a>> {
@@ -230,6 +255,7 @@ fn recordings_section<'a>(document: &Document, figures: &'a PageFigures) -> Opti
             tables::channels(document),
             tables::taps(document),
         ]),
+        folded: Vec::new(),
         figures: &figures.taps,
     })
 }
@@ -243,6 +269,13 @@ fn no_estimate(document: &Document) -> String {
 }
 
 impl Section<'_> {
+    /// Its tables, each with whether it is folded; those that open on demand last.
+    fn all_tables(&self) -> Vec<(&Table, bool)> {
+        let open = self.tables.iter().map(|table| (table, false));
+        let folded = self.folded.iter().map(|table| (table, true));
+        open.chain(folded).collect()
+    }
+
     /// Whether there is nothing to show but the reason why.
     fn is_empty(&self) -> bool {
         self.tables.is_empty() && self.figures.is_empty()

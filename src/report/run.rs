@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use super::document::Document;
 use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
+use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
 use super::plot::comparison::draw_frequencies;
 use super::plot::frf::draw_frf;
 use super::plot::spectrum::draw_spectrum;
+use super::plot::stabilisation::draw_stabilisation;
 use super::plot::time::draw_taps;
 use super::plot::{Drawing, render_png, render_svg};
 use super::{ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv};
@@ -31,8 +33,8 @@ struct Picture {
 }
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`, and the
-/// pictures that apply: `spectrum-*.png`, `frf-*.png`, `taps-*.png`, `frequencies.png`,
-/// `cloud.png`.
+/// pictures that apply: `spectrum-*.png`, `frf-*.png`, `stabilisation-*.png`,
+/// `amplitude-*.png`, `taps-*.png`, `frequencies.png`, `cloud.png`.
 ///
 /// # Errors
 /// The first [`ReportError`] of any file.
@@ -140,6 +142,21 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
             "frf",
             draw_frf(figure),
             format!("Response per force (H1) of {file}, magnitude, phase and coherence."),
+        ),
+        (
+            Shelf::Spectra,
+            "stabilisation",
+            draw_stabilisation(figure),
+            format!(
+                "Stabilisation diagram of {file}: poles that the fit finds at each order, marked by \
+                 what of them the order before had."
+            ),
+        ),
+        (
+            Shelf::Spectra,
+            "amplitude",
+            figure.amplitude.as_ref().and_then(draw_amplitude),
+            format!("Frequency and damping of the modes of {file} against amplitude."),
         ),
         (
             Shelf::Taps,

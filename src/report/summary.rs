@@ -2,21 +2,44 @@
 
 use super::document::{Document, ModeSection, PredictionSection, RecordingSection};
 use super::format::{bound_percent, signed_percent, significant, trimmed};
-use super::tables::{estimated, reading_bound};
+use super::tables::{estimated, quality_count, reading_bound};
+use crate::pipeline::AmplitudeChange;
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
-    [
-        taps(document),
-        channels(document),
-        modes(document),
+    let first = [taps(document), channels(document), modes(document)];
+    let rest = [
+        quality_count(document).map(|count| capital(&count) + "."),
         estimate(document),
         misfit(document),
         resolution(document),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    ];
+    let first = first.into_iter().flatten();
+    first
+        .chain(amplitudes(document))
+        .chain(rest.into_iter().flatten())
+        .collect()
+}
+
+/// One sentence for each mode that changes with the amplitude.
+fn amplitudes(document: &Document) -> Vec<String> {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let sentence = |mode: &ModeSection| {
+        let ends = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
+        let change = AmplitudeChange {
+            amplitude: ends.amplitude,
+            unit: ends.unit.clone(),
+            frequency: ends.frequency,
+            frequency_bound: ends.frequency_bound,
+            damping_ratio: ends.damping,
+            damping_bound: ends.damping_bound,
+        };
+        let change = change.to_string();
+        // A number stays on the line of its unit.
+        let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
+        Some(format!("Caution: mode {} {change}.", mode.mode?))
+    };
+    modes.iter().filter_map(sentence).collect()
 }
 
 fn taps(document: &Document) -> Option<String> {

@@ -13,6 +13,9 @@ const GAP: usize = 2;
 const NARROWEST: usize = 8;
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
+/// What the fitted frequencies are.
+const FIT_NOTE: &str = "Frequency: fit of the free decays of all taps and sensors, \u{b1} half the 95 % interval; \
+                        line: the highest spectral line \u{b1} half line; damping \u{b1} one standard deviation.";
 /// Most rows printed: a terminal is no place for a thousand taps.
 const MOST_ROWS: usize = 40;
 
@@ -27,6 +30,7 @@ pub fn render_text(document: &Document) -> String {
         estimate(document),
         prediction(document),
         perturbation(document),
+        quality(document),
         warnings(document),
         ending(document),
     ];
@@ -64,7 +68,17 @@ pub fn taps(document: &Document) -> String {
 /// The modes; empty without any, and where their frequency response functions are listed.
 pub fn modes(document: &Document) -> String {
     let listed = document.frfs.as_ref().is_some_and(|frfs| !frfs.is_empty());
-    table_or_nothing(tables::modes(document).filter(|_| !listed))
+    let Some(table) = tables::modes(document).filter(|_| !listed) else {
+        return String::new();
+    };
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let fitted = modes.iter().any(|mode| mode.method == "fit");
+    let note = if fitted {
+        wrapped(FIT_NOTE, 0)
+    } else {
+        String::new()
+    };
+    render_table(&table) + &note
 }
 
 /// The resonances on the frequency response functions; empty where those were not asked for.
@@ -126,6 +140,11 @@ pub fn perturbation(document: &Document) -> String {
     ];
     let texts: Vec<String> = texts.into_iter().filter(|text| !text.is_empty()).collect();
     texts.join("\n")
+}
+
+/// The checks of good practice that leave a doubt; empty without any. The ending counts them all.
+pub fn quality(document: &Document) -> String {
+    table_or_nothing(tables::quality_doubts(document))
 }
 
 /// The warnings; empty without any.

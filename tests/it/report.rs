@@ -176,8 +176,10 @@ fn limit_pictures_apply_only_where_there_are_data() {
         of("without hammer"),
         [
             "spectrum-low.png",
+            "stabilisation-low.png",
             "taps-low.png",
             "spectrum-full.png",
+            "stabilisation-full.png",
             "taps-full.png",
             "frequencies.png",
             "cloud.png"

@@ -10,6 +10,7 @@ pub mod frf;
 pub mod labels;
 pub mod palette;
 pub mod spectrum;
+pub mod stabilisation;
 pub mod time;
 
 mod closeup;

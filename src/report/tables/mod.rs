@@ -14,7 +14,7 @@ pub use frfs::frfs;
 pub use joint::{Parameter, estimated, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};
-pub use quality::{quality, quality_doubts};
+pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 
@@ -106,6 +106,12 @@ impl Table {
 }
 
 impl Column {
+    /// Whether its cells hold sentences, which need several lines.
+    pub fn is_long(&self) -> bool {
+        const LONG: [&str; 4] = ["Reason", "What happened", "Why it might be", "What helps"];
+        LONG.contains(&self.name.as_str())
+    }
+
     /// The same column, on the page only.
     fn on_page(mut self) -> Column {
         self.place = Place::Page;

@@ -22,19 +22,44 @@ pub fn modes(document: &Document) -> Option<Table> {
         (false, true) => "Modes",
         (false, false) => "Resonances",
     };
-    let bare = MODES_NOTE.trim_end_matches(LAMBDA_NOTE);
-    let note = match (given, described) {
-        (true, _) => "Frequency: as it was given, with its bound.",
-        (false, true) => MODES_NOTE,
-        (false, false) => bare,
+    let note = match given {
+        true => "Frequency: as it was given, with its bound.".to_owned(),
+        false => note(modes, described),
     };
-    Some(table(caption, modes.iter().map(row).collect(), note))
+    Some(table(caption, modes.iter().map(row).collect(), &note))
 }
 
-const LAMBDA_NOTE: &str = " \u{3bb}: non-dimensional frequency of the Euler beam.";
-const MODES_NOTE: &str = "Frequency: the best reading with its bound (about 95 %). Line: the \
-                          highest spectral line \u{b1} half of the larger of line spacing and 1/T. \
-                          \u{3bb}: non-dimensional frequency of the Euler beam.";
+/// What the columns mean, of the methods that occur.
+fn note(modes: &[ModeSection], described: bool) -> String {
+    let by = |method: &str| modes.iter().any(|mode| mode.method == method);
+    let mut parts = vec!["Frequency: the best reading with its bound (about 95 %)."];
+    if by("fit") {
+        parts.push(FIT_NOTE);
+    }
+    if by("interpolated") {
+        parts.push("Interpolated: from the shape of the peak between the lines.");
+    }
+    parts.push(LINE_NOTE);
+    if modes.iter().any(|mode| mode.damping_std.is_some()) {
+        parts.push("Damping: \u{b1} one standard deviation.");
+    }
+    if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
+        parts.push(TAPS_NOTE);
+    }
+    if described {
+        parts.push("\u{3bb}: non-dimensional frequency of the Euler beam.");
+    }
+    parts.join(" ")
+}
+
+const FIT_NOTE: &str = "Fit: maximum likelihood of the free decays of all taps and sensors after \
+                        the pulse, without a window; its bound is half the 95 % interval, which \
+                        rests on the noise that the fit leaves (residual), or on the scatter of \
+                        the taps where that is more than the noise explains (taps).";
+const LINE_NOTE: &str = "Line: the highest spectral line \u{b1} half of the larger of line spacing \
+                         and 1/T, as an analyser shows it.";
+const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, each fitted alone; p: \
+                         how often noise alone makes taps scatter so.";
 
 /// Each recording's own readings; `None` where there is at most one recording.
 pub fn readings(document: &Document) -> Option<Table> {
@@ -79,8 +104,11 @@ fn columns() -> Vec<Column> {
         words("Mode"),
         number("Frequency (Hz)"),
         words("Method").on_page(),
+        words("Interval from").on_page(),
         number("Line (Hz)"),
         number("Damping (%)"),
+        number("Tap deviation (Hz)").on_page(),
+        number("p").on_page(),
         number("\u{3bb} (1)"),
         number("Prominence (dB)").on_page(),
         number("Above noise (dB)").on_page(),
@@ -95,12 +123,17 @@ fn row(mode: &ModeSection) -> Vec<String> {
         Some(half) => line_reading(line, half).joined(),
         None => significant(line, 6),
     });
+    let fit = mode.fit.as_ref();
+    let scatter = fit.and_then(|fit| fit.scatter_probability);
     vec![
         mode_name(mode),
         reading(mode).joined(),
         mode.method.clone(),
+        fit.map_or_else(|| MISSING.into(), |fit| fit.uncertainty_from.clone()),
         line.unwrap_or_else(|| MISSING.into()),
         damping(mode),
+        optional(tap_deviation(mode), 2),
+        optional(scatter, 2),
         lambda(mode),
         optional(mode.prominence_db, 2),
         optional(mode.above_noise_db, 2),
@@ -108,6 +141,17 @@ fn row(mode: &ModeSection) -> Vec<String> {
         optional(mode.random_error.map(|error| 100.0 * error), 2),
         mode.recording.clone().unwrap_or_else(|| MISSING.into()),
     ]
+}
+
+/// Distance (Hz) of the tap farthest from the mean of all taps; `None` with fewer than two.
+fn tap_deviation(mode: &ModeSection) -> Option<f64> {
+    let taps = &mode.fit.as_ref()?.taps;
+    if taps.len() < 2 {
+        return None;
+    }
+    let mean = taps.iter().map(|tap| tap.frequency).sum::<f64>() / taps.len() as f64;
+    let deviations = taps.iter().map(|tap| (tap.frequency - mean).abs());
+    deviations.max_by(f64::total_cmp)
 }
 
 /// The damping ratio (%) with its standard deviation.

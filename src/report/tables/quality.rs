@@ -1,14 +1,48 @@
 //! Tables of verdicts on how well a test was made.
 
+use super::super::document::{Document, VerdictSection};
 use super::super::format::{MISSING, significant};
 use super::{Table, number, words};
-use crate::quality::{Check, Outcome, Verdict};
+
+/// Outcomes from the worst to the best.
+const OUTCOMES: [&str; 4] = ["bad", "doubtful", "good", "not applicable"];
+
+/// Place of a verdict's outcome: 0 for the worst.
+fn rank(verdict: &VerdictSection) -> usize {
+    let place = OUTCOMES.iter().position(|name| *name == verdict.outcome);
+    place.unwrap_or(OUTCOMES.len())
+}
+
+fn is_doubt(verdict: &VerdictSection) -> bool {
+    rank(verdict) < 2
+}
+
+fn verdicts(document: &Document) -> &[VerdictSection] {
+    document.quality.as_deref().unwrap_or_default()
+}
+
+/// "checks: 41 good, 2 doubtful, 1 bad"; `None` where no check applies.
+pub fn quality_count(document: &Document) -> Option<String> {
+    let counts: Vec<String> = ["good", "doubtful", "bad"]
+        .into_iter()
+        .filter_map(|name| {
+            let of_it = verdicts(document).iter().filter(|v| v.outcome == name);
+            let count = of_it.count();
+            (count > 0).then(|| format!("{count} {name}"))
+        })
+        .collect();
+    (!counts.is_empty()).then(|| format!("checks: {}", counts.join(", ")))
+}
 
 /// One row for each check: its worst verdict, and how many of all are no doubt; `None` without any.
-pub fn quality(verdicts: &[Verdict]) -> Option<Table> {
-    let mut checks: Vec<Check> = verdicts.iter().map(|verdict| verdict.check).collect();
-    checks.sort_unstable();
-    checks.dedup();
+pub fn quality(document: &Document) -> Option<Table> {
+    let verdicts = verdicts(document);
+    let mut checks: Vec<&str> = Vec::new();
+    for verdict in verdicts {
+        if !checks.contains(&verdict.check.as_str()) {
+            checks.push(&verdict.check);
+        }
+    }
     let rows: Vec<Vec<String>> = checks
         .into_iter()
         .filter_map(|check| summary_row(verdicts, check))
@@ -31,44 +65,46 @@ pub fn quality(verdicts: &[Verdict]) -> Option<Table> {
     })
 }
 
-fn summary_row(verdicts: &[Verdict], check: Check) -> Option<Vec<String>> {
-    let of_check = || {
-        verdicts
-            .iter()
-            .filter(move |verdict| verdict.check == check)
-    };
-    let worst = of_check().rev().max_by_key(|verdict| verdict.outcome)?;
-    let good = of_check().filter(|v| v.outcome == Outcome::Good).count();
-    let apply = of_check().filter(|v| v.outcome != Outcome::NotApplicable);
+fn summary_row(verdicts: &[VerdictSection], check: &str) -> Option<Vec<String>> {
+    let of_check = || verdicts.iter().filter(move |v| v.check == check);
+    let worst = of_check().min_by_key(|verdict| rank(verdict))?;
+    let good = of_check().filter(|v| v.outcome == "good").count();
+    let apply = of_check().filter(|v| v.outcome != "not applicable");
     let count = match apply.count() {
         0 => MISSING.to_owned(),
         all => format!("{good} of {all}"),
     };
     Some(vec![
-        check.code().to_owned(),
-        worst.outcome.name().to_owned(),
+        check.to_owned(),
+        worst.outcome.clone(),
         count,
         value(worst),
         significant(worst.limit, 3),
         unit(worst),
-        worst.subject.to_string(),
-        worst.happened.clone(),
+        worst.subject.clone(),
+        worst.text.clone(),
     ])
 }
 
 /// One row for each doubt, the worst first: what happened, why it might be, what helps; `None` without
 /// any.
-pub fn quality_doubts(verdicts: &[Verdict]) -> Option<Table> {
-    let mut doubts: Vec<&Verdict> = verdicts.iter().filter(|v| v.is_doubt()).collect();
-    doubts.sort_by_key(|verdict| std::cmp::Reverse(verdict.outcome));
-    let row = |verdict: &&Verdict| {
+pub fn quality_doubts(document: &Document) -> Option<Table> {
+    let mut doubts: Vec<&VerdictSection> = verdicts(document)
+        .iter()
+        .filter(|verdict| is_doubt(verdict))
+        .collect();
+    doubts.sort_by_key(|verdict| rank(verdict));
+    let row = |verdict: &&VerdictSection| {
         vec![
-            verdict.check.code().to_owned(),
-            verdict.outcome.name().to_owned(),
-            verdict.subject.to_string(),
-            verdict.happened.clone(),
-            verdict.check.cause().to_owned(),
-            verdict.check.remedy().to_owned(),
+            verdict.check.clone(),
+            verdict.outcome.clone(),
+            verdict.subject.clone(),
+            value(verdict),
+            significant(verdict.limit, 3),
+            unit(verdict),
+            verdict.text.clone(),
+            verdict.cause.clone().unwrap_or_default(),
+            verdict.remedy.clone().unwrap_or_default(),
         ]
     };
     (!doubts.is_empty()).then(|| Table {
@@ -77,7 +113,10 @@ pub fn quality_doubts(verdicts: &[Verdict]) -> Option<Table> {
             words("Check"),
             words("Outcome"),
             words("Where"),
-            words("What happened"),
+            number("Value"),
+            number("Limit"),
+            words("Unit"),
+            words("What happened").on_page(),
             words("Why it might be").on_page(),
             words("What helps").on_page(),
         ],
@@ -86,15 +125,46 @@ pub fn quality_doubts(verdicts: &[Verdict]) -> Option<Table> {
     })
 }
 
-fn value(verdict: &Verdict) -> String {
+/// One row for each verdict, doubts first; `None` without any.
+pub fn quality_all(document: &Document) -> Option<Table> {
+    let mut all: Vec<&VerdictSection> = verdicts(document).iter().collect();
+    all.sort_by_key(|verdict| rank(verdict));
+    let row = |verdict: &&VerdictSection| {
+        vec![
+            verdict.check.clone(),
+            verdict.outcome.clone(),
+            verdict.subject.clone(),
+            value(verdict),
+            significant(verdict.limit, 3),
+            unit(verdict),
+            verdict.text.clone(),
+        ]
+    };
+    (!all.is_empty()).then(|| Table {
+        caption: "All checks".to_owned(),
+        columns: vec![
+            words("Check"),
+            words("Outcome"),
+            words("Where"),
+            number("Value"),
+            number("Limit"),
+            words("Unit"),
+            words("What happened"),
+        ],
+        rows: all.iter().map(row).collect(),
+        note: String::new(),
+    })
+}
+
+fn value(verdict: &VerdictSection) -> String {
     verdict
         .value
         .map_or(MISSING.to_owned(), |value| significant(value, 3))
 }
 
 /// The unit; nothing for a ratio.
-fn unit(verdict: &Verdict) -> String {
-    match verdict.unit {
+fn unit(verdict: &VerdictSection) -> String {
+    match verdict.unit.as_str() {
         "1" => String::new(),
         unit => unit.to_owned(),
     }
@@ -102,11 +172,12 @@ fn unit(verdict: &Verdict) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::convert_quality::verdict_section;
     use super::*;
-    use crate::quality::Subject;
+    use crate::quality::{Check, Outcome, Subject, Verdict};
 
-    fn verdict(check: Check, outcome: Outcome, value: f64) -> Verdict {
-        Verdict {
+    fn verdict(check: Check, outcome: Outcome, value: f64) -> VerdictSection {
+        verdict_section(&Verdict {
             check,
             subject: Subject::Test,
             value: Some(value),
@@ -114,6 +185,13 @@ mod tests {
             unit: check.unit(),
             outcome,
             happened: format!("found {value}"),
+        })
+    }
+
+    fn document(verdicts: &[VerdictSection]) -> Document {
+        Document {
+            quality: Some(verdicts.to_vec()),
+            ..Document::default()
         }
     }
 
@@ -121,34 +199,39 @@ mod tests {
     fn regress_the_worst_of_each_check_stands_in_its_row() {
         let verdicts = [
             verdict(Check::DoubleHit, Outcome::Good, 0.01),
-            verdict(Check::DoubleHit, Outcome::Bad, 0.3),
             verdict(Check::DoubleHit, Outcome::Doubtful, 0.06),
+            verdict(Check::DoubleHit, Outcome::Bad, 0.3),
             verdict(Check::ForceFall, Outcome::NotApplicable, 7.0),
         ];
-        let table = quality(&verdicts).expect("two checks");
+        let whole = document(&verdicts);
+        let table = quality(&whole).expect("two checks");
         assert_eq!(table.rows.len(), 2);
         assert_eq!(table.rows[0][..4], ["double-hit", "bad", "1 of 3", "0.300"]);
         assert_eq!(
             table.rows[1][..3],
             ["force-fall", "not applicable", MISSING]
         );
-        assert!(
-            table
-                .rows
-                .iter()
-                .all(|row| row.len() == table.columns.len())
-        );
-        let doubts = quality_doubts(&verdicts).expect("two doubts");
-        let found: Vec<&str> = doubts.rows.iter().map(|row| row[3].as_str()).collect();
+        let doubts = quality_doubts(&whole).expect("two doubts");
+        let found: Vec<&str> = doubts.rows.iter().map(|row| row[6].as_str()).collect();
         assert_eq!(found, ["found 0.3", "found 0.06"]);
-        assert!(
-            doubts
-                .rows
-                .iter()
-                .all(|row| row.len() == doubts.columns.len())
-        );
-        assert_eq!(doubts.rows[0][5], Check::DoubleHit.remedy());
-        assert_eq!(quality_doubts(&verdicts[..1]), None);
-        assert_eq!(quality(&[]), None);
+        assert_eq!(doubts.rows[0][8], Check::DoubleHit.remedy());
+        let all = quality_all(&whole).expect("four verdicts");
+        let outcomes: Vec<&str> = all.rows.iter().map(|row| row[1].as_str()).collect();
+        assert_eq!(outcomes, ["bad", "doubtful", "good", "not applicable"]);
+        for table in [&table, &doubts, &all] {
+            assert!(
+                table
+                    .rows
+                    .iter()
+                    .all(|row| row.len() == table.columns.len()),
+                "{}",
+                table.caption
+            );
+        }
+        let count = quality_count(&whole);
+        assert_eq!(count.as_deref(), Some("checks: 1 good, 1 doubtful, 1 bad"));
+        assert_eq!(quality_doubts(&document(&verdicts[..1])), None);
+        assert_eq!(quality(&document(&[])), None);
+        assert_eq!(quality_count(&document(&verdicts[3..])), None);
     }
 }

@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use tapjoint::modal::polyreference::PoleStability;
 use tapjoint::report::document::*;
 use tapjoint::report::figures::*;
 use tapjoint::spectral::Lines;
@@ -32,6 +33,7 @@ pub fn document() -> Document {
         prediction: Some(prediction()),
         perturbation: Some(perturbation()),
         resolution_span: Some(span()),
+        quality: Some(quality()),
         warnings: vec![
             WarningSection {
                 code: "closure".into(),
@@ -51,6 +53,23 @@ pub fn figures() -> Vec<RecordingFigure> {
         figure("low.wav", [0.0, 200.0], 0..2),
         figure("full.wav", [0.0, 2000.0], 0..5),
     ]
+}
+
+/// One good check and one doubt.
+fn quality() -> Vec<VerdictSection> {
+    let verdict = |outcome: &str, tap: usize, value: f64| VerdictSection {
+        check: "force-ripple".into(),
+        subject: format!("full.wav, tap {tap}"),
+        recording: Some("full.wav".into()),
+        tap: Some(tap),
+        value: Some(value),
+        limit: 1.7,
+        unit: "dB".into(),
+        outcome: outcome.into(),
+        text: format!("The force spectrum ripples by {value} dB."),
+        ..VerdictSection::default()
+    };
+    vec![verdict("good", 1, 0.4), verdict("doubtful", 2, 2.9)]
 }
 
 fn test() -> TestSection {
@@ -285,6 +304,36 @@ fn figure(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recordin
         file: file.into(),
         overview: Some(overview()),
         spectra: Some(spectra(lines, peaks)),
+        stabilisation: Some(stabilisation(band)),
+        amplitude: None,
+    }
+}
+
+/// Each mode from its order on, new first and stable after.
+fn stabilisation(band: [f64; 2]) -> StabilisationFigure {
+    let within = |frequency: &&f64| (band[0]..band[1]).contains(*frequency);
+    let mut poles = Vec::new();
+    for order in 2..20 {
+        for (index, frequency) in FREQUENCIES.iter().filter(within).enumerate() {
+            let stability = match order.cmp(&(2 * index + 3)) {
+                std::cmp::Ordering::Less => continue,
+                std::cmp::Ordering::Equal => PoleStability::New,
+                std::cmp::Ordering::Greater => PoleStability::All,
+            };
+            poles.push(PoleMark {
+                order,
+                frequency: *frequency,
+                stability,
+            });
+        }
+    }
+    StabilisationFigure {
+        bands: vec![StabilisationBand {
+            core: (band[0], band[1]),
+            order: 20,
+            poles,
+            selected: FREQUENCIES.iter().filter(within).copied().collect(),
+        }],
     }
 }
 

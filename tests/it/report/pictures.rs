@@ -13,6 +13,7 @@ use tapjoint::report::plot::frf::draw_frf;
 use tapjoint::report::plot::labels::spread;
 use tapjoint::report::plot::palette::{BLUE, Color, SKY, VERMILION};
 use tapjoint::report::plot::spectrum::draw_spectrum;
+use tapjoint::report::plot::stabilisation::draw_stabilisation;
 use tapjoint::report::plot::time::draw_taps;
 use tapjoint::report::plot::{Drawing, render_png, render_svg};
 
@@ -23,12 +24,19 @@ fn drawings() -> Vec<Drawing> {
     let document = fixture::document();
     let mut drawings: Vec<Drawing> = fixture::figures()
         .iter()
-        .flat_map(|figure| [draw_spectrum(figure), draw_frf(figure), draw_taps(figure)])
+        .flat_map(|figure| {
+            [
+                draw_spectrum(figure),
+                draw_frf(figure),
+                draw_stabilisation(figure),
+                draw_taps(figure),
+            ]
+        })
         .flatten()
         .collect();
     drawings.extend(draw_frequencies(&document));
     drawings.extend(draw_cloud(&document));
-    assert_eq!(drawings.len(), 8, "two recordings have three pictures each");
+    assert_eq!(drawings.len(), 10, "two recordings have four pictures each");
     drawings
 }
 

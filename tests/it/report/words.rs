@@ -32,6 +32,8 @@ fn prop_page_holds_every_section_and_number() {
         "All frequencies changed by the same percentage",
         "Which mode drives which parameter",
         "Readings of each recording",
+        "Doubts about the measurement",
+        "<summary>All checks (2)</summary>",
         "Recordings and their spectra",
         "double hit: second excursion of 31 % after 14 ms",
         "MN/m",
@@ -43,7 +45,7 @@ fn prop_page_holds_every_section_and_number() {
     for part in wanted {
         assert!(html.contains(part), "the page lacks {part}");
     }
-    assert_eq!(html.matches("<svg").count(), 8, "pictures in the page");
+    assert_eq!(html.matches("<svg").count(), 10, "pictures in the page");
     let place = |part: &str| html.find(part).unwrap_or(usize::MAX);
     assert!(
         place("id=\"warnings\"") < place("id=\"summary\""),
@@ -121,6 +123,10 @@ fn prop_json_has_the_promised_keys() {
             "mode measured predicted lambda error_percent used",
         ),
         ("/perturbation/0", "percent method kx ky kz"),
+        (
+            "/quality/0",
+            "check subject recording tap frequency value limit unit outcome text",
+        ),
         ("/warnings/0", "code text"),
     ];
     for (place, keys) in wanted {
@@ -249,7 +255,9 @@ fn prop_terminal_ends_with_what_was_found() {
 #[test]
 fn val_summary_counts() {
     let sentences = summary::sentences(&fixture::document());
-    assert_eq!(sentences.len(), 5, "{sentences:?}");
+    assert_eq!(sentences.len(), 6, "{sentences:?}");
+    let checks = "Checks: 1 good, 1 doubtful.".to_owned();
+    assert!(sentences.contains(&checks), "{sentences:?}");
     assert_eq!(
         sentences[0],
         "8 of 12 taps in 2 recordings were used, 4 were rejected."

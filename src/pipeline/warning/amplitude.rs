@@ -1,0 +1,205 @@
+//! Modes whose frequency or damping changes with the amplitude.
+
+use std::fmt;
+
+use super::Warning;
+use crate::modal::ModeReading;
+use crate::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
+use crate::pipeline::analysis::RecordingResult;
+use crate::stats::median;
+
+/// A change of the frequency below this share is not worth a word: 0.01 %, a fifth of the smallest
+/// change that Ingole & Chatterjee perturb frequencies by.
+const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
+/// The same of the damping: 5 %, about what one repeats of a joint's damping.
+const LEAST_DAMPING_CHANGE: f64 = 0.05;
+/// Bounds of a curve up to this many times their median count as well known.
+const USUAL: f64 = 3.0;
+/// Most modes named in one warning; the findings of the report name them all.
+const MOST_NAMED: usize = 1;
+
+/// What a mode does along its decays: values at the largest and at the smallest amplitude at which its
+/// curve is well known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmplitudeChange {
+    /// Peak amplitude of the strongest sensor (`unit`).
+    pub amplitude: [f64; 2],
+    /// Unit of the amplitude; `None` where nobody said.
+    pub unit: Option<String>,
+    /// Frequency (Hz).
+    pub frequency: [f64; 2],
+    /// Its 95 % bounds (Hz).
+    pub frequency_bound: [f64; 2],
+    /// Damping ratio.
+    pub damping_ratio: [f64; 2],
+    /// Its 95 % bounds.
+    pub damping_bound: [f64; 2],
+}
+
+impl AmplitudeChange {
+    /// The change of a fitted mode where it is beyond its uncertainty and large enough to matter.
+    pub fn of(reading: &ModeReading, recording: &RecordingResult) -> Option<AmplitudeChange> {
+        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+        if curve.verdict != AmplitudeVerdict::Changes {
+            return None;
+        }
+        let known = well_known(curve);
+        let ends = [known.first()?, known.last()?];
+        let response = curve
+            .sensor
+            .and_then(|sensor| recording.responses.get(sensor));
+        let change = AmplitudeChange {
+            amplitude: ends.map(|end| end.amplitude),
+            unit: response.and_then(|response| response.unit.clone()),
+            frequency: ends.map(|end| end.frequency),
+            frequency_bound: ends.map(|end| end.frequency_bound),
+            damping_ratio: ends.map(|end| end.damping_ratio),
+            damping_bound: ends.map(|end| end.damping_bound),
+        };
+        change.matters().then_some(change)
+    }
+
+    fn matters(&self) -> bool {
+        let beyond = |values: [f64; 2], bounds: [f64; 2], least: f64| {
+            let share = ((values[1] - values[0]) / values[0]).abs();
+            differs(values, bounds) && share > least
+        };
+        beyond(self.frequency, self.frequency_bound, LEAST_FREQUENCY_CHANGE)
+            || beyond(self.damping_ratio, self.damping_bound, LEAST_DAMPING_CHANGE)
+    }
+}
+
+/// The curve at its points, the largest amplitude first, without those at which its bounds are far
+/// beyond the usual ones: at a curve's ends a polynomial says little.
+fn well_known(curve: &AmplitudeCurve) -> Vec<AmplitudeReading> {
+    let points = curve.points.iter();
+    let mut all: Vec<AmplitudeReading> = points
+        .filter_map(|point| curve.at_amplitude(point.amplitude))
+        .collect();
+    all.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+    if all.is_empty() {
+        return all;
+    }
+    let usual = |of: fn(&AmplitudeReading) -> f64| {
+        let mut bounds: Vec<f64> = all.iter().map(of).collect();
+        USUAL * median(&mut bounds)
+    };
+    let frequency = usual(|reading| reading.frequency_bound);
+    let damping = usual(|reading| reading.damping_bound);
+    all.retain(|r| r.frequency_bound <= frequency && r.damping_bound <= damping);
+    all
+}
+
+/// Whether two values differ by more than both their bounds.
+fn differs(values: [f64; 2], bounds: [f64; 2]) -> bool {
+    (values[1] - values[0]).abs() > bounds[0] + bounds[1]
+}
+
+impl fmt::Display for AmplitudeChange {
+    /// "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude falls from
+    /// 33 to 2.3 m/s\u{b2}".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = self.unit.as_deref().unwrap_or("of the file's unit");
+        let percent = |ratios: [f64; 2]| ratios.map(|ratio| 100.0 * ratio);
+        write!(
+            f,
+            "{} Hz and its damping {} % as the amplitude falls from {} to {} {}",
+            moves(self.frequency, self.frequency_bound),
+            moves(percent(self.damping_ratio), percent(self.damping_bound)),
+            two_digits(self.amplitude[0]),
+            two_digits(self.amplitude[1]),
+            unit.replace("m/s2", "m/s\u{b2}")
+        )
+    }
+}
+
+/// "rises from 80.28 to 80.54", with the decimals that show the change's two leading digits, or "stays
+/// near 80.4".
+fn moves([first, last]: [f64; 2], bounds: [f64; 2]) -> String {
+    if !differs([first, last], bounds) {
+        let decimals = decimals(bounds[0] + bounds[1]).saturating_sub(1);
+        return format!("stays near {:.decimals$}", 0.5 * (first + last));
+    }
+    let decimals = decimals(last - first);
+    let verb = if last > first { "rises" } else { "falls" };
+    format!("{verb} from {first:.decimals$} to {last:.decimals$}")
+}
+
+fn two_digits(value: f64) -> String {
+    format!("{value:.0$}", decimals(value))
+}
+
+/// Decimals that show the two leading digits of a value.
+fn decimals(value: f64) -> usize {
+    (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
+}
+
+/// One warning for each recording with modes that change.
+pub(in crate::pipeline) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<Warning> {
+    let warning = |recording: &RecordingResult| {
+        let spectra = recording.measurement.spectra.as_ref()?;
+        let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
+        let changes: Vec<(usize, AmplitudeChange)> = numbered
+            .filter_map(|(reading, &mode)| Some((mode?, AmplitudeChange::of(reading, recording)?)))
+            .collect();
+        (!changes.is_empty()).then(|| Warning::AmplitudeDependent {
+            file: recording.file.clone(),
+            changes,
+        })
+    };
+    recordings.iter().filter_map(warning).collect()
+}
+
+pub(super) fn write_dependence(
+    f: &mut fmt::Formatter<'_>,
+    file: &str,
+    changes: &[(usize, AmplitudeChange)],
+) -> fmt::Result {
+    let named: Vec<String> = changes
+        .iter()
+        .take(MOST_NAMED)
+        .map(|(mode, change)| format!("mode {mode} {change}"))
+        .collect();
+    write!(f, "{file}: {}", named.join("; "))?;
+    let more = changes.len().saturating_sub(MOST_NAMED);
+    if more > 0 {
+        let modes = if more == 1 {
+            "mode changes"
+        } else {
+            "modes change"
+        };
+        write!(f, "; {more} more {modes} with it")?;
+    }
+    f.write_str(
+        "; a joint or support that slips softens and damps more the harder it is driven, and so may a \
+         sensor or cable that sits loose; a recording at a second tap level would confirm it, and \
+         frequencies should be stated with their amplitude, or taken from softer taps",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_a_change_in_words() {
+        let change = AmplitudeChange {
+            amplitude: [33.2, 2.31],
+            unit: Some("m/s2".into()),
+            frequency: [80.281, 80.543],
+            frequency_bound: [0.01, 0.02],
+            damping_ratio: [0.00285, 0.00149],
+            damping_bound: [0.0001, 0.0001],
+        };
+        assert_eq!(
+            change.to_string(),
+            "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude \
+             falls from 33 to 2.3 m/s\u{b2}"
+        );
+        let steady = AmplitudeChange {
+            damping_bound: [0.001, 0.001],
+            ..change
+        };
+        assert!(steady.to_string().contains("its damping stays near 0.2 %"));
+    }
+}

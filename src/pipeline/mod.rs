@@ -10,7 +10,9 @@
 //! writes.
 
 mod analysis;
+mod consistent;
 mod decays;
+mod doubts;
 mod evidence;
 mod fits;
 mod force;
@@ -19,6 +21,7 @@ mod identification;
 mod measure;
 mod model;
 mod modes;
+mod neglect;
 mod quiet;
 mod recordings;
 mod stage;
@@ -33,8 +36,9 @@ pub use analysis::{
     Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
     Perturbation, RecordingResult, Response,
 };
+pub use consistent::{StructureDetails, structure_details};
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
-pub use identification::{IdentifySettings, identify};
+pub use identification::{EstimateMethod, IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
@@ -48,7 +52,8 @@ use crate::recording::Recording;
 /// Runs a described test: its recordings, or the frequencies it gives.
 ///
 /// `place` is the folder in which recordings are looked for and the description's own name, for
-/// messages. `settings.fit_modes` yields to the description's.
+/// messages. `settings.fit_modes` yields to the description's, `settings.details` are the
+/// description's.
 ///
 /// # Errors
 /// Recordings that cannot be read or analysed. Too few taps or modes are no errors: the analysis
@@ -86,9 +91,10 @@ pub fn run_test(
             found
         }
     };
-    warnings.extend(warning::of_neglect(test, &structure));
+    warnings.extend(neglect::of_neglect(test, &structure, settings.method));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
+        details: structure_details(test, &structure.beam),
         ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);

@@ -9,6 +9,7 @@ mod convert_figures;
 mod convert_fit;
 pub mod document;
 mod document_contents;
+mod document_estimate;
 mod document_fit;
 mod document_frf;
 mod document_resolution;
@@ -20,6 +21,7 @@ pub mod summary;
 pub mod tables;
 pub mod text;
 
+mod convert_consistent;
 mod convert_frf;
 mod csv;
 mod json;

@@ -5,6 +5,7 @@ use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tapjoint::description::{ChannelRef, JointKind, ReadingMethod, SensorKind, WindowKind};
+use tapjoint::pipeline::EstimateMethod;
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::ResponseForm;
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
@@ -386,7 +387,19 @@ impl From<ReadingArgument> for ReadingMethod {
 /// How the joint is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub(super) enum MethodArgument {
-    /// The multi-linear regression over pairs of modes (Euler beam, sensor masses neglected)
+    /// Least squares on the frequencies themselves, the pair regression beside it
     #[default]
+    Consistent,
+    /// The multi-linear regression over pairs of modes alone (Euler beam, sensor masses neglected)
     Pairs,
+}
+
+impl MethodArgument {
+    /// In the analysis's terms.
+    pub(super) fn method(self) -> EstimateMethod {
+        match self {
+            MethodArgument::Consistent => EstimateMethod::Consistent,
+            MethodArgument::Pairs => EstimateMethod::Pairs,
+        }
+    }
 }

@@ -97,7 +97,10 @@ pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::
     let analysis = run_test(
         &file.test,
         (&file.folder, &file.name),
-        &IdentifySettings::default(),
+        &IdentifySettings {
+            method: arguments.method.method(),
+            ..IdentifySettings::default()
+        },
     )?;
     // The perturbation has a command of its own.
     let document = Document {

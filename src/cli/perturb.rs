@@ -7,7 +7,7 @@ use super::terminal::Terminal;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::pipeline::{IdentifySettings, run_test};
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings, run_test};
 use tapjoint::report::{document_of, render_text};
 
 /// Show how the estimate moves when the frequencies are wrong.
@@ -42,6 +42,8 @@ pub(super) fn run(
 ) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
     let settings = IdentifySettings {
+        // What is perturbed is the pair regression.
+        method: EstimateMethod::Pairs,
         percents: arguments.percent.0.clone(),
         monte_carlo: Some((arguments.samples, seed)),
         ..Default::default()

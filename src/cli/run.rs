@@ -131,7 +131,7 @@ pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Resul
 pub(super) fn outcome(analysis: &Analysis) -> Outcome {
     let answered = match &analysis.identification {
         Some(found) => {
-            found.estimate.is_some() || found.prediction.iter().any(|mode| mode.measured.is_some())
+            found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
         }
         None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
     };

@@ -88,13 +88,14 @@ file = "taps.wav"              # WAV or CSV, seen from the folder of this file
 # window = "exponential"       # "rectangular" | "hann" | "exponential"; default: rectangular where the tap rings down to 1 % in the block, else exponential
 # reading = "fit"              # how frequencies are read: "fit" (default) | "interpolated" | "line", the paper's way
 # fit_modes = 4                # the first so many modes enter the estimate, default: all
-# weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights (not used by this version)
-# sensor_mass = true           # whether the sensors' masses enter the model, default: true (not used by this version)
+# weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights
+# sensor_mass = true           # whether the sensors' masses enter the model, default: true
 "#;
 
-const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated (not used by this version), default: the joint's stiffnesses; also \"modulus\", \"density\", and \"ktr\" with model = \"3p\"\n";
-const FIT_LAP: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated (not used by this version), default: the joint's stiffnesses; also \"modulus\", \"density\"\n";
-const FIT_FREE: &str = "# fit = [\"modulus\"]            # what is estimated (not used by this version), default: modulus; also \"density\"\n";
+const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\", and \"ktr\" with model = \"3p\"\n";
+const FIT_LAP: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\"\n";
+const FIT_FREE: &str =
+    "# fit = [\"modulus\"]            # what is estimated, default: modulus; also \"density\"\n";
 
 /// A commented test description: every key with its default and unit. It parses as it stands;
 /// replace its numbers by those of the test.

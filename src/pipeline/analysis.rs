@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::measure::Measurement;
 use super::model::TestedStructure;
 use super::warning::Warning;
+use crate::identify::consistent::ConsistentEstimate;
 use crate::identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
 use crate::identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
 use crate::modal::ModeReading;
@@ -122,12 +123,22 @@ pub struct ModeResult {
     pub lambda: Option<f64>,
 }
 
+impl Identification {
+    /// Whether there is an estimate by any method.
+    pub fn is_answered(&self) -> bool {
+        self.consistent.is_some() || self.estimate.is_some()
+    }
+}
+
 /// What the modes say about joint or material.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The estimate; `None` with a reason.
+    /// The main estimate: the joint whose frequencies are nearest; `None` where it was not asked for
+    /// or could not be had.
+    pub consistent: Option<Box<ConsistentEstimate>>,
+    /// The estimate in closed form, which stands beside the main one or in its place.
     pub estimate: Option<Estimate>,
-    /// Why there is no estimate.
+    /// Why there is no estimate, or not the one that was asked for.
     pub reason: Option<String>,
     /// Predicted beside measured frequencies; empty where no joint can be predicted with.
     pub prediction: Vec<PredictedMode>,
@@ -135,7 +146,7 @@ pub struct Identification {
     pub perturbation: Option<Perturbation>,
 }
 
-/// An estimate.
+/// An estimate in closed form.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Estimate {
     /// A joint, by the pair regression.

@@ -1,8 +1,11 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::analysis::{BoundPerturbation, Estimate, Identification, ModeResult, Perturbation};
+use super::consistent::{self, StructureDetails};
+use super::doubts;
 use super::model::TestedStructure;
 use super::warning::Warning;
+use crate::identify::consistent::ConsistentEstimate;
 use crate::identify::perturbation::{
     SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_spans,
     sign_patterns,
@@ -13,9 +16,24 @@ use crate::identify::{
 };
 use crate::structure::{Beam, JointStiffness};
 
+/// Which estimate is the main one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum EstimateMethod {
+    /// Least squares on the frequencies themselves, the closed form beside it.
+    #[default]
+    Consistent,
+    /// The closed form alone: the pair regression, or of a free beam its modulus.
+    Pairs,
+}
+
 /// How the joint is identified.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifySettings {
+    /// Which estimate is the main one: the consistent one, because it satisfies its own frequency
+    /// equation.
+    pub method: EstimateMethod,
+    /// What the consistent estimate knows beyond beam and joint; nothing.
+    pub details: StructureDetails,
     /// The first so many modes enter; `None` = all.
     pub fit_modes: Option<usize>,
     /// Changes of all frequencies for the perturbation (%).
@@ -27,6 +45,8 @@ pub struct IdentifySettings {
 impl Default for IdentifySettings {
     fn default() -> Self {
         IdentifySettings {
+            method: EstimateMethod::Consistent,
+            details: StructureDetails::default(),
             fit_modes: None,
             percents: crate::identify::perturbation::PAPER_PERCENTS.to_vec(),
             monte_carlo: None,
@@ -51,23 +71,42 @@ pub fn identify(
         .take(settings.fit_modes.unwrap_or(usize::MAX))
         .collect();
     let mut warnings = Vec::new();
-    let (estimate, reason) = match estimate(structure, &used) {
-        Ok(estimate) => (Some(estimate), None),
-        Err(error) => (None, Some(error.to_string())),
+    let (consistent, refused) = match settings.method {
+        EstimateMethod::Pairs => (None, None),
+        EstimateMethod::Consistent => {
+            split(consistent::estimate(structure, &settings.details, &used))
+        }
     };
+    let consistent = consistent.map(Box::new);
+    let (estimate, missing) = split(estimate(structure, &used));
+    if let Some(reason) = refused.as_ref().filter(|_| estimate.is_some()) {
+        warnings.push(doubts::of_fallback(structure, reason));
+    }
+    if let Some(found) = &consistent {
+        warnings.extend(doubts::of_consistent(found));
+    }
     if let Some(Estimate::Joint(joint)) = &estimate {
-        warnings.extend(joint.doubts.iter().map(of_doubt));
+        let told = |doubt: &&Doubt| {
+            consistent.is_none() || !matches!(doubt, Doubt::CouplingNotEstablished)
+        };
+        warnings.extend(joint.doubts.iter().filter(told).map(of_doubt));
     }
     // An estimate that no joint can have has its warning already; it predicts nothing.
-    let prediction = prediction(structure, estimate.as_ref(), &measured, &used).unwrap_or_default();
+    let found = (consistent.as_deref(), estimate.as_ref());
+    let prediction = prediction(structure, found, (&measured, &used), settings).unwrap_or_default();
     warnings.extend(misfit(&prediction, &measured));
     let perturbation = structure
         .regression
         .and_then(|model| perturbation(model, &structure.beam, modes, (&used, settings)));
     (
         Identification {
+            reason: match (&consistent, &estimate) {
+                (Some(_), _) => None,
+                (None, Some(_)) => refused,
+                (None, None) => refused.or(missing),
+            },
+            consistent,
             estimate,
-            reason,
             prediction,
             perturbation,
         },
@@ -97,40 +136,54 @@ fn estimate(structure: &TestedStructure, used: &[MeasuredMode]) -> Result<Estima
     }
 }
 
-/// Frequencies of the estimated joint (known stiffnesses in their place) beside the measured ones;
-/// of a free beam with the estimated modulus.
+/// A result, or the reason why there is none.
+fn split<T>(result: Result<T, IdentifyError>) -> (Option<T>, Option<String>) {
+    match result {
+        Ok(found) => (Some(found), None),
+        Err(error) => (None, Some(error.to_string())),
+    }
+}
+
+/// Frequencies of the main estimate, or of the closed form with known stiffnesses in their place,
+/// beside the measured ones; of a free beam with the estimated modulus.
 fn prediction(
     structure: &TestedStructure,
-    estimate: Option<&Estimate>,
-    measured: &[MeasuredMode],
-    used: &[MeasuredMode],
+    (consistent, estimate): (Option<&ConsistentEstimate>, Option<&Estimate>),
+    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
+    settings: &IdentifySettings,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
-    let (beam, joint) = match estimate {
-        Some(Estimate::FreeBeam(found)) => {
+    let (beam, joint) = match (consistent, estimate) {
+        (Some(found), _) => (found.beam, Some(found.joint)),
+        (None, Some(Estimate::FreeBeam(found))) => {
             let beam = Beam {
                 modulus: found.modulus.value,
                 ..structure.beam
             };
             (beam, Some(JointStiffness::FREE))
         }
-        Some(Estimate::Joint(found)) => (structure.beam, structure.known.over(found.pairs.joint())),
-        None => (structure.beam, structure.known.over(None)),
+        (None, Some(Estimate::Joint(found))) => {
+            (structure.beam, structure.known.over(found.pairs.joint()))
+        }
+        (None, None) => (structure.beam, structure.known.over(None)),
     };
     let Some(joint) = joint else {
         return Ok(Vec::new());
     };
-    let numbers: Vec<usize> = match estimate {
-        Some(_) => used.iter().map(|mode| mode.mode).collect(),
-        None => Vec::new(),
-    };
+    let estimated = consistent.is_some() || estimate.is_some();
+    let used = if estimated { used } else { &[] };
+    let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
-    predict(
-        structure.theory,
-        &beam,
-        (structure.assembly, &joint),
-        (measured, &numbers),
-        count,
-    )
+    let beside = (measured, &numbers[..]);
+    match settings.method {
+        EstimateMethod::Consistent => {
+            let held = (&beam, &joint);
+            consistent::predict(structure, &settings.details, held, beside, count)
+        }
+        EstimateMethod::Pairs => {
+            let held = (structure.assembly, &joint);
+            predict(structure.theory, &beam, held, beside, count)
+        }
+    }
 }
 
 /// The worst misfit, if it is notable and beyond three standard deviations of its reading.

@@ -10,7 +10,9 @@
 //! writes.
 
 mod analysis;
+mod consistent;
 mod decays;
+mod doubts;
 mod evidence;
 mod fits;
 mod force;
@@ -20,6 +22,7 @@ mod identification;
 mod measure;
 mod model;
 mod modes;
+mod neglect;
 mod quiet;
 mod recordings;
 mod stage;
@@ -34,9 +37,10 @@ pub use analysis::{
     Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
     Perturbation, RecordingResult, Response,
 };
+pub use consistent::{StructureDetails, structure_details};
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use functions::{FunctionSettings, run_functions};
-pub use identification::{IdentifySettings, identify};
+pub use identification::{EstimateMethod, IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
@@ -50,7 +54,8 @@ use crate::recording::Recording;
 /// Runs a described test: its recordings, or the frequencies it gives.
 ///
 /// `place` is the folder in which recordings are looked for and the description's own name, for
-/// messages. `settings.fit_modes` yields to the description's.
+/// messages. `settings.fit_modes` yields to the description's, `settings.details` are the
+/// description's.
 ///
 /// # Errors
 /// Recordings that cannot be read or analysed. Too few taps or modes are no errors: the analysis
@@ -89,9 +94,10 @@ pub fn run_test(
         }
     };
     warnings.extend(warning::of_amplitude(&recordings));
-    warnings.extend(warning::of_neglect(test, &structure));
+    warnings.extend(neglect::of_neglect(test, &structure, settings.method));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
+        details: structure_details(test, &structure.beam),
         ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);

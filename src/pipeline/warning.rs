@@ -9,12 +9,9 @@ pub use amplitude::AmplitudeChange;
 pub(super) use amplitude::of_amplitude;
 
 use super::measure::MeasuredSpectra;
-use super::model::TestedStructure;
-use crate::description::{SensorKind, TestDescription};
 use crate::modal::PeakLabel;
 use crate::recording::Recording;
 use crate::spectral::{RUNG_DOWN, SpectralError, Window};
-use crate::structure::BeamTheory;
 use crate::taps::{TapSource, Taps};
 
 /// A warning that travels with the result.
@@ -122,6 +119,13 @@ pub enum Warning {
         /// Error over the reading's standard deviation, where known.
         deviations: Option<f64>,
     },
+    /// Something that limits what the estimate can say.
+    Estimate {
+        /// Short code of the limit.
+        code: &'static str,
+        /// What happened, why, what helps.
+        text: String,
+    },
     /// Something the method leaves out.
     Neglected {
         /// What and with what effect.
@@ -133,7 +137,9 @@ impl Warning {
     /// Short code that scripts may look for.
     pub fn code(&self) -> &'static str {
         match self {
-            Warning::Recording { code, .. } | Warning::Quality { code, .. } => code,
+            Warning::Recording { code, .. }
+            | Warning::Quality { code, .. }
+            | Warning::Estimate { code, .. } => code,
             Warning::Description { .. } => "description",
             Warning::RejectedTaps { .. } => "rejected-taps",
             Warning::TapsTooShort { .. } => "taps-too-short",
@@ -159,6 +165,7 @@ impl fmt::Display for Warning {
             Warning::Recording { file, text, .. } => write!(f, "{file}: {text}"),
             Warning::Description { text }
             | Warning::Neglected { text }
+            | Warning::Estimate { text, .. }
             | Warning::Quality { text, .. } => f.write_str(text),
             Warning::RejectedTaps {
                 file,
@@ -293,75 +300,4 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
         }
     }
     warnings
-}
-
-/// What estimate and prediction leave out of the described test.
-pub(super) fn of_neglect(test: &TestDescription, structure: &TestedStructure) -> Vec<Warning> {
-    let mut texts = Vec::new();
-    texts.extend(neglected_masses(test, structure));
-    if structure.regression.is_some() && structure.theory == BeamTheory::Timoshenko {
-        texts.push(
-            "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
-             includes both, so that its errors show what that neglects"
-                .to_string(),
-        );
-    }
-    if structure.regression.is_some() && structure.known.any() {
-        texts.push(
-            "the pair regression cannot hold a stiffness at its known value: it estimates all of \
-             them, and the prediction uses the known ones"
-                .to_string(),
-        );
-    }
-    let joint = &test.joint;
-    if joint.overlap.is_some() || joint.right.is_some() || off_centre(test) {
-        texts.push(
-            "the lap joint's model takes two equal halves joined in the middle: overlap, position and \
-             different properties of the right half are left out"
-                .to_string(),
-        );
-    }
-    let analysis = &test.analysis;
-    if analysis.fit.is_some() {
-        texts.push(
-            "`fit` is not used by this version: all stiffnesses of the joint's model are estimated, of a \
-             free beam the modulus"
-                .to_string(),
-        );
-    }
-    if analysis.weights.is_some() && structure.regression.is_some() {
-        texts.push(
-            "`weights` is not used by this version: the pair regression weighs all pairs alike"
-                .to_string(),
-        );
-    }
-    texts
-        .into_iter()
-        .map(|text| Warning::Neglected { text })
-        .collect()
-}
-
-/// The sensors' masses, which neither estimate nor prediction knows. A microphone loads nothing.
-fn neglected_masses(test: &TestDescription, structure: &TestedStructure) -> Option<String> {
-    let loading = test
-        .sensors
-        .iter()
-        .filter(|sensor| sensor.kind != SensorKind::Sound);
-    let mass: f64 = loading.filter_map(|sensor| sensor.mass).sum();
-    (mass > 0.0).then(|| {
-        format!(
-            "the mass of the sensors, {:.3} g or {:.1} % of the beam, is in neither the estimate nor the \
-             prediction; it lowers the measured frequencies and thereby what is estimated from them",
-            1e3 * mass,
-            100.0 * mass / structure.beam.mass()
-        )
-    })
-}
-
-/// Whether a lap joint sits off the middle by more than a thousandth of the length.
-fn off_centre(test: &TestDescription) -> bool {
-    let middle = 0.5 * test.beam.length;
-    test.joint
-        .position
-        .is_some_and(|position| (position - middle).abs() > 1e-3 * test.beam.length)
 }

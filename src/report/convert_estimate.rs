@@ -1,8 +1,10 @@
 //! The parts of the document that say something about the joint.
 
+use super::convert_consistent::consistent_section;
 use super::document::{
-    AverageSection, EstimateSection, MonteCarloSection, PairsSection, PerturbationSection,
-    PredictionSection, ResolutionSpanSection, SensitivitySection, SingleModeSection, ValueSection,
+    AverageSection, EstimateSection, FreeBeamSection, MonteCarloSection, PairsSection,
+    PerturbationSection, PredictionSection, ResolutionSpanSection, SensitivitySection,
+    SingleModeSection, ValueSection,
 };
 use crate::identify::perturbation::{AverageError, Span, UniformPerturbation};
 use crate::identify::{
@@ -11,10 +13,20 @@ use crate::identify::{
 use crate::pipeline::{BoundPerturbation, Estimate, Identification};
 
 pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection> {
-    match found.estimate.as_ref()? {
-        Estimate::Joint(joint) => Some(joint_section(joint)),
-        Estimate::FreeBeam(free) => Some(free_section(free)),
-    }
+    let closed = found.estimate.as_ref().map(|estimate| match estimate {
+        Estimate::Joint(joint) => joint_section(joint),
+        Estimate::FreeBeam(free) => free_section(free),
+    });
+    let Some(consistent) = &found.consistent else {
+        return closed;
+    };
+    let closed = closed.unwrap_or_default();
+    Some(EstimateSection {
+        pairs: closed.pairs,
+        free_beam: closed.free_beam,
+        single_modes: closed.single_modes,
+        ..consistent_section(consistent)
+    })
 }
 
 fn joint_section(joint: &JointEstimate) -> EstimateSection {
@@ -34,6 +46,9 @@ fn joint_section(joint: &JointEstimate) -> EstimateSection {
             kx: joint.pairs.kx,
             ky: joint.pairs.ky,
             kz: joint.pairs.kz,
+            kt: joint.kt.map(|kt| kt.value),
+            kr: joint.kr.map(|kr| kr.value),
+            ktr: joint.ktr.map(|ktr| ktr.value),
             closure: joint.pairs.closure,
             condition: Some(joint.pairs.condition),
         }),
@@ -57,6 +72,10 @@ fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
         modes_used: free.modes_used.clone(),
         modulus: value(Some(free.modulus)),
         density: value(Some(free.density)),
+        free_beam: Some(FreeBeamSection {
+            modulus: free.modulus.value,
+            density: free.density.value,
+        }),
         single_modes: free
             .per_mode
             .iter()
@@ -76,6 +95,7 @@ fn value(found: Option<Uncertain>) -> Option<ValueSection> {
         std: found.std,
         low: found.low,
         high: found.high,
+        ..ValueSection::default()
     })
 }
 
@@ -119,6 +139,7 @@ pub(super) fn monte_carlo_section(found: &MonteCarlo) -> MonteCarloSection {
             std: None,
             low: Some(spread.low),
             high: Some(spread.high),
+            ..ValueSection::default()
         })
     };
     MonteCarloSection {

@@ -1,7 +1,9 @@
 //! Parameters and modes as comma separated values, one row each, numbers in full precision.
 
 use super::ReportError;
-use super::document::{Document, EstimateSection, ModeSection, PairsSection, ValueSection};
+use super::document::{
+    Document, EstimateSection, FreeBeamSection, ModeSection, PairsSection, ValueSection,
+};
 
 /// Columns of `parameters.csv`.
 const PARAMETER_COLUMNS: [&str; 7] = ["parameter", "method", "unit", "value", "std", "low", "high"];
@@ -65,27 +67,47 @@ fn parameter_rows(estimate: &EstimateSection) -> Vec<Vec<String>> {
         .pairs
         .iter()
         .flat_map(|pairs| pairs_rows(pairs, &estimate.method));
-    own.chain(pairs).collect()
+    let free = estimate
+        .free_beam
+        .iter()
+        .flat_map(|free| free_beam_rows(free, &estimate.method));
+    own.chain(pairs).chain(free).collect()
 }
 
 fn pairs_rows(pairs: &PairsSection, method: &str) -> Vec<Vec<String>> {
     let repeated = method == "pairs";
     [
-        ("kx", pairs.kx),
-        ("ky", pairs.ky),
-        ("kz", pairs.kz),
-        ("closure", pairs.closure),
+        ("kx", "1", pairs.kx),
+        ("ky", "1", pairs.ky),
+        ("kz", "1", pairs.kz),
+        ("kt", "N/m", pairs.kt),
+        ("kr", "N m/rad", pairs.kr),
+        ("ktr", "N/rad", pairs.ktr),
+        ("closure", "1", pairs.closure),
     ]
     .into_iter()
-    .filter(|(name, _)| !repeated || *name == "closure")
-    .filter_map(|(name, value)| {
-        let value = ValueSection {
-            value: value?,
-            ..ValueSection::default()
-        };
-        Some(parameter_row(name, "pairs", "1", &value))
-    })
+    .filter(|(name, _, _)| !repeated || *name == "closure")
+    .filter_map(|(name, unit, value)| Some(closed_row(name, "pairs", unit, value?)))
     .collect()
+}
+
+fn free_beam_rows(free: &FreeBeamSection, method: &str) -> Vec<Vec<String>> {
+    if method == "free-beam" {
+        return Vec::new();
+    }
+    vec![
+        closed_row("modulus", "free-beam", "Pa", free.modulus),
+        closed_row("density", "free-beam", "kg/m3", free.density),
+    ]
+}
+
+/// A value in closed form beside the main estimate, without its uncertainty.
+fn closed_row(name: &str, method: &str, unit: &str, value: f64) -> Vec<String> {
+    let value = ValueSection {
+        value,
+        ..ValueSection::default()
+    };
+    parameter_row(name, method, unit, &value)
 }
 
 fn parameter_row(name: &str, method: &str, unit: &str, value: &ValueSection) -> Vec<String> {

@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 pub use super::document_contents::{ChannelSection, DatasetSection};
+pub use super::document_estimate::{
+    CorrelationSection, FreeBeamSection, IdentifiabilitySection, MisfitSection,
+};
 pub use super::document_fit::{
     AmplitudeEndsSection, AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection,
     TapFitSection, TrendSection,
@@ -215,12 +218,19 @@ pub struct ValueSection {
     pub low: Option<f64>,
     /// Upper 95 % limit.
     pub high: Option<f64>,
+    /// Standard deviation scaled by the misfit: where the model misses the frequencies by more than
+    /// their uncertainties, and where none are stated.
+    pub std_scaled: Option<f64>,
+    /// Where there is no upper limit: at least this much, with 95 % confidence.
+    pub at_least: Option<f64>,
+    /// Where there is no lower limit: at most this much, likewise.
+    pub at_most: Option<f64>,
 }
 
 /// The joint, or the free beam's material.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct EstimateSection {
-    /// "pairs", or "free-beam".
+    /// "consistent", "pairs", or "free-beam".
     pub method: String,
     /// Modes that entered.
     pub modes_used: Vec<usize>,
@@ -245,9 +255,17 @@ pub struct EstimateSection {
     /// Density (kg/m3).
     pub density: Option<ValueSection>,
     /// Correlations between the parameters.
-    pub correlations: Vec<f64>,
+    pub correlations: Vec<CorrelationSection>,
+    /// Probability of a larger misfit if the model is right; null where nothing is left to test with.
+    pub goodness_of_fit: Option<f64>,
+    /// The misfit behind it; null of a closed form.
+    pub misfit: Option<MisfitSection>,
+    /// What the frequencies can tell; null of a closed form.
+    pub identifiability: Option<IdentifiabilitySection>,
     /// The pair regression.
     pub pairs: Option<PairsSection>,
+    /// A free beam in closed form.
+    pub free_beam: Option<FreeBeamSection>,
     /// What each mode says alone: of a lap joint its Kx if antisymmetric or Ky if symmetric, of a free
     /// beam its modulus; else empty.
     pub single_modes: Vec<SingleModeSection>,
@@ -275,6 +293,12 @@ pub struct PairsSection {
     pub ky: Option<f64>,
     /// Kz.
     pub kz: Option<f64>,
+    /// Kt (N/m).
+    pub kt: Option<f64>,
+    /// Kr (N m/rad).
+    pub kr: Option<f64>,
+    /// Ktr (N/rad).
+    pub ktr: Option<f64>,
     /// Product implied by the regression over the product of its own estimates, minus 1.
     pub closure: Option<f64>,
     /// Largest over smallest singular value of the regression, its columns scaled to 1.

@@ -183,6 +183,7 @@ fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Se
         missing: no_estimate(document),
         tables: found(vec![
             tables::parameters(document),
+            tables::methods(document),
             tables::prediction(document),
             tables::pairs(document),
         ]),

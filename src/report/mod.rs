@@ -10,6 +10,7 @@ mod convert_fit;
 mod convert_quality;
 pub mod document;
 mod document_contents;
+mod document_estimate;
 mod document_fit;
 mod document_frf;
 mod document_quality;
@@ -22,6 +23,7 @@ pub mod summary;
 pub mod tables;
 pub mod text;
 
+mod convert_consistent;
 mod convert_frf;
 mod csv;
 mod frf_uff;

@@ -185,6 +185,17 @@ fn estimate(document: &Document) -> Option<String> {
                 (None, Some(_)) => format!(" (95 %: below {high})"),
                 (None, None) => String::new(),
             };
+            let interval = match parameter.value.std_scaled {
+                Some(_) if parameter.value.std.is_some() => format!(
+                    "{interval}, from the readings alone; standard deviation scaled by the misfit {}",
+                    parameter.written_scaled()
+                ),
+                Some(_) => format!(
+                    " (standard deviation from the misfit {})",
+                    parameter.written_scaled()
+                ),
+                None => interval,
+            };
             format!(
                 "{} {}\u{a0}=\u{a0}{value}\u{a0}{}{interval}",
                 parameter.meaning,

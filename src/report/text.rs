@@ -100,6 +100,10 @@ pub fn estimate(document: &Document) -> String {
         }
         Some(Some(found)) => {
             let mut text = table_or_nothing(tables::parameters(document));
+            if let Some(methods) = tables::methods(document) {
+                text.push('\n');
+                text.push_str(&render_table(&methods));
+            }
             let closure = found.pairs.as_ref().and_then(|pairs| pairs.closure);
             if let Some(closure) = closure {
                 let percent = signed_percent(Some(100.0 * closure));

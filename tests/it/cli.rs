@@ -585,7 +585,17 @@ fn recover_the_joints_of_the_samples() {
     for (name, kx, ky) in [("cantilever", 1400.0, 4.8), ("lap-joint", 824.0, 15.4)] {
         let folder = sample(name);
         let document = json(folder.path(), &["run", "test.toml"], 0);
-        let pairs = &document["estimate"]["pairs"];
+        let estimate = &document["estimate"];
+        assert_eq!(estimate["method"], "consistent", "{name}");
+        for (key, truth) in [("kx", kx), ("ky", ky)] {
+            let found = number(&estimate[key]["value"]);
+            // Fitted frequencies are within 1e-6 and move the stiffness by ten times that at most.
+            assert!(
+                (found / truth - 1.0).abs() < 1e-4,
+                "{name}: {key} {found} for {truth}"
+            );
+        }
+        let pairs = &estimate["pairs"];
         // 60 dB of noise: what interpolated peaks leave, in the median over many such tests.
         for (key, truth) in [("kx", kx), ("ky", ky)] {
             let found = number(&pairs[key]);
@@ -890,9 +900,113 @@ fn val_identify_from_the_frequencies_of_table_4() {
     let bounded = [&arguments[..], &["--half-line", "0.125"]].concat();
     let document = json(folder.path(), &bounded, 0);
     assert_eq!(&document["estimate"]["pairs"], pairs, "bounds moved it");
+    let alone = [&bounded[..], &["--method", "pairs"]].concat();
+    let document = json(folder.path(), &alone, 0);
+    assert_eq!(document["estimate"]["method"], "pairs");
+    assert_eq!(&document["estimate"]["pairs"], pairs, "the method moved it");
     // Bounds of 0.1 to 0.7 % leave Kx open to some percent.
     let std = number(&document["estimate"]["kx"]["std"]) / kx;
     assert!((0.002..0.1).contains(&std), "{std}");
+}
+
+/// The description above with these lines at its end, and the frequencies of table 4.
+fn identified(description: &str, more: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("test.toml"), description).unwrap();
+    let table_4 = [
+        "identify",
+        "test.toml",
+        "--frequencies",
+        "17,118,335.625,628.75,994.5",
+    ];
+    json(folder.path(), &[&table_4[..], more].concat(), 0)
+}
+
+fn codes(document: &Value) -> Vec<&str> {
+    let warnings = document["warnings"].as_array().unwrap();
+    warnings
+        .iter()
+        .map(|warning| warning["code"].as_str().unwrap())
+        .collect()
+}
+
+#[test]
+fn val_the_consistent_estimate_from_the_frequencies_of_table_4() {
+    let description = format!("{TEST}beam = \"euler\"\n[analysis]\nweights = \"relative\"\n");
+    let document = identified(&description, &[]);
+    let estimate = &document["estimate"];
+    assert_eq!(estimate["method"], "consistent");
+    let (kx, ky) = (&estimate["kx"], &estimate["ky"]);
+    // Computed by independent least squares with scipy: 1415.0 and 4.830.
+    assert!((number(&kx["value"]) - 1415.0).abs() < 2.0, "Kx {kx}");
+    assert!((number(&ky["value"]) - 4.830).abs() < 0.005, "Ky {ky}");
+    for key in ["std", "low", "high"] {
+        assert_eq!(kx[key], Value::Null, "{key} without uncertainties");
+    }
+    assert!(number(&kx["std_scaled"]) > 0.0, "{kx}");
+    let values = estimate["identifiability"]["singular_values"].as_array();
+    assert_eq!(values.unwrap().len(), 2);
+    assert_eq!(estimate["correlations"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn val_a_model_that_misses_the_frequencies_says_so() {
+    let description = format!("{TEST}beam = \"euler\"\n");
+    let document = identified(&description, &["--half-line", "0.125"]);
+    assert!(codes(&document).contains(&"misfit"), "{document}");
+    let estimate = &document["estimate"];
+    assert!(number(&estimate["goodness_of_fit"]) < 0.01);
+    for key in ["kx", "ky"] {
+        // Frequencies that the model misses by many times their bounds widen the stiffness likewise.
+        let (std, scaled) = (&estimate[key]["std"], &estimate[key]["std_scaled"]);
+        assert!(number(scaled) > 3.0 * number(std), "{}", estimate[key]);
+    }
+}
+
+#[test]
+fn limit_known_stiffnesses_are_held() {
+    let held = format!("{TEST}beam = \"euler\"\nkt = \"rigid\"\n");
+    let document = identified(&held, &[]);
+    let estimate = &document["estimate"];
+    assert_eq!(estimate["kt"], Value::Null, "nothing was fitted of it");
+    assert!(number(&estimate["kr"]["value"]) > 0.0);
+    let all = format!("{TEST}beam = \"euler\"\nkt = 2e6\nkr = 1230\n");
+    let document = identified(&all, &[]);
+    assert_eq!(document["estimate"]["method"], "pairs");
+    assert!(codes(&document).contains(&"fallback"), "{document}");
+}
+
+#[test]
+fn recover_a_free_beams_modulus() {
+    // Euler: lambda 4.730041, 7.853205, 10.995608 of a free beam.
+    let free = TEST.replace("cantilever", "free");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.toml");
+    fs::write(&path, format!("{free}beam = \"euler\"\n")).unwrap();
+    let predicted = |arguments: &[&str]| -> Vec<f64> {
+        let document = json(folder.path(), arguments, 0);
+        let rows = document["prediction"].as_array().unwrap().clone();
+        rows.iter().map(|row| number(&row["predicted"])).collect()
+    };
+    let list = predicted(&["predict", "test.toml", "--modes", "4"]);
+    let list: Vec<String> = list.iter().map(f64::to_string).collect();
+    // A beam twice as heavy with the same frequencies is twice as stiff.
+    let twice = free.replace("7850", "15700");
+    fs::write(&path, format!("{twice}beam = \"euler\"\n")).unwrap();
+    let frequencies = list.join(",");
+    let arguments = ["identify", "test.toml", "--frequencies", &frequencies];
+    let document = json(folder.path(), &arguments, 0);
+    let estimate = &document["estimate"];
+    assert_eq!(estimate["method"], "consistent");
+    let modulus = number(&estimate["modulus"]["value"]);
+    // Rounding alone.
+    assert!((modulus / 414e9 - 1.0).abs() < 1e-8, "E {modulus}");
+    assert_eq!(estimate["density"], Value::Null, "only the ratio is known");
+    let closed = number(&estimate["free_beam"]["modulus"]);
+    assert!(
+        (modulus / closed - 1.0).abs() < 1e-8,
+        "closed form {closed}"
+    );
 }
 
 #[test]

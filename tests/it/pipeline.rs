@@ -4,13 +4,15 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use tapjoint::description::{ChannelRef, TestDescription};
+use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, LapLayout, Quantity};
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
-    Estimate, Identification, IdentifySettings, KnownJoint, ModeResult, TestedStructure, identify,
-    measure_bare, modes_of_recordings, run_test,
+    Analysis, Estimate, Identification, IdentifySettings, KnownJoint, ModeResult, TestedStructure,
+    identify, measure_bare, modes_of_recordings, run_test,
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
+use tapjoint::structure::finite_elements::PointAttachment;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
 
 const KX: f64 = 1400.0;
@@ -308,4 +310,136 @@ fn limit_one_tap_in_a_long_recording_takes_the_largest_block() {
         "{}",
         lines.block
     );
+}
+
+fn cantilever_beam() -> Beam {
+    Beam {
+        length: 0.423,
+        width: 0.05,
+        thickness: 0.005,
+        modulus: 207e9,
+        density: 7850.0,
+        poisson: 0.3,
+    }
+}
+
+/// Frequencies (Hz) of the first modes of a structure with this joint, Kt (N/m) and Kr (N m/rad).
+fn frequencies_of(structure: &JointedStructure, (kt, kr): (f64, f64), count: usize) -> Vec<f64> {
+    let model = FrequencyModel::new(structure, count).unwrap();
+    let mut point = model.nominal();
+    point[0] = f64::ln(kt);
+    point[1] = f64::ln(kr);
+    (1..=count)
+        .map(|mode| model.response(&point, mode, mode as f64).frequency)
+        .collect()
+}
+
+/// What the chain makes of a description with these frequencies at its end.
+fn identified(description: &str, frequencies: &[f64]) -> Analysis {
+    let list: Vec<String> = frequencies.iter().map(f64::to_string).collect();
+    let text = format!(
+        "{description}\n[measured]\nfrequencies = [{}]\n",
+        list.join(",")
+    );
+    let test = TestDescription::parse(&text, "test.toml").unwrap();
+    let place = (std::path::Path::new("."), "test.toml");
+    run_test(&test, place, &IdentifySettings::default()).unwrap()
+}
+
+fn assert_recovered(analysis: &Analysis, wanted: &[(Quantity, f64)]) {
+    let found = analysis.identification.as_ref().unwrap();
+    let consistent = found.consistent.as_ref().unwrap();
+    for &(quantity, truth) in wanted {
+        let value = consistent.quantity(quantity).unwrap().value.unwrap();
+        // Exact frequencies of the same model: rounding and the search's last step are left.
+        assert!(
+            (value / truth - 1.0).abs() < 1e-5,
+            "{quantity:?}: {value} for {truth}"
+        );
+    }
+    for mode in found
+        .prediction
+        .iter()
+        .filter(|mode| mode.measured.is_some())
+    {
+        let error = mode.error_percent.unwrap();
+        // The same model predicts, with as fine elements for one mode more: 1e-6 of a frequency.
+        assert!(error.abs() < 1e-3, "{mode:?}");
+    }
+}
+
+const SENSORS: &str = "
+[[sensor]]
+name = \"A\"
+channel = 2
+position = 0.338
+mass = \"24 g\"
+[[sensor]]
+name = \"B\"
+channel = 3
+position = 0.2
+mass = \"24 g\"
+[[sensor]]
+name = \"microphone\"
+channel = 4
+position = 0.1
+mass = \"1 kg\"
+kind = \"sound\"
+";
+
+#[test]
+fn recover_a_joint_under_the_masses_of_its_sensors() {
+    let beam = cantilever_beam();
+    let mut structure = JointedStructure::new(BeamTheory::Timoshenko, beam, Assembly::Cantilever);
+    structure.masses = [0.338, 0.2]
+        .map(|position| PointAttachment {
+            position,
+            size: 0.024,
+        })
+        .to_vec();
+    let (kt, kr) = (2.0e6, 1230.0);
+    let frequencies = frequencies_of(&structure, (kt, kr), 5);
+    let test = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9
+        density = 7850\n[joint]\nkind = \"cantilever\"\n";
+    let wanted = [(Quantity::Kt, kt), (Quantity::Kr, kr)];
+    assert_recovered(
+        &identified(&format!("{test}{SENSORS}"), &frequencies),
+        &wanted,
+    );
+    // Left out, 48 g on a beam of 830 g make the joint look much softer.
+    let without = format!("{test}{SENSORS}[analysis]\nsensor_mass = false\n");
+    let without = identified(&without, &frequencies);
+    let found = without.identification.unwrap().consistent.unwrap();
+    assert!(
+        found.goodness.relative_misfit > 1e-3,
+        "{:?}",
+        found.goodness
+    );
+    // A known rotation and an unknown modulus.
+    let known = format!("{test}kr = 1230\n{SENSORS}[analysis]\nfit = [\"kt\", \"modulus\"]\n");
+    let wanted = [(Quantity::Kt, kt), (Quantity::Modulus, 207e9)];
+    assert_recovered(&identified(&known, &frequencies), &wanted);
+}
+
+#[test]
+fn recover_an_uneven_lap_joint() {
+    let beam = cantilever_beam();
+    let mut structure = JointedStructure::new(BeamTheory::Timoshenko, beam, Assembly::Lap);
+    structure.lap = LapLayout {
+        position: Some(0.17),
+        right: Some(Beam {
+            thickness: 0.007,
+            density: 2700.0,
+            modulus: 70e9,
+            ..beam
+        }),
+        overlap: Some((0.04, 0.05)),
+    };
+    let (kt, kr) = (5.0e5, 900.0);
+    let frequencies = frequencies_of(&structure, (kt, kr), 5);
+    let test = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9
+        density = 7850\n[beam.right]\nthickness = 0.007\ndensity = 2700\nmodulus = 70e9
+        [joint]\nkind = \"lap\"\nposition = 0.17\noverlap = { length = 0.04, mass = 0.05 }\n";
+    let wanted = [(Quantity::Kt, kt), (Quantity::Kr, kr)];
+    assert_recovered(&identified(test, &frequencies), &wanted);
 }

@@ -334,4 +334,7 @@ fn recover_everything_about_a_cantilever_simulated_elsewhere() {
     // True frequencies with errors of 1e-5 move Kx and Ky by some 1e-4 at most.
     assert!((kx / 822.560 - 1.0).abs() < 1e-3, "Kx {kx}");
     assert!((ky / 5.4840 - 1.0).abs() < 2e-3, "Ky {ky}");
+    let consistent = identification.consistent.expect("the main estimate");
+    assert!((consistent.joint.kx / 822.560 - 1.0).abs() < 1e-3);
+    assert!((consistent.joint.ky / 5.4840 - 1.0).abs() < 1e-3);
 }

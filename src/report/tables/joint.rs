@@ -3,7 +3,7 @@
 use super::super::document::{Document, EstimateSection, PredictionSection, ValueSection};
 use super::super::format::{
     MISSING, RIGID, bound_percent, last_place, optional, prefix, rounded_to, signed_percent,
-    with_decimals_of,
+    significant, with_decimals_of,
 };
 use super::modes::reading;
 use super::{Table, bound_of, mode_of, number, words};
@@ -80,6 +80,14 @@ impl Parameter<'_> {
         ]
     }
 
+    /// Standard deviation scaled by the misfit, in the unit of the value.
+    pub fn written_scaled(&self) -> String {
+        let (factor, _) = self.scale();
+        let std = self.value.std_scaled.map(|std| factor * std);
+        std.filter(|std| std.is_finite() && *std > 0.0)
+            .map_or_else(|| MISSING.to_owned(), |std| significant(std, 2))
+    }
+
     /// Place of the last digit that is shown: no stiffness is known to more than five digits.
     fn finest_place(&self, value: f64) -> i32 {
         if value.is_finite() {
@@ -107,27 +115,103 @@ pub fn parameters(document: &Document) -> Option<Table> {
             let [value, std, low, high, unit] = parameter.written();
             let name = parameter.symbol.to_owned();
             let meaning = parameter.meaning.to_owned();
-            vec![name, meaning, value, unit, std, low, high]
+            let scaled = parameter.written_scaled();
+            vec![name, meaning, value, unit, std, scaled, low, high]
         })
         .collect();
     let modes: Vec<String> = estimate.modes_used.iter().map(usize::to_string).collect();
-    Some(Table {
+    let misses = estimated(estimate)
+        .iter()
+        .any(|parameter| parameter.value.std_scaled.is_some());
+    let table = Table {
         caption: format!("Estimated parameters, method: {}", estimate.method),
         columns: vec![
             words("Parameter"),
-            words("Meaning"),
+            words("Meaning").on_page_if(misses),
             number("Value"),
             words("Unit"),
             number("Std"),
+            number("Scaled std"),
             number("95 % low"),
             number("95 % high"),
         ],
         rows,
         note: format!(
             "From modes {}. Std and limits are in the value's unit; \u{2013} means unknown or \
-             unbounded.",
-            modes.join(", ")
+             unbounded.{}",
+            modes.join(", "),
+            scaled_note(estimate)
         ),
+    };
+    Some(if misses {
+        table
+    } else {
+        table.without_column("Scaled std")
+    })
+}
+
+/// What the scaled standard deviation is, where there is one.
+fn scaled_note(estimate: &EstimateSection) -> String {
+    let list = estimated(estimate);
+    let scaled = list.iter().any(|p| p.value.std_scaled.is_some());
+    let stated = list.iter().any(|p| p.value.std.is_some());
+    match (scaled, stated) {
+        (false, _) => String::new(),
+        (true, true) => " Std and limits stand for the readings alone; the model misses the \
+                         frequencies by more than their uncertainty, and the scaled std takes the \
+                         misfit for it."
+            .to_owned(),
+        (true, false) => " No uncertainty is stated for the frequencies: the scaled std takes the \
+                          misfit for it."
+            .to_owned(),
+    }
+}
+
+/// The consistent estimate beside the pair regression; `None` where there is only one of them.
+pub fn methods(document: &Document) -> Option<Table> {
+    let estimate = document.estimate.as_ref()?.as_ref()?;
+    let pairs = estimate
+        .pairs
+        .as_ref()
+        .filter(|_| estimate.method != "pairs")?;
+    let value = |value: &Option<ValueSection>| value.as_ref().map(|value| value.value);
+    let rows = [
+        ("Kx", value(&estimate.kx), pairs.kx),
+        ("Ky", value(&estimate.ky), pairs.ky),
+        ("Kz", value(&estimate.kz), pairs.kz),
+    ];
+    let rows: Vec<Vec<String>> = rows
+        .into_iter()
+        .filter(|(_, own, pairs)| own.is_some() || pairs.is_some())
+        .map(|(name, own, pairs)| {
+            let change = own
+                .zip(pairs)
+                .map(|(own, pairs)| 100.0 * (pairs - own) / own);
+            let change = change.filter(|change| change.is_finite());
+            vec![
+                name.to_owned(),
+                match own {
+                    Some(own) if own.is_infinite() => RIGID.to_owned(),
+                    own => optional(own, 5),
+                },
+                optional(pairs, 5),
+                signed_percent(change),
+            ]
+        })
+        .collect();
+    Some(Table {
+        caption: "Methods side by side".to_owned(),
+        columns: vec![
+            words("Parameter (1)"),
+            number("Consistent"),
+            number("Pairs"),
+            number("Pairs differ (%)"),
+        ],
+        rows,
+        note:
+            "The consistent estimate satisfies its own frequency equation and takes shear, sensor \
+               masses and known stiffnesses into account; the pair regression does neither."
+                .to_owned(),
     })
 }
 

@@ -11,7 +11,7 @@ mod uncertainty;
 
 pub use datasets::datasets;
 pub use frfs::frfs;
-pub use joint::{Parameter, estimated, pairs, parameters, prediction};
+pub use joint::{Parameter, estimated, methods, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
@@ -89,6 +89,17 @@ fn words(name: &str) -> Column {
 }
 
 impl Table {
+    /// The same table without the column of this name.
+    fn without_column(mut self, name: &str) -> Table {
+        if let Some(index) = self.columns.iter().position(|column| column.name == name) {
+            self.columns.remove(index);
+            for row in self.rows.iter_mut().filter(|row| index < row.len()) {
+                row.remove(index);
+            }
+        }
+        self
+    }
+
     /// The same table without the columns in which nothing stands.
     fn without_empty_columns(mut self) -> Table {
         let says = |cell: Option<&String>| cell.is_some_and(|c| !c.is_empty() && c != MISSING);

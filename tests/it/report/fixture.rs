@@ -200,6 +200,7 @@ fn value(value: f64, relative: f64) -> Option<ValueSection> {
         std: Some(std),
         low: Some(value - 1.96 * std),
         high: Some(value + 1.96 * std),
+        ..ValueSection::default()
     })
 }
 
@@ -218,6 +219,7 @@ fn estimate() -> EstimateSection {
             ky: Some(1.251),
             kz: None,
             closure: Some(0.0021),
+            ..PairsSection::default()
         }),
         ..EstimateSection::default()
     }

@@ -458,6 +458,7 @@ fn val_averages_and_monte_carlo_are_shown() {
         std: None,
         low: Some(0.9 * value),
         high: Some(1.2 * value),
+        ..ValueSection::default()
     };
     let document = Document {
         perturbation_averages: Some(vec![AverageSection {

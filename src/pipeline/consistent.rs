@@ -1,0 +1,234 @@
+//! The consistent estimate of a described test: what the description says, in the estimator's terms.
+
+use super::model::TestedStructure;
+use crate::description::{FitParameter, RightHalf, SensorKind, TestDescription, Weights};
+use crate::identify::consistent::{
+    BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
+    HeldJoint, JointedStructure, LapLayout, Parameter, ResidualWeights, estimate_consistently,
+};
+use crate::identify::predict::compare;
+use crate::identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
+use crate::structure::finite_elements::PointAttachment;
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::{Assembly, Beam, JointStiffness};
+
+/// A spring stated as absent (1): below every stiffness that a frequency feels, and with a logarithm.
+const NO_SPRING: f64 = 1e-9;
+
+/// What the consistent estimate knows beyond the plain beam with its joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StructureDetails {
+    /// Where a lap joint's halves differ from two equal pieces.
+    pub lap: LapLayout,
+    /// Masses (kg) of the sensors, where they sit in the reference configuration.
+    pub masses: Vec<PointAttachment>,
+    /// Relative standard uncertainties of the beam's properties.
+    pub tolerances: BeamTolerances,
+    /// What is estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
+    pub fit: Option<Vec<FitParameter>>,
+    /// Weights; `None` = measured where every uncertainty is known.
+    pub weights: Option<Weights>,
+}
+
+/// The details of a described test.
+pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetails {
+    let joint = &test.joint;
+    let tolerance = &test.beam.tolerance;
+    let relative = |std: Option<f64>, value: f64| std.map(|std| std / value);
+    StructureDetails {
+        lap: LapLayout {
+            position: joint.position,
+            right: joint.right.as_ref().map(|right| right_half(right, beam)),
+            overlap: joint.overlap.as_ref().map(|o| (o.length, o.mass)),
+        },
+        masses: sensor_masses(test),
+        tolerances: BeamTolerances {
+            length: relative(tolerance.length, beam.length),
+            width: relative(tolerance.width, beam.width),
+            thickness: relative(tolerance.thickness, beam.thickness),
+            modulus: relative(tolerance.modulus, beam.modulus),
+            density: relative(tolerance.density, beam.density),
+        },
+        fit: test.analysis.fit.clone(),
+        weights: test.analysis.weights,
+    }
+}
+
+fn right_half(right: &RightHalf, left: &Beam) -> Beam {
+    Beam {
+        length: left.length,
+        width: right.width.unwrap_or(left.width),
+        thickness: right.thickness.unwrap_or(left.thickness),
+        modulus: right.modulus.unwrap_or(left.modulus),
+        density: right.density.unwrap_or(left.density),
+        poisson: right.poisson.unwrap_or(left.poisson),
+    }
+}
+
+/// Sensors whose mass and place are known; the first recording is the reference configuration. A
+/// microphone loads nothing.
+fn sensor_masses(test: &TestDescription) -> Vec<PointAttachment> {
+    if !test.analysis.sensor_mass {
+        return Vec::new();
+    }
+    let moved = test.recordings.first().map(|recording| &recording.at);
+    test.sensors
+        .iter()
+        .filter(|sensor| sensor.kind != SensorKind::Sound)
+        .filter_map(|sensor| {
+            let moved = moved.and_then(|at| at.get(&sensor.name).copied());
+            Some(PointAttachment {
+                position: moved.or(sensor.position)?,
+                size: sensor.mass.filter(|mass| *mass > 0.0)?,
+            })
+        })
+        .collect()
+}
+
+/// The structure that the estimator takes.
+fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedStructure {
+    let mut jointed = JointedStructure::new(structure.theory, structure.beam, structure.assembly);
+    if structure.assembly == Assembly::Lap {
+        jointed.lap = details.lap;
+    }
+    jointed.masses = details.masses.clone();
+    jointed
+}
+
+/// What of the joint is estimated where the description names nothing: all that is not known.
+fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
+    let known = &structure.known;
+    let joint = match structure.regression {
+        None => return vec![Parameter::Modulus],
+        Some(PairsModel::ThreeParameter) => 3,
+        Some(PairsModel::TwoParameter | PairsModel::Lap) => 2,
+    };
+    [
+        (Parameter::Kt, known.kx),
+        (Parameter::Kr, known.ky),
+        (Parameter::Coupling, known.cross_compliance),
+    ]
+    .into_iter()
+    .take(joint)
+    .filter(|(_, known)| known.is_none())
+    .map(|(parameter, _)| parameter)
+    .collect()
+}
+
+fn settings(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+) -> ConsistentSettings {
+    let parameter = |fit: &FitParameter| match fit {
+        FitParameter::Kt => Parameter::Kt,
+        FitParameter::Kr => Parameter::Kr,
+        FitParameter::Ktr => Parameter::Coupling,
+        FitParameter::Modulus => Parameter::Modulus,
+        FitParameter::Density => Parameter::Density,
+    };
+    let fit = match &details.fit {
+        Some(fit) => fit.iter().map(parameter).collect(),
+        None => usual_fit(structure),
+    };
+    let units = StiffnessUnits::of(&structure.beam);
+    let known = &structure.known;
+    let all_known = used
+        .iter()
+        .all(|mode| mode.std.is_some_and(|std| std > 0.0));
+    ConsistentSettings {
+        held: HeldJoint {
+            kt: known.kx.map(|kx| kx.max(NO_SPRING) * units.kt),
+            kr: known.ky.map(|ky| ky.max(NO_SPRING) * units.kr),
+            coupling: known
+                .over(None)
+                .map(|joint| joint.coupling())
+                .filter(|coupling| coupling.is_finite()),
+        },
+        weights: match details.weights {
+            Some(Weights::Relative) => ResidualWeights::Relative,
+            _ if !all_known => ResidualWeights::Relative,
+            _ => ResidualWeights::Measured,
+        },
+        tolerances: details.tolerances,
+        ..ConsistentSettings::fitting(&fit)
+    }
+}
+
+/// Estimates by least squares on the frequencies of these modes.
+pub(super) fn estimate(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+) -> Result<ConsistentEstimate, IdentifyError> {
+    let jointed = jointed(structure, details);
+    let mut settings = settings(structure, details, used);
+    hold_cross_stiffness(structure, &jointed, used, &mut settings)?;
+    estimate_consistently(&jointed, used, &settings)
+}
+
+/// A known Ktr beside a fitted Kt or Kr: the estimator holds couplings, sqrt(Kt Kr)/Ktr, so that
+/// this one follows the fit until it stands still.
+fn hold_cross_stiffness(
+    structure: &TestedStructure,
+    jointed: &JointedStructure,
+    used: &[MeasuredMode],
+    settings: &mut ConsistentSettings,
+) -> Result<(), IdentifyError> {
+    // Each round reduces the error by the coupling's small share in the frequencies.
+    const ROUNDS: usize = 50;
+    const STILL: f64 = 1e-10;
+    // No joint has a coupling of 1 or more.
+    const LARGEST: f64 = 0.999_999;
+    let known = &structure.known;
+    let fitted = known.kx.is_none() || known.ky.is_none();
+    let Some(cross) = known.cross_compliance.filter(|c| fitted && *c != 0.0) else {
+        return Ok(());
+    };
+    let mut held = 0.0f64;
+    for _ in 0..ROUNDS {
+        settings.held.coupling = Some(held);
+        let joint = ConsistentEstimator::new(jointed, used, settings)?
+            .fit()
+            .joint();
+        let next = (cross * (joint.kx * joint.ky).sqrt()).clamp(-LARGEST, LARGEST);
+        let moved = (next - held).abs();
+        held = next;
+        if moved.is_nan() || moved <= STILL {
+            break;
+        }
+    }
+    settings.held.coupling = Some(held);
+    Ok(())
+}
+
+/// Frequencies of this beam on this joint with everything that is fastened to it, beside the
+/// measured ones.
+pub(super) fn predict(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    (beam, joint): (&Beam, &JointStiffness),
+    measured: (&[MeasuredMode], &[usize]),
+    count: usize,
+) -> Result<Vec<PredictedMode>, IdentifyError> {
+    let mut there = jointed(structure, details);
+    if let Some(right) = &mut there.lap.right {
+        right.modulus *= beam.modulus / there.beam.modulus;
+        right.density *= beam.density / there.beam.density;
+    }
+    there.beam = *beam;
+    let model = FrequencyModel::new(&there, count)?;
+    let units = StiffnessUnits::of(beam);
+    let mut point = model.nominal();
+    if structure.assembly != Assembly::Free {
+        point[Parameter::Kt as usize] = (joint.kx.max(NO_SPRING) * units.kt).ln();
+        point[Parameter::Kr as usize] = (joint.ky.max(NO_SPRING) * units.kr).ln();
+        let coupling = joint.coupling();
+        let coupling = if coupling.is_finite() { coupling } else { 0.0 };
+        point[Parameter::Coupling as usize] = coupling.atanh();
+    }
+    let frequencies: Vec<f64> = (1..=count)
+        .map(|mode| model.response(&point, mode, mode as f64).frequency)
+        .collect();
+    Ok(compare(beam, &frequencies, measured))
+}

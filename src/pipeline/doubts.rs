@@ -1,0 +1,167 @@
+//! What speaks against a consistent estimate, in words.
+
+use super::model::TestedStructure;
+use super::warning::Warning;
+use crate::identify::consistent::goodness::{DOUBTFUL, NOTABLE_MISFIT};
+use crate::identify::consistent::{
+    ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
+};
+use crate::stats::root_mean_square;
+
+/// Everything that a reader of the estimate has to know.
+pub(super) fn of_consistent(found: &ConsistentEstimate) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let mut add =
+        |code: &'static str, text: String| warnings.push(Warning::Estimate { code, text });
+    if let Some(text) = misfit(found) {
+        add("misfit", text);
+    }
+    if found.goodness.verdict == Verdict::Untestable {
+        add("untestable", found.goodness.words());
+    }
+    for text in found.quantities.iter().filter_map(open_end) {
+        add("at-limit", text);
+    }
+    for flat in &found.identifiability.flat {
+        add("flat-direction", flat.words.clone());
+    }
+    // A valley whose frequencies are off by more than a beam's dimensions leave open is none to doubt.
+    let near = |rms_percent: f64| rms_percent < 100.0 * NOTABLE_MISFIT;
+    for other in found.other_minima.iter().filter(|o| near(o.rms_percent)) {
+        let values = other
+            .values
+            .iter()
+            .map(|(q, v)| format!("{} {v:.4e}", q.name()));
+        let values: Vec<String> = values.collect();
+        add(
+            "other-minimum",
+            format!(
+                "another joint comes near the same frequencies, to {:.2} % rms: {}",
+                other.rms_percent,
+                values.join(", ")
+            ),
+        );
+    }
+    if !found.stop.converged() {
+        add(
+            "not-converged",
+            "the search for the best joint ended before it stood still; its values are not the best \
+             ones"
+                .to_owned(),
+        );
+    }
+    if coupling_is_open(found) {
+        warnings.push(Warning::CouplingNotEstablished);
+    }
+    warnings
+}
+
+/// The closed form stands in the place of the consistent estimate.
+pub(super) fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning {
+    let closed = match structure.regression {
+        Some(_) => "the pair regression",
+        None => "the closed form",
+    };
+    let text = if structure.known.over(None).is_some() {
+        format!(
+            "all stiffnesses are stated in [joint], so there is none to fit: the prediction uses the \
+             stated ones, and {closed} shows what the frequencies alone would say"
+        )
+    } else {
+        format!("no consistent estimate: {reason}; {closed} stands in its place")
+    };
+    Warning::Estimate {
+        code: "fallback",
+        text,
+    }
+}
+
+/// Whether the interval of a fitted coupling contains zero.
+fn coupling_is_open(found: &ConsistentEstimate) -> bool {
+    let coupling = found.quantity(Quantity::Coupling);
+    coupling.is_some_and(|coupling| {
+        let low = coupling.low.zip(coupling.high);
+        coupling.std.is_some() && low.is_none_or(|(low, high)| low * high <= 0.0)
+    })
+}
+
+/// The model against the readings: how far it misses, how often the readings' own uncertainty that
+/// is, and what either leaves of the intervals.
+fn misfit(found: &ConsistentEstimate) -> Option<String> {
+    let goodness = &found.goodness;
+    let percent = 100.0 * goodness.relative_misfit;
+    if goodness.chi_squared.is_none() {
+        let doubtful = matches!(goodness.verdict, Verdict::Doubtful | Verdict::CannotExplain);
+        return doubtful.then(|| goodness.words());
+    }
+    goodness.probability.filter(|p| *p < DOUBTFUL)?;
+    let standardised: Vec<f64> = found.modes.iter().filter_map(|m| m.standardised).collect();
+    let intervals: Vec<String> = found.quantities.iter().filter_map(two_intervals).collect();
+    let intervals = if intervals.is_empty() {
+        String::new()
+    } else {
+        format!("; {}", intervals.join("; "))
+    };
+    Some(format!(
+        "the model misses the frequencies by {percent:.2} % rms, {} times their uncertainty \
+         (goodness of fit {:.1e}); std and 95 % limits stand for the readings alone, and the joint is \
+         not known that well{intervals}",
+        Rounded(root_mean_square(&standardised)),
+        goodness.probability.unwrap_or(0.0)
+    ))
+}
+
+/// A number in three digits, without an exponent where it is large.
+struct Rounded(f64);
+
+impl std::fmt::Display for Rounded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 {
+            size if size >= 100.0 => write!(f, "{size:.0}"),
+            size => write!(f, "{size:.1}"),
+        }
+    }
+}
+
+/// "Kx: +-0.01 % from the readings alone, +-1.3 % scaled by the misfit", for non-dimensional ones
+/// and the material.
+fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
+    // Half width of a 95 % interval of a normal distribution, in standard deviations, in percent.
+    const PERCENT_95: f64 = 196.0;
+    let told = matches!(
+        quantity.quantity,
+        Quantity::Kx | Quantity::Ky | Quantity::Modulus | Quantity::Density
+    );
+    let value = quantity.value.filter(|value| told && *value != 0.0)?;
+    let (std, scaled) = quantity.std.zip(quantity.std_scaled)?;
+    Some(format!(
+        "95 % interval of {} from the readings alone +-{:.2} %, scaled by the misfit +-{:.2} %",
+        quantity.quantity.name(),
+        PERCENT_95 * std / value.abs(),
+        PERCENT_95 * scaled / value.abs()
+    ))
+}
+
+/// A value at the end of its range, or an interval without an end.
+fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
+    let name = quantity.quantity.name();
+    if !matches!(
+        quantity.quantity,
+        Quantity::Kt | Quantity::Kr | Quantity::Coupling
+    ) {
+        return None;
+    }
+    let limit = quantity.limit.map(|limit| match limit {
+        Limit::Rigid => format!("the best fit of {name} is rigid"),
+        Limit::Absent => format!("the best fit has no stiffness {name} at all"),
+        Limit::FullCoupling => "the coupling is as large as any joint can have it".to_owned(),
+    });
+    let least = quantity.at_least.map(|least| {
+        format!("the frequencies say only that {name} is at least {least:.4e} (95 %)")
+    });
+    let most = quantity
+        .at_most
+        .map(|most| format!("the frequencies say only that {name} is at most {most:.4e} (95 %)"));
+    let parts: Vec<String> = [limit, least, most].into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| parts.join("; "))
+}

@@ -1,0 +1,95 @@
+//! The consistent estimate in the document.
+
+use super::document::{
+    CorrelationSection, EstimateSection, IdentifiabilitySection, MisfitSection, ValueSection,
+};
+use crate::identify::consistent::{ConsistentEstimate, EstimatedQuantity, Limit, Quantity};
+
+/// The main estimate; what stands beside it is added by the caller.
+pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
+    let value = |quantity: Quantity| found.quantity(quantity).and_then(value_section);
+    let goodness = &found.goodness;
+    EstimateSection {
+        method: "consistent".to_owned(),
+        modes_used: found.modes_used.clone(),
+        reason: goodness.uncertainty_factor().map(|factor| {
+            format!(
+                "the model misses the frequencies by {:.2} % rms; uncertainties that would allow \
+                     that are {factor:.1} times the stated ones",
+                100.0 * goodness.relative_misfit
+            )
+        }),
+        kx: value(Quantity::Kx),
+        ky: value(Quantity::Ky),
+        kz: value(Quantity::Kz),
+        coupling: value(Quantity::Coupling),
+        kt: value(Quantity::Kt),
+        kr: value(Quantity::Kr),
+        ktr: value(Quantity::Ktr),
+        modulus: value(Quantity::Modulus),
+        density: value(Quantity::Density),
+        correlations: found
+            .correlations
+            .iter()
+            .map(|correlation| CorrelationSection {
+                first: correlation.first.name().to_owned(),
+                second: correlation.second.name().to_owned(),
+                value: correlation.value,
+            })
+            .collect(),
+        goodness_of_fit: goodness.probability,
+        misfit: Some(MisfitSection {
+            chi_squared: goodness.chi_squared,
+            degrees_of_freedom: goodness.degrees_of_freedom,
+            rms_percent: 100.0 * goodness.relative_misfit,
+            verdict: goodness.words(),
+        }),
+        identifiability: Some(identifiability(found)),
+        ..EstimateSection::default()
+    }
+}
+
+/// A rigid joint is infinite in the tables and null in JSON; a value at the edge of its range has no
+/// standard deviation.
+fn value_section(quantity: &EstimatedQuantity) -> Option<ValueSection> {
+    let rigid = quantity.limit == Some(Limit::Rigid) || quantity.value.is_none();
+    let spring = !matches!(
+        quantity.quantity,
+        Quantity::Coupling | Quantity::Kz | Quantity::Ktr
+    );
+    if quantity.value.is_none() && !spring {
+        return None;
+    }
+    let rigid = rigid && spring;
+    Some(ValueSection {
+        value: quantity.value.filter(|_| !rigid).unwrap_or(f64::INFINITY),
+        std: quantity.std.filter(|_| !rigid),
+        low: quantity.low,
+        high: quantity.high,
+        std_scaled: quantity.std_scaled.filter(|_| !rigid),
+        at_least: quantity.at_least,
+        at_most: quantity.at_most,
+    })
+}
+
+fn identifiability(found: &ConsistentEstimate) -> IdentifiabilitySection {
+    let report = &found.identifiability;
+    let dead = report
+        .dead
+        .iter()
+        .map(|parameter| format!("{} is felt by none of these frequencies", parameter.name()));
+    let limits = report.at_limit.iter().map(|(parameter, limit)| {
+        let end = match limit {
+            Limit::Rigid => "rigid",
+            Limit::Absent => "absent",
+            Limit::FullCoupling => "as large as any joint can have it",
+        };
+        format!("{} is at the end of its range: {end}", parameter.name())
+    });
+    let flat = report.flat.iter().map(|flat| flat.words.clone());
+    IdentifiabilitySection {
+        singular_values: report.singular_values.clone(),
+        condition: report.condition,
+        statements: flat.chain(dead).chain(limits).collect(),
+    }
+}

@@ -8,8 +8,8 @@ use super::measure::MeasuredSpectra;
 use super::warning::Warning;
 use crate::modal::{FrequencySource, ModeReading};
 use crate::quality::{
-    Check, ForceEvidence, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence,
-    TapEvidence, Verdict, judge_test,
+    Check, ForceEvidence, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence,
+    SensorEvidence, TapEvidence, Verdict, judge_test,
 };
 use crate::stats::median;
 
@@ -101,15 +101,17 @@ fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvide
 /// Doubts of one check in one recording are one warning: the first in full, the others counted. What
 /// the taps' own reasons and the warnings of the spectra say already is left out.
 fn warnings(verdicts: &[Verdict]) -> Vec<Warning> {
-    let said = |check: Check| {
-        matches!(
-            check,
-            Check::DoubleHit | Check::Overload | Check::WeakTap | Check::Averages | Check::Decay
-        )
+    let said = |verdict: &Verdict| match verdict.check {
+        Check::DoubleHit | Check::Overload | Check::WeakTap | Check::Averages | Check::Decay => {
+            true
+        }
+        // The tap was rejected for it.
+        Check::ForceRipple => verdict.outcome == Outcome::Bad,
+        _ => false,
     };
     let doubts: Vec<&Verdict> = verdicts
         .iter()
-        .filter(|verdict| verdict.is_doubt() && !said(verdict.check))
+        .filter(|verdict| verdict.is_doubt() && !said(verdict))
         .collect();
     let same =
         |a: &Verdict, b: &Verdict| a.check == b.check && a.subject.file() == b.subject.file();

@@ -55,16 +55,21 @@ impl Terminal {
         if self.json.is_none() {
             return Ok(());
         }
-        self.write_json(&serde_json::from_str(&render_json(document)?)?)
+        // The very text of report.json: reading numbers back could move their last digit.
+        self.write_text(&render_json(document)?)
     }
 
     /// Writes the document to where `--json` says, if it says anything. Call it last.
     pub(super) fn write_json(self, document: &serde_json::Value) -> anyhow::Result<()> {
         let mut text = serde_json::to_string_pretty(document)?;
         text.push('\n');
+        self.write_text(&text)
+    }
+
+    fn write_text(self, text: &str) -> anyhow::Result<()> {
         match self.json {
             None => Ok(()),
-            Some(Json::StandardOutput) => Ok(print(&text)?),
+            Some(Json::StandardOutput) => Ok(print(text)?),
             Some(Json::File(file)) => Ok(file.write(text.as_bytes())?),
         }
     }

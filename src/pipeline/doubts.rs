@@ -22,7 +22,9 @@ pub(super) fn of_consistent(found: &ConsistentEstimate) -> Vec<Warning> {
     for text in found.quantities.iter().filter_map(open_end) {
         add("at-limit", text);
     }
-    for flat in &found.identifiability.flat {
+    // Of one parameter alone the open end says the same.
+    let several = found.fit.len() > 1;
+    for flat in found.identifiability.flat.iter().filter(|_| several) {
         add("flat-direction", flat.words.clone());
     }
     // A valley whose frequencies are off by more than a beam's dimensions leave open is none to doubt.
@@ -103,22 +105,27 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
         format!("; {}", intervals.join("; "))
     };
     Some(format!(
-        "the model misses the frequencies by {percent:.2} % rms, {} times their uncertainty \
-         (goodness of fit {:.1e}); std and 95 % limits stand for the readings alone, and the joint is \
+        "the model misses the frequencies by {} % rms, {} times their uncertainty \
+         (goodness of fit {}); std and 95 % limits stand for the readings alone, and the joint is \
          not known that well{intervals}",
+        Rounded(percent),
         Rounded(root_mean_square(&standardised)),
-        goodness.probability.unwrap_or(0.0)
+        Rounded(goodness.probability.unwrap_or(0.0))
     ))
 }
 
-/// A number in three digits, without an exponent where it is large.
+/// A number in two digits, with an exponent only where it is very small.
 struct Rounded(f64);
 
 impl std::fmt::Display for Rounded {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.0 {
-            size if size >= 100.0 => write!(f, "{size:.0}"),
-            size => write!(f, "{size:.1}"),
+            size if size >= 10.0 => write!(f, "{size:.0}"),
+            size if size >= 1.0 => write!(f, "{size:.1}"),
+            size if size >= 0.1 => write!(f, "{size:.2}"),
+            size if size >= 0.01 => write!(f, "{size:.3}"),
+            size if size > 0.0 => write!(f, "{size:.1e}"),
+            _ => f.write_str("0"),
         }
     }
 }
@@ -135,10 +142,10 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     let value = quantity.value.filter(|value| told && *value != 0.0)?;
     let (std, scaled) = quantity.std.zip(quantity.std_scaled)?;
     Some(format!(
-        "95 % interval of {} from the readings alone +-{:.2} %, scaled by the misfit +-{:.2} %",
+        "95 % interval of {} from the readings alone +-{} %, scaled by the misfit +-{} %",
         quantity.quantity.name(),
-        PERCENT_95 * std / value.abs(),
-        PERCENT_95 * scaled / value.abs()
+        Rounded(PERCENT_95 * std / value.abs()),
+        Rounded(PERCENT_95 * scaled / value.abs())
     ))
 }
 

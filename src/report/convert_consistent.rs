@@ -3,20 +3,23 @@
 use super::document::{
     CorrelationSection, EstimateSection, IdentifiabilitySection, MisfitSection, ValueSection,
 };
+use super::format::significant;
 use crate::identify::consistent::{ConsistentEstimate, EstimatedQuantity, Limit, Quantity};
 
 /// The main estimate; what stands beside it is added by the caller.
 pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
     let value = |quantity: Quantity| found.quantity(quantity).and_then(value_section);
+    // A property with a tolerance is fitted along, but nobody asked for it.
+    let asked = |quantity: Quantity| value(quantity).filter(|_| is_asked(found, quantity));
     let goodness = &found.goodness;
     EstimateSection {
         method: "consistent".to_owned(),
         modes_used: found.modes_used.clone(),
         reason: goodness.uncertainty_factor().map(|factor| {
             format!(
-                "the model misses the frequencies by {:.2} % rms; uncertainties that would allow \
+                "the model misses the frequencies by {} % rms; uncertainties that would allow \
                      that are {factor:.1} times the stated ones",
-                100.0 * goodness.relative_misfit
+                significant(100.0 * goodness.relative_misfit, 2)
             )
         }),
         kx: value(Quantity::Kx),
@@ -26,8 +29,8 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
         kt: value(Quantity::Kt),
         kr: value(Quantity::Kr),
         ktr: value(Quantity::Ktr),
-        modulus: value(Quantity::Modulus),
-        density: value(Quantity::Density),
+        modulus: asked(Quantity::Modulus),
+        density: asked(Quantity::Density),
         correlations: found
             .correlations
             .iter()
@@ -72,6 +75,34 @@ fn value_section(quantity: &EstimatedQuantity) -> Option<ValueSection> {
     })
 }
 
+fn is_asked(found: &ConsistentEstimate, quantity: Quantity) -> bool {
+    found
+        .fit
+        .iter()
+        .any(|parameter| parameter.name() == quantity.name())
+}
+
+/// Where the beam's uncertain properties went.
+fn fitted_along(found: &ConsistentEstimate) -> Vec<String> {
+    let beam = [
+        (Quantity::Modulus, "Pa"),
+        (Quantity::Density, "kg/m3"),
+        (Quantity::Length, "m"),
+        (Quantity::Width, "m"),
+        (Quantity::Thickness, "m"),
+    ];
+    beam.iter()
+        .filter(|(quantity, _)| !is_asked(found, *quantity))
+        .filter_map(|(quantity, unit)| {
+            let value = found.quantity(*quantity)?.value?;
+            Some(format!(
+                "{} has a tolerance and was fitted along, to {value:.6e} {unit}",
+                quantity.name()
+            ))
+        })
+        .collect()
+}
+
 fn identifiability(found: &ConsistentEstimate) -> IdentifiabilitySection {
     let report = &found.identifiability;
     let dead = report
@@ -90,6 +121,10 @@ fn identifiability(found: &ConsistentEstimate) -> IdentifiabilitySection {
     IdentifiabilitySection {
         singular_values: report.singular_values.clone(),
         condition: report.condition,
-        statements: flat.chain(dead).chain(limits).collect(),
+        statements: flat
+            .chain(dead)
+            .chain(limits)
+            .chain(fitted_along(found))
+            .collect(),
     }
 }

@@ -1,10 +1,8 @@
 //! `tapjoint frf`: frequency response functions of a recording with a hammer, or of a test.
 
 use super::Outcome;
-use super::arguments::{
-    Band, ChannelScale, EstimatorArgument, FormArgument, RecordingArguments, SensorArgument,
-    WindowArgument, block_size,
-};
+use super::arguments::{Band, ChannelScale, RecordingArguments, block_size};
+use super::choices::{EstimatorArgument, FormArgument, SensorArgument, WindowArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;

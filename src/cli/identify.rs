@@ -1,7 +1,8 @@
 //! `tapjoint identify`: joint stiffness from natural frequencies alone.
 
 use super::Outcome;
-use super::arguments::{FrequencyList, HalfLines, MethodArgument};
+use super::arguments::{FrequencyList, HalfLines};
+use super::choices::MethodArgument;
 use super::input::{TestFile, read_test};
 use super::run::outcome;
 use super::terminal::Terminal;

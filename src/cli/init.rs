@@ -1,7 +1,7 @@
 //! `tapjoint init`: a commented test description to begin with.
 
 use super::Outcome;
-use super::arguments::KindArgument;
+use super::choices::KindArgument;
 use super::terminal::Terminal;
 use clap::Args;
 use serde_json::json;

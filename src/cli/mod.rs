@@ -5,6 +5,7 @@
 
 mod arguments;
 mod bare;
+mod choices;
 mod input;
 mod output;
 mod terminal;

@@ -1,7 +1,8 @@
 //! `tapjoint perturb`: how frequency errors move the estimate.
 
 use super::Outcome;
-use super::arguments::{MethodArgument, PercentList};
+use super::arguments::PercentList;
+use super::choices::MethodArgument;
 use super::identify::{FrequencyArguments, resolve};
 use super::terminal::Terminal;
 use clap::Args;

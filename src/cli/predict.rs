@@ -1,7 +1,8 @@
 //! `tapjoint predict`: natural frequencies of a known joint.
 
 use super::Outcome;
-use super::arguments::{CrossStiffness, KindArgument, Stiffness};
+use super::arguments::{CrossStiffness, Stiffness};
+use super::choices::KindArgument;
 use super::input::{TestFile, read_test};
 use super::terminal::Terminal;
 use anyhow::{anyhow, bail};

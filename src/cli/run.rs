@@ -1,8 +1,9 @@
 //! `tapjoint run`: from recordings to the joint, with a report.
 
 use super::Outcome;
-use super::arguments::{ReadingArgument, RecordingArguments};
+use super::arguments::RecordingArguments;
 use super::bare::{BareSettings, analyse};
+use super::choices::ReadingArgument;
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFolder;
 use super::terminal::Terminal;

@@ -1,8 +1,9 @@
 //! `tapjoint spectrum`: the averaged spectrum of one recording and its peaks.
 
 use super::Outcome;
-use super::arguments::{Band, ReadingArgument, RecordingArguments, WindowArgument, block_size};
+use super::arguments::{Band, RecordingArguments, block_size};
 use super::bare::{BareSettings, analyse};
+use super::choices::{ReadingArgument, WindowArgument};
 use super::input::check_file;
 use super::output::OutputFile;
 use super::run::outcome;

@@ -82,8 +82,12 @@ fn shifted(document: &Document) -> Vec<(f64, Point)> {
 }
 
 fn estimate(document: &Document) -> Option<Point> {
+    // The cloud is the pair regression's, and so is its middle.
     let estimate: &EstimateSection = document.estimate.as_ref()?.as_ref()?;
-    let point = (estimate.kx.as_ref()?.value, estimate.ky.as_ref()?.value);
+    let point = match &estimate.pairs {
+        Some(pairs) => (pairs.kx?, pairs.ky?),
+        None => (estimate.kx.as_ref()?.value, estimate.ky.as_ref()?.value),
+    };
     (point.0.is_finite() && point.1.is_finite()).then_some(point)
 }
 

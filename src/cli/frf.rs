@@ -29,7 +29,7 @@ use tapjoint::report::{
     after_help = "Examples:\n  tapjoint frf taps.wav --hammer 1 --scale-hammer 500 --scale-sensor 2000 --png frf.png\n  tapjoint frf test.toml --form receptance --csv frf.csv"
 )]
 pub(super) struct FrfArguments {
-    /// A recording (WAV, CSV) or a test description (.toml)
+    /// A recording (WAV, CSV, UFF58) or a test description (.toml)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]

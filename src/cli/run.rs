@@ -21,7 +21,8 @@ use tapjoint::report::{document_of, figures_of, render_run, render_text};
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// A test description (.toml), or a bare recording (WAV, CSV)
+    /// A test description (.toml), or a bare recording (WAV, CSV, UFF58; or frequency response
+    /// functions in UFF58 or text)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Folder of the report; default: <name>-report beside FILE

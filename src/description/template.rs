@@ -66,7 +66,7 @@ position = 0.338               # m
 # kind = "acceleration"        # "acceleration" (default) | "velocity" | "displacement" | "sound"
 
 [[recording]]                  # once for each file; the same file may be read in several bands
-file = "taps.wav"              # WAV or CSV, seen from the folder of this file
+file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this file
 # tap = 0.04                   # m, where the hammer strikes, default: not known
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
 # block = 2048                 # samples, block/2.56 lines are shown; default: what fits the shortest tap

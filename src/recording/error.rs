@@ -44,7 +44,7 @@ pub enum RecordingError {
     #[error(transparent)]
     Responses(#[from] ResponseError),
     /// A format that is known but not read.
-    #[error("{file}: {format} is not read by this version; export as WAV or CSV")]
+    #[error("{file}: {format} is not read by this version; export as WAV, CSV or UFF58")]
     UnsupportedFormat {
         /// The file.
         file: String,
@@ -53,7 +53,7 @@ pub enum RecordingError {
     },
     /// Neither a WAV file nor text.
     #[error(
-        "{file}: neither a WAV file nor text (first bytes {first_bytes}); export as WAV or CSV"
+        "{file}: neither a WAV file nor text (first bytes {first_bytes}); export as WAV, CSV or UFF58"
     )]
     UnknownFormat {
         /// The file.

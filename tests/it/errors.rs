@@ -1098,7 +1098,7 @@ fn regress_bad_recordings_each_have_their_own_message() {
         b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0",
         &["run", "test.toml"],
         "taps.csv: neither a WAV file nor text",
-        &["export as WAV or CSV"],
+        &["export as WAV, CSV or UFF58"],
     );
 }
 

@@ -3,7 +3,7 @@
 use super::super::document::{Document, EstimateSection, PredictionSection, ValueSection};
 use super::super::format::{
     MISSING, RIGID, bound_percent, last_place, optional, prefix, rounded_to, signed_percent,
-    significant, with_decimals_of,
+    with_decimals_of,
 };
 use super::modes::reading;
 use super::{Table, bound_of, mode_of, number, words};
@@ -83,9 +83,12 @@ impl Parameter<'_> {
     /// Standard deviation scaled by the misfit, in the unit of the value.
     pub fn written_scaled(&self) -> String {
         let (factor, _) = self.scale();
+        let value = factor * self.value.value;
         let std = self.value.std_scaled.map(|std| factor * std);
+        // To the same last digit as the std beside it.
         std.filter(|std| std.is_finite() && *std > 0.0)
-            .map_or_else(|| MISSING.to_owned(), |std| significant(std, 2))
+            .and_then(|std| rounded_to(value, Some(std), self.finest_place(value)).uncertainty)
+            .unwrap_or_else(|| MISSING.to_owned())
     }
 
     /// Place of the last digit that is shown: no stiffness is known to more than five digits.

@@ -416,7 +416,11 @@ fn other_formats_are_named() {
         assert_message(
             &message,
             "tested.dat: ",
-            &[name, "not read by this version", "export as WAV or CSV"],
+            &[
+                name,
+                "not read by this version",
+                "export as WAV, CSV or UFF58",
+            ],
         );
     }
     let message = open_error(b"\x01\x02\x03\x04");

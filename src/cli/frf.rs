@@ -11,9 +11,7 @@ use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use tapjoint::description::{ChannelRef, WindowKind};
-use tapjoint::pipeline::{
-    Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_test, run_wired,
-};
+use tapjoint::pipeline::{Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_wired};
 use tapjoint::recording::UffFormat;
 use tapjoint::report::{
     frf_document, frf_figure, render_frf_csv, render_frf_png, render_frf_uff, render_text,
@@ -205,11 +203,7 @@ fn picture_files(png: &Path, stems: &[String]) -> Vec<PathBuf> {
 pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, &terminal)?;
     let analysis = match &request.subject {
-        Subject::Test(file) => run_test(
-            &file.test,
-            (&file.folder, &file.name),
-            &IdentifySettings::default(),
-        )?,
+        Subject::Test(file) => file.analyse(&IdentifySettings::default())?,
         Subject::Recording(hammer) => bare(arguments, hammer)?,
     };
     let frfs: Vec<Vec<Frf>> = analysis

@@ -10,7 +10,7 @@ use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::MeasuredFrequencies;
-use tapjoint::pipeline::{IdentifySettings, run_test};
+use tapjoint::pipeline::IdentifySettings;
 use tapjoint::report::{document::Document, document_of, render_text};
 
 /// Estimate joint stiffness from natural frequencies alone.
@@ -95,14 +95,10 @@ pub(super) fn resolve(
 
 pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
-    let analysis = run_test(
-        &file.test,
-        (&file.folder, &file.name),
-        &IdentifySettings {
-            method: arguments.method.method(),
-            ..IdentifySettings::default()
-        },
-    )?;
+    let analysis = file.analyse(&IdentifySettings {
+        method: arguments.method.method(),
+        ..IdentifySettings::default()
+    })?;
     // The perturbation has a command of its own.
     let document = Document {
         perturbation: None,

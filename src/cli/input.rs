@@ -5,6 +5,7 @@ use anyhow::{Context, anyhow};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tapjoint::description::TestDescription;
+use tapjoint::pipeline::{Analysis, IdentifySettings, PipelineError, run_test};
 
 /// A test description and where it was found.
 #[derive(Debug)]
@@ -43,6 +44,14 @@ pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<Test
 }
 
 impl TestFile {
+    /// Runs the described test.
+    ///
+    /// # Errors
+    /// Those of [`run_test`].
+    pub(super) fn analyse(&self, settings: &IdentifySettings) -> Result<Analysis, PipelineError> {
+        run_test(&self.test, (&self.folder, &self.name), settings)
+    }
+
     /// The path of a recording that the description names.
     pub(super) fn path_of(&self, file: &Path) -> PathBuf {
         self.folder.join(file)

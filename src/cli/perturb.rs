@@ -8,7 +8,7 @@ use super::terminal::Terminal;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings, run_test};
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
 use tapjoint::report::{document_of, render_text};
 
 /// Show how the estimate moves when the frequencies are wrong.
@@ -49,7 +49,7 @@ pub(super) fn run(
         monte_carlo: Some((arguments.samples, seed)),
         ..Default::default()
     };
-    let analysis = run_test(&file.test, (&file.folder, &file.name), &settings)?;
+    let analysis = file.analyse(&settings)?;
     let document = document_of(&analysis);
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;

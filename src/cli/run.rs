@@ -10,7 +10,7 @@ use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
-use tapjoint::pipeline::{Analysis, IdentifySettings, run_test};
+use tapjoint::pipeline::{Analysis, IdentifySettings};
 use tapjoint::report::{document_of, figures_of, render_run, render_text};
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
@@ -101,11 +101,7 @@ fn report_folder(name: &str) -> String {
 pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, &terminal)?;
     let analysis = match &request.subject {
-        Subject::Test(file) => run_test(
-            &file.test,
-            (&file.folder, &file.name),
-            &IdentifySettings::default(),
-        )?,
+        Subject::Test(file) => file.analyse(&IdentifySettings::default())?,
         Subject::Recording(path) => {
             let settings = BareSettings {
                 reading: arguments.reading.unwrap_or_default().into(),

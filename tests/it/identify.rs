@@ -3,6 +3,7 @@
 // A test that unwraps fails as it should; the lint spares only the test functions themselves.
 #![allow(clippy::unwrap_used)]
 
+use crate::shared::steel_strip;
 use tapjoint::identify::perturbation::{
     PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_spans,
 };
@@ -16,17 +17,6 @@ use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, Slenderness, Symmetry, natural_frequencies,
     natural_lambdas, natural_modes,
 };
-
-fn steel_strip() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
 
 fn exact(assembly: Assembly, joint: &JointStiffness, modes: &[usize]) -> Vec<ModeLambda> {
     let lambdas = natural_lambdas(assembly, joint, 8).unwrap();

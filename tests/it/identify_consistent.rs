@@ -3,6 +3,7 @@
 // A test that unwraps fails as it should; the lint spares only the test functions themselves.
 #![allow(clippy::unwrap_used)]
 
+use crate::shared::steel_strip;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -16,15 +17,10 @@ use tapjoint::structure::finite_elements::{FiniteElementModel, PointAttachment};
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
 
-fn steel_strip() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
+/// Natural frequencies of the strip on a joint, by Euler's theory (Hz).
+fn exact_frequencies(joint: &JointStiffness, modes: usize) -> Vec<f64> {
+    let (theory, assembly) = (BeamTheory::Euler, Assembly::Cantilever);
+    natural_frequencies(theory, &steel_strip(), assembly, joint, modes).unwrap()
 }
 
 fn modes_of(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Vec<MeasuredMode> {
@@ -433,14 +429,7 @@ fn recover_any_joint_from_exact_frequencies() {
             (ConsistentSettings::three_parameter(), 0.95)
         };
         let truth = random_joint(&mut random, coupled);
-        let frequencies = natural_frequencies(
-            BeamTheory::Euler,
-            &steel_strip(),
-            Assembly::Cantilever,
-            &truth,
-            5,
-        )
-        .unwrap();
+        let frequencies = exact_frequencies(&truth, 5);
         let modes = modes_of(&frequencies, |f| Some(1e-3 * f));
         let fit = ConsistentEstimator::new(&cantilever(), &modes, &settings)
             .unwrap()
@@ -464,14 +453,7 @@ fn recover_within_the_stated_intervals() {
     let mut covered = [0usize; 3];
     for _ in 0..CASES {
         let truth = random_joint(&mut random, 0.9);
-        let exact = natural_frequencies(
-            BeamTheory::Euler,
-            &steel_strip(),
-            Assembly::Cantilever,
-            &truth,
-            5,
-        )
-        .unwrap();
+        let exact = exact_frequencies(&truth, 5);
         let noisy: Vec<f64> = exact
             .iter()
             .map(|f| {
@@ -501,14 +483,7 @@ fn recover_within_the_stated_intervals() {
 #[test]
 fn recover_from_modes_with_gaps() {
     let truth = joint(800.0, 9.0, 0.0);
-    let all = natural_frequencies(
-        BeamTheory::Euler,
-        &steel_strip(),
-        Assembly::Cantilever,
-        &truth,
-        7,
-    )
-    .unwrap();
+    let all = exact_frequencies(&truth, 7);
     let modes: Vec<MeasuredMode> = [1, 2, 4, 7]
         .into_iter()
         .map(|mode| MeasuredMode {
@@ -534,14 +509,7 @@ fn recover_from_modes_with_gaps() {
 #[test]
 fn limit_a_rigid_rotation_has_no_upper_end() {
     let truth = joint(500.0, f64::INFINITY, 0.0);
-    let exact = natural_frequencies(
-        BeamTheory::Euler,
-        &steel_strip(),
-        Assembly::Cantilever,
-        &truth,
-        5,
-    )
-    .unwrap();
+    let exact = exact_frequencies(&truth, 5);
     let modes = modes_of(&exact, |f| Some(1e-3 * f));
     let settings = ConsistentSettings::two_parameter();
     let estimate = estimate_consistently(&cantilever(), &modes, &settings).unwrap();
@@ -721,14 +689,7 @@ fn prop_an_uncertain_modulus_widens_what_depends_on_it() {
 #[test]
 fn recover_in_spite_of_a_wild_frequency() {
     let truth = joint(1415.0, 4.83, 0.0);
-    let mut frequencies = natural_frequencies(
-        BeamTheory::Euler,
-        &steel_strip(),
-        Assembly::Cantilever,
-        &truth,
-        8,
-    )
-    .unwrap();
+    let mut frequencies = exact_frequencies(&truth, 8);
     frequencies[2] *= 1.03;
     let error = |loss: Loss, std: Option<f64>| {
         let mut settings = ConsistentSettings::two_parameter();
@@ -755,14 +716,7 @@ fn recover_in_spite_of_a_wild_frequency() {
 #[test]
 fn prop_an_extra_mode_brings_what_was_announced() {
     let truth = joint(900.0, 12.0, 0.1);
-    let exact = natural_frequencies(
-        BeamTheory::Euler,
-        &steel_strip(),
-        Assembly::Cantilever,
-        &truth,
-        5,
-    )
-    .unwrap();
+    let exact = exact_frequencies(&truth, 5);
     let settings = ConsistentSettings::three_parameter();
     let with = |count: usize| {
         let modes = modes_of(&exact[..count], |f| Some(1e-3 * f));

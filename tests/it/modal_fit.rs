@@ -474,11 +474,9 @@ fn recover_frequency_response_functions_with_modes_beyond_the_band() {
 
 #[test]
 fn val_a_free_beam_by_an_analyser_has_its_four_modes() {
-    let Some(folder) = std::env::var_os("TAPJOINT_DATA") else {
-        eprintln!("skipped: TAPJOINT_DATA is not set");
+    let Some(folder) = crate::shared::data("modelab_freefree_beam") else {
         return;
     };
-    let folder = std::path::PathBuf::from(folder).join("modelab_freefree_beam");
     let (mut frequencies, mut columns) = (Vec::new(), Vec::new());
     for (sensor, name) in ["Hxysv00001.txt", "Hxysv00005.txt"].iter().enumerate() {
         let bytes = std::fs::read(folder.join(name)).unwrap();

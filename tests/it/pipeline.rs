@@ -1,5 +1,6 @@
 //! The whole chain on virtual tests whose answer is known.
 
+use crate::shared::steel_strip;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -31,11 +32,7 @@ fn virtual_test(seed: u64) -> VirtualTest {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let beam = Beam {
         length: 0.423 * (1.0 + random.random_range(-0.02..0.02)),
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
+        ..steel_strip()
     };
     let joint = JointStiffness::two_parameter(KX, KY);
     let shapes = mode_shapes(&beam, Assembly::Cantilever, &joint, 8).unwrap();
@@ -196,14 +193,7 @@ fn span_holds_the_truth(test: &VirtualTest) -> bool {
 fn prop_a_sensitivity_is_per_volt_whatever_the_header_says() {
     let folder = tempfile::tempdir().unwrap();
     let shapes = mode_shapes(
-        &Beam {
-            length: 0.423,
-            width: 0.05,
-            thickness: 0.005,
-            modulus: 207e9,
-            density: 7850.0,
-            poisson: 0.3,
-        },
+        &steel_strip(),
         Assembly::Cantilever,
         &JointStiffness::two_parameter(KX, KY),
         4,
@@ -312,17 +302,6 @@ fn limit_one_tap_in_a_long_recording_takes_the_largest_block() {
     );
 }
 
-fn cantilever_beam() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
-
 /// Frequencies (Hz) of the first modes of a structure with this joint, Kt (N/m) and Kr (N m/rad).
 fn frequencies_of(structure: &JointedStructure, (kt, kr): (f64, f64), count: usize) -> Vec<f64> {
     let model = FrequencyModel::new(structure, count).unwrap();
@@ -389,7 +368,7 @@ kind = \"sound\"
 
 #[test]
 fn recover_a_joint_under_the_masses_of_its_sensors() {
-    let beam = cantilever_beam();
+    let beam = steel_strip();
     let mut structure = JointedStructure::new(BeamTheory::Timoshenko, beam, Assembly::Cantilever);
     structure.masses = [0.338, 0.2]
         .map(|position| PointAttachment {
@@ -423,7 +402,7 @@ fn recover_a_joint_under_the_masses_of_its_sensors() {
 
 #[test]
 fn recover_an_uneven_lap_joint() {
-    let beam = cantilever_beam();
+    let beam = steel_strip();
     let mut structure = JointedStructure::new(BeamTheory::Timoshenko, beam, Assembly::Lap);
     structure.lap = LapLayout {
         position: Some(0.17),

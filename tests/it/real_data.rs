@@ -2,8 +2,9 @@
 //!
 //! What is expected was published by who measured it, or computed from the file by other programs.
 
+use crate::shared::data;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use tapjoint::description::{ChannelRef, TestDescription};
 use tapjoint::modal::amplitude::{
@@ -12,17 +13,6 @@ use tapjoint::modal::amplitude::{
 use tapjoint::pipeline::{Analysis, Estimate, IdentifySettings, run_recording, run_test};
 use tapjoint::recording::{ReadSettings, Recording};
 use tapjoint::taps::{Rejection, Tap};
-
-/// A file or folder of the data folder; `None` without the folder.
-fn data(name: &str) -> Option<PathBuf> {
-    let Some(folder) = std::env::var_os("TAPJOINT_DATA") else {
-        eprintln!("skipped: TAPJOINT_DATA is not set");
-        return None;
-    };
-    let path = PathBuf::from(folder).join(name);
-    assert!(path.exists(), "{} is missing", path.display());
-    Some(path)
-}
 
 fn analyse(path: &Path, hammer: Option<ChannelRef>) -> Analysis {
     let recording =

@@ -6,24 +6,13 @@ mod listing;
 mod responses;
 mod synthetic;
 
-use std::path::PathBuf;
+use crate::shared::data;
 
 use tapjoint::recording::{
     FunctionValues, ReadSettings, Recording, RecordingError, list_datasets, read_function,
 };
 
 use crate::recording::{TestFile, file};
-
-/// A file of the data folder; `None` without the folder.
-fn data(name: &str) -> Option<PathBuf> {
-    let Some(folder) = std::env::var_os("TAPJOINT_DATA") else {
-        eprintln!("skipped: TAPJOINT_DATA is not set");
-        return None;
-    };
-    let path = PathBuf::from(folder).join(name);
-    assert!(path.exists(), "{} is missing", path.display());
-    Some(path)
-}
 
 fn open(path: &std::path::Path) -> Result<Recording, RecordingError> {
     Recording::open(path, &ReadSettings::default())

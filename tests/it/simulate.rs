@@ -1,5 +1,6 @@
 //! The simulator against solutions found another way: closed forms, momentum, statics.
 
+use crate::shared::steel_strip;
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
@@ -136,14 +137,7 @@ fn limit_a_mass_on_a_soft_spring_moves_by_newton() {
 #[test]
 fn limit_static_compliance_of_a_clamped_beam() {
     // Sum over modes of shape^2/omega^2 at the tip is the static L^3/(3 E I).
-    let beam = Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    };
+    let beam = steel_strip();
     let shapes = mode_shapes(&beam, Assembly::Cantilever, &JointStiffness::RIGID, 20).unwrap();
     let seen = seen_modes(
         &shapes,

@@ -3,24 +3,13 @@
 // A test that unwraps fails as it should; the lint spares only the test functions themselves.
 #![allow(clippy::unwrap_used)]
 
+use crate::shared::steel_strip;
 use tapjoint::structure::frequency_equation::RootedBeam;
 use tapjoint::structure::receptance::EndFunctions;
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, ModeShape, Slenderness, StructureError, Symmetry,
     mode_shapes, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint, natural_modes,
 };
-
-/// The cantilever of Ingole & Chatterjee, table 2.
-fn steel_strip() -> Beam {
-    Beam {
-        length: 0.423,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
 
 fn joint(kx: f64, ky: f64) -> JointStiffness {
     JointStiffness::two_parameter(kx, ky)

@@ -2,7 +2,7 @@
 
 use super::super::document::{Document, VerdictSection};
 use super::super::format::{MISSING, significant};
-use super::{Table, number, words};
+use super::{Column, Table, number, words};
 
 /// Outcomes from the worst to the best.
 const OUTCOMES: [&str; 4] = ["bad", "doubtful", "good", "not applicable"];
@@ -95,31 +95,17 @@ pub fn quality_doubts(document: &Document) -> Option<Table> {
         .collect();
     doubts.sort_by_key(|verdict| rank(verdict));
     let row = |verdict: &&VerdictSection| {
-        vec![
-            verdict.check.clone(),
-            verdict.outcome.clone(),
-            verdict.subject.clone(),
-            value(verdict),
-            significant(verdict.limit, 3),
-            unit(verdict),
-            verdict.text.clone(),
-            verdict.cause.clone().unwrap_or_default(),
-            verdict.remedy.clone().unwrap_or_default(),
-        ]
+        let mut row = row(verdict);
+        row.push(verdict.cause.clone().unwrap_or_default());
+        row.push(verdict.remedy.clone().unwrap_or_default());
+        row
     };
     (!doubts.is_empty()).then(|| Table {
         caption: "Doubts about the measurement".to_owned(),
-        columns: vec![
-            words("Check"),
-            words("Outcome"),
-            words("Where"),
-            number("Value"),
-            number("Limit"),
-            words("Unit"),
-            words("What happened").on_page(),
-            words("Why it might be").on_page(),
-            words("What helps").on_page(),
-        ],
+        columns: columns()
+            .into_iter()
+            .chain(["Why it might be", "What helps"].map(|title| words(title).on_page()))
+            .collect(),
         rows: doubts.iter().map(row).collect(),
         note: String::new(),
     })
@@ -129,31 +115,36 @@ pub fn quality_doubts(document: &Document) -> Option<Table> {
 pub fn quality_all(document: &Document) -> Option<Table> {
     let mut all: Vec<&VerdictSection> = verdicts(document).iter().collect();
     all.sort_by_key(|verdict| rank(verdict));
-    let row = |verdict: &&VerdictSection| {
-        vec![
-            verdict.check.clone(),
-            verdict.outcome.clone(),
-            verdict.subject.clone(),
-            value(verdict),
-            significant(verdict.limit, 3),
-            unit(verdict),
-            verdict.text.clone(),
-        ]
-    };
     (!all.is_empty()).then(|| Table {
         caption: "All checks".to_owned(),
-        columns: vec![
-            words("Check"),
-            words("Outcome"),
-            words("Where"),
-            number("Value"),
-            number("Limit"),
-            words("Unit"),
-            words("What happened"),
-        ],
-        rows: all.iter().map(row).collect(),
+        columns: columns(),
+        rows: all.iter().map(|verdict| row(verdict)).collect(),
         note: String::new(),
     })
+}
+
+fn columns() -> Vec<Column> {
+    vec![
+        words("Check"),
+        words("Outcome"),
+        words("Where"),
+        number("Value"),
+        number("Limit"),
+        words("Unit"),
+        words("What happened").on_page(),
+    ]
+}
+
+fn row(verdict: &VerdictSection) -> Vec<String> {
+    vec![
+        verdict.check.clone(),
+        verdict.outcome.clone(),
+        verdict.subject.clone(),
+        value(verdict),
+        significant(verdict.limit, 3),
+        unit(verdict),
+        verdict.text.clone(),
+    ]
 }
 
 fn value(verdict: &VerdictSection) -> String {

@@ -1,17 +1,11 @@
 //! Recordings by others, where the folder of TAPJOINT_DATA has them.
 
-use std::path::PathBuf;
-
+use crate::shared::data;
 use tapjoint::recording::{Format, ReadSettings, Recording, Separator, Timing};
 
 /// Opens a file of the data folder; `None` without the folder.
 fn open(name: &str) -> Option<Recording> {
-    let Some(folder) = std::env::var_os("TAPJOINT_DATA") else {
-        eprintln!("skipped: TAPJOINT_DATA is not set");
-        return None;
-    };
-    let path = PathBuf::from(folder).join(name);
-    let recording = Recording::open(&path, &ReadSettings::default());
+    let recording = Recording::open(&data(name)?, &ReadSettings::default());
     Some(recording.unwrap_or_else(|error| panic!("{error}")))
 }
 
@@ -118,11 +112,9 @@ fn val_the_slater_cantilever_opens_at_1280_hz() {
 
 #[test]
 fn val_an_analysers_frequency_table_is_not_taken_for_time() {
-    let Some(folder) = std::env::var_os("TAPJOINT_DATA") else {
-        eprintln!("skipped: TAPJOINT_DATA is not set");
+    let Some(path) = data("modelab_freefree_beam/Hxysv00001.txt") else {
         return;
     };
-    let path = PathBuf::from(folder).join("modelab_freefree_beam/Hxysv00001.txt");
     let error = Recording::open(&path, &ReadSettings::default()).expect_err("no time series");
     let message = error.to_string();
     assert!(

@@ -146,6 +146,18 @@ fn read_lap(
     };
     let position = table.optional("position", |entry| entry.within(Dimension::Length, &inside))?;
     let overlap = table.optional("overlap", |entry| read_overlap(entry, length))?;
+    let place = position.unwrap_or(0.5 * length);
+    let reach = place.min(length - place);
+    let beyond = |overlap: &Overlap| 0.5 * overlap.length > reach;
+    if let Some(entry) = table
+        .get("overlap")
+        .filter(|_| overlap.as_ref().is_some_and(beyond))
+    {
+        return Err(entry.error(DescriptionProblem::Conflict {
+            reason: "half of the overlap reaches beyond an end of the beam".into(),
+            remedy: "the overlap lies about the joint's `position`: shorten it, or move the joint",
+        }));
+    }
     Ok((position, overlap))
 }
 

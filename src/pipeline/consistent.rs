@@ -1,7 +1,9 @@
 //! The consistent estimate of a described test: what the description says, in the estimator's terms.
 
 use super::model::TestedStructure;
-use crate::description::{FitParameter, RightHalf, SensorKind, TestDescription, Weights};
+use crate::description::{
+    FitParameter, RightHalf, SensorDescription, SensorKind, TestDescription, Weights,
+};
 use crate::identify::consistent::{
     BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
     HeldJoint, JointedStructure, LapLayout, Parameter, ResidualWeights, estimate_consistently,
@@ -71,18 +73,23 @@ fn sensor_masses(test: &TestDescription) -> Vec<PointAttachment> {
     if !test.analysis.sensor_mass {
         return Vec::new();
     }
-    let moved = test.recordings.first().map(|recording| &recording.at);
     test.sensors
         .iter()
         .filter(|sensor| sensor.kind != SensorKind::Sound)
         .filter_map(|sensor| {
-            let moved = moved.and_then(|at| at.get(&sensor.name).copied());
             Some(PointAttachment {
-                position: moved.or(sensor.position)?,
+                position: reference_place(test, sensor)?,
                 size: sensor.mass.filter(|mass| *mass > 0.0)?,
             })
         })
         .collect()
+}
+
+/// Where a sensor sits (m) in the reference configuration, that of the first recording.
+pub(super) fn reference_place(test: &TestDescription, sensor: &SensorDescription) -> Option<f64> {
+    let first = test.recordings.first();
+    let moved = first.and_then(|recording| recording.at.get(&sensor.name).copied());
+    moved.or(sensor.position)
 }
 
 /// The structure that the estimator takes.
@@ -185,13 +192,15 @@ fn hold_cross_stiffness(
     let Some(cross) = known.cross_compliance.filter(|c| fitted && *c != 0.0) else {
         return Ok(());
     };
+    let units = StiffnessUnits::of(&structure.beam);
     let mut held = 0.0f64;
     for _ in 0..ROUNDS {
         settings.held.coupling = Some(held);
-        let joint = ConsistentEstimator::new(jointed, used, settings)?
-            .fit()
-            .joint();
-        let next = (cross * (joint.kx * joint.ky).sqrt()).clamp(-LARGEST, LARGEST);
+        let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
+        // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
+        let spring = |parameter: Parameter, unit: f64| fit.point[parameter as usize].exp() / unit;
+        let product = spring(Parameter::Kt, units.kt) * spring(Parameter::Kr, units.kr);
+        let next = (cross * product.sqrt()).clamp(-LARGEST, LARGEST);
         let moved = (next - held).abs();
         held = next;
         if moved.is_nan() || moved <= STILL {
@@ -211,12 +220,7 @@ pub(super) fn predict(
     measured: (&[MeasuredMode], &[usize]),
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
-    let mut there = jointed(structure, details);
-    if let Some(right) = &mut there.lap.right {
-        right.modulus *= beam.modulus / there.beam.modulus;
-        right.density *= beam.density / there.beam.density;
-    }
-    there.beam = *beam;
+    let there = jointed(structure, details).with_beam(beam);
     let model = FrequencyModel::new(&there, count)?;
     let units = StiffnessUnits::of(beam);
     let mut point = model.nominal();

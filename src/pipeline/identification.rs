@@ -6,6 +6,7 @@ use super::doubts;
 use super::model::TestedStructure;
 use super::warning::Warning;
 use crate::identify::consistent::ConsistentEstimate;
+use crate::identify::consistent::goodness;
 use crate::identify::perturbation::{
     SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_spans,
     sign_patterns,
@@ -56,7 +57,7 @@ impl Default for IdentifySettings {
 
 /// A misfit is worth a warning beyond this error (%): what a beam's stated dimensions usually leave
 /// open in its frequencies.
-const NOTABLE_MISFIT: f64 = 1.0;
+const NOTABLE_MISFIT: f64 = 100.0 * goodness::NOTABLE_MISFIT;
 
 /// Estimates the joint from numbered modes, predicts with it and perturbs it.
 pub fn identify(
@@ -93,7 +94,16 @@ pub fn identify(
     }
     // An estimate that no joint can have has its warning already; it predicts nothing.
     let found = (consistent.as_deref(), estimate.as_ref());
-    let prediction = prediction(structure, found, (&measured, &used), settings).unwrap_or_default();
+    let prediction = match prediction(structure, found, (&measured, &used), settings) {
+        Ok(prediction) => prediction,
+        Err(error) => {
+            warnings.extend(consistent.as_ref().map(|_| Warning::Estimate {
+                code: "no-prediction",
+                text: format!("the estimated joint cannot be predicted with: {error}"),
+            }));
+            Vec::new()
+        }
+    };
     warnings.extend(misfit(&prediction, &measured));
     let perturbation = structure
         .regression
@@ -174,12 +184,14 @@ fn prediction(
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
     let beside = (measured, &numbers[..]);
+    // A fallback estimated without sensors' masses predicts without them: it has taken them in.
+    let attached = consistent.is_some() || structure.known.over(None).is_some();
     match settings.method {
-        EstimateMethod::Consistent => {
+        EstimateMethod::Consistent if attached => {
             let held = (&beam, &joint);
             consistent::predict(structure, &settings.details, held, beside, count)
         }
-        EstimateMethod::Pairs => {
+        EstimateMethod::Consistent | EstimateMethod::Pairs => {
             let held = (structure.assembly, &joint);
             predict(structure.theory, &beam, held, beside, count)
         }

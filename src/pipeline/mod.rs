@@ -94,13 +94,20 @@ pub fn run_test(
         }
     };
     warnings.extend(warning::of_amplitude(&recordings));
-    warnings.extend(neglect::of_neglect(test, &structure, settings.method));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
         details: structure_details(test, &structure.beam),
         ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
+    let known = structure.known.over(None).is_some();
+    let method = match settings.method {
+        EstimateMethod::Consistent if known || identification.consistent.is_some() => {
+            EstimateMethod::Consistent
+        }
+        _ => EstimateMethod::Pairs,
+    };
+    warnings.extend(neglect::of_neglect(test, &structure, method));
     warnings.extend(doubts);
     let (verdicts, doubts) = evidence::judge(&recordings);
     warnings.extend(doubts);

@@ -1,5 +1,6 @@
 //! What the estimates leave out of the described test.
 
+use super::consistent::reference_place;
 use super::identification::EstimateMethod;
 use super::model::TestedStructure;
 use super::warning::Warning;
@@ -135,14 +136,17 @@ fn of_masses(
     );
     let lowers = "it lowers the measured frequencies and thereby what is estimated from them";
     let included = method == EstimateMethod::Consistent && test.analysis.sensor_mass;
-    let unplaced = loading().any(|sensor| sensor.mass.is_some() && sensor.position.is_none());
+    let unplaced =
+        loading().any(|sensor| sensor.mass.is_some() && reference_place(test, sensor).is_none());
     match (included, unplaced, structure.regression) {
         (true, true, _) => Some(format!(
-            "{size} is in the estimate only as far as the sensors' positions are known; state them"
+            "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
         )),
-        (true, false, None) => None,
+        (true, false, None) => Some(format!(
+            "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
+        )),
         (true, false, Some(_)) => Some(format!(
-            "{size} is in the consistent estimate and the prediction; the pair regression neglects it"
+            "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
         )),
         (false, ..) => Some(format!(
             "{size} is in neither the estimate nor the prediction; {lowers}"

@@ -17,7 +17,7 @@
 use super::end_slopes::EndSlopes;
 use super::finite_elements::InterfaceModes;
 use super::receptance::EndFunctions;
-use super::{Beam, BeamTheory, JointStiffness, Slenderness};
+use super::{Beam, BeamTheory, Slenderness};
 
 /// The five functions P, X, Y, Z, Q at one frequency, or their slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,17 +61,6 @@ pub struct JointCompliance {
     pub b: f64,
     /// 1/Kz (1).
     pub c: f64,
-}
-
-impl JointCompliance {
-    /// Of a joint whose springs all have some stiffness.
-    pub fn of(joint: &JointStiffness) -> Self {
-        Self {
-            a: 1.0 / joint.kx,
-            b: 1.0 / joint.ky,
-            c: joint.cross_compliance,
-        }
-    }
 }
 
 /// The body's functions at one frequency.

@@ -51,10 +51,12 @@ impl ConsistentEstimator {
         let frequencies = self.frequencies();
         let (renewed, minima) = self.solve(&frequencies);
         let model = renewed.as_ref().unwrap_or(&self.model);
-        let problem = self.problem(model, &frequencies);
+        let mut problem = self.problem(model, &frequencies);
         let (best, others) = minima
             .split_first()
             .ok_or(IdentifyError::NothingToEstimate)?;
+        // A robust loss without stated uncertainties was fitted in units of the usual misfit.
+        self.rescale(&mut problem, &[best.at.point]);
         let directions = self.directions();
         let covariance = Covariance::of(&best.at, &directions);
         let finished = Finished {
@@ -130,7 +132,9 @@ impl Finished<'_> {
         if self.measured() {
             self.goodness.uncertainty_factor()
         } else {
-            self.goodness.misfit_per_freedom
+            // The covariance is in units of the weights' relative deviation, 1 unless a loss rescaled it.
+            let unit = self.problem.data.first().map(|d| d.std / d.frequency)?;
+            self.goodness.misfit_per_freedom.map(|misfit| misfit / unit)
         }
     }
 

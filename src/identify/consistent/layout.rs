@@ -59,6 +59,32 @@ impl JointedStructure {
         }
     }
 
+    /// The same structure of another beam: places and the overlap in proportion to its length, the right
+    /// half's section and material by the same factors.
+    #[must_use]
+    pub fn with_beam(&self, beam: &Beam) -> Self {
+        let longer = beam.length / self.beam.length;
+        let mut there = self.clone();
+        if let Some(right) = &mut there.lap.right {
+            right.length = beam.length;
+            right.width *= beam.width / self.beam.width;
+            right.thickness *= beam.thickness / self.beam.thickness;
+            right.modulus *= beam.modulus / self.beam.modulus;
+            right.density *= beam.density / self.beam.density;
+        }
+        there.lap.position = there.lap.position.map(|position| position * longer);
+        there.lap.overlap = there
+            .lap
+            .overlap
+            .map(|(length, mass)| (length * longer, mass));
+        for attached in there.masses.iter_mut().chain(&mut there.springs) {
+            // A point at the end stays on the beam, whatever the last digit of the product.
+            attached.position = (attached.position * longer).min(beam.length);
+        }
+        there.beam = *beam;
+        there
+    }
+
     /// The beams between which the joint sits, or the one beam.
     pub(super) fn pieces(&self) -> Result<Vec<Beam>, StructureError> {
         self.beam.check()?;

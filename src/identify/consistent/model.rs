@@ -25,7 +25,7 @@ pub enum Parameter {
     Modulus,
     /// Density (kg/m3), likewise.
     Density,
-    /// Length (m), all positions in proportion.
+    /// Length (m), all positions in proportion; its part in shear and rotary inertia is left out.
     Length,
     /// Width (m).
     Width,
@@ -208,12 +208,9 @@ impl FrequencyModel {
 
     /// The same model built for the beam at this point.
     pub(super) fn rebuilt(&self, point: &Point, highest: usize) -> Result<Self, StructureError> {
-        let mut there = self.structure.clone();
-        there.beam = beam_at(&self.structure.beam, point);
-        if let Some(right) = &mut there.lap.right {
-            right.modulus *= there.beam.modulus / self.structure.beam.modulus;
-            right.density *= there.beam.density / self.structure.beam.density;
-        }
+        let there = self
+            .structure
+            .with_beam(&beam_at(&self.structure.beam, point));
         let built = Self::new(&there, highest)?;
         Ok(Self {
             structure: self.structure.clone(),

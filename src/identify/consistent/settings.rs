@@ -3,7 +3,6 @@
 use super::least_squares::Accuracy;
 use super::model::Parameter;
 use super::problem::Loss;
-use crate::structure::Assembly;
 
 /// What the residuals are divided by.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -109,14 +108,6 @@ impl ConsistentSettings {
     /// Both springs and their coupling.
     pub fn three_parameter() -> Self {
         Self::fitting(&[Parameter::Kt, Parameter::Kr, Parameter::Coupling])
-    }
-
-    /// The two-parameter joint, or a free beam's modulus.
-    pub fn usual(assembly: Assembly) -> Self {
-        match assembly {
-            Assembly::Cantilever | Assembly::Lap => Self::two_parameter(),
-            Assembly::Free => Self::fitting(&[Parameter::Modulus]),
-        }
     }
 
     /// The same with equal relative weights.

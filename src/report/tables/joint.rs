@@ -164,7 +164,7 @@ fn scaled_note(estimate: &EstimateSection) -> String {
                          frequencies by more than their uncertainty, and the scaled std takes the \
                          misfit for it."
             .to_owned(),
-        (true, false) => " No uncertainty is stated for the frequencies: the scaled std takes the \
+        (true, false) => " Not every frequency has an uncertainty, so that all weigh alike: the scaled std takes the \
                           misfit for it."
             .to_owned(),
     }
@@ -212,8 +212,9 @@ pub fn methods(document: &Document) -> Option<Table> {
         ],
         rows,
         note:
-            "The consistent estimate satisfies its own frequency equation and takes shear, sensor \
-               masses and known stiffnesses into account; the pair regression does neither."
+            "The consistent estimate satisfies its own frequency equation, and takes shear, sensor \
+               masses and known stiffnesses into account where they are described; the pair regression \
+               does none of this."
                 .to_owned(),
     })
 }

@@ -1,10 +1,11 @@
 //! Taking a bare file as far as it goes: samples in time, or frequency response functions.
 
 use super::arguments::RecordingArguments;
+use anyhow::bail;
 use std::path::Path;
 use tapjoint::description::{ReadingMethod, WindowKind};
 use tapjoint::pipeline::{Analysis, FunctionSettings, run_functions, run_recording};
-use tapjoint::recording::open_frequency_responses;
+use tapjoint::recording::{RecordingError, ResponseError, UffError, open_frequency_responses};
 
 /// What the command line may say of the analysis.
 #[derive(Debug, Default)]
@@ -18,7 +19,8 @@ pub(super) struct BareSettings {
 /// Analyses a recording; a file that holds frequency response functions instead is read as such.
 ///
 /// # Errors
-/// Those of the recording, unless the file holds functions; an analysis that is not possible.
+/// What keeps the file from being read; options that functions have no use for; an analysis that is
+/// not possible.
 pub(super) fn analyse(
     path: &Path,
     arguments: &RecordingArguments,
@@ -36,9 +38,13 @@ pub(super) fn analyse(
         }
         Err(problem) => problem,
     };
-    let Ok(mut functions) = open_frequency_responses(path) else {
-        return Err(problem.into());
+    // Only a file that is recognised as no time series is looked at again.
+    let mut functions = match (problem, open_frequency_responses(path)) {
+        (RecordingError::Responses(ResponseError::NotTimeSeries { .. }), functions) => functions?,
+        (RecordingError::Uff(UffError::NoTimeSeries { .. }), Ok(functions)) => functions,
+        (problem, _) => return Err(problem.into()),
     };
+    refuse_options(path, arguments, settings)?;
     let name = path.file_name().unwrap_or(path.as_os_str());
     functions.file = name.to_string_lossy().into_owned();
     let settings = FunctionSettings {
@@ -47,4 +53,25 @@ pub(super) fn analyse(
         ..FunctionSettings::default()
     };
     Ok(run_functions(&functions, &settings)?)
+}
+
+/// Options for samples in time say nothing of functions that an analyser has computed.
+fn refuse_options(
+    path: &Path,
+    arguments: &RecordingArguments,
+    settings: &BareSettings,
+) -> anyhow::Result<()> {
+    let given = [
+        ("--hammer", arguments.hammer.is_some()),
+        ("--sample-rate", arguments.sample_rate.is_some()),
+        ("--block", settings.block.is_some()),
+        ("--window", settings.window.is_some()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((name, _)) => bail!(
+            "{}: holds frequency response functions, and {name} is for samples in time; leave it out",
+            path.display()
+        ),
+        None => Ok(()),
+    }
 }

@@ -14,7 +14,7 @@ pub struct ModeReading {
     pub source: FrequencySource,
     /// Its interval (Hz): 95 % of a fit, the bounds of a reading between the lines or on one.
     pub interval: (f64, f64),
-    /// Frequency of the peak's line (Hz).
+    /// Frequency of the peak's line, without a peak of the nearest one (Hz).
     pub line_frequency: f64,
     /// Bound of the line reading (Hz).
     pub half_line: f64,
@@ -28,8 +28,8 @@ pub struct ModeReading {
     pub damping_ratio: Option<f64>,
     /// Its standard deviation.
     pub damping_std: Option<f64>,
-    /// How far the peak stands out (dB).
-    pub prominence_db: f64,
+    /// How far the peak stands out (dB); `None` of a mode that makes no peak.
+    pub prominence_db: Option<f64>,
     /// Height above the noise (dB), where known.
     pub above_noise_db: Option<f64>,
     /// What it is when it is no mode of the structure.
@@ -146,8 +146,9 @@ pub struct MergedMode {
 /// Merges the readings of several recordings, ascending in frequency.
 ///
 /// Readings are the same resonance when they differ by less than their half lines together plus
-/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency); the one with the smallest
-/// half line stays, among equals the one that stands out most. Two readings of one recording are
+/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency); a fitted
+/// one stays before one that is not, of two fits the one with the smaller standard deviation, else the
+/// one with the smaller half line, and among equals the one that stands out most. Two readings of one recording are
 /// never merged.
 pub fn merge_modes(recordings: &[Vec<ModeReading>]) -> Vec<MergedMode> {
     let mut merged: Vec<(MergedMode, Vec<usize>)> = Vec::new();
@@ -191,6 +192,13 @@ fn same_resonance(a: &ModeReading, b: &ModeReading) -> bool {
 fn resolves_better(a: &ModeReading, b: &ModeReading) -> bool {
     if a.label.is_some() != b.label.is_some() {
         return a.label.is_none();
+    }
+    let fitted = |reading: &ModeReading| reading.source == FrequencySource::Fit;
+    match (fitted(a), fitted(b)) {
+        (true, true) => return a.std < b.std,
+        (true, false) => return true,
+        (false, true) => return false,
+        (false, false) => {}
     }
     // Half lines that differ by less than 1 % come from blocks of nearly the same length.
     if (a.half_line - b.half_line).abs() > 0.01 * a.half_line.max(b.half_line) {

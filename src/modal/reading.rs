@@ -106,7 +106,7 @@ fn reading(
         std: None,
         damping_ratio: sharp.and_then(|found| found.damping_ratio),
         damping_std: sharp.and_then(|found| found.damping_ratio.map(|_| found.damping_std)),
-        prominence_db: peak.prominence_db,
+        prominence_db: Some(peak.prominence_db),
         above_noise_db: peak.above_noise_db,
         label,
         fit: None,

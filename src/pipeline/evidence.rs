@@ -6,11 +6,12 @@ use super::analysis::RecordingResult;
 use super::frf::form_of;
 use super::measure::MeasuredSpectra;
 use super::warning::Warning;
-use crate::modal::{FrequencySource, ModeReading};
+use crate::modal::ModeReading;
 use crate::quality::{
-    Check, ForceEvidence, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence,
-    SensorEvidence, TapEvidence, Verdict, judge_test,
+    Check, DampingSource, ForceEvidence, Outcome, QualitySettings, RecordingEvidence,
+    ResonanceEvidence, SensorEvidence, TapEvidence, Verdict, judge_test,
 };
+use crate::recording::Format;
 use crate::stats::median;
 
 /// The verdicts on all recordings of a test, and the warnings that follow from them.
@@ -21,9 +22,13 @@ pub(super) fn judge(recordings: &[RecordingResult]) -> (Vec<Verdict>, Vec<Warnin
     (verdicts, warnings)
 }
 
-/// `None` for a recording without spectra: what is wrong with it its taps say.
+/// `None` for a recording without spectra: what is wrong with it its taps say; and for functions from
+/// a file, of whose taps nothing is known.
 fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
     let spectra = recording.measurement.spectra.as_ref()?;
+    if recording.format == Format::FrequencyResponses {
+        return None;
+    }
     let averages = &spectra.averages;
     let force = averages.force.as_ref().map(|spectrum| ForceEvidence {
         spectrum: spectrum.clone(),
@@ -49,7 +54,7 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
         force,
         sensors: sensors(recording, spectra),
         resonances,
-        decay: Some(spectra.decay),
+        decay: spectra.decay,
         window: spectra.window,
     })
 }
@@ -77,10 +82,9 @@ fn sensors(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<Sensor
     recording.responses.iter().enumerate().map(sensor).collect()
 }
 
-/// A fit reads the record without its window, whose share is then in no damping.
+/// The window widens every resonance of the spectra, also where the damping was fitted without it.
 fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvidence {
     let added = spectra.window.added_decay() / (TAU * reading.frequency);
-    let windowed = reading.source != FrequencySource::Fit;
     let taps = reading
         .fit
         .as_deref()
@@ -89,10 +93,11 @@ fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvide
     ResonanceEvidence {
         frequency: reading.frequency,
         std: reading.std,
-        apparent_damping_ratio: reading
-            .damping_ratio
-            .filter(|_| windowed)
-            .map(|own| own + added),
+        apparent_damping_ratio: reading.damping_ratio.map(|own| own + added),
+        damping_from: match reading.fit {
+            Some(_) => DampingSource::Decays,
+            None => DampingSource::Spectra,
+        },
         tap_frequencies: taps.iter().map(|tap| tap.frequency).collect(),
         tap_std: (!stds.is_empty()).then(|| median(&mut stds)),
     }

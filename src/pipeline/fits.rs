@@ -186,7 +186,7 @@ impl Candidates<'_> {
             std: Some(fit.frequency.std),
             damping_ratio: None,
             damping_std: None,
-            prominence_db: 0.0,
+            prominence_db: None,
             above_noise_db: Some(proposal.above_noise_db),
             label: None,
             fit: Some(Box::new(FittedReading::new(fit))),
@@ -260,12 +260,6 @@ pub(super) fn complete(
     let curves = follow_amplitude(&decays.decays, &known, &AmplitudeSettings::default());
     for (fit, curve) in fitted.into_iter().zip(curves) {
         fit.amplitude = Some(curve);
-        let assumed: Vec<ResponseForm> = kinds
-            .iter()
-            .map(|kind| kind.unwrap_or(ResponseForm::Accelerance))
-            .collect();
-        let mut constants = modal_constants(&fit.mode, &decays.forces, &assumed);
-        constants.retain(|constant| kinds.get(constant.sensor).is_some_and(Option::is_some));
-        fit.constants = constants;
+        fit.constants = modal_constants(&fit.mode, &decays.forces, kinds);
     }
 }

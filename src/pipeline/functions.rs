@@ -12,9 +12,7 @@ use crate::description::{FrfForm, ReadingMethod, SensorKind};
 use crate::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use crate::modal::{CompositeLevel, ModeReading, PeakSettings, find_peaks, read_peaks};
 use crate::recording::{Format, FrequencyResponses, ResponseForm};
-use crate::spectral::{
-    AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, SpectralError, Window,
-};
+use crate::spectral::{AveragedSpectra, DISPLAY_RATIO, LEAST_BLOCK, Lines, SpectralError, Window};
 use crate::taps::Taps;
 
 /// What is known of a file of frequency response functions beside its numbers.
@@ -175,10 +173,7 @@ fn spectra(
             ..AveragedSpectra::empty(lines)
         },
         window: Window::Rectangular,
-        decay: DecayCheck {
-            remaining: 0.0,
-            noise: 1.0,
-        },
+        decay: None,
         readings,
         force_noise: None,
         stabilisation,

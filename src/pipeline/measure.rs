@@ -72,8 +72,8 @@ pub struct MeasuredSpectra {
     pub averages: AveragedSpectra,
     /// The window.
     pub window: Window,
-    /// The records' decay: the response that keeps most.
-    pub decay: DecayCheck,
+    /// The records' decay: the response that keeps most; `None` of functions from a file.
+    pub decay: Option<DecayCheck>,
     /// Resonances and mains lines, ascending.
     pub readings: Vec<ModeReading>,
     /// What the noise of the force channel leaves in its windowed transforms, line by line (N s); `None`

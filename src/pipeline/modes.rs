@@ -215,7 +215,10 @@ fn number(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning>
 /// A mode with its height over the noise, or its prominence, as weight.
 fn weighted(mode: &ModeResult) -> WeightedPeak {
     let weight = mode.reading.as_ref().map_or(1.0, |reading| {
-        reading.above_noise_db.unwrap_or(reading.prominence_db)
+        reading
+            .above_noise_db
+            .or(reading.prominence_db)
+            .unwrap_or(0.0)
     });
     WeightedPeak {
         frequency: mode.frequency,

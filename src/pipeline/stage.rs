@@ -111,7 +111,7 @@ impl<'a> Stage<'a> {
         Ok(MeasuredSpectra {
             averages,
             window,
-            decay,
+            decay: Some(decay),
             readings,
             force_noise: quiet.force_noise(&self.lines),
             stabilisation,

@@ -11,7 +11,7 @@ pub(super) use amplitude::of_amplitude;
 use super::measure::MeasuredSpectra;
 use crate::modal::PeakLabel;
 use crate::recording::Recording;
-use crate::spectral::{RUNG_DOWN, SpectralError, Window};
+use crate::spectral::{DecayCheck, RUNG_DOWN, SpectralError, Window};
 use crate::taps::{TapSource, Taps};
 
 /// A warning that travels with the result.
@@ -233,7 +233,8 @@ fn write_not_rung_down(
         Window::Exponential { decay } => write!(
             f,
             "an exponential window with a decay of {decay:.3} 1/s was applied to force and response, \
-             and taken out of every damping; taps farther apart need none"
+             and taken out of every damping read from the spectra (fits take the decays without it); taps \
+             farther apart need none"
         ),
         _ => f.write_str(
             "readings on lines suffer from it; leave the window to the program, or set the taps farther \
@@ -277,8 +278,8 @@ pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
 /// Doubts about a recording's spectra.
 pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let decay = &spectra.decay;
-    if decay.remaining > RUNG_DOWN && decay.remaining > decay.noise {
+    let rings = |decay: &DecayCheck| decay.remaining > RUNG_DOWN && decay.remaining > decay.noise;
+    if let Some(decay) = spectra.decay.filter(rings) {
         warnings.push(Warning::NotRungDown {
             file: file.to_string(),
             remaining: decay.remaining,

@@ -3,6 +3,7 @@
 use super::{
     Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Subject, Verdict,
 };
+use crate::spectral::random_error;
 
 /// Quantile of the normal distribution beyond which one in a hundred lies.
 const ONE_IN_A_HUNDRED: f64 = 2.326;
@@ -86,14 +87,6 @@ pub fn check_random_error(
         verdict.found(error, outcome, happened)
     };
     recording.resonances.iter().map(of_mode).collect()
-}
-
-/// Normalised random error of an FRF's magnitude, sqrt((1 - g2)/(2 n g2)) (Bendat and Piersol, Random
-/// Data); `None` where the coherence g2 is 0 or n below 2.
-pub fn random_error(coherence: f64, averages: usize) -> Option<f64> {
-    let n = averages as f64;
-    (coherence > 0.0 && averages >= 2)
-        .then(|| ((1.0 - coherence).max(0.0) / (2.0 * n * coherence)).sqrt())
 }
 
 /// Name and coherence of the sensor that sees a resonance best, or why there is none.

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use super::averages::of_mode;
 use super::{
-    Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Subject, Verdict,
+    Check, DampingSource, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Subject,
+    Verdict,
 };
 use crate::spectral::Window;
 
@@ -84,6 +85,11 @@ pub fn check_window_damping(
         if added <= 0.0 {
             return verdict.missing(NO_WINDOW);
         }
+        if mode.damping_from == DampingSource::Decays {
+            return verdict.missing(
+                "Not applicable: the damping was fitted to the decays, without the window.",
+            );
+        }
         let Some(apparent) = mode.apparent_damping_ratio.filter(|ratio| *ratio > 0.0) else {
             return verdict.missing("Not applicable: no damping was read.");
         };
@@ -117,7 +123,7 @@ pub fn check_window_damping(
 /// `None` where a/omega >= zeta_hat: no damping is left that could be told from an error.
 ///
 /// `added_decay` is a (1/s), `frequency` in Hz.
-pub fn corrected_damping(apparent: f64, added_decay: f64, frequency: f64) -> Option<f64> {
+fn corrected_damping(apparent: f64, added_decay: f64, frequency: f64) -> Option<f64> {
     let own = apparent - added_decay / (TAU * frequency);
     (own > 0.0).then_some(own)
 }

@@ -53,6 +53,15 @@ pub struct SensorEvidence {
     pub coherence: Option<Vec<f64>>,
 }
 
+/// What a damping was read from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DampingSource {
+    /// Spectra, under their window.
+    Spectra,
+    /// Decays without any window.
+    Decays,
+}
+
 /// One resonance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResonanceEvidence {
@@ -60,8 +69,10 @@ pub struct ResonanceEvidence {
     pub frequency: f64,
     /// Standard deviation of that (Hz); `None` where it is not known.
     pub std: Option<f64>,
-    /// Damping ratio as read under the window, the window's share still in it.
+    /// Damping ratio as the spectra show it, the window's share in it.
     pub apparent_damping_ratio: Option<f64>,
+    /// What the damping was read from.
+    pub damping_from: DampingSource,
     /// Frequency of each tap alone (Hz); empty where they were not read.
     pub tap_frequencies: Vec<f64>,
     /// Standard deviation of one tap's frequency that the noise explains (Hz).
@@ -108,15 +119,16 @@ impl RecordingEvidence {
         (!peaks.is_empty()).then(|| median(&mut peaks))
     }
 
-    /// The sensor that sees a line best: its index, by the largest response.
+    /// The sensor that knows a line best: the one with the highest coherence there. Levels of different
+    /// quantities cannot be compared.
     pub(super) fn best_sensor(&self, line: usize) -> Option<&SensorEvidence> {
-        let level = |sensor: &SensorEvidence| {
-            let frf = sensor.frf.as_ref()?;
-            frf.get(line).map(|h| h.norm())
+        let known = |sensor: &SensorEvidence| {
+            let values = sensor.coherence.as_ref()?;
+            values.get(line).copied()
         };
         self.sensors
             .iter()
             .filter(|sensor| sensor.coherence.is_some())
-            .max_by(|a, b| level(a).unwrap_or(0.0).total_cmp(&level(b).unwrap_or(0.0)))
+            .max_by(|a, b| known(a).unwrap_or(0.0).total_cmp(&known(b).unwrap_or(0.0)))
     }
 }

@@ -16,13 +16,11 @@ mod tap;
 mod verdict;
 
 pub use across::{check_linearity, check_mass_loading, check_reciprocity};
-pub use averages::{
-    check_averages, check_coherence, check_frequency_scatter, check_random_error, random_error,
-};
-pub use decay::{check_decay, check_exponential_window, check_window_damping, corrected_damping};
+pub use averages::{check_averages, check_coherence, check_frequency_scatter, check_random_error};
+pub use decay::{check_decay, check_exponential_window, check_window_damping};
 pub use driving_point::{check_antiresonances, check_driving_point};
 pub use evidence::{
-    ForceEvidence, RecordingEvidence, ResonanceEvidence, SensorEvidence, TapEvidence,
+    DampingSource, ForceEvidence, RecordingEvidence, ResonanceEvidence, SensorEvidence, TapEvidence,
 };
 pub use force::{check_force_fall, check_force_noise};
 pub use levels::check_tap_levels;

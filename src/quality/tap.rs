@@ -30,12 +30,15 @@ pub fn check_force_ripple(
     recording: &RecordingEvidence,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
-    let limit = depth_db(settings.double_hit);
+    let limit = decibels(SecondHit {
+        delay: 0.0,
+        ratio: settings.double_hit,
+    });
     of_force(recording, (Check::ForceRipple, limit), |tap, verdict| {
         let Some(hit) = tap.second_hit else {
-            return verdict.clear("No ripple in the force spectrum.".to_owned());
+            return verdict.clear("No second hit that would ripple the force spectrum.".to_owned());
         };
-        let depth = depth_db(hit.ratio);
+        let depth = decibels(hit);
         let happened = format!(
             "The force spectrum ripples by {depth:.1} dB every {:.1} Hz, from a second hit of {:.1} % after {:.2} ms (limit {limit:.1} dB).",
             hit.ripple_period(),
@@ -46,9 +49,9 @@ pub fn check_force_ripple(
     })
 }
 
-/// 20 log10((1 + r)/(1 - r)) (dB).
-fn depth_db(ratio: f64) -> f64 {
-    20.0 * ((1.0 + ratio) / (1.0 - ratio)).log10()
+/// Depth of the ripple that a second hit leaves (dB).
+fn decibels(hit: SecondHit) -> f64 {
+    20.0 * hit.ripple_depth().log10()
 }
 
 fn outcome(hit: SecondHit, settings: &QualitySettings) -> Outcome {

@@ -169,7 +169,7 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
         window_decay: spectra
             .filter(|spectra| matches!(spectra.window, Window::Exponential { .. }))
             .and(decay),
-        remaining_at_end: spectra.map(|spectra| spectra.decay.remaining),
+        remaining_at_end: spectra.and_then(|spectra| Some(spectra.decay?.remaining)),
         modes,
     }
 }
@@ -265,7 +265,7 @@ fn reading_section(reading: &ModeReading, recording: Option<&RecordingResult>) -
         coherence: None,
         random_error: None,
         lambda: None,
-        prominence_db: Some(reading.prominence_db),
+        prominence_db: reading.prominence_db,
         above_noise_db: reading.above_noise_db,
         recording: None,
         label: reading.label.map(|label| label.to_string()),

@@ -160,7 +160,7 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
                 frequency: reading.frequency,
                 line_frequency: reading.line_frequency,
                 half_line: reading.half_line,
-                prominence_db: reading.prominence_db,
+                prominence_db: reading.prominence_db.unwrap_or(0.0),
                 label: reading.label.map(|label| label.to_string()),
             })
             .collect(),

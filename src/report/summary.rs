@@ -47,6 +47,10 @@ fn taps(document: &Document) -> Option<String> {
     let all: Vec<_> = recordings.iter().flat_map(|r| &r.taps).collect();
     let used = all.iter().filter(|tap| tap.accepted).count();
     let files = counted(recordings.len(), "recording");
+    // Functions from a file have no samples in time.
+    let functions = recordings
+        .iter()
+        .all(|recording| recording.sample_rate.is_none());
     let total = all.len();
     let found = match total {
         1 => format!("1 tap was found in {files}"),
@@ -60,6 +64,9 @@ fn taps(document: &Document) -> Option<String> {
     };
     let [was_used, were_used] = were_used;
     Some(match (total, used) {
+        (0, _) if functions => {
+            format!("{files} of frequency response functions: there are no taps to judge.")
+        }
         (0, _) => format!("No taps were found in {files}."),
         (1, 1) => format!("{found}, and it {was_used}."),
         (1, _) => format!("{found}, and it was rejected."),

@@ -58,20 +58,6 @@ pub fn choose_window(checks: &[DecayCheck], duration: f64) -> Window {
     }
 }
 
-/// The share of a measured decay that an exponential window added: a/(a + own decay), from 0 to 1.
-///
-/// A damping is what was measured less the window's part, zeta = zeta_measured - a/omega. Where a
-/// reaches the whole nothing is left and a damping must be refused; where its share is large the
-/// damping is a small difference of large numbers. `own_decay` (1/s) is what is left after taking
-/// the window's out.
-pub fn window_share(window: Window, own_decay: f64) -> f64 {
-    let added = window.added_decay();
-    if added == 0.0 {
-        return 0.0;
-    }
-    added / (added + own_decay.max(0.0))
-}
-
 /// End of an exponential window on a record that has rung down already: 10 %, so that what was asked for
 /// is there, and the decay it adds stays below that of the record.
 const GENTLE: f64 = 0.1;

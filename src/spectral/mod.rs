@@ -18,9 +18,7 @@ mod zoom;
 pub use average::{AveragedSpectra, SpectralAverager, TapRecord, average_records};
 pub use block::{largest_smooth_block, smallest_smooth_block};
 pub use chirp::chirp_z;
-pub use decay::{
-    DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay, window_share,
-};
+pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
 pub use frf::{FrfEstimator, LinePowers, LineQuality, random_error};
 pub use lines::{DISPLAY_RATIO, Lines};
 pub use noise::{line_amplitude, noise_power};

@@ -227,7 +227,7 @@ fn reading(frequency: f64, half_line: f64) -> ModeReading {
         std: None,
         damping_ratio: None,
         damping_std: None,
-        prominence_db: 20.0,
+        prominence_db: Some(20.0),
         above_noise_db: None,
         label: None,
         source: FrequencySource::Line,

@@ -399,7 +399,7 @@ fn recover_modal_constants_with_their_signs() {
         .collect();
     let kinds = [ResponseForm::Accelerance; 2];
     for (fit, mode) in all_fitted(&data, &starts).iter().zip(&modes) {
-        let constants = modal_constants(fit, &forces, &kinds);
+        let constants = modal_constants(fit, &forces, &kinds.map(Some));
         assert_eq!(constants.len(), 2);
         for (constant, shape) in constants.iter().zip(&mode.shape_at_sensors) {
             // The simulator's force is linear between samples: sinc^2(f/rate) of the sampled one.

@@ -11,7 +11,7 @@ use tapjoint::recording::ResponseForm;
 use tapjoint::spectral::{
     AveragedSpectra, DecayCheck, FrfEstimator, LinePowers, Lines, SpectralAverager, TapRecord,
     Transformer, Window, apply_force_window, average_records, choose_window, random_error,
-    transform_block, window_share,
+    transform_block,
 };
 
 const RATE: f64 = 2048.0;
@@ -644,13 +644,4 @@ fn recover_the_force_window_takes_the_noise_out_and_leaves_the_pulse() {
         "{with} with, {without} without the window"
     );
     assert!(error(clean) < 1e-3, "the pulse itself is right to 0.1 %");
-}
-
-#[test]
-fn limit_the_windows_share_of_a_damping() {
-    let window = Window::Exponential { decay: 3.0 };
-    assert_eq!(window_share(window, 1.0), 0.75);
-    assert_eq!(window_share(window, 0.0), 1.0, "nothing is left of it");
-    assert_eq!(window_share(window, -1.0), 1.0, "less than nothing");
-    assert_eq!(window_share(Window::Rectangular, 0.0), 0.0);
 }

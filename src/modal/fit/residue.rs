@@ -52,10 +52,11 @@ struct Uncertain {
 pub fn modal_constants(
     mode: &ModeFit,
     forces: &[TapForce],
-    kinds: &[ResponseForm],
+    kinds: &[Option<ResponseForm>],
 ) -> Vec<ModalConstant> {
     (0..kinds.len())
         .filter_map(|sensor| {
+            let kind = kinds[sensor]?;
             let seen: Vec<(&ColumnAmplitude, Complex64, Complex64)> = mode
                 .amplitudes
                 .iter()
@@ -68,7 +69,7 @@ pub fn modal_constants(
                 })
                 .collect();
             let residues: Vec<(Uncertain, f64)> = seen.iter().map(residue_of_tap).collect();
-            constant(mode, sensor, kinds[sensor], &residues)
+            constant(mode, sensor, kind, &residues)
         })
         .collect()
 }

@@ -3,7 +3,6 @@
 use num_complex::Complex64;
 
 use super::PolyreferenceError;
-use crate::spectral::Lines;
 
 /// Responses on equally spaced lines: frequency response functions, or transforms of free decays
 /// (then each tap and sensor is an output of one input).
@@ -55,19 +54,6 @@ impl<'a> ResponseMatrix<'a> {
             inputs,
             entries,
         })
-    }
-
-    /// One input, as a hammer test with a single tapped point has it, or free decays.
-    ///
-    /// # Errors
-    /// As [`ResponseMatrix::new`].
-    pub fn single_input(
-        lines: &Lines,
-        spectra: &[&'a [Complex64]],
-    ) -> Result<Self, PolyreferenceError> {
-        let values: Vec<Vec<&[Complex64]>> =
-            spectra.iter().map(|&spectrum| vec![spectrum]).collect();
-        Self::new(lines.low, lines.spacing, &values)
     }
 
     /// The part between two frequencies (Hz), both ends included.

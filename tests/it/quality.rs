@@ -270,7 +270,14 @@ fn val_averages_and_coherence() {
             "without a hammer",
         );
     }
-    let low = |value| changed(|r| r.sensors[0].coherence = Some(vec![value; lines().points()]));
+    // The best sensor speaks for a line: a resonance is unclear only where all are.
+    let low = |value| {
+        changed(|r| {
+            for sensor in &mut r.sensors {
+                sensor.coherence = Some(vec![value; lines().points()]);
+            }
+        })
+    };
     // sqrt(0.3/(10 x 0.7)) = 0.207.
     assert_doubt(
         &judged(&low(0.7), Check::Coherence),

@@ -1,0 +1,185 @@
+//! What was planted in a test, and what the diagnosis answered: all that the score sees.
+
+use std::collections::BTreeMap;
+
+use crate::effects::{EffectId, Group, Place};
+
+/// What a diagnosis chooses between.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// Nothing is missing.
+    None,
+    /// An effect of this group is missing.
+    Group(Group),
+    /// Something is missing that the catalogue does not know.
+    Unknown,
+}
+
+impl Class {
+    /// As in a table.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Group(group) => group.name(),
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+/// One planted effect.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Planted {
+    /// Of the catalogue, with its parameters by name (SI).
+    Catalogue(EffectId, BTreeMap<String, f64>),
+    /// Of a kind that the catalogue does not have.
+    Outside(String),
+}
+
+/// What was planted in one test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// The test.
+    pub name: String,
+    /// Empty: nothing.
+    pub effects: Vec<Planted>,
+    /// Whether an ideal observer would notice that something is missing; `None` where unknown.
+    pub detectable: Option<bool>,
+    /// Whether an ideal observer could tell that nothing in the catalogue explains it.
+    pub refutable: Option<bool>,
+}
+
+/// Kinds of cases, each with questions of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CaseKind {
+    /// Nothing was planted.
+    Null,
+    /// One effect of the catalogue.
+    Single(EffectId),
+    /// Several effects of the catalogue.
+    Several,
+    /// Something outside the catalogue.
+    Outside,
+}
+
+impl Truth {
+    /// The catalogue's effects that were planted.
+    pub fn catalogue(&self) -> impl Iterator<Item = (EffectId, &BTreeMap<String, f64>)> {
+        self.effects.iter().filter_map(|planted| match planted {
+            Planted::Catalogue(id, values) => Some((*id, values)),
+            Planted::Outside(_) => None,
+        })
+    }
+
+    /// What kind of case this is.
+    pub fn kind(&self) -> CaseKind {
+        match &self.effects[..] {
+            [] => CaseKind::Null,
+            all if all.iter().any(|p| matches!(p, Planted::Outside(_))) => CaseKind::Outside,
+            [Planted::Catalogue(id, _)] => CaseKind::Single(*id),
+            _ => CaseKind::Several,
+        }
+    }
+
+    /// The class that is right; of several effects none alone is.
+    pub fn class(&self) -> Option<Class> {
+        match self.kind() {
+            CaseKind::Null => Some(Class::None),
+            CaseKind::Single(id) => Some(Class::Group(id.group())),
+            CaseKind::Outside => Some(Class::Unknown),
+            CaseKind::Several => None,
+        }
+    }
+}
+
+/// Kinds of verdicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The nominal model explains the data.
+    NoGap,
+    /// One effect, or the two that are needed.
+    Named,
+    /// One group of effects that cannot be told apart.
+    Group,
+    /// A short list.
+    Set,
+    /// Something that the catalogue does not explain.
+    Unknown,
+    /// Too few data for the question.
+    NotEnoughData,
+}
+
+impl Verdict {
+    /// As in the report.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoGap => "no-gap",
+            Self::Named => "named",
+            Self::Group => "group",
+            Self::Set => "set",
+            Self::Unknown => "unknown",
+            Self::NotEnoughData => "not-enough-data",
+        }
+    }
+}
+
+/// What the diagnosis said of one test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// Its verdict.
+    pub verdict: Verdict,
+    /// The effects that the verdict names.
+    pub effects: Vec<EffectId>,
+    /// Probability of each class, adding to 1.
+    pub classes: BTreeMap<Class, f64>,
+    /// Probability of each place; `None` is the place of what is unknown.
+    pub places: Vec<(Option<Place>, f64)>,
+    /// Estimated parameters of the named effects (SI).
+    pub parameters: Vec<(EffectId, String, f64)>,
+    /// How far the gap closes on withheld data; `None` where it was too small to say.
+    pub closure: Option<f64>,
+}
+
+impl Answer {
+    /// The most probable class, and its probability.
+    pub fn first(&self) -> Option<(Class, f64)> {
+        self.ranked().into_iter().next()
+    }
+
+    /// All classes, the most probable first; equal ones in the catalogue's order.
+    pub fn ranked(&self) -> Vec<(Class, f64)> {
+        let mut ranked: Vec<(Class, f64)> = self.classes.iter().map(|(c, p)| (*c, *p)).collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+        ranked
+    }
+
+    /// The most probable effect groups, `none` and `unknown` left out.
+    pub fn groups(&self) -> Vec<Group> {
+        let group = |(class, _): (Class, f64)| match class {
+            Class::Group(group) => Some(group),
+            Class::None | Class::Unknown => None,
+        };
+        self.ranked().into_iter().filter_map(group).collect()
+    }
+
+    /// The smallest set of classes that holds `share` (1) of the probability.
+    pub fn set(&self, share: f64) -> Vec<Class> {
+        let mut held = 0.0;
+        let mut set = Vec::new();
+        for (class, probability) in self.ranked() {
+            if held >= share {
+                break;
+            }
+            held += probability;
+            set.push(class);
+        }
+        set
+    }
+
+    /// The groups that the verdict names.
+    pub fn named_groups(&self) -> Vec<Group> {
+        let mut groups: Vec<Group> = self.effects.iter().map(|id| id.group()).collect();
+        groups.sort();
+        groups.dedup();
+        groups
+    }
+}

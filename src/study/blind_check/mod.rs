@@ -1,0 +1,28 @@
+//! The blind check: virtual tests whose effect is withheld, diagnosed and scored.
+//!
+//! ```text
+//! draw -> recordings and description (without the truth) -> diagnosis -> answers
+//!   \-> truth, sealed by a commitment -----------------------------------> score
+//! ```
+//!
+//! The diagnosis sees recordings and description alone; it shares no random state with what drew
+//! the tests. The definitions of the effects are shared, so that the score is an upper bound:
+//! tests made elsewhere ([`parse_truths`]) are the check that counts.
+
+mod calibration;
+mod case;
+mod commitment;
+mod mutation;
+mod rate;
+mod score;
+mod table;
+mod truth_file;
+
+pub use calibration::{Calibration, ReliabilityBin};
+pub use case::{Answer, CaseKind, Class, Planted, Truth, Verdict};
+pub use commitment::commitment;
+pub use mutation::{always_scale, shuffled};
+pub use rate::Rate;
+pub use score::{Case, SET_SHARE, Scores, score};
+pub use table::{Row, Target, render_rows, rows};
+pub use truth_file::{TruthError, parse_truths};

@@ -1,0 +1,147 @@
+//! The score as rows: what each rate means, what was reached, what was aimed at.
+
+use super::rate::Rate;
+use super::score::Scores;
+
+/// Which side of its target a figure has to stay on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// At least so much.
+    AtLeast(f64),
+    /// At most so much.
+    AtMost(f64),
+    /// No target; for information.
+    None,
+}
+
+impl Target {
+    /// Whether a figure meets it.
+    pub fn is_met(&self, value: f64) -> bool {
+        match *self {
+            Self::AtLeast(limit) => value >= limit,
+            Self::AtMost(limit) => value <= limit,
+            Self::None => true,
+        }
+    }
+}
+
+/// One figure of the score.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Name for programs.
+    pub key: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// The figure; `None` without a case.
+    pub value: Option<f64>,
+    /// Its 95 % interval; `None` where it is no rate.
+    pub interval: Option<(f64, f64)>,
+    /// Hits and cases of a rate.
+    pub counts: Option<(usize, usize)>,
+    /// What is aimed at with five recordings (two sensor positions, three tap positions, two
+    /// levels, six modes).
+    pub target: Target,
+}
+
+/// All figures in the order of reading.
+pub fn rows(scores: &Scores) -> Vec<Row> {
+    use Target::{AtLeast, AtMost};
+    let s = scores;
+    let mut rows = vec![
+        rate("top_1", "one effect: first group is right", s.top_1, AtLeast(0.80)),
+        rate("top_1_detectable", "the same where it can be noticed", s.top_1_detectable, AtLeast(0.88)),
+        rate("top_3", "one effect: among the first three", s.top_3, AtLeast(0.94)),
+        rate("where", "one effect: place is right", s.place, AtLeast(0.83)),
+        rate("top_1_of_all", "one effect: first of all classes", s.top_1_of_all, Target::None),
+        rate("named_right", "one effect, named: name is right", s.named_right, AtLeast(0.96)),
+        rate("coverage", "one effect: something is named", s.named, AtLeast(0.62)),
+        rate("named_right_of_all", "any case, named: name is right", s.named_right_of_all, Target::None),
+        rate("null_called_effect", "nothing: called an effect", s.null_called_effect, AtMost(0.02)),
+        rate("null_false_alarm", "nothing: an effect comes first", s.null_false_alarm, Target::None),
+        rate("outside_named", "outside: named", s.outside_named, AtMost(0.18)),
+        rate("outside_refused", "outside, refutable: refused", s.outside_refused, AtLeast(0.80)),
+        rate("outside_unknown", "outside: called unknown", s.outside_unknown, Target::None),
+        rate("several_found_or_refused", "two: both found, or refused", s.several_found_or_refused, AtLeast(0.80)),
+        rate("several_found", "two: both found", s.several_found, Target::None),
+        rate("set_coverage", "90 % set holds the truth", s.set_coverage, AtLeast(0.88)),
+    ];
+    rows.extend(figures(scores));
+    rows
+}
+
+fn figures(scores: &Scores) -> [Row; 7] {
+    use Target::{AtLeast, AtMost};
+    let calibration = &scores.calibration;
+    let (median, tenth) = (scores.closure.map(|c| c.0), scores.closure.map(|c| c.1));
+    [
+        figure("set_size", "mean size of the 90 % set", scores.set_size, AtMost(2.0)),
+        figure("truth_probability", "mean probability of the truth", scores.truth_probability, Target::None),
+        figure("brier", "Brier score", calibration.brier, Target::None),
+        figure(
+            "calibration_error",
+            "expected calibration error",
+            calibration.expected_calibration_error,
+            AtMost(0.08),
+        ),
+        figure("closure_median", "withheld closure, named: median", median, AtLeast(0.97)),
+        figure("closure_10th", "withheld closure, named: 10th pct", tenth, AtLeast(0.75)),
+        figure("size_error", "size error, median |ln ratio|", scores.size_error, AtMost(0.15)),
+    ]
+}
+
+fn rate(key: &'static str, meaning: &'static str, rate: Rate, target: Target) -> Row {
+    Row {
+        key,
+        meaning,
+        value: rate.value(),
+        interval: rate.interval(),
+        counts: Some((rate.hits, rate.of)),
+        target,
+    }
+}
+
+fn figure(key: &'static str, meaning: &'static str, value: Option<f64>, target: Target) -> Row {
+    Row {
+        key,
+        meaning,
+        value,
+        interval: None,
+        counts: None,
+        target,
+    }
+}
+
+/// The rows as a table for a terminal, 80 columns wide.
+pub fn render_rows(rows: &[Row]) -> String {
+    let mut text = format!(
+        "{:<36}{:>7}  {:<15}{:>9}  {}\n",
+        "figure", "value", "95 % interval", "cases", "target"
+    );
+    for row in rows {
+        let value = row.value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let interval = row
+            .interval
+            .map_or_else(String::new, |(low, high)| format!("{low:.3} to {high:.3}"));
+        let counts = row
+            .counts
+            .map_or_else(String::new, |(hits, of)| format!("{hits}/{of}"));
+        let line = format!(
+            "{:<36}{value:>7}  {interval:<15}{counts:>9}  {}",
+            row.meaning,
+            target_text(row)
+        );
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+fn target_text(row: &Row) -> String {
+    let (sign, limit) = match row.target {
+        Target::AtLeast(limit) => (">=", limit),
+        Target::AtMost(limit) => ("<=", limit),
+        Target::None => return String::new(),
+    };
+    let missed = row.value.is_some_and(|value| !row.target.is_met(value));
+    format!("{sign} {limit:.2}{}", if missed { " MISSED" } else { "" })
+}

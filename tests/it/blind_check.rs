@@ -1,0 +1,224 @@
+//! The score of a blind check, on answers made by hand.
+
+use std::collections::BTreeMap;
+
+use tapjoint::effects::{EffectId, Place};
+use tapjoint::study::blind_check::{
+    Answer, Case, Class, Planted, Rate, Truth, Verdict, always_scale, parse_truths, rows, score,
+    shuffled,
+};
+
+fn planted(name: &str, effects: &[EffectId], size: f64) -> Truth {
+    let effects = effects
+        .iter()
+        .map(|id| Planted::Catalogue(*id, [(id.size_parameter().to_owned(), size)].into()));
+    Truth {
+        name: name.to_owned(),
+        effects: effects.collect(),
+        detectable: Some(true),
+        refutable: None,
+    }
+}
+
+fn outside(name: &str) -> Truth {
+    Truth {
+        name: name.to_owned(),
+        effects: vec![Planted::Outside("second support".to_owned())],
+        detectable: Some(true),
+        refutable: Some(true),
+    }
+}
+
+/// An answer that gives `p` to one class and the rest to none (or to unknown, where the class is none).
+fn answer(verdict: Verdict, class: Class, p: f64) -> Answer {
+    let other = if class == Class::None {
+        Class::Unknown
+    } else {
+        Class::None
+    };
+    let effects = match (verdict, class) {
+        (Verdict::Named, Class::Group(group)) => EffectId::ALL
+            .iter()
+            .copied()
+            .filter(|id| id.group() == group)
+            .take(1)
+            .collect(),
+        _ => Vec::new(),
+    };
+    let place = effects.first().map(|id: &EffectId| id.place());
+    Answer {
+        verdict,
+        parameters: effects
+            .iter()
+            .map(|id| (*id, id.size_parameter().to_owned(), 1.1))
+            .collect(),
+        effects,
+        classes: [(class, p), (other, 1.0 - p)].into(),
+        places: vec![(place, p), (Some(Place::Fixture), 0.0)],
+        closure: Some(p),
+    }
+}
+
+fn group(id: EffectId) -> Class {
+    Class::Group(id.group())
+}
+
+/// One of each: right name, wrong name, no gap called, named null, right null, refused outside,
+/// two effects of which one is named.
+fn cases() -> Vec<Case> {
+    use EffectId::{AddedMass, CrossCoupling, JointMass, SensorMass};
+    vec![
+        (
+            planted("right", &[SensorMass], 1.0),
+            answer(Verdict::Named, group(SensorMass), 0.95),
+        ),
+        (
+            planted("wrong", &[AddedMass], 1.0),
+            answer(Verdict::Named, group(JointMass), 0.85),
+        ),
+        (
+            planted("missed", &[CrossCoupling], 1.0),
+            answer(Verdict::NoGap, Class::None, 0.75),
+        ),
+        (
+            planted("called", &[], 1.0),
+            answer(Verdict::Named, group(JointMass), 0.85),
+        ),
+        (
+            planted("clean", &[], 1.0),
+            answer(Verdict::NoGap, Class::None, 0.65),
+        ),
+        (
+            outside("refused"),
+            answer(Verdict::Unknown, Class::Unknown, 0.65),
+        ),
+        (
+            planted("two", &[SensorMass, CrossCoupling], 1.0),
+            answer(Verdict::Named, group(SensorMass), 0.95),
+        ),
+    ]
+}
+
+#[test]
+fn val_a_score_counted_by_hand() {
+    let scores = score(&cases());
+    let of = |hits, of| Rate { hits, of };
+    assert_eq!(scores.counts, [2, 3, 1, 1]);
+    assert_eq!(scores.top_1, of(1, 3));
+    assert_eq!(scores.top_1_of_all, of(1, 3));
+    assert_eq!(scores.top_3, of(1, 3));
+    // Sensor and joint were named; the joint is not where the mass was added.
+    assert_eq!(scores.place, of(1, 3));
+    assert_eq!(scores.named, of(2, 3));
+    assert_eq!(scores.named_right, of(1, 2));
+    assert_eq!(scores.named_right_of_all, of(1, 4));
+    assert_eq!(scores.null_called_effect, of(1, 2));
+    assert_eq!(scores.null_false_alarm, of(1, 2));
+    assert_eq!(scores.outside_named, of(0, 1));
+    assert_eq!(scores.outside_refused, of(1, 1));
+    assert_eq!(scores.several_found_or_refused, of(0, 1));
+    // Sets: {sensor-mass} holds it; {joint-mass, none} does not hold added-mass, but the null;
+    // {none, unknown} does not hold cross-coupling, but the other null; {unknown, none} the outside.
+    assert_eq!(scores.set_coverage, of(4, 6));
+    assert_eq!(scores.set_size, Some(11.0 / 6.0));
+    assert_eq!(scores.closures, 2);
+    let (median, tenth) = scores.closure.expect("two were named");
+    // Linear between 0.85 and 0.95.
+    assert!((median - 0.90).abs() < 1e-12 && (tenth - 0.86).abs() < 1e-12);
+    // ln 1.1, of the one right name.
+    let size = scores.size_error.expect("one was named rightly");
+    assert!((size - 1.1f64.ln()).abs() < 1e-12);
+}
+
+#[test]
+fn val_brier_and_reliability_by_hand() {
+    let scores = score(&cases());
+    // (0.05^2 + 0.05^2, 1 + 0.85^2 + 0.15^2, 1 + 0.75^2 + 0.25^2, 0.85^2 + 0.85^2,
+    // 0.35^2 + 0.35^2, 0.35^2 + 0.35^2)/6.
+    let expected = (0.005 + 1.745 + 1.625 + 1.445 + 0.245 + 0.245) / 6.0;
+    let found = scores.calibration.brier.expect("there are cases");
+    assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    let bins = &scores.calibration.reliability;
+    assert_eq!(bins.iter().map(|bin| bin.cases).sum::<usize>(), 6);
+    let bin = bins[6];
+    assert_eq!((bin.cases, bin.right), (2, Some(1.0)));
+    // |0.65 - 1| x 2/6 + |0.75 - 0|/6 + |0.85 - 0| x 2/6 + |0.95 - 1|/6.
+    let expected = (0.35 * 2.0 + 0.75 + 0.85 * 2.0 + 0.05) / 6.0;
+    let found = scores.calibration.expected_calibration_error;
+    assert!((found.expect("there are cases") - expected).abs() < 1e-12);
+}
+
+#[test]
+fn prop_mutations_lose() {
+    let all: Vec<Case> = EffectId::ALL
+        .iter()
+        .map(|id| {
+            let class = group(*id);
+            (
+                planted(id.name(), &[*id], 1.0),
+                answer(Verdict::Named, class, 0.95),
+            )
+        })
+        .collect();
+    let right = score(&all).top_1;
+    assert_eq!(right.hits, right.of);
+    let share = |cases: &[Case]| score(cases).top_1.hits as f64 / right.of as f64;
+    // Of 16 effects in 13 groups at most the three of one group can be right by chance together,
+    // plus a few that the shuffle left in place.
+    assert!(share(&shuffled(&all, 1)) < 0.4);
+    let scale = EffectId::ALL
+        .iter()
+        .filter(|id| id.group() == EffectId::Modulus.group())
+        .count();
+    assert_eq!(score(&always_scale(&all)).top_1.hits, scale);
+}
+
+#[test]
+fn prop_rates_do_not_depend_on_the_order_of_cases() {
+    let (first, mut second) = (cases(), cases());
+    second.reverse();
+    assert_eq!(rows(&score(&first)), rows(&score(&second)));
+}
+
+#[test]
+fn limit_no_cases_have_no_figures() {
+    let rows = rows(&score(&[]));
+    assert!(rows.iter().all(|row| row.value.is_none()), "{rows:?}");
+}
+
+#[test]
+fn val_truths_of_tests_made_elsewhere() {
+    let text = r#"[
+        {"name": "a", "effects": []},
+        {"name": "b", "effects": ["added-mass"], "params": {"mass": 0.02, "position": 0.3}},
+        {"name": "c", "effects": ["sensor-mass", "local-crack"],
+         "params": {"sensor-mass": {"mass": 0.008}, "local-crack": {"compliance": 0.01}}},
+        {"name": "d", "effects": ["loose-screw"], "params": {"torque": 1}}
+    ]"#;
+    let truths = parse_truths(text).expect("a list of truths");
+    assert_eq!(truths.len(), 4);
+    assert_eq!(truths[0].class(), Some(Class::None));
+    let values: BTreeMap<_, _> = [("mass".to_owned(), 0.02), ("position".to_owned(), 0.3)].into();
+    assert_eq!(
+        truths[1].effects,
+        [Planted::Catalogue(EffectId::AddedMass, values)]
+    );
+    assert_eq!(truths[2].class(), None);
+    assert_eq!(truths[2].catalogue().count(), 2);
+    assert_eq!(truths[3].class(), Some(Class::Unknown));
+}
+
+#[test]
+fn regress_a_wrong_truth_file_says_what_is_expected() {
+    for (text, expected) in [
+        ("{}", "write a JSON list"),
+        ("[{\"name\": \"a\"}]", "effects"),
+        (
+            "[{\"name\": \"a\", \"effects\": []}, {\"name\": \"a\", \"effects\": []}]",
+            "occurs twice",
+        ),
+    ] {
+        let error = parse_truths(text).expect_err("no truths").to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
+}

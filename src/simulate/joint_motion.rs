@@ -63,7 +63,7 @@ impl JointMotion {
         let slots = law.memory();
         Self {
             tolerance: match law {
-                JointMoment::Cubic { .. } => ELASTIC_TOLERANCE,
+                JointMoment::Elastic { .. } => ELASTIC_TOLERANCE,
                 JointMoment::MicroSlip { .. } => SLIP_TOLERANCE,
             },
             collocations: (0..=FINEST)

@@ -111,7 +111,11 @@ fn val_one_mode_on_a_cubic_joint_has_the_period_of_duffings_oscillator() {
         structure.joint_compliance = 0.0;
         structure.joint_to_sensors = vec![0.0];
         (place.to_sensors, place.to_joint) = (vec![0.0], 0.0);
-        let law = JointMoment::Cubic { stiffness, cubic };
+        let law = JointMoment::Elastic {
+            stiffness,
+            coefficient: cubic,
+            exponent: 2.0,
+        };
         let mut motion = struck(
             (&structure, &place),
             Sensed::Displacement,
@@ -160,7 +164,11 @@ fn val_energy_stays_through_a_thousand_periods_of_a_cubic_joint() {
         let quiet = struck((&structure, &place), Sensed::Displacement, 1e-4, None, pulse(50.0));
         let largest = largest_rotation(&quiet);
         let cubic = 4.0 * ratio / (3.0 * largest * largest);
-        let law = JointMoment::Cubic { stiffness, cubic };
+        let law = JointMoment::Elastic {
+            stiffness,
+            coefficient: cubic,
+            exponent: 2.0,
+        };
         let mut motion = struck(
             (&structure, &place),
             Sensed::Displacement,
@@ -236,7 +244,11 @@ fn val_micro_slip_loses_the_energy_that_the_structure_loses() {
 fn val_the_non_linear_joint_agrees_with_runge_and_kutta() {
     let (structure, place, stiffness) = cantilever(3, 0.003);
     let cubic = 2e4;
-    let law = JointMoment::Cubic { stiffness, cubic };
+    let law = JointMoment::Elastic {
+            stiffness,
+            coefficient: cubic,
+            exponent: 2.0,
+        };
     let step = 1e-4;
     let strike = pulse(100.0);
     let mut motion = struck((&structure, &place), Sensed::Displacement, step, Some(law), strike);
@@ -304,9 +316,10 @@ fn limit_few_modes_with_their_springs_move_as_many_modes_do() {
     let mut seen = Vec::new();
     for count in [3, 12] {
         let (structure, place, stiffness) = cantilever(count, 0.0);
-        let law = JointMoment::Cubic {
+        let law = JointMoment::Elastic {
             stiffness,
-            cubic: 2e4,
+            coefficient: 2e4,
+            exponent: 2.0,
         };
         let slow = Pulse {
             length: 2e-2,
@@ -337,9 +350,10 @@ fn limit_few_modes_with_their_springs_move_as_many_modes_do() {
 fn limit_a_joint_without_extra_moment_moves_as_the_linear_structure() {
     let (structure, place, stiffness) = cantilever(6, 0.004);
     let laws = [
-        JointMoment::Cubic {
+        JointMoment::Elastic {
             stiffness,
-            cubic: 0.0,
+            coefficient: 0.0,
+            exponent: 2.0,
         },
         JointMoment::MicroSlip {
             stiffness,

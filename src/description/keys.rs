@@ -75,6 +75,7 @@ pub(super) const RECORDING: KnownTable = KnownTable {
     keys: &[
         "file",
         "tap",
+        "level",
         "band",
         "block",
         "at",

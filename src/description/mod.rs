@@ -244,6 +244,9 @@ pub struct RecordingDescription {
     pub line: usize,
     /// Where the hammer strikes (m).
     pub tap: Option<f64>,
+    /// How hard it is struck, relative to the test's other recordings (1): the simulator follows it, the
+    /// analysis measures it.
+    pub level: Option<f64>,
     /// Zoom band (Hz).
     pub band: Option<(f64, f64)>,
     /// Block size (samples).

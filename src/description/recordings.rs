@@ -29,6 +29,7 @@ const SAMPLE_RATE: Limits = Limits::between(
 );
 const BAND_EDGE: Limits =
     Limits::between(0.0, 1e8, "write two frequencies in Hz: `band = [0, 200]`");
+const LEVEL: Limits = Limits::positive(1e3, "give how many times as hard as level 1 it is struck");
 const TORQUE: Limits = Limits::between(0.0, 1e9, "give the tightening torque in N m");
 const TEMPERATURE: Limits = Limits::between(
     -273.15,
@@ -58,6 +59,7 @@ pub(super) fn read_recording(
         file: file.text("a file such as \"taps.wav\"")?.into(),
         line: file.line,
         tap: table.optional("tap", |entry| entry.within(Dimension::Length, &position))?,
+        level: table.optional("level", |entry| entry.within(Dimension::Ratio, &LEVEL))?,
         band: table.optional("band", read_band)?,
         block: table.optional("block", |entry| entry.count(&BLOCK))?,
         at: at.unwrap_or_default(),

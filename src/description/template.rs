@@ -68,6 +68,7 @@ position = 0.338               # m
 [[recording]]                  # once for each file; the same file may be read in several bands
 file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this file
 # tap = 0.04                   # m, where the hammer strikes, default: not known
+# level = 1                    # how hard it is struck beside the others, for `tapjoint simulate` alone, default: 1
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
 # block = 2048                 # samples, block/2.56 lines are shown; default: what fits the shortest tap
 # at = { A = 0.20 }            # m, sensors moved for this recording, default: none

@@ -36,6 +36,7 @@ mod units;
 mod warning;
 mod wav;
 mod wav_error;
+mod wav_stream;
 mod write;
 
 pub use blocks::Blocks;
@@ -54,6 +55,7 @@ pub use uff::{
 pub use units::{STANDARD_GRAVITY, channel_unit};
 pub use warning::{ChannelLabel, RecordingWarning};
 pub use wav_error::WavError;
+pub use wav_stream::{WavLayout, WavStream};
 pub use write::{WavFormat, encode_wav, write_wav};
 
 use health::HealthMeter;

@@ -1,10 +1,11 @@
 //! Writing WAV files, through hound.
 
 use std::fs::File;
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::error::RecordingError;
+use super::wav_stream::{WavLayout, WavStream};
 
 /// Number format of a WAV file that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,7 +19,7 @@ pub enum WavFormat {
 }
 
 impl WavFormat {
-    fn bits(self) -> u16 {
+    pub(super) fn bits(self) -> u16 {
         match self {
             Self::Pcm16 => 16,
             Self::Pcm24 => 24,
@@ -42,38 +43,32 @@ pub fn write_wav(
     format: WavFormat,
 ) -> Result<u64, RecordingError> {
     let name = path.display().to_string();
-    let unwritable = |source| RecordingError::Unwritable {
-        file: name.clone(),
-        source,
-    };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut aside = tempfile::NamedTempFile::new_in(folder).map_err(unwritable)?;
-    let clipped = encode_wav(
-        &name,
-        &mut BufWriter::new(aside.as_file_mut()),
+    let frames = check(&name, sample_rate, channels, format)?;
+    let layout = WavLayout {
         sample_rate,
-        channels,
+        channels: channels.len(),
+        frames: frames as u64,
         format,
-    )?;
-    allow_others_to_read(aside.as_file()).map_err(unwritable)?;
-    aside
-        .persist(path)
-        .map_err(|error| unwritable(error.error))?;
-    Ok(clipped)
+    };
+    let mut stream = WavStream::create(path, layout)?;
+    let mut frame = Vec::with_capacity(channels.len());
+    for index in 0..frames {
+        frame.clear();
+        frame.extend(channels.iter().filter_map(|channel| channel.get(index)));
+        stream.write(&frame)?;
+    }
+    stream.finish()
 }
 
 /// Temporary files are private to their owner; a recording is an ordinary file.
 #[cfg(unix)]
-fn allow_others_to_read(file: &File) -> std::io::Result<()> {
+pub(super) fn allow_others_to_read(file: &File) -> std::io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
     file.set_permissions(std::fs::Permissions::from_mode(0o644))
 }
 
 #[cfg(not(unix))]
-fn allow_others_to_read(_file: &File) -> std::io::Result<()> {
+pub(super) fn allow_others_to_read(_file: &File) -> std::io::Result<()> {
     Ok(())
 }
 
@@ -120,19 +115,30 @@ fn check(
     }
     let slices: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
     let frames = super::open::check_samples(name, f64::from(sample_rate), &slices)?;
-    let bytes = (frames as u64)
-        .saturating_mul(channels.len() as u64)
+    check_size(name, channels.len(), frames as u64, format)?;
+    Ok(frames)
+}
+
+/// Whether a WAV file can hold so much.
+pub(super) fn check_size(
+    name: &str,
+    channels: usize,
+    frames: u64,
+    format: WavFormat,
+) -> Result<(), RecordingError> {
+    let bytes = frames
+        .saturating_mul(channels as u64)
         .saturating_mul(u64::from(format.bits() / 8));
     // 128 bytes are more than the header takes.
-    if channels.len() > usize::from(u16::MAX) || bytes > u64::from(u32::MAX) - 128 {
+    if channels > usize::from(u16::MAX) || bytes > u64::from(u32::MAX) - 128 {
         return Err(RecordingError::TooLarge {
             file: name.to_owned(),
-            channels: channels.len(),
-            frames,
+            channels,
+            frames: usize::try_from(frames).unwrap_or(usize::MAX),
             bits: format.bits(),
         });
     }
-    Ok(frames)
+    Ok(())
 }
 
 fn encode(
@@ -141,37 +147,48 @@ fn encode(
     channels: &[Vec<f64>],
     format: WavFormat,
 ) -> Result<u64, hound::Error> {
-    let spec = hound::WavSpec {
-        channels: channels.len() as u16,
-        sample_rate,
-        bits_per_sample: format.bits(),
-        sample_format: match format {
-            WavFormat::Float32 => hound::SampleFormat::Float,
-            WavFormat::Pcm16 | WavFormat::Pcm24 => hound::SampleFormat::Int,
-        },
-    };
-    let mut wav = hound::WavWriter::new(writer, spec)?;
-    let full_scale = 2_f64.powi(i32::from(format.bits()) - 1);
+    let mut wav = hound::WavWriter::new(writer, spec(sample_rate, channels.len(), format))?;
     let mut clipped = 0;
     for frame in 0..channels.first().map_or(0, Vec::len) {
         for value in channels.iter().filter_map(|channel| channel.get(frame)) {
-            match format {
-                WavFormat::Float32 => wav.write_sample(*value as f32)?,
-                WavFormat::Pcm16 | WavFormat::Pcm24 => {
-                    let wanted = (value * full_scale).round();
-                    let stored = wanted.clamp(-full_scale, full_scale - 1.0);
-                    clipped += u64::from(stored != wanted);
-                    wav.write_sample(stored as i32)?;
-                }
-            }
+            clipped += u64::from(write_value(&mut wav, *value, format)?);
         }
     }
     wav.finalize()?;
     Ok(clipped)
 }
 
+pub(super) fn spec(sample_rate: u32, channels: usize, format: WavFormat) -> hound::WavSpec {
+    hound::WavSpec {
+        channels: channels as u16,
+        sample_rate,
+        bits_per_sample: format.bits(),
+        sample_format: match format {
+            WavFormat::Float32 => hound::SampleFormat::Float,
+            WavFormat::Pcm16 | WavFormat::Pcm24 => hound::SampleFormat::Int,
+        },
+    }
+}
+
+/// Writes one value, and says whether it was clipped.
+pub(super) fn write_value(
+    wav: &mut hound::WavWriter<impl Write + Seek>,
+    value: f64,
+    format: WavFormat,
+) -> Result<bool, hound::Error> {
+    if format == WavFormat::Float32 {
+        wav.write_sample(value as f32)?;
+        return Ok(false);
+    }
+    let full_scale = 2_f64.powi(i32::from(format.bits()) - 1);
+    let wanted = (value * full_scale).round();
+    let stored = wanted.clamp(-full_scale, full_scale - 1.0);
+    wav.write_sample(stored as i32)?;
+    Ok(stored != wanted)
+}
+
 /// Chunks have even length: an odd one is followed by a pad byte that counts for the whole only.
-fn pad_to_even(writer: &mut (impl Write + Seek), data_bytes: u64) -> std::io::Result<()> {
+pub(super) fn pad_to_even(writer: &mut (impl Write + Seek), data_bytes: u64) -> std::io::Result<()> {
     if data_bytes.is_multiple_of(2) {
         return Ok(());
     }

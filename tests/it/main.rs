@@ -23,6 +23,7 @@ mod recording_uff;
 mod report;
 mod shared;
 mod simulate;
+mod simulate_motion;
 mod spectral;
 mod spectral_frf;
 mod structure;

@@ -1,0 +1,58 @@
+//! The description that the user of a virtual test believes: what was planted left out, the joint to
+//! be fitted, files and channels as they were written.
+
+use toml::{Table, Value};
+
+use super::plan::VirtualTest;
+use crate::description::{Scale, TestDescription};
+
+/// What stands at the head of the description.
+const HEAD: &str = "# Recordings of a virtual test, made by `tapjoint simulate`.\n\n";
+
+/// The description's text with recordings as written; the joint's stiffnesses left out, so that they
+/// are fitted. `text` is the description that was simulated.
+///
+/// # Errors
+/// A text that is no TOML; it was read before.
+pub fn believed_description(
+    text: &str,
+    test: &TestDescription,
+    simulated: &VirtualTest,
+) -> Result<String, toml::de::Error> {
+    let mut table: Table = text.parse()?;
+    if let Some(Value::Table(joint)) = table.get_mut("joint") {
+        for key in ["kt", "kr", "ktr"] {
+            joint.remove(key);
+        }
+    }
+    let mut scales = simulated.scales.iter().zip(1i64..);
+    if test.hammer.is_some()
+        && let Some(Value::Table(hammer)) = table.get_mut("hammer")
+    {
+        describe_channel(hammer, scales.next());
+    }
+    for sensor in tables(&mut table, "sensor") {
+        describe_channel(sensor, scales.next());
+    }
+    for (recording, described) in tables(&mut table, "recording").zip(&test.recordings) {
+        recording.insert("file".into(), super::plan::wav_name(described).into());
+        recording.remove("sample_rate");
+        recording.remove("level");
+    }
+    Ok(format!("{HEAD}{table}"))
+}
+
+fn tables<'t>(table: &'t mut Table, key: &str) -> impl Iterator<Item = &'t mut Table> {
+    let entries = table.get_mut(key).and_then(Value::as_array_mut);
+    entries.into_iter().flatten().filter_map(Value::as_table_mut)
+}
+
+fn describe_channel(table: &mut Table, channel: Option<(&Scale, i64)>) {
+    let Some((scale, number)) = channel else {
+        return;
+    };
+    table.insert("channel".into(), number.into());
+    if let (Scale::PerUnit(scale), false) = (scale, table.contains_key("sensitivity")) {
+        table.insert("scale".into(), (*scale).into());
+    }
+}

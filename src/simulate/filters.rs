@@ -1,0 +1,164 @@
+//! Filters of the measuring chain, at the rate of the simulation.
+
+use std::f64::consts::{PI, TAU};
+
+/// A high-pass of first order, as condensers make it.
+#[derive(Debug, Clone)]
+pub(super) struct HighPass {
+    factor: f64,
+    gain: f64,
+    input: f64,
+    output: f64,
+}
+
+impl HighPass {
+    /// By the bilinear transform, which is exact enough where the corner lies far below the rate.
+    pub(super) fn new(corner: f64, rate: f64) -> Self {
+        let warped = (PI * corner / rate).tan();
+        Self {
+            factor: (1.0 - warped) / (1.0 + warped),
+            gain: 1.0 / (1.0 + warped),
+            input: 0.0,
+            output: 0.0,
+        }
+    }
+
+    pub(super) fn push(&mut self, input: f64) -> f64 {
+        self.output = self.factor * self.output + self.gain * (input - self.input);
+        self.input = input;
+        self.output
+    }
+}
+
+/// A resonance: a mass on a spring, driven by the spring's foot.
+#[derive(Debug, Clone)]
+pub(super) struct Resonance {
+    feedback: [f64; 2],
+    forward: [f64; 3],
+    inputs: [f64; 2],
+    outputs: [f64; 2],
+}
+
+impl Resonance {
+    /// Poles of the continuous system, zeros so that the magnitude is right at zero, at the resonance
+    /// and at half the rate (Vicanek, "Matched second order digital filters", 2016). The resonance must
+    /// lie below half the rate.
+    pub(super) fn new(frequency: f64, quality: f64, rate: f64) -> Self {
+        let omega = TAU * frequency / rate;
+        let decay = 0.5 * omega / quality;
+        let turn = (omega * omega - decay * decay).max(0.0).sqrt();
+        let feedback = [-2.0 * (-decay).exp() * turn.cos(), (-2.0 * decay).exp()];
+        let [a1, a2] = feedback;
+        let half = (0.5 * omega).sin().powi(2);
+        let phi = [1.0 - half, half, 4.0 * half * (1.0 - half)];
+        let squares = [
+            (1.0 + a1 + a2).powi(2),
+            (1.0 - a1 + a2).powi(2),
+            -4.0 * a2,
+        ];
+        let at_resonance: f64 = squares.iter().zip(phi).map(|(a, phi)| a * phi).sum();
+        let b0_square = squares[0];
+        let wanted = at_resonance * quality * quality;
+        let b1_square = ((wanted - b0_square * phi[0]) / phi[1]).max(0.0);
+        let b0 = 0.5 * (b0_square.sqrt() + b1_square.sqrt());
+        Self {
+            feedback,
+            forward: [b0, b0_square.sqrt() - b0, 0.0],
+            inputs: [0.0; 2],
+            outputs: [0.0; 2],
+        }
+    }
+
+    pub(super) fn push(&mut self, input: f64) -> f64 {
+        let [b0, b1, b2] = self.forward;
+        let [a1, a2] = self.feedback;
+        let output = b0 * input + b1 * self.inputs[0] + b2 * self.inputs[1]
+            - a1 * self.outputs[0]
+            - a2 * self.outputs[1];
+        self.inputs = [input, self.inputs[0]];
+        self.outputs = [output, self.outputs[0]];
+        output
+    }
+}
+
+/// An anti-alias filter of linear phase that gives one sample for each `factor` of its input.
+#[derive(Debug, Clone)]
+pub(super) struct Decimator {
+    weights: Vec<f64>,
+    /// The last inputs, twice, so that they lie in one piece wherever the newest stands.
+    inputs: Vec<f64>,
+    newest: usize,
+}
+
+/// Half the filter's length, in samples after decimation: 110 dB over a transition from rate/2.56 to
+/// its mirror (1 - 1/2.56) rate take 16.2 by Kaiser's formula.
+pub(super) const HALF_LENGTH: usize = 17;
+/// Kaiser's beta for 110 dB, 0.1102 (110 - 8.7).
+const BETA: f64 = 11.16;
+
+impl Decimator {
+    pub(super) fn new(factor: usize) -> Self {
+        let half = HALF_LENGTH * factor;
+        let mut weights: Vec<f64> = (0..=2 * half)
+            .map(|index| {
+                let offset = index as f64 - half as f64;
+                let x = offset / half as f64;
+                let window = bessel_i0(BETA * (1.0 - x * x).max(0.0).sqrt());
+                // Cut-off in the middle of the transition, half the rate after decimation.
+                window * sinc(offset / factor as f64)
+            })
+            .collect();
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= sum);
+        Self {
+            inputs: vec![0.0; 2 * weights.len()],
+            weights,
+            newest: 0,
+        }
+    }
+
+    pub(super) fn push(&mut self, input: f64) {
+        let length = self.weights.len();
+        self.newest = (self.newest + 1) % length;
+        self.inputs[self.newest] = input;
+        self.inputs[self.newest + length] = input;
+    }
+
+    /// The filtered signal, in the middle of the last inputs.
+    pub(super) fn output(&self) -> f64 {
+        let length = self.weights.len();
+        let window = &self.inputs[self.newest + 1..=self.newest + length];
+        // Sums of their own for each of eight lanes keep the processor's units busy.
+        let mut sums = [0.0; 8];
+        let (weights, rest) = self.weights.as_chunks::<8>();
+        let (inputs, others) = window.as_chunks::<8>();
+        for (weights, inputs) in weights.iter().zip(inputs) {
+            for lane in 0..8 {
+                sums[lane] += weights[lane] * inputs[lane];
+            }
+        }
+        let tail: f64 = rest.iter().zip(others).map(|(w, x)| w * x).sum();
+        sums.iter().sum::<f64>() + tail
+    }
+}
+
+fn sinc(x: f64) -> f64 {
+    if x == 0.0 {
+        1.0
+    } else {
+        (PI * x).sin() / (PI * x)
+    }
+}
+
+/// Modified Bessel function of the first kind, sum of ((x/2)^n/n!)^2.
+fn bessel_i0(x: f64) -> f64 {
+    let mut term = 1.0;
+    let mut sum = 1.0;
+    let mut n = 1.0;
+    while term > 1e-17 * sum {
+        term *= (0.5 * x / n).powi(2);
+        sum += term;
+        n += 1.0;
+    }
+    sum
+}

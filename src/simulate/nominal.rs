@@ -1,0 +1,154 @@
+//! From a test description to the specimen it describes.
+
+use super::error::SimulateError;
+use crate::description::{
+    BeamTheory, JointKind, KnownStiffness, RecordingDescription, SensorKind, TestDescription,
+};
+use crate::effects::SensorPlace;
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::specimen::{
+    Body, LapOverlap, PointInertia, PointMass, Specimen, SpecimenJoint,
+};
+use crate::structure::{Beam, beam::DEFAULT_POISSON};
+
+/// Non-dimensional stiffnesses of a joint, in place of the description's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GivenJoint {
+    /// Kx (1).
+    pub kx: f64,
+    /// Ky (1).
+    pub ky: f64,
+    /// 1/Kz (1), 0 without coupling.
+    pub cross_compliance: f64,
+}
+
+/// The described specimen as one recording finds it.
+pub(super) fn nominal_specimen(
+    test: &TestDescription,
+    recording: &RecordingDescription,
+    given: Option<GivenJoint>,
+) -> Result<Specimen, SimulateError> {
+    let body = body(test);
+    let mut specimen = Specimen::new(body, joint(test, given)?);
+    specimen.shear_rotary = match test.joint.beam {
+        BeamTheory::Euler => 0.0,
+        BeamTheory::Timoshenko => 1.0,
+    };
+    specimen.overlap = test.joint.overlap.map(|overlap| LapOverlap {
+        length: overlap.length,
+        mass: overlap.mass,
+    });
+    specimen.joint_mass = PointInertia::default();
+    for place in sensor_places(test, recording)? {
+        if place.mass > 0.0 {
+            specimen.masses.push(PointMass {
+                position: place.position,
+                mass: place.mass,
+                inertia: 0.0,
+            });
+        }
+    }
+    Ok(specimen)
+}
+
+/// The beam of the description; of a lap joint the left half's properties and the total length.
+pub(super) fn beam(test: &TestDescription) -> Beam {
+    Beam {
+        length: test.beam.length,
+        width: test.beam.width,
+        thickness: test.beam.thickness,
+        modulus: test.beam.modulus,
+        density: test.beam.density,
+        poisson: test.beam.poisson.unwrap_or(DEFAULT_POISSON),
+    }
+}
+
+fn body(test: &TestDescription) -> Body {
+    let whole = beam(test);
+    if test.joint.kind != JointKind::Lap {
+        return Body::One(whole);
+    }
+    let position = test.joint.position.unwrap_or(0.5 * whole.length);
+    let left = Beam {
+        length: position,
+        ..whole
+    };
+    let other = test.joint.right.clone().unwrap_or_default();
+    let right = Beam {
+        length: whole.length - position,
+        width: other.width.unwrap_or(whole.width),
+        thickness: other.thickness.unwrap_or(whole.thickness),
+        modulus: other.modulus.unwrap_or(whole.modulus),
+        density: other.density.unwrap_or(whole.density),
+        poisson: other.poisson.unwrap_or(whole.poisson),
+    };
+    Body::Joined([left, right])
+}
+
+fn joint(test: &TestDescription, given: Option<GivenJoint>) -> Result<SpecimenJoint, SimulateError> {
+    if test.joint.kind == JointKind::Free {
+        return Ok(SpecimenJoint::Free);
+    }
+    let units = StiffnessUnits::of(&beam(test));
+    if let Some(given) = given {
+        return Ok(SpecimenJoint::Springs {
+            kt: given.kx * units.kt,
+            kr: given.ky * units.kr,
+            coupling: coupling(given.kx, given.ky, given.cross_compliance),
+        });
+    }
+    let (missing, keys) = match (test.joint.kt, test.joint.kr) {
+        (Some(kt), Some(kr)) => {
+            let (kt, kr) = (stiffness(kt), stiffness(kr));
+            let ktr = test.joint.ktr.map_or(f64::INFINITY, stiffness);
+            return Ok(SpecimenJoint::Springs {
+                kt,
+                kr,
+                coupling: coupling(kt, kr, 1.0 / ktr),
+            });
+        }
+        (None, None) => ("kt and kr are", "`kt = 1.9e6` (N/m) and `kr = 1.2e3` (N m/rad)"),
+        (None, Some(_)) => ("kt is", "`kt = 1.9e6` (N/m)"),
+        (Some(_), None) => ("kr is", "`kr = 1.2e3` (N m/rad)"),
+    };
+    Err(SimulateError::NoJoint { missing, keys })
+}
+
+/// sqrt(Kt Kr)/Ktr; none where a spring is rigid.
+fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
+    if cross_compliance == 0.0 {
+        0.0
+    } else {
+        kt.sqrt() * kr.sqrt() * cross_compliance
+    }
+}
+
+fn stiffness(known: KnownStiffness) -> f64 {
+    match known {
+        KnownStiffness::Value(value) => value,
+        KnownStiffness::Rigid => f64::INFINITY,
+    }
+}
+
+/// Where the sensors sit in a recording, with their masses by the datasheet.
+pub(super) fn sensor_places(
+    test: &TestDescription,
+    recording: &RecordingDescription,
+) -> Result<Vec<SensorPlace>, SimulateError> {
+    let places = test.sensors.iter().map(|sensor| {
+        if sensor.kind == SensorKind::Sound {
+            return Err(SimulateError::Sound {
+                name: sensor.name.clone(),
+            });
+        }
+        let moved = recording.at.get(&sensor.name).copied();
+        let position = moved.or(sensor.position);
+        Ok(SensorPlace {
+            position: position.ok_or_else(|| SimulateError::NoPosition {
+                name: sensor.name.clone(),
+            })?,
+            mass: sensor.mass.unwrap_or(0.0),
+        })
+    });
+    places.collect()
+}

@@ -1,0 +1,321 @@
+//! From a described test and what is planted in it to recordings ready to be made.
+
+use crate::description::{
+    RecordingDescription, Scale, SensorKind, TestDescription,
+};
+use crate::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::chain::Signal;
+use super::check::check_laboratory;
+use super::error::SimulateError;
+use super::hammer::TapPlan;
+use super::joint_moment::JointMoment;
+use super::laboratory::{Laboratory, Tip};
+use super::nominal::{GivenJoint, nominal_specimen, sensor_places};
+use super::reduced::Sensed;
+use super::seen::SeenStructure;
+use super::session::{Session, SessionPlan};
+use super::trial::{Trial, round_scale, try_out};
+use crate::structure::specimen::{Specimen, SpecimenJoint};
+
+/// What is to be simulated.
+#[derive(Debug, Clone)]
+pub struct TestPlan<'a> {
+    /// The test as described: the nominal structure, with its joint.
+    pub description: &'a TestDescription,
+    /// What the description leaves out.
+    pub effects: &'a [Effect],
+    /// How the test is carried out.
+    pub laboratory: &'a Laboratory,
+    /// The joint, where it is not the description's.
+    pub joint: Option<GivenJoint>,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// A test ready to be recorded.
+#[derive(Debug, Clone)]
+pub struct VirtualTest {
+    /// The recordings, each file once.
+    pub recordings: Vec<VirtualRecording>,
+    /// SI units per unit of the file of each channel: the hammer's first, where there is one, then the
+    /// sensors'.
+    pub scales: Vec<Scale>,
+    /// The nominal structure, without sensors that were moved.
+    pub nominal: Specimen,
+    /// Law of the joint that is not linear, with the largest rotation (rad) that it refers to.
+    pub joint_law: Option<(JointLaw, f64)>,
+}
+
+/// One recording, ready to be made.
+#[derive(Debug, Clone)]
+pub struct VirtualRecording {
+    /// Name of the file: a WAV file in the test's folder.
+    pub file: String,
+    /// Line of the description that names it first.
+    pub line: usize,
+    /// How hard it is struck (1).
+    pub level: f64,
+    /// What is seen of the structure: at rest, where its joint is not linear.
+    pub seen: Seen,
+    /// The structure in its modes.
+    pub structure: SeenStructure,
+    /// How it is recorded.
+    pub session: SessionPlan,
+}
+
+/// Prepares a virtual test.
+///
+/// # Errors
+/// [`SimulateError`]: what the description must say and does not, what cannot be simulated.
+pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
+    check_laboratory(plan.laboratory)?;
+    let test = plan.description;
+    let described = distinct_files(test)?;
+    if plan.effects.iter().any(|effect| effect.id == EffectId::Resolution) {
+        return Err(SimulateError::Resolution);
+    }
+    let mut recordings = Vec::new();
+    let mut trials = Vec::new();
+    for (visit, recording) in described.iter().enumerate() {
+        let recording = prepare(plan, recording, visit)?;
+        trials.push(try_out(&recording.structure, &recording.session, plan.laboratory));
+        recordings.push(recording);
+    }
+    let scales = scales(test, &trials);
+    let joint_law = hardest(&recordings, &trials);
+    for recording in &mut recordings {
+        let channels = recording.session.channels.iter_mut();
+        for ((_, scale), wanted) in channels.zip(&scales) {
+            *scale = match wanted {
+                Scale::PerUnit(scale) | Scale::PerVolt(scale) => *scale,
+            };
+        }
+        if let Some((law, hardest)) = &joint_law {
+            let stiffness = turning_stiffness(&recording.seen.specimen)?;
+            recording.session.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
+        }
+    }
+    Ok(VirtualTest {
+        nominal: nominal_specimen(test, described[0].0, plan.joint)?,
+        recordings,
+        scales,
+        joint_law,
+    })
+}
+
+impl VirtualRecording {
+    /// Begins the recording.
+    pub fn begin(&self, laboratory: &Laboratory) -> Session {
+        Session::new(self.structure.clone(), &self.session, laboratory)
+    }
+}
+
+/// Each file once, with its name as a WAV file and the highest frequency (Hz) and the longest block (s)
+/// that are wanted of it.
+type Wanted<'a> = (&'a RecordingDescription, String, Option<f64>, f64);
+
+fn distinct_files(test: &TestDescription) -> Result<Vec<Wanted<'_>>, SimulateError> {
+    if test.recordings.is_empty() {
+        return Err(SimulateError::NoRecordings);
+    }
+    if test.sensors.is_empty() {
+        return Err(SimulateError::NoSensors);
+    }
+    let mut distinct: Vec<Wanted<'_>> = Vec::new();
+    for recording in &test.recordings {
+        let file = wav_name(recording);
+        let line = recording.line;
+        if recording.form.is_some() {
+            return Err(SimulateError::Responses { file, line });
+        }
+        let highest = recording.band.map(|(_, high)| high);
+        let seconds = block_seconds(recording);
+        let Some(found) = distinct.iter_mut().find(|(_, name, ..)| *name == file) else {
+            distinct.push((recording, file, highest, seconds));
+            continue;
+        };
+        let first = found.0;
+        let other = (recording.tap, recording.level, &recording.at);
+        if (first.tap, first.level, &first.at) != other {
+            return Err(SimulateError::SameFile { file, line });
+        }
+        found.2 = [found.2, highest].into_iter().flatten().reduce(f64::max);
+        found.3 = found.3.max(seconds);
+    }
+    Ok(distinct)
+}
+
+/// A file's name as a WAV file, in the test's folder.
+pub fn wav_name(recording: &RecordingDescription) -> String {
+    let stem = recording.file.file_stem().unwrap_or_default();
+    format!("{}.wav", stem.to_string_lossy())
+}
+
+/// Length (s) of a described block, where it does not depend on the sample rate.
+fn block_seconds(recording: &RecordingDescription) -> f64 {
+    match (recording.block, recording.band) {
+        // block/2.56 lines over the band.
+        (Some(block), Some((low, high))) => block as f64 / (2.56 * (high - low)),
+        _ => 0.0,
+    }
+}
+
+fn prepare(
+    plan: &TestPlan<'_>,
+    (described, file, highest, block_seconds): &Wanted<'_>,
+    visit: usize,
+) -> Result<VirtualRecording, SimulateError> {
+    let (test, laboratory) = (plan.description, plan.laboratory);
+    let tap = described.tap.ok_or_else(|| SimulateError::NoTap {
+        file: file.clone(),
+        line: described.line,
+    })?;
+    let places = sensor_places(test, described)?;
+    let nominal = nominal_specimen(test, described, plan.joint)?;
+    let level = described.level.unwrap_or(1.0);
+    let seen = see(plan, &nominal, &places, visit);
+    let sample_rate = sample_rate(laboratory, file, *highest)?;
+    let reach = f64::from(sample_rate) / 2.56;
+    let tip = laboratory.hammer.tip;
+    let tip = tip.unwrap_or_else(|| Tip::softest_for(highest.unwrap_or(reach)));
+    let mut session = SessionPlan {
+        sample_rate,
+        frames: 0,
+        frequency_scale: seen.frequency_scale * (1.0 + laboratory.recorder.clock_error),
+        channels: channels(test),
+        taps: TapPlan {
+            taps: laboratory.hammer.taps,
+            interval: 0.0,
+            place: (tap, seen.specimen.body.length()),
+            peak_force: laboratory.hammer.peak_force * level,
+            pulse: tip.pulse(),
+        },
+        joint: None,
+        seed: (plan.seed, visit as u64),
+    };
+    let positions: Vec<f64> = places.iter().map(|place| place.position).collect();
+    let structure = SeenStructure::new(
+        &seen.specimen,
+        &laboratory.specimen,
+        &positions,
+        (seen.joint_loss_factor, session.highest_mode(laboratory)),
+    )?;
+    let block = described.block.filter(|_| described.band.is_none());
+    let block = block.map_or(*block_seconds, |block| block as f64 / f64::from(sample_rate));
+    let interval = interval(laboratory, &structure, block);
+    session.taps.interval = interval;
+    let seconds = laboratory.hammer.lead + laboratory.hammer.taps as f64 * interval;
+    session.frames = (seconds * f64::from(sample_rate)).round() as u64;
+    Ok(VirtualRecording {
+        file: file.clone(),
+        line: described.line,
+        level,
+        seen,
+        structure,
+        session,
+    })
+}
+
+/// What is seen of the specimen on one visit; a joint that is not linear is seen at rest.
+fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[SensorPlace], visit: usize) -> Seen {
+    let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
+    // Streams of their own, behind those of the recordings' channels.
+    random.set_stream(1 << 40 | visit as u64);
+    let circumstances = Circumstances {
+        sensors: places,
+        level: 0.0,
+        visit,
+        drift: std::array::from_fn(|_| StandardNormal.sample(&mut random)),
+    };
+    apply(plan.effects, nominal, &circumstances)
+}
+
+/// Usual sample rates (Hz) of analysers: 2.56 times the band.
+const USUAL_RATES: [u32; 7] = [2560, 5120, 10_240, 12_800, 25_600, 51_200, 102_400];
+
+fn sample_rate(
+    laboratory: &Laboratory,
+    file: &str,
+    highest: Option<f64>,
+) -> Result<u32, SimulateError> {
+    let band = highest.unwrap_or(0.0);
+    let Some(rate) = laboratory.recorder.sample_rate else {
+        // Without a band, 2000 Hz: the modes of a beam of some decimetres that the method uses.
+        let needed = 2.56 * highest.unwrap_or(2000.0);
+        let usual = USUAL_RATES.into_iter().find(|rate| f64::from(*rate) >= needed);
+        return Ok(usual.unwrap_or(needed.ceil() as u32));
+    };
+    let reach = f64::from(rate) / 2.56;
+    if band > reach {
+        return Err(SimulateError::RateTooLow {
+            file: file.to_owned(),
+            rate,
+            reach,
+            band,
+            needed: (2.56 * band).ceil(),
+        });
+    }
+    Ok(rate)
+}
+
+fn interval(laboratory: &Laboratory, structure: &SeenStructure, block: f64) -> f64 {
+    laboratory.hammer.interval.unwrap_or_else(|| {
+        // e^{-zeta omega t} = 0.001 after 6.9/(zeta omega).
+        let ring = structure
+            .elastic_modes()
+            .map(|(frequency, damping)| 6.9 / (damping * std::f64::consts::TAU * frequency))
+            .fold(0.0, f64::max);
+        // A block begins a little before its tap, and no tap is quite on time.
+        ring.clamp(1.0, 10.0).max(1.03 * block + 0.1)
+    })
+}
+
+/// Hammer and sensors in the order of the file.
+fn channels(test: &TestDescription) -> Vec<(Signal, f64)> {
+    let hammer = test.hammer.iter().map(|_| Signal::Force);
+    let sensors = test.sensors.iter().map(|sensor| {
+        Signal::Response(match sensor.kind {
+            SensorKind::Velocity => Sensed::Velocity,
+            SensorKind::Displacement => Sensed::Displacement,
+            SensorKind::Acceleration | SensorKind::Sound => Sensed::Acceleration,
+        })
+    });
+    hammer.chain(sensors).map(|signal| (signal, 1.0)).collect()
+}
+
+/// The described scales, and round ones with room for harder taps where none is described.
+fn scales(test: &TestDescription, trials: &[Trial]) -> Vec<Scale> {
+    let hammer = test.hammer.iter().map(|hammer| hammer.scale);
+    let described = hammer.chain(test.sensors.iter().map(|sensor| sensor.scale));
+    described
+        .enumerate()
+        .map(|(channel, described)| {
+            let peaks = trials.iter().map(|trial| trial.peaks[channel]);
+            let peak = peaks.fold(0.0, f64::max);
+            described.unwrap_or(Scale::PerUnit(round_scale(3.0 * peak)))
+        })
+        .collect()
+}
+
+/// The joint's law, and the largest rotation that a mean tap of any recording brings.
+fn hardest(recordings: &[VirtualRecording], trials: &[Trial]) -> Option<(JointLaw, f64)> {
+    let law = recordings.first()?.seen.joint_law?;
+    let rotations = trials.iter().map(|trial| trial.joint_rotation);
+    Some((law, rotations.fold(0.0, f64::max)))
+}
+
+fn turning_stiffness(specimen: &Specimen) -> Result<f64, SimulateError> {
+    let stiffness = match specimen.joint {
+        SpecimenJoint::Free => 0.0,
+        SpecimenJoint::Springs { kr, .. } => kr,
+    };
+    if stiffness > 0.0 && stiffness.is_finite() {
+        Ok(stiffness)
+    } else {
+        Err(SimulateError::NoRotation { stiffness })
+    }
+}

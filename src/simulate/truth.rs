@@ -1,0 +1,184 @@
+//! What is true of a virtual test, to be kept from whoever diagnoses it.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::hammer::Tap;
+use super::laboratory::Laboratory;
+use super::plan::{TestPlan, VirtualRecording, VirtualTest};
+use crate::effects::Effect;
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::specimen::{Specimen, SpecimenJoint};
+
+/// All that is true of a virtual test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Truth {
+    /// Version of this form.
+    pub version: u32,
+    /// The test's name.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// What the description leaves out.
+    pub effects: Vec<PlantedEffect>,
+    /// The nominal joint.
+    pub joint: Option<JointTruth>,
+    /// The joint's law, where it is not linear.
+    pub joint_law: Option<LawTruth>,
+    /// The recordings.
+    pub recordings: Vec<RecordingTruth>,
+    /// How the test was carried out.
+    pub laboratory: Laboratory,
+}
+
+/// An effect with its parameters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlantedEffect {
+    /// Its name.
+    pub effect: &'static str,
+    /// Its parameters (SI).
+    pub parameters: BTreeMap<&'static str, f64>,
+}
+
+/// Stiffnesses of a joint; a rigid spring has none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointTruth {
+    /// Translational stiffness (N/m).
+    pub kt: Option<f64>,
+    /// Rotational stiffness (N m/rad).
+    pub kr: Option<f64>,
+    /// Cross-coupling stiffness (N/rad); none without coupling.
+    pub ktr: Option<f64>,
+    /// Kt L^3/(E I) (1), by the described beam.
+    pub kx: Option<f64>,
+    /// Kr L/(E I) (1).
+    pub ky: Option<f64>,
+    /// Ktr L^2/(E I) (1).
+    pub kz: Option<f64>,
+    /// sqrt(Kt Kr)/Ktr (1).
+    pub coupling: f64,
+}
+
+/// Law of a joint that is not linear.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LawTruth {
+    /// Relative change of the secant stiffness at the hardest rotation (1).
+    pub ratio: f64,
+    /// Power of the rotation (1).
+    pub exponent: f64,
+    /// The hardest rotation: the largest that a mean tap of any recording brings to the joint at rest
+    /// (rad).
+    pub hardest_rotation: f64,
+}
+
+/// What is true of one recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RecordingTruth {
+    /// Its file.
+    pub file: String,
+    /// Sample rate that the file states (Hz).
+    pub sample_rate: u32,
+    /// Length (s).
+    pub seconds: f64,
+    /// How hard it was struck (1).
+    pub level: f64,
+    /// What true frequencies are multiplied by when the file is read (1): the clock.
+    pub frequency_scale: f64,
+    /// The joint on this visit, at rest.
+    pub joint: Option<JointTruth>,
+    /// Modes up to sample rate/2.56, at rest.
+    pub modes: Vec<ModeTruth>,
+    /// The taps, in true seconds.
+    pub taps: Vec<Tap>,
+    /// Gain (1) of each channel beside its scale.
+    pub gains: Vec<f64>,
+}
+
+/// One mode.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ModeTruth {
+    /// Its number, from 1; rigid-body motions do not count.
+    pub mode: usize,
+    /// Natural frequency (Hz).
+    pub frequency: f64,
+    /// Damping ratio (1).
+    pub damping: f64,
+}
+
+/// The truth about a virtual test.
+pub fn truth_of(plan: &TestPlan<'_>, test: &VirtualTest) -> Truth {
+    let units = StiffnessUnits::of(&super::nominal::beam(plan.description));
+    Truth {
+        version: 1,
+        name: plan.description.name.clone(),
+        seed: plan.seed,
+        effects: plan.effects.iter().map(planted).collect(),
+        joint: joint_of(&test.nominal, &units),
+        joint_law: test.joint_law.map(|(law, hardest_rotation)| LawTruth {
+            ratio: law.ratio,
+            exponent: law.exponent,
+            hardest_rotation,
+        }),
+        recordings: test
+            .recordings
+            .iter()
+            .map(|recording| recording_of(recording, plan.laboratory, &units))
+            .collect(),
+        laboratory: plan.laboratory.clone(),
+    }
+}
+
+fn planted(effect: &Effect) -> PlantedEffect {
+    PlantedEffect {
+        effect: effect.id.name(),
+        parameters: effect.values().map(|(info, value)| (info.name, value)).collect(),
+    }
+}
+
+fn joint_of(specimen: &Specimen, units: &StiffnessUnits) -> Option<JointTruth> {
+    let SpecimenJoint::Springs { kt, kr, coupling } = specimen.joint else {
+        return None;
+    };
+    // 1/Ktr = coupling/sqrt(Kt Kr).
+    let ktr = kt.sqrt() * kr.sqrt() / coupling;
+    let finite = |value: f64| value.is_finite().then_some(value);
+    Some(JointTruth {
+        kt: finite(kt),
+        kr: finite(kr),
+        ktr: finite(ktr),
+        kx: finite(kt / units.kt),
+        ky: finite(kr / units.kr),
+        kz: finite(ktr / units.ktr),
+        coupling,
+    })
+}
+
+fn recording_of(
+    recording: &VirtualRecording,
+    laboratory: &Laboratory,
+    units: &StiffnessUnits,
+) -> RecordingTruth {
+    let plan = &recording.session;
+    let reach = f64::from(plan.sample_rate) / 2.56;
+    let session = recording.begin(laboratory);
+    let modes = recording.structure.elastic_modes().zip(1..);
+    RecordingTruth {
+        file: recording.file.clone(),
+        sample_rate: plan.sample_rate,
+        seconds: plan.frames as f64 / f64::from(plan.sample_rate),
+        level: recording.level,
+        frequency_scale: plan.frequency_scale,
+        joint: joint_of(&recording.seen.specimen, units),
+        modes: modes
+            .take_while(|((frequency, _), _)| *frequency <= reach)
+            .map(|((frequency, damping), mode)| ModeTruth {
+                mode,
+                frequency,
+                damping,
+            })
+            .collect(),
+        taps: session.taps(),
+        gains: session.gains(),
+    }
+}

@@ -11,7 +11,7 @@ use tapjoint::study::blind_check::{
 fn planted(name: &str, effects: &[EffectId], size: f64) -> Truth {
     let effects = effects
         .iter()
-        .map(|id| Planted::Catalogue(*id, [(id.size_parameter().to_owned(), size)].into()));
+        .map(|id| Planted::Catalogue(*id, [(id.size_parameters()[0].to_owned(), size)].into()));
     Truth {
         name: name.to_owned(),
         effects: effects.collect(),
@@ -50,7 +50,7 @@ fn answer(verdict: Verdict, class: Class, p: f64) -> Answer {
         verdict,
         parameters: effects
             .iter()
-            .map(|id| (*id, id.size_parameter().to_owned(), 1.1))
+            .map(|id| (*id, id.size_parameters()[0].to_owned(), 1.1))
             .collect(),
         effects,
         classes: [(class, p), (other, 1.0 - p)].into(),

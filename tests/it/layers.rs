@@ -50,7 +50,18 @@ const TABLE: &[(&str, &[&str])] = &[
             "stats",
         ],
     ),
-    ("study", &["structure", "identify", "pipeline", "simulate"]),
+    (
+        "study",
+        &[
+            "description",
+            "stats",
+            "structure",
+            "effects",
+            "identify",
+            "pipeline",
+            "simulate",
+        ],
+    ),
     (
         "report",
         &[

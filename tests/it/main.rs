@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
 mod amplitude;
+mod blind_check;
 mod cli;
 mod cli_frf;
 mod description;

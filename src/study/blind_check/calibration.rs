@@ -1,6 +1,6 @@
 //! Whether stated probabilities are what they say: Brier's score and a reliability table.
 
-use super::case::{Class, Truth, Answer};
+use super::case::{Answer, Class, Truth};
 
 /// Bins of the reliability table, equal in width.
 const BINS: usize = 10;
@@ -43,8 +43,13 @@ pub fn calibrate(cases: &[(Truth, Answer)]) -> Calibration {
         Some(bin.cases as f64 / total * (stated - right).abs())
     };
     Calibration {
-        brier: (!cases.is_empty())
-            .then(|| cases.iter().map(|(class, answer)| brier(*class, answer)).sum::<f64>() / total),
+        brier: (!cases.is_empty()).then(|| {
+            cases
+                .iter()
+                .map(|(class, answer)| brier(*class, answer))
+                .sum::<f64>()
+                / total
+        }),
         expected_calibration_error: (!cases.is_empty())
             .then(|| reliability.iter().filter_map(distance).sum()),
         reliability,

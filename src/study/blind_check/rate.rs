@@ -13,7 +13,10 @@ pub struct Rate {
 
 impl Rate {
     /// Of all cases for which `hit` says something.
-    pub fn of<T>(cases: impl IntoIterator<Item = T>, mut hit: impl FnMut(T) -> Option<bool>) -> Self {
+    pub fn of<T>(
+        cases: impl IntoIterator<Item = T>,
+        mut hit: impl FnMut(T) -> Option<bool>,
+    ) -> Self {
         let mut rate = Self::default();
         for case in cases {
             if let Some(hit) = hit(case) {
@@ -62,7 +65,10 @@ mod tests {
         let close = |rate: Rate, low: f64, high: f64| {
             let (l, h) = rate.interval().expect("there are cases");
             // The digits of the table.
-            assert!((l - low).abs() < 1e-6 && (h - high).abs() < 1e-6, "{rate:?}: {l} {h}");
+            assert!(
+                (l - low).abs() < 1e-6 && (h - high).abs() < 1e-6,
+                "{rate:?}: {l} {h}"
+            );
         };
         close(Rate { hits: 8, of: 10 }, 0.443_905, 0.974_789);
         close(Rate { hits: 0, of: 100 }, 0.0, 0.036_217);
@@ -71,7 +77,10 @@ mod tests {
 
     #[test]
     fn limit_no_case_has_no_rate() {
-        assert_eq!((Rate::default().value(), Rate::default().interval()), (None, None));
+        assert_eq!(
+            (Rate::default().value(), Rate::default().interval()),
+            (None, None)
+        );
         let rate = Rate::of([Some(true), None, Some(false)], |hit| hit);
         assert_eq!(rate, Rate { hits: 1, of: 2 });
     }

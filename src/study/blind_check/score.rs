@@ -66,10 +66,17 @@ pub struct Scores {
 /// Scores all cases.
 pub fn score(cases: &[Case]) -> Scores {
     let kinds = [Kind::Null, Kind::Single, Kind::Several, Kind::Outside];
-    let of = |kind: Kind| cases.iter().filter(move |(truth, _)| Kind::of(truth) == kind);
+    let of = |kind: Kind| {
+        cases
+            .iter()
+            .filter(move |(truth, _)| Kind::of(truth) == kind)
+    };
     let closures = sorted(of(Kind::Single).filter_map(closure_of_named));
     let sizes = sorted(of(Kind::Single).filter_map(size_error));
-    let sets: Vec<_> = cases.iter().filter(|(truth, _)| truth.class().is_some()).collect();
+    let sets: Vec<_> = cases
+        .iter()
+        .filter(|(truth, _)| truth.class().is_some())
+        .collect();
     Scores {
         counts: kinds.map(|kind| of(kind).count()),
         top_1: Rate::of(of(Kind::Single), |case| rank_within(case, 1)),
@@ -106,7 +113,10 @@ pub fn score(cases: &[Case]) -> Scores {
         set_coverage: Rate::of(&sets, |(truth, answer)| {
             Some(answer.set(SET_SHARE).contains(&truth.class()?))
         }),
-        set_size: mean(sets.iter().map(|(_, answer)| answer.set(SET_SHARE).len() as f64)),
+        set_size: mean(
+            sets.iter()
+                .map(|(_, answer)| answer.set(SET_SHARE).len() as f64),
+        ),
         truth_probability: mean(of(Kind::Single).filter_map(|(truth, answer)| {
             let class = truth.class().filter(|_| answer.verdict != Verdict::NoGap)?;
             Some(answer.classes.get(&class).copied().unwrap_or(0.0))
@@ -160,7 +170,13 @@ fn rank_within((truth, answer): &Case, most: usize) -> Option<bool> {
     let Some(Class::Group(group)) = truth.class() else {
         return None;
     };
-    Some(answer.groups().iter().take(most).any(|found| *found == group))
+    Some(
+        answer
+            .groups()
+            .iter()
+            .take(most)
+            .any(|found| *found == group),
+    )
 }
 
 /// A group over two places counts as right in either.
@@ -170,7 +186,11 @@ fn place_right((truth, answer): &Case) -> Option<bool> {
     };
     let places: Vec<Place> = places_of(group);
     let found = answer.places.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    Some(found.and_then(|(place, _)| *place).is_some_and(|place| places.contains(&place)))
+    Some(
+        found
+            .and_then(|(place, _)| *place)
+            .is_some_and(|place| places.contains(&place)),
+    )
 }
 
 fn places_of(group: Group) -> Vec<Place> {
@@ -180,7 +200,11 @@ fn places_of(group: Group) -> Vec<Place> {
 
 /// Whether the verdict names the groups of all that was planted, and no other.
 fn names_exactly((truth, answer): &Case) -> bool {
-    if truth.effects.iter().any(|p| matches!(p, Planted::Outside(_))) {
+    if truth
+        .effects
+        .iter()
+        .any(|p| matches!(p, Planted::Outside(_)))
+    {
         return false;
     }
     let mut groups: Vec<Group> = truth.catalogue().map(|(id, _)| id.group()).collect();
@@ -200,14 +224,18 @@ fn size_error((truth, answer): &Case) -> Option<f64> {
     if !is_named(answer) || answer.effects != [id] {
         return None;
     }
-    let name = id.size_parameter();
+    let name = *id.size_parameters().first()?;
     let planted = values.get(name)?;
     let (.., found) = answer
         .parameters
         .iter()
         .find(|(effect, parameter, _)| *effect == id && parameter == name)?;
     let ratio = found / planted;
-    Some(if ratio > 0.0 { ratio.ln().abs() } else { f64::INFINITY })
+    Some(if ratio > 0.0 {
+        ratio.ln().abs()
+    } else {
+        f64::INFINITY
+    })
 }
 
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -221,7 +249,11 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let at = share * last as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-    Some(if low == high { low } else { low + at.fract() * (high - low) })
+    Some(if low == high {
+        low
+    } else {
+        low + at.fract() * (high - low)
+    })
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -48,22 +48,102 @@ pub fn rows(scores: &Scores) -> Vec<Row> {
     use Target::{AtLeast, AtMost};
     let s = scores;
     let mut rows = vec![
-        rate("top_1", "one effect: first group is right", s.top_1, AtLeast(0.80)),
-        rate("top_1_detectable", "the same where it can be noticed", s.top_1_detectable, AtLeast(0.88)),
-        rate("top_3", "one effect: among the first three", s.top_3, AtLeast(0.94)),
-        rate("where", "one effect: place is right", s.place, AtLeast(0.83)),
-        rate("top_1_of_all", "one effect: first of all classes", s.top_1_of_all, Target::None),
-        rate("named_right", "one effect, named: name is right", s.named_right, AtLeast(0.96)),
-        rate("coverage", "one effect: something is named", s.named, AtLeast(0.62)),
-        rate("named_right_of_all", "any case, named: name is right", s.named_right_of_all, Target::None),
-        rate("null_called_effect", "nothing: called an effect", s.null_called_effect, AtMost(0.02)),
-        rate("null_false_alarm", "nothing: an effect comes first", s.null_false_alarm, Target::None),
-        rate("outside_named", "outside: named", s.outside_named, AtMost(0.18)),
-        rate("outside_refused", "outside, refutable: refused", s.outside_refused, AtLeast(0.80)),
-        rate("outside_unknown", "outside: called unknown", s.outside_unknown, Target::None),
-        rate("several_found_or_refused", "two: both found, or refused", s.several_found_or_refused, AtLeast(0.80)),
-        rate("several_found", "two: both found", s.several_found, Target::None),
-        rate("set_coverage", "90 % set holds the truth", s.set_coverage, AtLeast(0.88)),
+        rate(
+            "top_1",
+            "one effect: first group is right",
+            s.top_1,
+            AtLeast(0.80),
+        ),
+        rate(
+            "top_1_detectable",
+            "the same where it can be noticed",
+            s.top_1_detectable,
+            AtLeast(0.88),
+        ),
+        rate(
+            "top_3",
+            "one effect: among the first three",
+            s.top_3,
+            AtLeast(0.94),
+        ),
+        rate(
+            "where",
+            "one effect: place is right",
+            s.place,
+            AtLeast(0.83),
+        ),
+        rate(
+            "top_1_of_all",
+            "one effect: first of all classes",
+            s.top_1_of_all,
+            Target::None,
+        ),
+        rate(
+            "named_right",
+            "one effect, named: name is right",
+            s.named_right,
+            AtLeast(0.96),
+        ),
+        rate(
+            "coverage",
+            "one effect: something is named",
+            s.named,
+            AtLeast(0.62),
+        ),
+        rate(
+            "named_right_of_all",
+            "any case, named: name is right",
+            s.named_right_of_all,
+            Target::None,
+        ),
+        rate(
+            "null_called_effect",
+            "nothing: called an effect",
+            s.null_called_effect,
+            AtMost(0.02),
+        ),
+        rate(
+            "null_false_alarm",
+            "nothing: an effect comes first",
+            s.null_false_alarm,
+            Target::None,
+        ),
+        rate(
+            "outside_named",
+            "outside: named",
+            s.outside_named,
+            AtMost(0.18),
+        ),
+        rate(
+            "outside_refused",
+            "outside, refutable: refused",
+            s.outside_refused,
+            AtLeast(0.80),
+        ),
+        rate(
+            "outside_unknown",
+            "outside: called unknown",
+            s.outside_unknown,
+            Target::None,
+        ),
+        rate(
+            "several_found_or_refused",
+            "two: both found, or refused",
+            s.several_found_or_refused,
+            AtLeast(0.80),
+        ),
+        rate(
+            "several_found",
+            "two: both found",
+            s.several_found,
+            Target::None,
+        ),
+        rate(
+            "set_coverage",
+            "90 % set holds the truth",
+            s.set_coverage,
+            AtLeast(0.88),
+        ),
     ];
     rows.extend(figures(scores));
     rows
@@ -74,8 +154,18 @@ fn figures(scores: &Scores) -> [Row; 7] {
     let calibration = &scores.calibration;
     let (median, tenth) = (scores.closure.map(|c| c.0), scores.closure.map(|c| c.1));
     [
-        figure("set_size", "mean size of the 90 % set", scores.set_size, AtMost(2.0)),
-        figure("truth_probability", "mean probability of the truth", scores.truth_probability, Target::None),
+        figure(
+            "set_size",
+            "mean size of the 90 % set",
+            scores.set_size,
+            AtMost(2.0),
+        ),
+        figure(
+            "truth_probability",
+            "mean probability of the truth",
+            scores.truth_probability,
+            Target::None,
+        ),
         figure("brier", "Brier score", calibration.brier, Target::None),
         figure(
             "calibration_error",
@@ -83,9 +173,24 @@ fn figures(scores: &Scores) -> [Row; 7] {
             calibration.expected_calibration_error,
             AtMost(0.08),
         ),
-        figure("closure_median", "withheld closure, named: median", median, AtLeast(0.97)),
-        figure("closure_10th", "withheld closure, named: 10th pct", tenth, AtLeast(0.75)),
-        figure("size_error", "size error, median |ln ratio|", scores.size_error, AtMost(0.15)),
+        figure(
+            "closure_median",
+            "withheld closure, named: median",
+            median,
+            AtLeast(0.97),
+        ),
+        figure(
+            "closure_10th",
+            "withheld closure, named: 10th pct",
+            tenth,
+            AtLeast(0.75),
+        ),
+        figure(
+            "size_error",
+            "size error, median |ln ratio|",
+            scores.size_error,
+            AtMost(0.15),
+        ),
     ]
 }
 
@@ -118,7 +223,9 @@ pub fn render_rows(rows: &[Row]) -> String {
         "figure", "value", "95 % interval", "cases", "target"
     );
     for row in rows {
-        let value = row.value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let value = row
+            .value
+            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
         let interval = row
             .interval
             .map_or_else(String::new, |(low, high)| format!("{low:.3} to {high:.3}"));

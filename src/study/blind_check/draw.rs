@@ -1,0 +1,389 @@
+//! Draws virtual tests: a structure, a plan of recordings, and an effect that its description leaves
+//! out.
+//!
+//! All tests of a campaign look alike from outside: a cantilever that is described as an Euler beam
+//! with two springs and sensors without mass, so that the description does not give the effect away.
+//! Sizes are drawn from small to large as a test engineer meets them, positions off any grid.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use rand::seq::IndexedRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::case::{Planted, Truth};
+use super::outside::{Fastened, OutsideKind};
+use crate::description::{DescriptionError, TestDescription};
+use crate::effects::{Effect, EffectError, EffectId};
+use crate::simulate::{Damping, Laboratory, SimulateError};
+use crate::structure::StructureError;
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
+
+/// How many recordings a drawn test has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Five recordings: two sensors, one of them moved once; three tap positions; two levels; six
+    /// modes.
+    FiveRecordings,
+    /// One recording with one sensor, five modes.
+    OneRecording,
+}
+
+/// A blind check to be drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Campaign {
+    /// Tests with one effect of the catalogue, dealt out evenly over its groups.
+    pub singles: usize,
+    /// Tests with nothing.
+    pub nulls: usize,
+    /// Tests with something outside the catalogue.
+    pub outside: usize,
+    /// Tests with two effects.
+    pub pairs: usize,
+    /// What is recorded.
+    pub extent: Extent,
+    /// Noise of the responses below their root mean square (dB). 60.
+    pub noise_db: f64,
+    /// Largest standard deviation of the joint's drift between recordings (1); each test draws its
+    /// own up to it, and is not told. 0.01.
+    pub drift: f64,
+    /// Seed of everything.
+    pub seed: u64,
+}
+
+impl Default for Campaign {
+    fn default() -> Self {
+        Self {
+            singles: 300,
+            nulls: 150,
+            outside: 60,
+            pairs: 60,
+            extent: Extent::FiveRecordings,
+            noise_db: 60.0,
+            drift: 0.01,
+            seed: 1,
+        }
+    }
+}
+
+/// What a test of a campaign is to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Plant {
+    Single(usize),
+    Nothing,
+    Outside(usize),
+    Pair,
+}
+
+/// A test drawn but not yet recorded.
+#[derive(Debug, Clone)]
+pub struct DrawnTest {
+    /// Its description with the joint's stiffnesses, which the diagnosis does not see.
+    pub text: String,
+    /// The same, read.
+    pub description: TestDescription,
+    /// The effects, the joint's drift among them.
+    pub effects: Vec<Effect>,
+    /// What no effect of the catalogue describes.
+    pub fastened: Fastened,
+    /// How it is recorded.
+    pub laboratory: Laboratory,
+    /// Noise of the responses below their root mean square (dB).
+    pub noise_db: f64,
+    /// What was planted.
+    pub truth: Truth,
+    /// Seed of the recording.
+    pub seed: u64,
+}
+
+/// Why a test cannot be drawn or recorded: a defect of this module.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// The drawn description cannot be read.
+    #[error("a drawn description cannot be read: {0}")]
+    Description(#[from] DescriptionError),
+    /// A drawn effect is out of its range.
+    #[error("a drawn effect cannot be: {0}")]
+    Effect(#[from] EffectError),
+    /// A drawn structure cannot be.
+    #[error("a drawn structure cannot be: {0}")]
+    Structure(#[from] StructureError),
+    /// The test cannot be simulated.
+    #[error("a drawn test cannot be simulated: {0}")]
+    Simulate(#[from] SimulateError),
+    /// The description as the user believes it cannot be written.
+    #[error("a drawn description cannot be written: {0}")]
+    Believed(#[from] toml::de::Error),
+}
+
+impl Campaign {
+    /// Number of tests.
+    pub fn len(&self) -> usize {
+        self.singles + self.nulls + self.outside + self.pairs
+    }
+
+    /// Whether there is no test.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Draws test number `index`, from 0. Kinds follow each other in a shuffled order, so that a
+    /// test's number says nothing.
+    ///
+    /// # Errors
+    /// [`DrawError`]: a defect of the drawing.
+    pub fn draw(&self, index: usize) -> Result<DrawnTest, DrawError> {
+        let plant = self.plants()[index];
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        // Stream 0 shuffles the kinds.
+        random.set_stream(index as u64 + 1);
+        let subject = Subject::draw(&mut random);
+        let mut planted = Vec::new();
+        let mut effects = Vec::new();
+        let mut fastened = Fastened::default();
+        for group in groups_of(plant, &mut random) {
+            let effect = subject.draw_effect(GROUPS[group], &mut random)?;
+            let values = effect
+                .values()
+                .map(|(info, value)| (info.name.to_owned(), value));
+            planted.push(Planted::Catalogue(
+                effect.id,
+                values.collect::<BTreeMap<_, _>>(),
+            ));
+            effects.push(effect);
+        }
+        if let Plant::Outside(number) = plant {
+            let kind = OutsideKind::ALL[number % OutsideKind::ALL.len()];
+            fastened = kind.draw(&subject.beam, &mut random);
+            planted.push(Planted::Outside(kind.name().to_owned()));
+        }
+        let drift = random.random_range(0.0..=self.drift);
+        effects.push(Effect::from_pairs(EffectId::JointDrift, &[("std", drift)])?);
+        let name = format!("test-{index:04}");
+        let text = subject.describe(&name, self.extent, &mut random);
+        Ok(DrawnTest {
+            description: TestDescription::parse(&text, &name)?,
+            laboratory: subject.laboratory(self.extent, &mut random)?,
+            noise_db: self.noise_db,
+            seed: random.random(),
+            truth: Truth {
+                name,
+                effects: planted,
+                detectable: None,
+                refutable: None,
+            },
+            text,
+            effects,
+            fastened,
+        })
+    }
+
+    fn plants(&self) -> Vec<Plant> {
+        let mut plants: Vec<Plant> = (0..self.singles).map(Plant::Single).collect();
+        plants.extend(std::iter::repeat_n(Plant::Nothing, self.nulls));
+        plants.extend((0..self.outside).map(Plant::Outside));
+        plants.extend(std::iter::repeat_n(Plant::Pair, self.pairs));
+        use rand::seq::SliceRandom;
+        plants.shuffle(&mut ChaCha8Rng::seed_from_u64(self.seed));
+        plants
+    }
+}
+
+/// The groups that single effects are dealt from; `resolution` is a reading bias that recordings
+/// cannot hold, `joint-drift` a nuisance that every test has.
+const GROUPS: [&[EffectId]; 12] = [
+    &[EffectId::SensorMass],
+    &[EffectId::SensorCable],
+    &[EffectId::CrossCoupling],
+    &[EffectId::JointMass],
+    &[EffectId::JointNonlinearity],
+    &[EffectId::JointDamping],
+    &[EffectId::Fixture],
+    &[EffectId::Modulus, EffectId::Length, EffectId::Timebase],
+    &[EffectId::AddedMass],
+    &[EffectId::LocalCrack],
+    &[EffectId::AxialLoad],
+    &[EffectId::ShearRotary],
+];
+
+fn groups_of(plant: Plant, random: &mut ChaCha8Rng) -> Vec<usize> {
+    match plant {
+        Plant::Single(number) => vec![number % GROUPS.len()],
+        Plant::Nothing | Plant::Outside(_) => Vec::new(),
+        Plant::Pair => rand::seq::index::sample(random, GROUPS.len(), 2).into_vec(),
+    }
+}
+
+/// The structure of one test.
+struct Subject {
+    beam: Beam,
+    kx: f64,
+    ky: f64,
+}
+
+impl Subject {
+    fn draw(random: &mut ChaCha8Rng) -> Self {
+        // Strips of steel or aluminium, as long as a forearm, about a hundred times longer than thick.
+        let length = random.random_range(0.32..0.60);
+        let steel = random.random_bool(0.6);
+        let (modulus, density, poisson) = if steel {
+            (207e9, 7850.0, 0.29)
+        } else {
+            (70e9, 2700.0, 0.33)
+        };
+        let normal = |spread: f64, random: &mut ChaCha8Rng| {
+            let draw: f64 = StandardNormal.sample(random);
+            (spread * draw).exp()
+        };
+        Self {
+            beam: Beam {
+                length,
+                width: random.random_range(0.022..0.055),
+                thickness: length * random.random_range(0.0070..0.0125),
+                modulus,
+                density,
+                poisson,
+            },
+            // About the joint of Ingole & Chatterjee.
+            kx: 1400.0 * normal(0.5, random),
+            ky: 4.8 * normal(0.3, random),
+        }
+    }
+
+    /// One effect of a group with a size between what is small and what is large.
+    fn draw_effect(
+        &self,
+        group: &[EffectId],
+        random: &mut ChaCha8Rng,
+    ) -> Result<Effect, EffectError> {
+        let id = *group.choose(random).unwrap_or(&group[0]);
+        let beam = &self.beam;
+        // Masses as they would be on a beam of 0.83 kg.
+        let gram = 1e-3 * beam.mass() / 0.83;
+        let (stiffness, length) = (beam.bending_stiffness(), beam.length);
+        let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
+        let mut size = |low: f64, high: f64| (random.random_range(low.ln()..high.ln())).exp();
+        let pairs: Vec<(&str, f64)> = match id {
+            EffectId::SensorMass => vec![("mass", gram * size(2.0, 24.0))],
+            EffectId::SensorCable => {
+                vec![("stiffness", size(0.01, 0.3) * stiffness / length.powi(3))]
+            }
+            EffectId::CrossCoupling => vec![("coupling", sign * size(0.03, 0.35))],
+            EffectId::JointMass => {
+                let mass = gram * size(10.0, 100.0);
+                // Bolts and washers: 15 mm radius of gyration.
+                vec![("mass", mass), ("inertia", mass * 0.015f64.powi(2))]
+            }
+            EffectId::JointNonlinearity => {
+                let slips = size(0.1, 10.0) < 1.0;
+                let ratio = size(0.008, 0.08);
+                let exponent = if slips { 1.0 } else { 2.0 };
+                vec![
+                    ("ratio", if slips { -ratio } else { sign * ratio }),
+                    ("exponent", exponent),
+                ]
+            }
+            EffectId::JointDamping => vec![("loss_factor", size(0.003, 0.05))],
+            EffectId::Fixture => vec![
+                ("frequency", size(65.0, 800.0)),
+                ("ratio", size(0.005, 0.08)),
+            ],
+            EffectId::Modulus => vec![("relative", sign * size(0.003, 0.03))],
+            EffectId::Length => vec![("relative", sign * size(0.0012, 0.007))],
+            EffectId::Timebase => vec![("relative", sign * size(2e-5, 1e-3))],
+            EffectId::AddedMass => vec![
+                ("mass", gram * size(2.0, 24.0)),
+                ("position", length * random.random_range(0.15..1.0)),
+            ],
+            EffectId::LocalCrack => vec![
+                ("compliance", size(0.003, 0.04)),
+                ("position", length * random.random_range(0.08..0.75)),
+            ],
+            EffectId::AxialLoad => {
+                vec![("force", sign * size(0.02, 0.5) * stiffness / length.powi(2))]
+            }
+            EffectId::ShearRotary => vec![("factor", size(0.5, 3.0))],
+            EffectId::JointDrift | EffectId::Resolution => Vec::new(),
+        };
+        Effect::from_pairs(id, &pairs)
+    }
+
+    fn describe(&self, name: &str, extent: Extent, random: &mut ChaCha8Rng) -> String {
+        let Beam {
+            length,
+            width,
+            thickness,
+            modulus,
+            density,
+            poisson,
+        } = self.beam;
+        let units = StiffnessUnits::of(&self.beam);
+        let (kt, kr) = (self.kx * units.kt, self.ky * units.kr);
+        let mut text = format!(
+            "name = \"{name}\"\n\n[beam]\nlength = {length}\nwidth = {width}\nthickness = {thickness}\n\
+             modulus = {modulus:e}\ndensity = {density:.1}\npoisson = {poisson}\n\n[joint]\n\
+             kind = \"cantilever\"\nmodel = \"2p\"\nbeam = \"euler\"\nkt = {kt:e}\nkr = {kr:e}\n\n\
+             [hammer]\nchannel = 1\n"
+        );
+        let mut place = |share: f64| length * share * random.random_range(0.98..1.0);
+        let (a, b, moved) = (place(0.81), place(0.46), place(0.43));
+        let taps = [place(0.12), place(0.50), place(0.96)];
+        let sensor = |text: &mut String, name: &str, channel: usize, x: f64| {
+            // Writing to a string cannot fail.
+            let _ = write!(
+                text,
+                "\n[[sensor]]\nname = \"{name}\"\nchannel = {channel}\nposition = {x}\n"
+            );
+        };
+        let recording = |text: &mut String, number: usize, tap: f64, more: &str| {
+            let _ = write!(
+                text,
+                "\n[[recording]]\nfile = \"r{number}.wav\"\ntap = {tap}\n{more}"
+            );
+        };
+        sensor(&mut text, "A", 2, a);
+        if extent == Extent::OneRecording {
+            recording(&mut text, 1, taps[2], "");
+            return text;
+        }
+        sensor(&mut text, "B", 3, b);
+        for (number, tap) in taps.iter().enumerate() {
+            recording(&mut text, number + 1, *tap, "");
+        }
+        recording(&mut text, 4, taps[2], &format!("at = {{ A = {moved} }}\n"));
+        recording(&mut text, 5, taps[2], "level = 4\n");
+        text
+    }
+
+    /// A rate whose band ends between the last mode that is wanted and the next.
+    fn laboratory(
+        &self,
+        extent: Extent,
+        random: &mut ChaCha8Rng,
+    ) -> Result<Laboratory, StructureError> {
+        let modes = match extent {
+            Extent::FiveRecordings => 6,
+            Extent::OneRecording => 5,
+        };
+        let joint = JointStiffness::two_parameter(self.kx, self.ky);
+        let frequencies = natural_frequencies(
+            BeamTheory::Euler,
+            &self.beam,
+            Assembly::Cantilever,
+            &joint,
+            modes + 1,
+        )?;
+        let mut laboratory = Laboratory::default();
+        let between = (frequencies[modes - 1] * frequencies[modes]).sqrt();
+        laboratory.recorder.sample_rate = Some((2.56 * between).round() as u32);
+        // White noise is added to the recording instead, so that its level is known.
+        laboratory.sensors.noise = 0.0;
+        laboratory.hammer.interval = Some(4.5);
+        let ratio = |_| random.random_range(0.0015f64.ln()..0.006f64.ln()).exp();
+        laboratory.specimen.damping = Damping::Modal((0..8).map(ratio).collect());
+        Ok(laboratory)
+    }
+}

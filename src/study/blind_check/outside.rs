@@ -1,0 +1,132 @@
+//! Physics that the catalogue does not have, on purpose: a diagnosis must say that it does not know.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use crate::structure::Beam;
+use crate::structure::specimen::{Hinge, PointMass, PointSpring, Specimen};
+
+/// Things fastened to a specimen that neither its description nor an effect knows.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Fastened {
+    /// Masses.
+    pub masses: Vec<PointMass>,
+    /// Springs to the ground.
+    pub springs: Vec<PointSpring>,
+    /// Hinges.
+    pub hinges: Vec<Hinge>,
+}
+
+impl Fastened {
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.masses.is_empty() && self.springs.is_empty() && self.hinges.is_empty()
+    }
+
+    /// Fastens all of it.
+    pub fn add_to(&self, specimen: &mut Specimen) {
+        specimen.masses.extend_from_slice(&self.masses);
+        specimen.springs.extend_from_slice(&self.springs);
+        specimen.hinges.extend_from_slice(&self.hinges);
+    }
+}
+
+/// Kinds of physics outside the catalogue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OutsideKind {
+    /// Something touches the beam somewhere: a spring to the ground, away from any sensor.
+    SecondSupport,
+    /// Mass spread over a part of the beam, such as tape or paint.
+    MassPatch,
+    /// A part of the beam is softer, such as a delamination.
+    SoftPatch,
+    /// A wide and light thing that turns with the beam: rotary inertia without mass.
+    RotaryLump,
+    /// Two masses in two places.
+    TwoMasses,
+}
+
+/// Pieces into which a patch is divided: the spacing is far below a quarter wave of the sixth mode.
+const PIECES: usize = 12;
+
+impl OutsideKind {
+    /// All kinds.
+    pub const ALL: [Self; 5] = [
+        Self::SecondSupport,
+        Self::MassPatch,
+        Self::SoftPatch,
+        Self::RotaryLump,
+        Self::TwoMasses,
+    ];
+
+    /// As results name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SecondSupport => "second-support",
+            Self::MassPatch => "mass-patch",
+            Self::SoftPatch => "soft-patch",
+            Self::RotaryLump => "rotary-lump",
+            Self::TwoMasses => "two-masses",
+        }
+    }
+
+    /// Draws a size and a place.
+    pub fn draw(self, beam: &Beam, random: &mut ChaCha8Rng) -> Fastened {
+        let (length, stiffness) = (beam.length, beam.bending_stiffness());
+        let size = |low: f64, high: f64, random: &mut ChaCha8Rng| {
+            random.random_range(low.ln()..high.ln()).exp()
+        };
+        let mut fastened = Fastened::default();
+        match self {
+            Self::SecondSupport => fastened.springs.push(PointSpring {
+                position: length * random.random_range(0.55..0.95),
+                stiffness: size(0.5, 8.0, random) * stiffness / length.powi(3),
+            }),
+            Self::MassPatch => {
+                let total = beam.mass() * size(0.01, 0.06, random);
+                for position in patch(length, random) {
+                    fastened.masses.push(mass(position, total / PIECES as f64));
+                }
+            }
+            Self::SoftPatch => {
+                let total = size(0.01, 0.1, random) * length / stiffness;
+                for position in patch(length, random) {
+                    fastened.hinges.push(Hinge {
+                        position,
+                        compliance: total / PIECES as f64,
+                    });
+                }
+            }
+            Self::RotaryLump => fastened.masses.push(PointMass {
+                position: length * random.random_range(0.3..1.0),
+                mass: 0.0,
+                inertia: size(2e-5, 1e-3, random) * beam.mass() * length * length,
+            }),
+            Self::TwoMasses => {
+                let near = length * random.random_range(0.2..0.5);
+                let far = near + length * random.random_range(0.2..0.45);
+                for position in [near, far] {
+                    let size = size(0.004, 0.03, random);
+                    fastened.masses.push(mass(position, size * beam.mass()));
+                }
+            }
+        }
+        fastened
+    }
+}
+
+fn mass(position: f64, mass: f64) -> PointMass {
+    PointMass {
+        position,
+        mass,
+        inertia: 0.0,
+    }
+}
+
+/// Evenly spread positions (m) over a fifth to two fifths of the beam.
+fn patch(length: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
+    let width = length * random.random_range(0.2..0.4);
+    let start = random.random_range(0.05 * length..0.95 * length - width);
+    let at = |piece: usize| start + (piece as f64 + 0.5) / PIECES as f64 * width;
+    (0..PIECES).map(at).collect()
+}

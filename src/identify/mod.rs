@@ -9,6 +9,9 @@
 //!                      -> perturbation  how far errors in the frequencies move the estimate
 //! ```
 //!
+//! What the measurement saw, as a diagnosis compares it with predictions, is [`observation`]; which peak
+//! is which mode says [`pairing`].
+//!
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
 
@@ -17,6 +20,7 @@ pub mod doubt;
 pub mod estimate;
 pub mod free_beam;
 pub mod monte_carlo;
+pub mod observation;
 pub mod pairing;
 pub mod pairs;
 pub mod perturbation;

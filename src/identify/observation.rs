@@ -87,7 +87,7 @@ pub struct ObservedMode {
     /// Modal constant at the strongest sensor (1/kg): product of the mass-normalised shapes at sensor
     /// and tap, with its sign; `None` without a calibrated hammer and sensor.
     pub constant: Option<Observed>,
-    /// Displacement amplitude at the strongest sensor when the decay begins (m), median of the taps;
+    /// Displacement amplitude at the strongest sensor when the fitted decay begins (m), median of the taps;
     /// `None` without a calibrated sensor.
     pub amplitude: Option<f64>,
     /// How frequency and damping change along the decay; `None` where they could not be followed.

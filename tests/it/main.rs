@@ -14,6 +14,7 @@ mod modal;
 mod modal_fit;
 mod modal_matrix_pencil;
 mod modal_polyreference;
+mod observations;
 mod pipeline;
 mod pipeline_fits;
 mod quality;

@@ -30,7 +30,7 @@ pub use doubt::Doubt;
 pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
 pub use free_beam::{FreeBeamEstimate, estimate_modulus};
 pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
-pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio};
+pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio, pair_modes};
 pub use pairs::{
     ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap, estimate_pairs,
     estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,

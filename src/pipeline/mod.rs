@@ -23,6 +23,7 @@ mod measure;
 mod model;
 mod modes;
 mod neglect;
+mod numbering;
 mod observations;
 mod quiet;
 mod recordings;
@@ -90,7 +91,9 @@ pub fn run_test(
         Some(measured) => modes_of_measured(measured, &structure),
         None => {
             let reference = modes::reference_configuration(test, &recordings);
-            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, &structure);
+            let details = structure_details(test, &structure.beam);
+            let known = (&structure, &details);
+            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
             found
         }

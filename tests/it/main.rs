@@ -15,6 +15,7 @@ mod modal_fit;
 mod modal_matrix_pencil;
 mod modal_polyreference;
 mod observations;
+mod pairing;
 mod pipeline;
 mod pipeline_fits;
 mod quality;

@@ -13,7 +13,7 @@ mod repeats;
 
 use super::analysis::{Analysis, ModeResult, RecordingResult};
 use crate::identify::observation::{
-    Configuration, ExtraPeak, Observations, ObservedMode, ObservedSensor,
+    Configuration, ExtraPeak, Observations, Observed, ObservedMode, ObservedSensor, ShapeValue,
 };
 use crate::modal::{ModeReading, PeakLabel};
 use crate::recording::Format;
@@ -28,6 +28,16 @@ const LEVEL_GAP: f64 = 2.0;
 /// steel beam's fall by 1.5e-4 per kelvin, and a tenth of a kelvin goes unnoticed. Sample clocks (some
 /// 5e-5) are the same in all recordings, and no part of it.
 const COMMON: f64 = 1.5e-5;
+
+/// A reading's shape at the sensors of its recording, over all taps, and its modal constant (1/kg) at the
+/// strongest sensor.
+pub(super) fn shape_of(
+    reading: &ModeReading,
+    recording: &RecordingResult,
+) -> (Vec<ShapeValue>, Option<Observed>) {
+    let taps: Vec<usize> = (0..recording.measurement.taps.accepted().count()).collect();
+    ModeSeen::new(0, reading, (recording, &taps, true)).shape_and_constant()
+}
 
 /// What the test observed; empty for a bare recording, whose peaks have no numbers of a model.
 pub fn observations(analysis: &Analysis) -> Observations {

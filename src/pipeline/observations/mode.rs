@@ -86,8 +86,7 @@ impl<'a> ModeSeen<'a> {
     pub fn observed(&self, hardest: bool) -> ObservedMode {
         let frequency = self.frequency();
         let shape = self.shape();
-        let reference = shape.iter().find(|value| value.std == 0.0);
-        let reference = reference.map(|value| value.sensor);
+        let reference = reference(&shape);
         ObservedMode {
             mode: self.number,
             frequency: frequency.value,
@@ -104,6 +103,13 @@ impl<'a> ModeSeen<'a> {
             shape,
             reference,
         }
+    }
+
+    /// The shape, and the modal constant (1/kg) where it is 1.
+    pub fn shape_and_constant(&self) -> (Vec<ShapeValue>, Option<Observed>) {
+        let shape = self.shape();
+        let constant = reference(&shape).and_then(|sensor| self.constant(sensor));
+        (shape, constant)
     }
 
     fn fit(&self) -> Option<&'a FittedReading> {
@@ -269,6 +275,12 @@ impl<'a> ModeSeen<'a> {
             damping: observed(reading.damping_ratio, reading.damping_bound),
         })
     }
+}
+
+/// The sensor where a shape is 1 by definition.
+fn reference(shape: &[ShapeValue]) -> Option<usize> {
+    let one = shape.iter().find(|value| value.std == 0.0);
+    one.map(|value| value.sensor)
 }
 
 /// Real part of each tap's ratio and its standard uncertainty, sqrt(s^2 + |r|^2 s_ref^2)/|a_ref|.

@@ -29,6 +29,8 @@ pub mod taps;
 pub mod identify;
 pub mod structure;
 
+pub mod gap;
+
 pub mod pipeline;
 pub mod report;
 pub mod simulate;

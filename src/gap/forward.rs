@@ -140,6 +140,9 @@ impl<'a> Forward<'a> {
                 }
             }
         }
+        if self.softening(parameters).is_some() {
+            self.amplitude_slopes(parameters, &base, &mut slopes);
+        }
         let predicted = self.add_smalls(&solved, base, (parameters, &mut slopes));
         Some(Linearised { predicted, slopes })
     }
@@ -404,8 +407,10 @@ impl<'a> Forward<'a> {
         let first = self.layout.smalls();
         for (row, kind) in self.rows.iter().enumerate() {
             for (k, small) in self.frame.smalls.iter().enumerate() {
-                let slope = self.small_slope(kind, small, (solved, predicted[row]), parameters);
-                slopes[(row, first + k)] = slope;
+                if *small != Small::Amplitude {
+                    let slope = self.small_slope(kind, small, (solved, predicted[row]), parameters);
+                    slopes[(row, first + k)] = slope;
+                }
             }
         }
         for (k, small) in self.frame.smalls.iter().enumerate() {
@@ -418,26 +423,21 @@ impl<'a> Forward<'a> {
                 *predicted += value * slopes[(row, first + k)];
             }
         }
-        if self.softening(parameters).is_some() {
-            self.amplitude_slopes(parameters, slopes);
-        }
         predicted
     }
 
     /// Slopes with respect to the effective amplitude, by finite differences.
-    fn amplitude_slopes(&self, parameters: &[f64], slopes: &mut DMatrix<f64>) {
+    fn amplitude_slopes(&self, parameters: &[f64], base: &[f64], slopes: &mut DMatrix<f64>) {
         const STEP: f64 = 1e-2;
         let Some(k) = self.frame.small_index(Small::Amplitude) else {
             return;
         };
         let column = self.layout.smalls() + k;
-        let values = |step: f64| {
-            let mut moved = parameters.to_vec();
-            moved[column] += step;
-            self.rows_of(&self.solve(&moved)?, &moved)
-        };
-        if let (Some(old), Some(new)) = (values(0.0), values(STEP)) {
-            for (row, (new, old)) in new.iter().zip(&old).enumerate() {
+        let mut moved = parameters.to_vec();
+        moved[column] += STEP;
+        let solved = self.solve(&moved);
+        if let Some(new) = solved.and_then(|solved| self.rows_of(&solved, &moved)) {
+            for (row, (new, old)) in new.iter().zip(base).enumerate() {
                 slopes[(row, column)] = (new - old) / STEP;
             }
         }

@@ -16,7 +16,11 @@ impl Specimen {
         not_negative("joint mass", self.joint_mass.mass)?;
         not_negative("joint inertia", self.joint_mass.inertia)?;
         if !self.axial_force.is_finite() {
-            return Err(unphysical("axial force", self.axial_force, "give a finite force in N"));
+            return Err(unphysical(
+                "axial force",
+                self.axial_force,
+                "give a finite force in N",
+            ));
         }
         self.check_attachments()?;
         self.check_joint()?;
@@ -99,7 +103,11 @@ impl Specimen {
         }
         if matches!(self.body, Body::Joined(_)) || !(kr > 0.0 && kr.is_finite()) {
             let remedy = "a flexible base needs a cantilever whose joint has a finite kr above 0";
-            return Err(unphysical("stiffness ratio of the base", base.ratio, remedy));
+            return Err(unphysical(
+                "stiffness ratio of the base",
+                base.ratio,
+                remedy,
+            ));
         }
         Ok(())
     }
@@ -117,6 +125,10 @@ fn not_negative(quantity: &'static str, value: f64) -> Result<(), StructureError
     if value >= 0.0 && value.is_finite() {
         Ok(())
     } else {
-        Err(unphysical(quantity, value, "it must be finite and at least 0"))
+        Err(unphysical(
+            quantity,
+            value,
+            "it must be finite and at least 0",
+        ))
     }
 }

@@ -207,7 +207,12 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums beside each other: one alone would wait for its own last addition.
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    let rest: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in a4.zip(b4) {
         for i in 0..4 {
             sums[i] += x[i] * y[i];
@@ -254,7 +259,9 @@ fn by_subspace(shifted: &Band, mass: &Band, count: usize) -> Result<Pairs, Struc
     let top = pairs.values[count - 1] * (1.0 + 1e-6);
     let below = pairs.values.iter().filter(|value| **value < top).count();
     if below < width && shifted.plus(-top, mass).negative_eigenvalues() != below {
-        return Err(failure("some of its modes lie too close together to be told apart"));
+        return Err(failure(
+            "some of its modes lie too close together to be told apart",
+        ));
     }
     pairs.values.truncate(count);
     pairs.vectors.truncate(count);

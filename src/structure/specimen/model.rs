@@ -81,9 +81,9 @@ impl Model {
         for beam in beams {
             let share = mesh.elements as f64 * beam.length / length;
             let elements = (share.round() as usize).max(1);
-            let (start, node) = runs.last().map_or((0.0, 0), |run| {
-                (beams[0].length / length, run.elements + 1)
-            });
+            let (start, node) = runs
+                .last()
+                .map_or((0.0, 0), |run| (beams[0].length / length, run.elements + 1));
             let theory = BeamTheory::Timoshenko;
             let piece = Piece::new(theory, beam, &units, elements, (start, node));
             let element = Element {
@@ -139,10 +139,18 @@ impl Model {
             }
         }
         for item in &self.masses {
-            scatter(&mut mass, &self.place_equations(&item.place), &item.matrix());
+            scatter(
+                &mut mass,
+                &self.place_equations(&item.place),
+                &item.matrix(),
+            );
         }
         for item in &self.springs {
-            scatter(&mut stiffness, &self.place_equations(&item.place), &item.matrix());
+            scatter(
+                &mut stiffness,
+                &self.place_equations(&item.place),
+                &item.matrix(),
+            );
         }
         self.scatter_joint(&mut stiffness);
         if let (Some(base), Some(row)) = (&self.base, self.numbering.base) {
@@ -162,7 +170,9 @@ impl Model {
     }
 
     fn hinged_at(&self, run: usize, index: usize) -> Option<&HingedElement> {
-        self.hinged.iter().find(|h| h.run == run && h.index == index)
+        self.hinged
+            .iter()
+            .find(|h| h.run == run && h.index == index)
     }
 
     fn scatter_joint(&self, stiffness: &mut Band) {
@@ -212,7 +222,11 @@ impl Model {
         let mut sum = 0.0;
         for (row, a) in self.joint.iter().zip(u) {
             for (entry, b) in row.iter().zip(u) {
-                sum += if entry.is_finite() { entry * a * b } else { 0.0 };
+                sum += if entry.is_finite() {
+                    entry * a * b
+                } else {
+                    0.0
+                };
             }
         }
         sum
@@ -251,7 +265,12 @@ impl Model {
     pub(super) fn motion(&self, vector: &[f64]) -> Motion {
         let at = |row: usize| if row == HELD { 0.0 } else { vector[row] };
         Motion {
-            nodes: self.numbering.nodes.iter().map(|node| node.map(at)).collect(),
+            nodes: self
+                .numbering
+                .nodes
+                .iter()
+                .map(|node| node.map(at))
+                .collect(),
             base: self.numbering.base.map(at),
         }
     }

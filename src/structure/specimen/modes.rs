@@ -49,14 +49,20 @@ impl SpecimenModes {
         let loose = model.rigid_motions();
         let singular = loose > 0 && !model.is_supported();
         let shift = if loose > 0 { SHIFT } else { 0.0 };
-        let locked = if singular { model.rigid_vectors() } else { Vec::new() };
+        let locked = if singular {
+            model.rigid_vectors()
+        } else {
+            Vec::new()
+        };
         let pairs = lowest_pairs(&stiffness, &mass, shift, &locked, count + loose)?;
         let Pairs { values, vectors } = pairs;
         let rigid = (0..loose).filter(|&i| values[i] < NO_STIFFNESS);
         let rigid = rigid.map(|i| vectors[i].clone()).collect();
         let statics = Statics::new(&stiffness, mass, rigid)?;
         let frequency = |square: f64| square.max(0.0).sqrt() * model.units.omega / (2.0 * PI);
-        let suspension = values[..loose].iter().filter(|value| **value >= NO_STIFFNESS);
+        let suspension = values[..loose]
+            .iter()
+            .filter(|value| **value >= NO_STIFFNESS);
         let motions: Vec<Motion> = vectors[loose..].iter().map(|v| model.motion(v)).collect();
         let energies: Vec<Energies> = motions.iter().map(|m| model.energies(m)).collect();
         Ok(Self {
@@ -111,7 +117,10 @@ impl SpecimenModes {
     /// Of a lap joint right minus left; with a base, against the base.
     pub fn joint_motion(&self, mode: usize) -> [f64; 2] {
         let [w, theta] = self.model.joint_motion(&self.motions[mode]);
-        [w / self.model.units.mass.sqrt(), theta / self.rotation_unit()]
+        [
+            w / self.model.units.mass.sqrt(),
+            theta / self.rotation_unit(),
+        ]
     }
 
     /// Share of the joint's springs in the strain energy (1).
@@ -159,11 +168,7 @@ impl SpecimenModes {
     ///
     /// # Errors
     /// As [`Specimen::modes`], and where the other specimen has other beams or other rigid springs.
-    pub fn rayleigh_frequency(
-        &self,
-        mode: usize,
-        other: &Specimen,
-    ) -> Result<f64, StructureError> {
+    pub fn rayleigh_frequency(&self, mode: usize, other: &Specimen) -> Result<f64, StructureError> {
         let model = self.model_of(other)?;
         Ok(self.quotient_frequency(&model, mode))
     }
@@ -182,9 +187,8 @@ impl SpecimenModes {
     fn model_of(&self, other: &Specimen) -> Result<Model, StructureError> {
         let model = Model::new(other, self.mesh)?;
         let rigid = |model: &Model| [0, 1].map(|i| model.joint[i][i].is_infinite());
-        let nodes = |model: &Model| -> Vec<usize> {
-            model.runs.iter().map(|run| run.elements).collect()
-        };
+        let nodes =
+            |model: &Model| -> Vec<usize> { model.runs.iter().map(|run| run.elements).collect() };
         if nodes(&model) != nodes(&self.model) || rigid(&model) != rigid(&self.model) {
             return Err(StructureError::FiniteElements {
                 reason: "a shape serves specimens of the same beams and rigid springs only"
@@ -218,12 +222,11 @@ impl Statics {
     fn new(stiffness: &Band, mass: Band, rigid: Vec<Vec<f64>>) -> Result<Self, StructureError> {
         // A hundredth of the first elastic eigenvalue: each step of `solve` gains two digits.
         let shift = if rigid.is_empty() { 0.0 } else { 0.01 * SHIFT };
-        let factor = stiffness
-            .plus(shift, &mass)
-            .cholesky()
-            .ok_or_else(|| StructureError::FiniteElements {
+        let factor = stiffness.plus(shift, &mass).cholesky().ok_or_else(|| {
+            StructureError::FiniteElements {
                 reason: "it is not stable: the axial force buckles it".to_owned(),
-            })?;
+            }
+        })?;
         let with_load = |vector: Vec<f64>| {
             let load = mass.times(&vector);
             (vector, load)
@@ -241,7 +244,9 @@ impl Statics {
     fn solve(&self, mut load: Vec<f64>) -> Vec<f64> {
         for (motion, inertia) in &self.rigid {
             let share: f64 = motion.iter().zip(&load).map(|(a, b)| a * b).sum();
-            load.iter_mut().zip(inertia).for_each(|(f, i)| *f -= share * i);
+            load.iter_mut()
+                .zip(inertia)
+                .for_each(|(f, i)| *f -= share * i);
         }
         let mut answer = self.solved(load.clone());
         if self.rigid.is_empty() {
@@ -270,7 +275,10 @@ impl Statics {
     fn remove_rigid(&self, vector: &mut [f64]) {
         for (motion, inertia) in &self.rigid {
             let share: f64 = inertia.iter().zip(vector.iter()).map(|(a, b)| a * b).sum();
-            vector.iter_mut().zip(motion).for_each(|(x, m)| *x -= share * m);
+            vector
+                .iter_mut()
+                .zip(motion)
+                .for_each(|(x, m)| *x -= share * m);
         }
     }
 }

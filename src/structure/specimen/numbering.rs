@@ -32,7 +32,11 @@ impl Numbering {
         match specimen.body {
             Body::One(_) => {
                 let first = [0, 1].map(|motion| {
-                    if rigid[motion] { HELD } else { numbering.next() }
+                    if rigid[motion] {
+                        HELD
+                    } else {
+                        numbering.next()
+                    }
                 });
                 numbering.nodes.push(first);
                 numbering.run(elements[0]);

@@ -119,7 +119,11 @@ fn shear_strains(element: &Element) -> [f64; 4] {
 fn geometric_stiffness(element: &Element, axial_force: f64) -> Square {
     // Three of Gauss's points integrate the fourth power exactly.
     let off = 0.5 * 0.6f64.sqrt();
-    let points = [(0.5 - off, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + off, 5.0 / 18.0)];
+    let points = [
+        (0.5 - off, 5.0 / 18.0),
+        (0.5, 8.0 / 18.0),
+        (0.5 + off, 5.0 / 18.0),
+    ];
     let mut matrix = [[0.0; 4]; 4];
     for (x, weight) in points {
         let slope = slopes(element, x);
@@ -147,7 +151,12 @@ fn end_motions(element: &Element) -> [Motion; 4] {
     let s = 1.0 / (1.0 + phi);
     let shapes = [
         [s * (1.0 + phi), -s * phi, -3.0 * s, 2.0 * s],
-        [0.0, s * h * (1.0 + 0.5 * phi), -s * h * (2.0 + 0.5 * phi), s * h],
+        [
+            0.0,
+            s * h * (1.0 + 0.5 * phi),
+            -s * h * (2.0 + 0.5 * phi),
+            s * h,
+        ],
         [0.0, s * phi, 3.0 * s, -2.0 * s],
         [0.0, -0.5 * s * h * phi, s * h * (0.5 * phi - 1.0), s * h],
     ];
@@ -216,7 +225,13 @@ fn combine((a, x): (f64, &Polynomial), (b, y): (f64, &Polynomial)) -> Polynomial
 
 /// Integral from 0; the highest coefficient is never in use before.
 fn integral(polynomial: &Polynomial) -> Polynomial {
-    std::array::from_fn(|i| if i == 0 { 0.0 } else { polynomial[i - 1] / i as f64 })
+    std::array::from_fn(|i| {
+        if i == 0 {
+            0.0
+        } else {
+            polynomial[i - 1] / i as f64
+        }
+    })
 }
 
 fn value_at_end(polynomial: &Polynomial) -> f64 {

@@ -15,7 +15,8 @@ pub(super) fn eigen(diagonal: &[f64], beside: &[f64]) -> Option<(Vec<f64>, Vec<V
         .collect();
     for first in 0..size {
         for turn in 0.. {
-            let negligible = |m: &usize| e[*m].abs() <= f64::EPSILON * (d[*m].abs() + d[*m + 1].abs());
+            let negligible =
+                |m: &usize| e[*m].abs() <= f64::EPSILON * (d[*m].abs() + d[*m + 1].abs());
             let last = (first..size - 1).find(negligible).unwrap_or(size - 1);
             if last == first {
                 break;

@@ -71,7 +71,11 @@ fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
 impl Model {
     /// Adds hinges first: they change the shape by which the others move.
     pub(super) fn attach(&mut self, specimen: &Specimen) -> Result<(), StructureError> {
-        for hinge in specimen.hinges.iter().filter(|hinge| hinge.compliance > 0.0) {
+        for hinge in specimen
+            .hinges
+            .iter()
+            .filter(|hinge| hinge.compliance > 0.0)
+        {
             let (run, index, within) = self.locate(hinge.position);
             // The unit of rotational compliance.
             let unit = self.units.stiffness() * self.units.length.powi(2);
@@ -167,7 +171,10 @@ impl Model {
         hinge: (f64, f64),
     ) -> Result<(), StructureError> {
         let section = self.runs[run].section;
-        let known = self.hinged.iter().position(|h| h.run == run && h.index == index);
+        let known = self
+            .hinged
+            .iter()
+            .position(|h| h.run == run && h.index == index);
         let mut hinges = known.map_or_else(Vec::new, |known| self.hinged.remove(known).hinges);
         hinges.push(hinge);
         self.hinged

@@ -131,7 +131,10 @@ impl HingedElement {
     }
 
     fn kinks(&self, section: &Section) -> impl Iterator<Item = (Kink, &[f64; 4])> {
-        let shapes = self.hinges.iter().map(|(place, _)| Kink::new(section, *place));
+        let shapes = self
+            .hinges
+            .iter()
+            .map(|(place, _)| Kink::new(section, *place));
         shapes.zip(&self.kinks)
     }
 

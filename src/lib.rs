@@ -29,6 +29,7 @@ pub mod taps;
 pub mod identify;
 pub mod structure;
 
+pub mod effects;
 pub mod gap;
 
 pub mod pipeline;

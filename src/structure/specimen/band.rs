@@ -86,8 +86,8 @@ impl Band {
             }
             let squares: f64 = own[..HALF_BAND].iter().map(|entry| entry * entry).sum();
             let rest = own[HALF_BAND] - squares;
-            // Written so that a NaN is caught too.
-            if !(rest > 0.0) {
+            // A NaN is no positive pivot either.
+            if rest.is_nan() || rest <= 0.0 {
                 return None;
             }
             own[HALF_BAND] = 1.0 / rest.sqrt();

@@ -75,7 +75,7 @@ impl Specimen {
         if coupling == 0.0 {
             return Ok(());
         }
-        if !(coupling.abs() < 1.0) {
+        if coupling.is_nan() || coupling.abs() >= 1.0 {
             let remedy = "it must lie between -1 and 1, or the joint releases energy";
             return Err(unphysical("coupling of the joint", coupling, remedy));
         }

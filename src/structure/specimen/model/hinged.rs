@@ -94,9 +94,9 @@ impl HingedElement {
         };
         for (kink, &(place, _)) in element.kinks.iter().zip(&element.hinges) {
             let moment = section.moment(place);
-            for i in 0..4 {
-                for j in 0..4 {
-                    element.stiffness[i][j] -= moment[i] * kink[j];
+            for (row, moment) in element.stiffness.iter_mut().zip(moment) {
+                for (entry, turn) in row.iter_mut().zip(kink) {
+                    *entry -= moment * turn;
                 }
             }
         }

@@ -1,0 +1,506 @@
+//! Names, places, groups and parameters of the effects.
+
+use super::{EffectError, nearest_name};
+
+/// An effect that a model may be missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum EffectId {
+    /// Mass of an accelerometer.
+    SensorMass,
+    /// Stiffness of a sensor's cable or suspension.
+    SensorCable,
+    /// The joint's cross compliance 1/Kz.
+    CrossCoupling,
+    /// Mass or inertia that moves with the joint.
+    JointMass,
+    /// Stiffness and damping of the joint depend on the tap level.
+    JointNonlinearity,
+    /// Dissipation in the joint.
+    JointDamping,
+    /// The joint's stiffness differs between visits.
+    JointDrift,
+    /// A flexible base with a mode of its own.
+    Fixture,
+    /// The beam's modulus differs from the description.
+    Modulus,
+    /// The beam's length differs from the description.
+    Length,
+    /// The recorder's clock runs fast or slow.
+    Timebase,
+    /// A mass on the beam.
+    AddedMass,
+    /// A local loss of bending stiffness.
+    LocalCrack,
+    /// Preload or gravity along the beam.
+    AxialLoad,
+    /// Shear and rotary inertia.
+    ShearRotary,
+    /// A constant bias of the reading of frequencies.
+    Resolution,
+}
+
+/// Where an effect sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Place {
+    /// In the joint.
+    Joint,
+    /// In what holds the joint.
+    Fixture,
+    /// At a sensor.
+    Sensor,
+    /// In the beam.
+    Body,
+    /// In how the signals are recorded and read.
+    Acquisition,
+}
+
+impl Place {
+    /// All places.
+    pub const ALL: [Self; 5] = [
+        Self::Joint,
+        Self::Fixture,
+        Self::Sensor,
+        Self::Body,
+        Self::Acquisition,
+    ];
+
+    /// As results name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Fixture => "fixture",
+            Self::Sensor => "sensor",
+            Self::Body => "body",
+            Self::Acquisition => "acquisition",
+        }
+    }
+}
+
+/// Effects that most data cannot tell apart share a group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Group {
+    /// One effect alone.
+    Own(EffectId),
+    /// Modulus, length, time base: one common factor on all frequencies.
+    Scale,
+    /// Axial load and reading bias: nearly the same number of Hz on every frequency.
+    Offset,
+}
+
+impl Group {
+    /// As results name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Own(id) => id.name(),
+            Self::Scale => "scale",
+            Self::Offset => "offset",
+        }
+    }
+}
+
+/// How the size of a parameter is best divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterScale {
+    /// Both signs, or a place: in equal steps.
+    Linear,
+    /// Sizes above 0: in equal factors.
+    Log,
+}
+
+/// Physical dimension of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// (1)
+    None,
+    /// (kg)
+    Mass,
+    /// (kg m2)
+    Inertia,
+    /// (N/m)
+    Stiffness,
+    /// (Hz)
+    Frequency,
+    /// (m)
+    Length,
+    /// (N)
+    Force,
+}
+
+impl Dimension {
+    /// Its SI unit; empty for a pure number.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Mass => "kg",
+            Self::Inertia => "kg m2",
+            Self::Stiffness => "N/m",
+            Self::Frequency => "Hz",
+            Self::Length => "m",
+            Self::Force => "N",
+        }
+    }
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParameterInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Lowest possible value (SI).
+    pub lowest: f64,
+    /// Highest possible value (SI); of a position the end of the beam limits it further.
+    pub highest: f64,
+    /// How to divide its range.
+    pub scale: ParameterScale,
+    /// Value where none is given (SI): typical in size. `None` = it must be given.
+    pub typical: Option<f64>,
+}
+
+use Dimension as D;
+use ParameterScale::{Linear, Log};
+
+const fn parameter(
+    (name, dimension, meaning): (&'static str, Dimension, &'static str),
+    (lowest, highest): (f64, f64),
+    scale: ParameterScale,
+    typical: Option<f64>,
+) -> ParameterInfo {
+    ParameterInfo {
+        name,
+        dimension,
+        meaning,
+        lowest,
+        highest,
+        scale,
+        typical,
+    }
+}
+
+/// Limits of sizes are those of the kind of structure that is tapped by hand: beams of decimetres,
+/// first frequencies of some tens of hertz.
+const POSITION: ParameterInfo = parameter(
+    ("position", D::Length, "distance from the left end"),
+    (0.0, f64::INFINITY),
+    Linear,
+    None,
+);
+const fn relative(meaning: &'static str, most: f64, typical: f64) -> ParameterInfo {
+    parameter(
+        ("relative", D::None, meaning),
+        (-most, most),
+        Linear,
+        Some(typical),
+    )
+}
+
+const SENSOR_MASS: &[ParameterInfo] = &[parameter(
+    (
+        "mass",
+        D::Mass,
+        "mass of each accelerometer that the model leaves out",
+    ),
+    (0.0, 1.0),
+    Log,
+    Some(0.01),
+)];
+const SENSOR_CABLE: &[ParameterInfo] = &[parameter(
+    (
+        "stiffness",
+        D::Stiffness,
+        "stiffness to the ground at each sensor",
+    ),
+    (0.0, 1e5),
+    Log,
+    Some(50.0),
+)];
+const CROSS_COUPLING: &[ParameterInfo] = &[parameter(
+    ("coupling", D::None, "sqrt(Kx Ky)/Kz of the joint"),
+    (-0.99, 0.99),
+    Linear,
+    Some(-0.1),
+)];
+const JOINT_MASS: &[ParameterInfo] = &[
+    parameter(
+        ("mass", D::Mass, "mass moving with the joint"),
+        (0.0, 10.0),
+        Log,
+        Some(0.01),
+    ),
+    parameter(
+        (
+            "inertia",
+            D::Inertia,
+            "moment of inertia turning with the joint",
+        ),
+        (0.0, 1.0),
+        Log,
+        Some(0.0),
+    ),
+];
+const JOINT_NONLINEARITY: &[ParameterInfo] = &[
+    parameter(
+        (
+            "ratio",
+            D::None,
+            "relative change of the rotational stiffness at the hardest tap",
+        ),
+        (-0.95, 1.0),
+        Linear,
+        Some(-0.05),
+    ),
+    parameter(
+        (
+            "exponent",
+            D::None,
+            "power of the amplitude with which the stiffness changes",
+        ),
+        (0.1, 4.0),
+        Linear,
+        Some(1.0),
+    ),
+];
+const JOINT_DAMPING: &[ParameterInfo] = &[parameter(
+    ("loss_factor", D::None, "loss factor of the joint's springs"),
+    (0.0, 1.0),
+    Log,
+    Some(0.02),
+)];
+const JOINT_DRIFT: &[ParameterInfo] = &[parameter(
+    (
+        "std",
+        D::None,
+        "standard deviation of the relative stiffness between visits",
+    ),
+    (0.0, 0.5),
+    Log,
+    Some(0.01),
+)];
+const FIXTURE: &[ParameterInfo] = &[
+    parameter(
+        (
+            "frequency",
+            D::Frequency,
+            "natural frequency of the base alone",
+        ),
+        (1.0, 1e5),
+        Log,
+        Some(300.0),
+    ),
+    parameter(
+        (
+            "ratio",
+            D::None,
+            "rotational stiffness of the joint over that of the base",
+        ),
+        (0.0, 1.0),
+        Log,
+        Some(0.03),
+    ),
+];
+const MODULUS: &[ParameterInfo] = &[relative("relative change of the modulus", 0.5, 0.02)];
+const LENGTH: &[ParameterInfo] = &[relative("relative change of the length", 0.2, 0.005)];
+const TIMEBASE: &[ParameterInfo] = &[relative("relative change of all frequencies", 0.2, 0.005)];
+const ADDED_MASS: &[ParameterInfo] = &[
+    parameter(
+        ("mass", D::Mass, "mass on the beam"),
+        (0.0, 10.0),
+        Log,
+        Some(0.01),
+    ),
+    POSITION,
+];
+const LOCAL_CRACK: &[ParameterInfo] = &[
+    parameter(
+        (
+            "compliance",
+            D::None,
+            "rotational compliance of the crack times E I/L",
+        ),
+        (0.0, 10.0),
+        Log,
+        Some(0.02),
+    ),
+    POSITION,
+];
+const AXIAL_LOAD: &[ParameterInfo] = &[parameter(
+    ("force", D::Force, "axial force, tension positive"),
+    (-1e7, 1e7),
+    Linear,
+    Some(50.0),
+)];
+const SHEAR_ROTARY: &[ParameterInfo] = &[parameter(
+    (
+        "factor",
+        D::None,
+        "share of shear and rotary inertia, 1 = the full effect",
+    ),
+    (0.0, 10.0),
+    Linear,
+    Some(1.0),
+)];
+const RESOLUTION: &[ParameterInfo] = &[parameter(
+    (
+        "offset",
+        D::Frequency,
+        "constant bias of every frequency read",
+    ),
+    (-1e4, 1e4),
+    Linear,
+    Some(0.25),
+)];
+
+impl EffectId {
+    /// All effects.
+    pub const ALL: [Self; 16] = [
+        Self::SensorMass,
+        Self::SensorCable,
+        Self::CrossCoupling,
+        Self::JointMass,
+        Self::JointNonlinearity,
+        Self::JointDamping,
+        Self::JointDrift,
+        Self::Fixture,
+        Self::Modulus,
+        Self::Length,
+        Self::Timebase,
+        Self::AddedMass,
+        Self::LocalCrack,
+        Self::AxialLoad,
+        Self::ShearRotary,
+        Self::Resolution,
+    ];
+
+    /// As results and the command line name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SensorMass => "sensor-mass",
+            Self::SensorCable => "sensor-cable",
+            Self::CrossCoupling => "cross-coupling",
+            Self::JointMass => "joint-mass",
+            Self::JointNonlinearity => "joint-nonlinearity",
+            Self::JointDamping => "joint-damping",
+            Self::JointDrift => "joint-drift",
+            Self::Fixture => "fixture",
+            Self::Modulus => "modulus",
+            Self::Length => "length",
+            Self::Timebase => "timebase",
+            Self::AddedMass => "added-mass",
+            Self::LocalCrack => "local-crack",
+            Self::AxialLoad => "axial-load",
+            Self::ShearRotary => "shear-rotary",
+            Self::Resolution => "resolution",
+        }
+    }
+
+    /// The effect of that name.
+    ///
+    /// # Errors
+    /// [`EffectError::UnknownEffect`], with the nearest name.
+    pub fn parse(name: &str) -> Result<Self, EffectError> {
+        let known = || Self::ALL.into_iter().map(Self::name);
+        Self::ALL
+            .into_iter()
+            .find(|id| id.name() == name)
+            .ok_or_else(|| EffectError::UnknownEffect {
+                name: name.to_owned(),
+                nearest: nearest_name(name, known()),
+                known: known().collect::<Vec<_>>().join(", "),
+            })
+    }
+
+    /// Where it sits.
+    pub fn place(self) -> Place {
+        match self {
+            Self::SensorMass | Self::SensorCable => Place::Sensor,
+            Self::CrossCoupling
+            | Self::JointMass
+            | Self::JointNonlinearity
+            | Self::JointDamping
+            | Self::JointDrift => Place::Joint,
+            Self::Fixture => Place::Fixture,
+            Self::Modulus
+            | Self::Length
+            | Self::AddedMass
+            | Self::LocalCrack
+            | Self::AxialLoad
+            | Self::ShearRotary => Place::Body,
+            Self::Timebase | Self::Resolution => Place::Acquisition,
+        }
+    }
+
+    /// Its group.
+    pub fn group(self) -> Group {
+        match self {
+            Self::Modulus | Self::Length | Self::Timebase => Group::Scale,
+            Self::AxialLoad | Self::Resolution => Group::Offset,
+            _ => Group::Own(self),
+        }
+    }
+
+    /// What it is, in half a sentence.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::SensorMass => "the accelerometers load the beam with their mass",
+            Self::SensorCable => "cables or suspension hold the beam at the sensors",
+            Self::CrossCoupling => "a force on the joint turns it, and a moment moves it",
+            Self::JointMass => "bolts, washers or a lap's overlap move with the joint",
+            Self::JointNonlinearity => "stiffness and damping of the joint depend on the tap level",
+            Self::JointDamping => "the joint dissipates more than the model says",
+            Self::JointDrift => "the joint's stiffness differs between visits",
+            Self::Fixture => "the base under the joint gives and has a mode of its own",
+            Self::Modulus => "the beam is stiffer or softer than described",
+            Self::Length => "the beam is longer or shorter than described",
+            Self::Timebase => "the recorder's clock is off",
+            Self::AddedMass => "there is a mass on the beam",
+            Self::LocalCrack => "the beam bends more easily at one place",
+            Self::AxialLoad => "preload or gravity pulls or presses along the beam",
+            Self::ShearRotary => "shear deformation and rotary inertia count",
+            Self::Resolution => "frequencies are read with a constant bias",
+        }
+    }
+
+    /// Its parameters, the one that measures its size first.
+    pub fn parameters(self) -> &'static [ParameterInfo] {
+        match self {
+            Self::SensorMass => SENSOR_MASS,
+            Self::SensorCable => SENSOR_CABLE,
+            Self::CrossCoupling => CROSS_COUPLING,
+            Self::JointMass => JOINT_MASS,
+            Self::JointNonlinearity => JOINT_NONLINEARITY,
+            Self::JointDamping => JOINT_DAMPING,
+            Self::JointDrift => JOINT_DRIFT,
+            Self::Fixture => FIXTURE,
+            Self::Modulus => MODULUS,
+            Self::Length => LENGTH,
+            Self::Timebase => TIMEBASE,
+            Self::AddedMass => ADDED_MASS,
+            Self::LocalCrack => LOCAL_CRACK,
+            Self::AxialLoad => AXIAL_LOAD,
+            Self::ShearRotary => SHEAR_ROTARY,
+            Self::Resolution => RESOLUTION,
+        }
+    }
+
+    /// The parameters that measure its size: with all of them 0 the effect is absent.
+    pub fn size_parameters(self) -> &'static [&'static str] {
+        match self {
+            Self::JointMass => &["mass", "inertia"],
+            Self::Fixture => &["ratio"],
+            Self::SensorMass | Self::AddedMass => &["mass"],
+            Self::SensorCable => &["stiffness"],
+            Self::CrossCoupling => &["coupling"],
+            Self::JointNonlinearity => &["ratio"],
+            Self::JointDamping => &["loss_factor"],
+            Self::JointDrift => &["std"],
+            Self::Modulus | Self::Length | Self::Timebase => &["relative"],
+            Self::LocalCrack => &["compliance"],
+            Self::AxialLoad => &["force"],
+            Self::ShearRotary => &["factor"],
+            Self::Resolution => &["offset"],
+        }
+    }
+}

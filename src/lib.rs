@@ -30,6 +30,7 @@ pub mod identify;
 pub mod structure;
 
 pub mod effects;
+pub mod gap;
 
 pub mod pipeline;
 pub mod report;

@@ -9,6 +9,9 @@
 //!                      -> perturbation  how far errors in the frequencies move the estimate
 //! ```
 //!
+//! What the measurement saw, as a diagnosis compares it with predictions, is [`observation`]; which peak
+//! is which mode says [`pairing`].
+//!
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
 
@@ -17,6 +20,7 @@ pub mod doubt;
 pub mod estimate;
 pub mod free_beam;
 pub mod monte_carlo;
+pub mod observation;
 pub mod pairing;
 pub mod pairs;
 pub mod perturbation;
@@ -26,7 +30,7 @@ pub use doubt::Doubt;
 pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
 pub use free_beam::{FreeBeamEstimate, estimate_modulus};
 pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
-pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio};
+pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio, pair_modes};
 pub use pairs::{
     ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap, estimate_pairs,
     estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,

@@ -15,7 +15,7 @@ use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, Beam, JointStiffness};
 
 /// A spring stated as absent (1): below every stiffness that a frequency feels, and with a logarithm.
-const NO_SPRING: f64 = 1e-9;
+pub(super) const NO_SPRING: f64 = 1e-9;
 
 /// What the consistent estimate knows beyond the plain beam with its joint.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -93,7 +93,7 @@ pub(super) fn reference_place(test: &TestDescription, sensor: &SensorDescription
 }
 
 /// The structure that the estimator takes.
-fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedStructure {
+pub(super) fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedStructure {
     let mut jointed = JointedStructure::new(structure.theory, structure.beam, structure.assembly);
     if structure.assembly == Assembly::Lap {
         jointed.lap = details.lap;
@@ -103,7 +103,7 @@ fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedSt
 }
 
 /// What of the joint is estimated where the description names nothing: all that is not known.
-fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
+pub(super) fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
     let known = &structure.known;
     let joint = match structure.regression {
         None => return vec![Parameter::Modulus],

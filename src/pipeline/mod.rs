@@ -23,6 +23,8 @@ mod measure;
 mod model;
 mod modes;
 mod neglect;
+mod numbering;
+mod observations;
 mod quiet;
 mod recordings;
 mod stage;
@@ -44,6 +46,7 @@ pub use identification::{EstimateMethod, IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
+pub use observations::observations;
 pub use recordings::{PipelineError, inspect_bare, measure_bare, si_unit};
 pub use warning::{AmplitudeChange, Warning};
 pub use wired::{Wiring, run_wired};
@@ -88,7 +91,9 @@ pub fn run_test(
         Some(measured) => modes_of_measured(measured, &structure),
         None => {
             let reference = modes::reference_configuration(test, &recordings);
-            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, &structure);
+            let details = structure_details(test, &structure.beam);
+            let known = (&structure, &details);
+            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
             found
         }

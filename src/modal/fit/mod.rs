@@ -30,7 +30,7 @@ pub use extra::{ExtraMode, ExtraVerdict, test_extra_mode};
 pub use kernel::StopReason;
 pub use residue::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
 pub use result::{ColumnAmplitude, ModeFit, fit_modes};
-pub use uncertainty::{FittedValue, TapFit, UncertaintySource};
+pub use uncertainty::{FittedValue, TapFit, UncertaintySource, scatter_about_mean, weighted_mean};
 
 /// Where the search for a mode begins.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -189,15 +189,19 @@ fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
     if taps.len() < 2 {
         return None;
     }
+    let scatter = scatter_about_mean(taps);
+    let distribution = ChiSquared::new(taps.len() as f64 - 1.0).ok()?;
+    scatter.is_finite().then(|| distribution.sf(scatter))
+}
+
+/// Chi-squared of values with their standard deviations about their weighted mean.
+pub fn scatter_about_mean(taps: &[(f64, f64)]) -> f64 {
     let weight = |std: f64| 1.0 / (std * std);
     let total: f64 = taps.iter().map(|tap| weight(tap.1)).sum();
     let mean = taps.iter().map(|tap| weight(tap.1) * tap.0).sum::<f64>() / total;
-    let scatter: f64 = taps
-        .iter()
+    taps.iter()
         .map(|tap| weight(tap.1) * (tap.0 - mean).powi(2))
-        .sum();
-    let distribution = ChiSquared::new(taps.len() as f64 - 1.0).ok()?;
-    scatter.is_finite().then(|| distribution.sf(scatter))
+        .sum()
 }
 
 /// Mean of values that scatter between taps by tau beside their own std_i, and its standard deviation.
@@ -205,7 +209,7 @@ fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
 /// Weights v_i = 1/(std_i^2 + tau^2), tau^2 after DerSimonian & Laird 1986; standard deviation
 /// sqrt(sum v_i (x_i - mean)^2/((n - 1) sum v_i)), which goes with Student's t of n - 1 (Hartung & Knapp
 /// 2001).
-fn weighted_mean(taps: &[(f64, f64)]) -> (f64, f64) {
+pub fn weighted_mean(taps: &[(f64, f64)]) -> (f64, f64) {
     let sum = |of: &dyn Fn(&(f64, f64)) -> f64| taps.iter().map(of).sum::<f64>();
     let degrees = taps.len() as f64 - 1.0;
     let weight = |std: f64| 1.0 / (std * std);

@@ -1,0 +1,242 @@
+//! From the competition to the answer: every number that is shown.
+
+use super::catalogue::PlaceKind;
+use super::forward::Layout;
+use super::frame::Frame;
+use super::place_map::place_map;
+use super::posterior::{APART, Entry, confounded, lead, places, spreads};
+use super::quality::{Residuals, noise_floor, pulls};
+use super::result::{
+    Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
+};
+use super::search::Competition;
+use super::settings::GapSettings;
+use super::verdict::{Checks, verdict};
+use super::withheld::{WithheldErrors, closure};
+use crate::effects::{Effect, EffectId};
+
+/// The answer to a competition.
+pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Diagnosis {
+    let frame = &competition.frame;
+    let entries = &competition.entries;
+    let context = Context::new(competition, settings);
+    let hypotheses: Vec<HypothesisResult> = (0..entries.len()).map(|k| context.result(k)).collect();
+    // The best explanation that can be shown: what is unknown has no residual.
+    let best = entries
+        .iter()
+        .position(|entry| entry.hypothesis != Hypothesis::Unknown)
+        .unwrap_or(0);
+    let after = Residuals::new(frame, &entries[best].fit);
+    let blocks = after
+        .as_ref()
+        .map_or_else(Vec::new, |residuals| residuals.blocks(frame));
+    let goodness = after.as_ref().and_then(Residuals::goodness);
+    let checks = Checks {
+        goodness,
+        blocks: &blocks,
+        closure_low: hypotheses[best].closure.map(|closure| closure.low),
+    };
+    let verdict = verdict(entries, &checks);
+    let pulls = match (&context.before, &after) {
+        (Some(before), Some(after)) => pulls(frame, before, after),
+        _ => Vec::new(),
+    };
+    Diagnosis {
+        verdict,
+        places: places(entries),
+        pulls,
+        blocks,
+        noise_floor: noise_floor(frame),
+        goodness_of_fit: goodness,
+        joint_shift: hypotheses[best].joint_shift,
+        hypotheses,
+        map: place_map(frame, &competition.baseline),
+        decided_by: decided_by(entries),
+        fitted_modes: frame.fitted_modes,
+    }
+}
+
+/// Likelihood ratio of the two best hypotheses of different groups at their optima.
+fn decided_by(entries: &[Entry]) -> DecidedBy {
+    let rival = entries.iter().skip(1).find(|entry| {
+        entry.groups() != entries[0].groups() || entry.hypothesis == Hypothesis::None
+    });
+    match rival {
+        // 2 ln 3
+        Some(rival) if lead(&entries[0].fit, &rival.fit) < 2.2 => DecidedBy::Priors,
+        _ => DecidedBy::Readings,
+    }
+}
+
+/// What every hypothesis is held against.
+struct Context<'a> {
+    competition: &'a Competition,
+    settings: &'a GapSettings,
+    before: Option<Residuals>,
+    withheld_before: Option<WithheldErrors>,
+}
+
+impl<'a> Context<'a> {
+    fn new(competition: &'a Competition, settings: &'a GapSettings) -> Self {
+        Context {
+            competition,
+            settings,
+            before: Residuals::new(&competition.frame, &competition.baseline),
+            withheld_before: WithheldErrors::new(&competition.frame, &competition.baseline),
+        }
+    }
+
+    fn frame(&self) -> &Frame {
+        &self.competition.frame
+    }
+
+    fn result(&self, index: usize) -> HypothesisResult {
+        let entries = &self.competition.entries;
+        let entry = &entries[index];
+        let predicts = entry.hypothesis != Hypothesis::Unknown;
+        let residuals = predicts
+            .then(|| Residuals::new(self.frame(), &entry.fit))
+            .flatten();
+        let withheld = predicts
+            .then(|| WithheldErrors::new(self.frame(), &entry.fit))
+            .flatten();
+        let none = entries
+            .iter()
+            .find(|entry| entry.hypothesis == Hypothesis::None);
+        let reference = none.map_or(f64::NAN, |none| none.fit.log_evidence);
+        HypothesisResult {
+            hypothesis: entry.hypothesis.clone(),
+            groups: entry.groups(),
+            probability: entry.probability,
+            log_bayes_factor: entry.fit.log_evidence - reference,
+            confounded_with: confounded(self.frame(), entries, index),
+            parameters: self.parameters(index),
+            gap_before: self
+                .before
+                .as_ref()
+                .map_or(f64::NAN, |r| r.frequency_rms(self.frame())),
+            gap_after: residuals.as_ref().map(|r| r.frequency_rms(self.frame())),
+            left_out_after: residuals
+                .as_ref()
+                .and_then(|r| r.left_out_rms(self.frame())),
+            withheld_before: self.withheld_before.as_ref().map(WithheldErrors::rms),
+            withheld_after: withheld.as_ref().map(WithheldErrors::rms),
+            withheld_floor: withheld.as_ref().map(WithheldErrors::floor),
+            closure: self.closure(withheld.as_ref()),
+            goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
+            joint_shift: if predicts {
+                self.joint_shift(entry)
+            } else {
+                JointShift::default()
+            },
+            effects: self.effects(entry),
+            joint: self.joint(entry),
+        }
+    }
+
+    fn closure(&self, after: Option<&WithheldErrors>) -> Option<Closure> {
+        closure(self.withheld_before.as_ref()?, after?, self.settings.seed)
+    }
+
+    fn effects(&self, entry: &Entry) -> Vec<Effect> {
+        let layout = Layout::new(self.frame(), &entry.fit.effects);
+        layout
+            .effects_at(&entry.fit.branch.optimum.parameters)
+            .unwrap_or_default()
+    }
+
+    fn joint(&self, entry: &Entry) -> Option<[f64; 2]> {
+        let mut joint = self.frame().nominal.specimen.joint.stiffnesses();
+        let sought = self.frame().nominal.sought();
+        if joint == [0.0; 2] || entry.hypothesis == Hypothesis::Unknown {
+            return None;
+        }
+        for (k, (direction, _)) in sought.iter().enumerate() {
+            joint[*direction] = entry.fit.branch.optimum.parameters[k].exp();
+        }
+        Some(joint)
+    }
+
+    fn joint_shift(&self, entry: &Entry) -> JointShift {
+        let mut shift = JointShift::default();
+        let before = &self.competition.baseline.branch.optimum.parameters;
+        let after = &entry.fit.branch.optimum.parameters;
+        for (k, (direction, _)) in self.frame().nominal.sought().iter().enumerate() {
+            let percent = Some(100.0 * ((after[k] - before[k]).exp() - 1.0));
+            match direction {
+                0 => shift.kx_percent = percent,
+                _ => shift.ky_percent = percent,
+            }
+        }
+        shift
+    }
+
+    fn parameters(&self, index: usize) -> Vec<ParameterValue> {
+        let entry = &self.competition.entries[index];
+        if let Some(drift) = entry.drift {
+            return vec![plain(EffectId::JointDrift, "std", (drift, None))];
+        }
+        let layout = Layout::new(self.frame(), &entry.fit.effects);
+        let spreads = spreads(entry);
+        let values = &entry.fit.branch.optimum.parameters;
+        let mut parameters = Vec::new();
+        for (k, candidate) in entry.fit.effects.iter().enumerate() {
+            let size = layout.size(k);
+            let mut own = plain(
+                candidate.effect,
+                candidate.size.name,
+                (values[size], Some(spreads[size])),
+            );
+            // lambda = 14.9: 1 % level, 90 % power.
+            own.smallest_detectable = Some(14.9_f64.sqrt() * spreads[size]);
+            own.smallest_isolable = self.isolable(index, values[size] - candidate.size.nothing);
+            parameters.push(own);
+            if let (Some(range), Some(place)) = (&candidate.place, layout.place(k)) {
+                let value = range.outward(values[place]);
+                let std = match range.kind {
+                    PlaceKind::FixtureFrequency | PlaceKind::Gyration => value * spreads[place],
+                    PlaceKind::Position | PlaceKind::Exponent => spreads[place],
+                };
+                let known = std < 0.5 * (range.high - range.low);
+                let (name, value, std) = match range.kind {
+                    PlaceKind::Position => ("position", value, std),
+                    PlaceKind::FixtureFrequency => ("frequency", value, std),
+                    PlaceKind::Exponent => ("exponent", value, std),
+                    // J = m r^2
+                    PlaceKind::Gyration => (
+                        "inertia",
+                        values[size] * value * value,
+                        2.0 * values[size] * value * std,
+                    ),
+                };
+                parameters.push(plain(candidate.effect, name, (value, known.then_some(std))));
+            }
+        }
+        parameters
+    }
+
+    /// Size at which every rival would be three standard deviations worse: chi square grows with the
+    /// square of the size.
+    fn isolable(&self, index: usize, size: f64) -> Option<f64> {
+        let entries = &self.competition.entries;
+        let own = &entries[index];
+        let nearest = entries
+            .iter()
+            .filter(|entry| entry.effects().len() <= 1 && entry.hypothesis != Hypothesis::Unknown)
+            .filter(|entry| entry.hypothesis == Hypothesis::None || entry.groups() != own.groups())
+            .map(|rival| lead(&own.fit, &rival.fit))
+            .fold(f64::INFINITY, f64::min);
+        (nearest > 0.0 && nearest.is_finite()).then(|| size.abs() * (APART / nearest).sqrt())
+    }
+}
+
+fn plain(effect: EffectId, name: &'static str, (value, std): (f64, Option<f64>)) -> ParameterValue {
+    ParameterValue {
+        effect,
+        name,
+        value,
+        std: std.filter(|std| std.is_finite()),
+        smallest_detectable: None,
+        smallest_isolable: None,
+    }
+}

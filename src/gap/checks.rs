@@ -1,0 +1,113 @@
+//! What must hold before there is anything to diagnose.
+
+use super::error::GapError;
+use super::nominal::Nominal;
+use crate::identify::observation::Observations;
+use crate::structure::specimen::Mesh;
+
+/// Ratio of frequencies of one mode between configurations beyond which they are of two structures: a
+/// heavy sensor or a re-tightened joint moves a frequency by up to 15 %.
+const APART: f64 = 1.3;
+
+/// Displacement at a sensor over the mode's largest, below which nothing is seen (1).
+const NODE: f64 = 0.01;
+
+/// Refuses observations that answer nothing.
+pub(super) fn check(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+    nominal.specimen.check()?;
+    enough_modes(observations, nominal)?;
+    let known = observations
+        .configurations
+        .iter()
+        .flat_map(|c| &c.modes)
+        .any(|mode| mode.std.is_some_and(|std| std > 0.0));
+    if !known {
+        return Err(GapError::NoUncertainty);
+    }
+    one_structure(observations)?;
+    sensors_see(observations, nominal)
+}
+
+fn enough_modes(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+    let mut modes: Vec<usize> = observations
+        .configurations
+        .iter()
+        .flat_map(|c| c.modes.iter().map(|mode| mode.mode))
+        .collect();
+    modes.sort_unstable();
+    modes.dedup();
+    let needed = nominal.sought().len();
+    let least = needed + 1;
+    if modes.len() < least.max(2) {
+        return Err(GapError::TooFewModes {
+            modes: modes.len(),
+            needed,
+            least: least.max(2),
+        });
+    }
+    Ok(())
+}
+
+fn one_structure(observations: &Observations) -> Result<(), GapError> {
+    let name = |k: usize| {
+        let file = observations.configurations[k].file.clone();
+        file.unwrap_or_else(|| format!("configuration {}", k + 1))
+    };
+    for (second, configuration) in observations.configurations.iter().enumerate() {
+        for mode in &configuration.modes {
+            for first in 0..second {
+                let Some(other) = observations.configurations[first].mode(mode.mode) else {
+                    continue;
+                };
+                let ratio = mode.frequency / other.frequency;
+                if !(1.0 / APART..APART).contains(&ratio) {
+                    return Err(GapError::Contradictory {
+                        first: name(first),
+                        second: name(second),
+                        mode: mode.mode,
+                        low: other.frequency,
+                        high: mode.frequency,
+                    });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Sensors at the joint, or all at the nodes of all modes.
+fn sensors_see(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+    let highest = observations
+        .configurations
+        .iter()
+        .flat_map(|c| c.modes.iter().map(|mode| mode.mode))
+        .max()
+        .unwrap_or(1);
+    let modes = nominal.specimen.modes(highest, Mesh::DIAGNOSIS)?;
+    let length = nominal.specimen.body.length();
+    let mut largest: f64 = 0.0;
+    let mut placed = false;
+    for configuration in &observations.configurations {
+        for position in configuration
+            .sensors
+            .iter()
+            .filter_map(|sensor| sensor.position)
+        {
+            placed = true;
+            for mode in &configuration.modes {
+                let at = |x: f64| modes.displacement(mode.mode - 1, x).abs();
+                let top = (0..=100)
+                    .map(|k| at(length * f64::from(k) / 100.0))
+                    .fold(0.0, f64::max);
+                largest = largest.max(at(position) / top);
+            }
+        }
+    }
+    if placed && largest < NODE {
+        return Err(GapError::SensorsAtNodes {
+            percent: 100.0 * NODE,
+            distance: 0.1 * length,
+        });
+    }
+    Ok(())
+}

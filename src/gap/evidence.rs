@@ -1,0 +1,332 @@
+//! How probable the data are under a hypothesis: Laplace's method for all that is well determined, and
+//! quadrature for an effect's size, whose prior has a peak at zero and an end there.
+
+use super::catalogue::Size;
+use super::forward::{Forward, Layout};
+use super::frame::{Frame, Small};
+use super::least_squares::{Knowledge, Linearised, Optimum, factor_of, maximise};
+use super::noise::{self, Reading};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::PI;
+
+/// A hypothesis fitted from one start.
+#[derive(Debug, Clone)]
+pub(super) struct Branch {
+    /// The best parameters, at the most probable drift.
+    pub(super) optimum: Optimum,
+    /// What was known of each parameter there.
+    pub(super) knowledge: Vec<Knowledge>,
+    /// Logarithm of the evidence.
+    pub(super) log_evidence: f64,
+}
+
+/// What is known of all parameters of a hypothesis before the data.
+pub(super) fn knowledge(
+    frame: &Frame,
+    layout: &Layout,
+    joint_std: f64,
+    drift: f64,
+) -> Vec<Knowledge> {
+    let mut all: Vec<Knowledge> = frame
+        .nominal
+        .sought()
+        .into_iter()
+        .map(|(_, start)| Knowledge {
+            // Beyond these a beam's frequencies no longer feel the joint.
+            low: start.ln() - 8.0 * joint_std,
+            high: start.ln() + 8.0 * joint_std,
+            ..Knowledge::normal(start.ln(), joint_std)
+        })
+        .collect();
+    for effect in &layout.effects {
+        all.push(Knowledge {
+            low: effect.size.low,
+            high: effect.size.high,
+            ..Knowledge::normal(effect.size.nothing, 3.0 * effect.size.scale)
+        });
+        if let Some(range) = &effect.place {
+            all.push(Knowledge {
+                centre: 0.0,
+                std: f64::INFINITY,
+                low: range.inward(range.low),
+                high: range.inward(range.high),
+            });
+        }
+    }
+    for ((small, std), centre) in frame
+        .smalls
+        .iter()
+        .zip(&frame.small_stds)
+        .zip(&frame.small_centres)
+    {
+        let std = if matches!(small, Small::Drift { .. }) {
+            drift
+        } else {
+            *std
+        };
+        all.push(Knowledge::normal(*centre, std));
+    }
+    all
+}
+
+/// The same with another spread of the drift.
+pub(super) fn with_drift(
+    frame: &Frame,
+    layout: &Layout,
+    known: &[Knowledge],
+    drift: f64,
+) -> Vec<Knowledge> {
+    let first = layout.smalls();
+    let mut known = known.to_vec();
+    for (k, small) in frame.smalls.iter().enumerate() {
+        if matches!(small, Small::Drift { .. }) {
+            known[first + k].std = drift;
+        }
+    }
+    known
+}
+
+/// Fits a hypothesis from a start and integrates over everything, the drift's spread included.
+pub(super) fn evaluate(
+    forward: &Forward<'_>,
+    known: &[Knowledge],
+    start: &[f64],
+    drifts: &[f64],
+) -> Option<Branch> {
+    let frame = forward.frame;
+    let middle = drifts[drifts.len() / 2];
+    let known = with_drift(frame, &forward.layout, known, middle);
+    let readings = &frame.readings;
+    let optimum = maximise(readings, &known, start, &mut |p| {
+        forward.linearise(p, &known)
+    })?;
+    Some(over_drifts(frame, &forward.layout, &known, optimum, drifts))
+}
+
+/// Evidence at an optimum, averaged over the drift's spreads by the model linearised there.
+pub(super) fn over_drifts(
+    frame: &Frame,
+    layout: &Layout,
+    known: &[Knowledge],
+    optimum: Optimum,
+    drifts: &[f64],
+) -> Branch {
+    let has_drift = frame
+        .smalls
+        .iter()
+        .any(|small| matches!(small, Small::Drift { .. }));
+    let drifts = if has_drift { drifts } else { &drifts[..1] };
+    let mut best: Option<Branch> = None;
+    let mut all = Vec::new();
+    for &drift in drifts {
+        let own = with_drift(frame, layout, known, drift);
+        let moved =
+            linear_optimum(&frame.readings, &own, &optimum).unwrap_or_else(|| optimum.clone());
+        let log_evidence = log_evidence(&frame.readings, layout, &own, &moved);
+        all.push(log_evidence);
+        if best
+            .as_ref()
+            .is_none_or(|best| log_evidence > best.log_evidence)
+        {
+            best = Some(Branch {
+                optimum: moved,
+                knowledge: own,
+                log_evidence,
+            });
+        }
+    }
+    let mut best = best.unwrap_or(Branch {
+        optimum,
+        knowledge: known.to_vec(),
+        log_evidence: f64::NEG_INFINITY,
+    });
+    best.log_evidence = log_mean(&all);
+    best
+}
+
+/// The optimum of the model as it was linearised at another one.
+pub(super) fn linear_optimum(
+    readings: &[Reading],
+    known: &[Knowledge],
+    at: &Optimum,
+) -> Option<Optimum> {
+    let mut model = |parameters: &[f64]| {
+        let step = DVector::from_iterator(
+            parameters.len(),
+            parameters
+                .iter()
+                .zip(&at.parameters)
+                .map(|(new, old)| new - old),
+        );
+        let moved = &at.model.slopes * step;
+        Some(Linearised {
+            predicted: at
+                .model
+                .predicted
+                .iter()
+                .zip(moved.iter())
+                .map(|(p, d)| p + d)
+                .collect(),
+            slopes: at.model.slopes.clone(),
+        })
+    };
+    maximise(readings, known, &at.parameters, &mut model)
+}
+
+/// Logarithm of the mean of exponentials.
+pub(super) fn log_mean(logs: &[f64]) -> f64 {
+    log_sum(logs) - (logs.len() as f64).ln()
+}
+
+/// Logarithm of the sum of exponentials.
+pub(super) fn log_sum(logs: &[f64]) -> f64 {
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return most;
+    }
+    most + logs.iter().map(|x| (x - most).exp()).sum::<f64>().ln()
+}
+
+/// Parameters that are not held.
+fn free(known: &[Knowledge]) -> Vec<usize> {
+    (0..known.len())
+        .filter(|&k| known[k].low < known[k].high)
+        .collect()
+}
+
+/// Logarithm of the integral of likelihood times prior about an optimum.
+///
+/// Laplace: ln Z = -objective + d/2 ln 2 pi - ln det(A)/2 + ln of the priors' constants, A being the
+/// objective's curvature. The size of a single effect is integrated apart ([`over_size`]); of two
+/// effects, kept only when both stand out, the sizes are Gaussian too.
+fn log_evidence(
+    readings: &[Reading],
+    layout: &Layout,
+    known: &[Knowledge],
+    optimum: &Optimum,
+) -> f64 {
+    let free = free(known);
+    let Some(factor) = factor_of(&optimum.curvature, &free) else {
+        return f64::NEG_INFINITY;
+    };
+    let log_det = 2.0
+        * factor
+            .l_dirty()
+            .diagonal()
+            .iter()
+            .map(|x| x.ln())
+            .sum::<f64>();
+    let mut log = -optimum.objective;
+    log += readings
+        .iter()
+        .map(|reading| noise::log_density_peak(reading.std, reading.freedom))
+        .sum::<f64>();
+    log += 0.5 * free.len() as f64 * (2.0 * PI).ln() - 0.5 * log_det;
+    let sizes: Vec<usize> = (0..layout.effects.len())
+        .map(|effect| layout.size(effect))
+        .collect();
+    for &k in free.iter().filter(|k| !sizes.contains(k)) {
+        if known[k].std.is_finite() {
+            log -= 0.5 * (2.0 * PI).ln() + known[k].std.ln();
+        }
+    }
+    for effect in 0..layout.effects.len() {
+        if let Some(place) = layout.place(effect)
+            && known[place].low < known[place].high
+            && let Some(range) = &layout.effects[effect].place
+        {
+            log -= (range.inward(range.high) - range.inward(range.low)).ln();
+        }
+        let size = layout.size(effect);
+        let Some(position) = free.iter().position(|&k| k == size) else {
+            continue;
+        };
+        let mut unit = DVector::zeros(free.len());
+        unit[position] = 1.0;
+        let variance = factor.solve(&unit)[position];
+        // What Laplace's method has put there for this parameter is taken out again.
+        log -= 0.5 * (2.0 * PI * variance).ln();
+        log += over_size(
+            &layout.effects[effect].size,
+            &known[size],
+            (
+                optimum.parameters[size],
+                optimum.gradient[size],
+                1.0 / variance,
+            ),
+        );
+    }
+    log
+}
+
+/// Points of the quadrature over a size.
+const POINTS: usize = 160;
+
+/// ln of the integral of prior(t) exp(-g (t - t0) - h (t - t0)^2/2 + regularisation(t)) dt, where the
+/// objective with its normal regularisation has slope g and curvature h at t0.
+fn over_size(size: &Size, known: &Knowledge, (at, slope, curvature): (f64, f64, f64)) -> f64 {
+    let log_likelihood = |t: f64| {
+        let away = t - at;
+        let regular = (t - known.centre) / known.std;
+        -slope * away - 0.5 * curvature * away * away + 0.5 * regular * regular
+    };
+    let std = curvature.powf(-0.5);
+    let peak = (at - slope / curvature).clamp(size.low, size.high);
+    log_integral(size, (peak - 9.0 * std, peak + 9.0 * std), &log_likelihood)
+}
+
+/// ln of the integral of prior times likelihood over a range within the size's bounds, by Simpson's
+/// rule on points that crowd at the prior's own peak as well as at the likelihood's.
+pub(super) fn log_integral(
+    size: &Size,
+    (from, to): (f64, f64),
+    log_likelihood: &dyn Fn(f64) -> f64,
+) -> f64 {
+    let (from, to) = (from.max(size.low), to.min(size.high));
+    if from >= to {
+        return f64::NEG_INFINITY;
+    }
+    // The prior bends within a sixteenth of its scale; cut there, both pieces are smooth.
+    let near = 0.2 * size.scale;
+    let mut cuts = vec![from];
+    for cut in [size.nothing - near, size.nothing, size.nothing + near] {
+        if cut > from && cut < to {
+            cuts.push(cut);
+        }
+    }
+    cuts.push(to);
+    let pieces: Vec<f64> = cuts
+        .windows(2)
+        .map(|piece| simpson(size, (piece[0], piece[1]), log_likelihood))
+        .collect();
+    log_sum(&pieces)
+}
+
+fn simpson(size: &Size, (from, to): (f64, f64), log_likelihood: &dyn Fn(f64) -> f64) -> f64 {
+    let step = (to - from) / POINTS as f64;
+    let logs: Vec<f64> = (0..=POINTS)
+        .map(|k| {
+            let t = from + step * k as f64;
+            let weight: f64 = match k {
+                0 | POINTS => 1.0,
+                k if k % 2 == 1 => 4.0,
+                _ => 2.0,
+            };
+            weight.ln() + log_likelihood(t) + size.log_density(t.clamp(size.low, size.high))
+        })
+        .collect();
+    log_sum(&logs) + (step / 3.0).ln()
+}
+
+/// Covariance of the parameters at an optimum; held ones have none.
+pub(super) fn covariance(known: &[Knowledge], optimum: &Optimum) -> Option<DMatrix<f64>> {
+    let free = free(known);
+    let inverse = factor_of(&optimum.curvature, &free)?.inverse();
+    let mut full = DMatrix::zeros(known.len(), known.len());
+    for (i, &a) in free.iter().enumerate() {
+        for (j, &b) in free.iter().enumerate() {
+            full[(a, b)] = inverse[(i, j)];
+        }
+    }
+    Some(full)
+}

@@ -1,0 +1,616 @@
+//! What a hypothesis predicts: all readings, with their slopes.
+
+use super::catalogue::{Candidate, PlaceKind};
+use super::frame::{Frame, Row, Setup, Small};
+use super::least_squares::{Knowledge, Linearised};
+use crate::effects::{Circumstances, Effect, EffectId, Seen, apply};
+use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Parameters of a hypothesis in their order: joint, effects (size and place of each), small unknowns.
+#[derive(Debug, Clone)]
+pub(super) struct Layout {
+    /// Directions of the joint's stiffnesses that are sought.
+    pub(super) joint: Vec<usize>,
+    /// The effects.
+    pub(super) effects: Vec<Candidate>,
+}
+
+impl Layout {
+    pub(super) fn new(frame: &Frame, effects: &[Candidate]) -> Self {
+        let sought = frame.nominal.sought();
+        Layout {
+            joint: sought.iter().map(|(direction, _)| *direction).collect(),
+            effects: effects.to_vec(),
+        }
+    }
+
+    /// Index of the size of an effect.
+    pub(super) fn size(&self, effect: usize) -> usize {
+        let before = self.effects[..effect].iter();
+        self.joint.len()
+            + before
+                .map(|one| 1 + usize::from(one.place.is_some()))
+                .sum::<usize>()
+    }
+
+    /// Index of the place of an effect, if it has one.
+    pub(super) fn place(&self, effect: usize) -> Option<usize> {
+        self.effects[effect].place.map(|_| self.size(effect) + 1)
+    }
+
+    /// Index of the first small unknown.
+    pub(super) fn smalls(&self) -> usize {
+        self.size(self.effects.len())
+    }
+
+    /// The effects with the values that the parameters give them.
+    pub(super) fn effects_at(&self, parameters: &[f64]) -> Option<Vec<Effect>> {
+        (0..self.effects.len())
+            .map(|index| {
+                let candidate = &self.effects[index];
+                let size = parameters[self.size(index)];
+                let place = self.place(index).map(|place| parameters[place]);
+                effect_of(candidate, size, place)
+            })
+            .collect()
+    }
+
+    /// The nominal structure with the joint that the parameters give it.
+    fn with_joint(&self, specimen: &Specimen, parameters: &[f64]) -> Specimen {
+        let mut specimen = specimen.clone();
+        if let SpecimenJoint::Springs { kt, kr, .. } = &mut specimen.joint {
+            for (direction, value) in self.joint.iter().zip(parameters) {
+                *(if *direction == 0 { &mut *kt } else { &mut *kr }) = value.exp();
+            }
+        }
+        specimen
+    }
+}
+
+/// The effect with its size and its place as it is searched for.
+pub(super) fn effect_of(candidate: &Candidate, size: f64, place: Option<f64>) -> Option<Effect> {
+    let mut pairs = vec![(candidate.size.name, size)];
+    if let (Some(range), Some(searched)) = (&candidate.place, place) {
+        let value = range.outward(searched);
+        pairs.push(match range.kind {
+            PlaceKind::Position => ("position", value),
+            PlaceKind::FixtureFrequency => ("frequency", value),
+            PlaceKind::Exponent => ("exponent", value),
+            PlaceKind::Gyration => ("inertia", size * value * value),
+        });
+    }
+    Effect::from_pairs(candidate.effect, &pairs).ok()
+}
+
+/// A configuration's structure under a hypothesis, and its modes.
+#[derive(Clone)]
+pub(super) struct Solved {
+    pub(super) seen: Seen,
+    pub(super) modes: Arc<SpecimenModes>,
+    /// Which of the modes is the model's mode 1, 2, ...: that of a fixture is left out.
+    numbers: Vec<usize>,
+}
+
+impl Solved {
+    /// Index of the mode with this number (1 = lowest).
+    pub(super) fn index(&self, mode: usize) -> Option<usize> {
+        self.numbers.get(mode - 1).copied()
+    }
+
+    /// Frequency as it is read (Hz).
+    pub(super) fn frequency(&self, mode: usize) -> Option<f64> {
+        let own = self.modes.frequencies()[self.index(mode)?];
+        Some(self.seen.read(own))
+    }
+}
+
+/// Predicts all rows of a frame under one hypothesis.
+pub(super) struct Forward<'a> {
+    pub(super) frame: &'a Frame,
+    pub(super) layout: Layout,
+    /// Rows beyond those of the fit (withheld or planned), if wanted in their place.
+    pub(super) rows: &'a [Row],
+}
+
+impl<'a> Forward<'a> {
+    pub(super) fn new(frame: &'a Frame, effects: &[Candidate]) -> Self {
+        Forward {
+            frame,
+            layout: Layout::new(frame, effects),
+            rows: &frame.rows,
+        }
+    }
+
+    /// Prediction and slopes with respect to all parameters that are not held.
+    pub(super) fn linearise(&self, parameters: &[f64], known: &[Knowledge]) -> Option<Linearised> {
+        let solved = self.solve(parameters)?;
+        let base = self.rows_of(&solved, parameters)?;
+        let mut slopes = DMatrix::zeros(self.rows.len(), parameters.len());
+        self.joint_slopes(&solved, parameters, &mut slopes);
+        for index in 0..self.layout.effects.len() {
+            let steps = self.steps(index, parameters);
+            for (column, step) in steps.into_iter().filter(|(k, _)| !known[*k].is_held()) {
+                let mut moved = parameters.to_vec();
+                moved[column] += step;
+                let other = self.rows_of(&self.solve(&moved)?, &moved)?;
+                for (row, (new, old)) in other.iter().zip(&base).enumerate() {
+                    slopes[(row, column)] = (new - old) / step;
+                }
+            }
+        }
+        if self.softening(parameters).is_some() {
+            self.amplitude_slopes(parameters, &base, &mut slopes);
+        }
+        let predicted = self.add_smalls(&solved, base, (parameters, &mut slopes));
+        Some(Linearised { predicted, slopes })
+    }
+
+    /// Steps of the finite differences of one effect: small against the size's own scale, away from
+    /// its bounds.
+    fn steps(&self, index: usize, parameters: &[f64]) -> Vec<(usize, f64)> {
+        let candidate = &self.layout.effects[index];
+        let column = self.layout.size(index);
+        let size = 2e-3 * candidate.size.scale.max(parameters[column].abs());
+        let inward =
+            |value: f64, step: f64, high: f64| if value + step > high { -step } else { step };
+        let mut steps = vec![(
+            column,
+            inward(parameters[column], size, candidate.size.high),
+        )];
+        if let (Some(range), Some(place)) = (&candidate.place, self.layout.place(index)) {
+            let step = 1e-3 * (range.inward(range.high) - range.inward(range.low));
+            steps.push((
+                place,
+                inward(parameters[place], step, range.inward(range.high)),
+            ));
+        }
+        steps
+    }
+
+    /// Structure and modes of each configuration; equal structures are solved once.
+    pub(super) fn solve(&self, parameters: &[f64]) -> Option<Vec<Solved>> {
+        let effects = self.layout.effects_at(parameters)?;
+        let mut all: Vec<Solved> = Vec::with_capacity(self.frame.setups.len());
+        for setup in &self.frame.setups {
+            let nominal = self.layout.with_joint(&setup.specimen, parameters);
+            let circumstances = Circumstances {
+                sensors: &setup.sensors,
+                level: self.level(setup, parameters),
+                visit: setup.visit,
+                ..Circumstances::default()
+            };
+            let seen = apply(&effects, &nominal, &circumstances);
+            let known = all
+                .iter()
+                .find(|other| other.seen.specimen == seen.specimen);
+            let (modes, numbers) = match known {
+                Some(other) => (other.modes.clone(), other.numbers.clone()),
+                None => self.modes_of(&seen.specimen)?,
+            };
+            all.push(Solved {
+                seen,
+                modes,
+                numbers,
+            });
+        }
+        Some(all)
+    }
+
+    /// Amplitude that counts for the frequency of a whole decay.
+    fn level(&self, setup: &Setup, parameters: &[f64]) -> f64 {
+        setup.level * self.share(parameters)
+    }
+
+    /// Effective amplitude over the first one.
+    fn share(&self, parameters: &[f64]) -> f64 {
+        self.frame
+            .small_index(Small::Amplitude)
+            .map_or(1.0, |index| parameters[self.layout.smalls() + index].exp())
+    }
+
+    fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
+        let based = specimen.base.is_some_and(|base| base.ratio > 0.0);
+        let count = self.frame.modes + usize::from(based);
+        let modes = specimen.modes(count, Mesh::DIAGNOSIS).ok()?;
+        let mut numbers: Vec<usize> = (0..count).collect();
+        if based {
+            // The mode in which the base moves most is its own; the others keep the beam's numbers.
+            let most = numbers.iter().copied().max_by(|&a, &b| {
+                modes
+                    .base_participation(a)
+                    .total_cmp(&modes.base_participation(b))
+            })?;
+            numbers.remove(most);
+        }
+        Some((Arc::new(modes), numbers))
+    }
+
+    /// Slopes of all rows with respect to the joint's stiffnesses by finite differences.
+    pub(super) fn joint_differences(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
+        const STEP: f64 = 1e-2;
+        let base = self.rows_of(&self.solve(parameters)?, parameters)?;
+        let mut slopes = DMatrix::zeros(self.rows.len(), self.layout.joint.len());
+        for column in 0..self.layout.joint.len() {
+            let mut moved = parameters.to_vec();
+            moved[column] += STEP;
+            let other = self.rows_of(&self.solve(&moved)?, &moved)?;
+            for (row, (new, old)) in other.iter().zip(&base).enumerate() {
+                slopes[(row, column)] = (new - old) / STEP;
+            }
+        }
+        Some(slopes)
+    }
+
+    /// All rows without the small unknowns.
+    fn rows_of(&self, solved: &[Solved], parameters: &[f64]) -> Option<Vec<f64>> {
+        self.rows
+            .iter()
+            .map(|row| self.row_of(row, solved, parameters))
+            .collect()
+    }
+
+    fn row_of(&self, row: &Row, solved: &[Solved], parameters: &[f64]) -> Option<f64> {
+        match *row {
+            Row::Frequency {
+                configuration,
+                mode,
+            } => {
+                let frequency = solved[configuration].frequency(mode)?;
+                (frequency > 0.0).then(|| frequency.ln())
+            }
+            Row::Constant {
+                configuration,
+                mode,
+                sensor,
+            } => {
+                let one = &solved[configuration];
+                let index = one.index(mode)?;
+                let setup = &self.frame.setups[configuration];
+                let at = |x: f64| one.modes.displacement(index, x);
+                Some(at(setup.sensors[sensor].position) * at(setup.tap?))
+            }
+            Row::Ratio {
+                configuration,
+                mode,
+                sensor,
+                reference,
+            } => {
+                let one = &solved[configuration];
+                let index = one.index(mode)?;
+                let setup = &self.frame.setups[configuration];
+                let at = |sensor: usize| {
+                    one.modes
+                        .displacement(index, setup.sensors[sensor].position)
+                };
+                Some(at(sensor) / at(reference))
+            }
+            Row::Damping { mode } => Some(self.damping(mode, &solved[0], parameters)?.0.ln()),
+            Row::Slope {
+                configuration,
+                mode,
+            } => Some(self.slope_along_decay(
+                (configuration, mode),
+                &solved[configuration],
+                parameters,
+            )),
+        }
+    }
+
+    /// Damping ratio: the nominal level and eta/2 times the joint's share of the strain energy; and the
+    /// nominal level alone.
+    fn damping(&self, mode: usize, solved: &Solved, parameters: &[f64]) -> Option<(f64, f64)> {
+        let level = self.frame.small_index(Small::Damping)?;
+        let nominal = parameters[self.layout.smalls() + level].exp();
+        let shares = joint_shares(solved, solved.index(mode)?);
+        Some((
+            nominal + 0.5 * solved.seen.joint_loss_factor * (shares[0] + shares[1]).max(0.0),
+            nominal,
+        ))
+    }
+
+    /// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr and
+    /// kr(a) = kr0 (1 + ratio a^p), averaged over the followed part of the decay.
+    fn slope_along_decay(
+        &self,
+        (configuration, mode): (usize, usize),
+        solved: &Solved,
+        parameters: &[f64],
+    ) -> f64 {
+        let Some((ratio, power)) = self.softening(parameters) else {
+            return 0.0;
+        };
+        let Some(index) = solved.index(mode) else {
+            return 0.0;
+        };
+        let setup = &self.frame.setups[configuration];
+        let sensitivity = 0.5 * joint_shares(solved, index)[1];
+        let spans = setup.spans.iter().find(|span| span.0 == mode);
+        let stiffness = |amplitude: f64| {
+            (1.0 + ratio * (setup.level * amplitude).powf(power))
+                .max(0.05)
+                .ln()
+        };
+        match spans {
+            Some(&(_, early, late)) => {
+                sensitivity * (stiffness(early) - stiffness(late)) / (early / late).ln()
+            }
+            None => {
+                let a = self.share(parameters);
+                // A factor of 1 % either way: the derivative at the effective amplitude.
+                sensitivity * (stiffness(a * 1.01) - stiffness(a / 1.01)) / (2.0 * 1.01_f64.ln())
+            }
+        }
+    }
+
+    /// Relative stiffness change at the hardest tap and its exponent, where that is a hypothesis.
+    fn softening(&self, parameters: &[f64]) -> Option<(f64, f64)> {
+        let index = self
+            .layout
+            .effects
+            .iter()
+            .position(|one| one.effect == EffectId::JointNonlinearity)?;
+        Some((
+            parameters[self.layout.size(index)],
+            parameters[self.layout.place(index)?],
+        ))
+    }
+
+    /// d ln f/d ln k = half the strain energy of that spring, as the mode has it, over that of the
+    /// structure (Rayleigh's quotient is stationary in the shape).
+    fn joint_slopes(&self, solved: &[Solved], parameters: &[f64], slopes: &mut DMatrix<f64>) {
+        for (row, kind) in self.rows.iter().enumerate() {
+            let Row::Frequency {
+                configuration,
+                mode,
+            } = *kind
+            else {
+                if let Some(known) = &self.frame.shape_slopes {
+                    for column in 0..self.layout.joint.len() {
+                        slopes[(row, column)] = known[(row, column)];
+                    }
+                }
+                continue;
+            };
+            let one = &solved[configuration];
+            let Some(index) = one.index(mode) else {
+                continue;
+            };
+            for (column, &direction) in self.layout.joint.iter().enumerate() {
+                slopes[(row, column)] = self.joint_slope(one, (index, direction), parameters)
+                    * offset_factor(one, index);
+            }
+        }
+    }
+
+    fn joint_slope(
+        &self,
+        one: &Solved,
+        (index, direction): (usize, usize),
+        _parameters: &[f64],
+    ) -> f64 {
+        if one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0) {
+            // The base's spring is tied to the joint's by their ratio: both move.
+            return stiffened_slope(one, index, direction);
+        }
+        0.5 * joint_shares(one, index)[direction]
+    }
+
+    /// Adds the small unknowns to the predictions, and their columns to the slopes.
+    fn add_smalls(
+        &self,
+        solved: &[Solved],
+        mut predicted: Vec<f64>,
+        (parameters, slopes): (&[f64], &mut DMatrix<f64>),
+    ) -> Vec<f64> {
+        let first = self.layout.smalls();
+        for (row, kind) in self.rows.iter().enumerate() {
+            for (k, small) in self.frame.smalls.iter().enumerate() {
+                if *small != Small::Amplitude {
+                    let slope = self.small_slope(kind, small, (solved, predicted[row]), parameters);
+                    slopes[(row, first + k)] = slope;
+                }
+            }
+        }
+        for (k, small) in self.frame.smalls.iter().enumerate() {
+            // These two enter the solution itself.
+            if matches!(small, Small::Damping | Small::Amplitude) {
+                continue;
+            }
+            let value = parameters[first + k];
+            for (row, predicted) in predicted.iter_mut().enumerate() {
+                *predicted += value * slopes[(row, first + k)];
+            }
+        }
+        predicted
+    }
+
+    /// Slopes with respect to the effective amplitude, by finite differences.
+    fn amplitude_slopes(&self, parameters: &[f64], base: &[f64], slopes: &mut DMatrix<f64>) {
+        const STEP: f64 = 1e-2;
+        let Some(k) = self.frame.small_index(Small::Amplitude) else {
+            return;
+        };
+        let column = self.layout.smalls() + k;
+        let mut moved = parameters.to_vec();
+        moved[column] += STEP;
+        let solved = self.solve(&moved);
+        if let Some(new) = solved.and_then(|solved| self.rows_of(&solved, &moved)) {
+            for (row, (new, old)) in new.iter().zip(base).enumerate() {
+                slopes[(row, column)] = (new - old) / STEP;
+            }
+        }
+    }
+
+    /// Derivative of a row with respect to a small unknown.
+    fn small_slope(
+        &self,
+        row: &Row,
+        small: &Small,
+        (solved, predicted): (&[Solved], f64),
+        parameters: &[f64],
+    ) -> f64 {
+        match *row {
+            Row::Frequency {
+                configuration,
+                mode,
+            } => self.frequency_slope(small, (configuration, mode), &solved[configuration]),
+            Row::Constant {
+                configuration,
+                mode,
+                sensor,
+            } => self.constant_slope(
+                small,
+                (configuration, mode, sensor),
+                (&solved[configuration], predicted),
+            ),
+            Row::Ratio {
+                configuration,
+                mode,
+                sensor,
+                reference,
+            } => {
+                let one = &solved[configuration];
+                let towards = self.ratio_slope(small, (configuration, mode, sensor), one);
+                let away = self.ratio_slope(small, (configuration, mode, reference), one);
+                predicted * (towards - away)
+            }
+            Row::Damping { mode } if *small == Small::Damping => {
+                let (all, nominal) = self
+                    .damping(mode, &solved[0], parameters)
+                    .unwrap_or((1.0, 1.0));
+                nominal / all
+            }
+            Row::Damping { .. } | Row::Slope { .. } => 0.0,
+        }
+    }
+
+    fn frequency_slope(
+        &self,
+        small: &Small,
+        (configuration, mode): (usize, usize),
+        one: &Solved,
+    ) -> f64 {
+        let setup = &self.frame.setups[configuration];
+        let Some(index) = one.index(mode) else {
+            return 0.0;
+        };
+        let displacement = |x: f64| one.modes.displacement(index, x);
+        match *small {
+            Small::Scale => 1.0,
+            Small::Discrepancy { mode: own } if own == mode => 1.0,
+            Small::Drift { visit, direction } if visit == setup.visit => {
+                0.5 * joint_shares(one, index)[direction]
+            }
+            // d ln f/d m = -phi^2/2 for a mass-normalised shape.
+            Small::SensorMass { name } => setup
+                .names
+                .iter()
+                .zip(&setup.sensors)
+                .filter(|(own, _)| **own == name)
+                .map(|(_, sensor)| -0.5 * sensor.mass * displacement(sensor.position).powi(2))
+                .sum(),
+            Small::SensorPlace { place } => setup
+                .places
+                .iter()
+                .zip(&setup.sensors)
+                .filter(|(own, _)| **own == place)
+                .map(|(_, sensor)| {
+                    -sensor.mass
+                        * displacement(sensor.position)
+                        * one.modes.slope(index, sensor.position)
+                })
+                .sum(),
+            _ => 0.0,
+        }
+    }
+
+    fn constant_slope(
+        &self,
+        small: &Small,
+        (configuration, mode, sensor): (usize, usize, usize),
+        (one, predicted): (&Solved, f64),
+    ) -> f64 {
+        let setup = &self.frame.setups[configuration];
+        let (Some(index), Some(tap)) = (one.index(mode), setup.tap) else {
+            return 0.0;
+        };
+        let x = setup.sensors[sensor].position;
+        match *small {
+            Small::Gain { name } if setup.names[sensor] == name => predicted,
+            Small::SensorPlace { place } if setup.places[sensor] == place => {
+                one.modes.slope(index, x) * one.modes.displacement(index, tap)
+            }
+            Small::TapPlace { visit } if setup.visit == visit => {
+                one.modes.displacement(index, x) * one.modes.slope(index, tap)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Relative derivative of the displacement at one sensor.
+    fn ratio_slope(
+        &self,
+        small: &Small,
+        (configuration, mode, sensor): (usize, usize, usize),
+        one: &Solved,
+    ) -> f64 {
+        let setup = &self.frame.setups[configuration];
+        let Some(index) = one.index(mode) else {
+            return 0.0;
+        };
+        match *small {
+            Small::Gain { name } if setup.names[sensor] == name => 1.0,
+            Small::SensorPlace { place } if setup.places[sensor] == place => {
+                let x = setup.sensors[sensor].position;
+                one.modes.slope(index, x) / one.modes.displacement(index, x)
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+/// A constant bias does not move with the structure: d ln(s f + b)/d ln f = s f/(s f + b).
+fn offset_factor(one: &Solved, index: usize) -> f64 {
+    let own = one.modes.frequencies()[index] * one.seen.frequency_scale;
+    own / (own + one.seen.frequency_offset)
+}
+
+/// Share of each spring of the joint in the strain energy of a mode, q_t F_t/omega^2 for a shape of
+/// unit modal mass that deforms the joint by q against the forces F = K q. With coupled springs the
+/// shares belong to the stiffnesses at a fixed coupling: dK/d ln k_t = (E_t K + K E_t)/2.
+pub(super) fn joint_shares(one: &Solved, index: usize) -> [f64; 2] {
+    let SpecimenJoint::Springs { kt, kr, coupling } = one.seen.specimen.joint else {
+        return [0.0; 2];
+    };
+    let q = one.modes.joint_motion(index);
+    let omega = std::f64::consts::TAU * one.modes.frequencies()[index];
+    let square = 1.0 - coupling * coupling;
+    // A rigid spring holds no energy; its deformation is 0 and its stiffness infinite.
+    let part = |own: f64, other: f64, own_k: f64, other_k: f64| {
+        if !own_k.is_finite() {
+            return 0.0;
+        }
+        let cross = if coupling == 0.0 {
+            0.0
+        } else {
+            coupling * (own_k * other_k).sqrt() * other
+        };
+        own * (own_k * own + cross) / square / (omega * omega)
+    };
+    [part(q[0], q[1], kt, kr), part(q[1], q[0], kr, kt)]
+}
+
+/// d ln f/d ln k of a spring of the joint by Rayleigh's quotient of the stiffened structure.
+fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f64 {
+    const STEP: f64 = 1e-4;
+    let mut other = one.seen.specimen.clone();
+    if let SpecimenJoint::Springs { kt, kr, .. } = &mut other.joint {
+        *(if direction == 0 { kt } else { kr }) *= STEP.exp();
+    }
+    match one.modes.rayleigh_frequency(index, &other) {
+        Ok(frequency) => (frequency / one.modes.frequencies()[index]).ln() / STEP,
+        Err(_) => 0.0,
+    }
+}

@@ -1,0 +1,469 @@
+//! What was observed, in the order in which it is compared: readings (rows) and small unknowns
+//! (columns) that every hypothesis shares.
+
+use super::noise::{self, Reading};
+use super::nominal::Nominal;
+use super::settings::GapSettings;
+use crate::effects::SensorPlace;
+use crate::identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
+use crate::structure::specimen::Specimen;
+use nalgebra::DMatrix;
+
+/// What a reading is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Row {
+    /// Logarithm of a natural frequency.
+    Frequency { configuration: usize, mode: usize },
+    /// Modal constant at a sensor and the tap (1/kg).
+    Constant {
+        configuration: usize,
+        mode: usize,
+        sensor: usize,
+    },
+    /// Shape at a sensor over that at the reference sensor (1).
+    Ratio {
+        configuration: usize,
+        mode: usize,
+        sensor: usize,
+        reference: usize,
+    },
+    /// Logarithm of a damping ratio, all configurations together.
+    Damping { mode: usize },
+    /// Change of the logarithm of a frequency per e-fold of the amplitude along the decay (1).
+    Slope { configuration: usize, mode: usize },
+}
+
+/// A small unknown whose influence is linear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Small {
+    /// Common factor on all frequencies (logarithm).
+    Scale,
+    /// Stiffness of the joint in one visit (logarithm): direction 0 translation, 1 rotation.
+    Drift { visit: usize, direction: usize },
+    /// Mass of a sensor over its stated one (1).
+    SensorMass { name: usize },
+    /// Place of a sensor (m), the same in all configurations where it has the same stated one.
+    SensorPlace { place: usize },
+    /// Where the hammer struck in one visit (m).
+    TapPlace { visit: usize },
+    /// Calibration of a sensor (1).
+    Gain { name: usize },
+    /// Common level of the nominal damping ratios (logarithm).
+    Damping,
+    /// Amplitude that counts over the one at the decay's begin (logarithm).
+    Amplitude,
+    /// What no effect explains in one mode, the same in all configurations (logarithm).
+    Discrepancy { mode: usize },
+}
+
+/// One configuration as the model needs it.
+#[derive(Debug, Clone)]
+pub(super) struct Setup {
+    /// What it is called: file and level.
+    pub(super) label: String,
+    /// The structure with all masses that are known.
+    pub(super) specimen: Specimen,
+    /// Places and masses of the sensors.
+    pub(super) sensors: Vec<SensorPlace>,
+    /// Names of the sensors, as indices.
+    pub(super) names: Vec<usize>,
+    /// Distinct stated places of the sensors, as indices.
+    pub(super) places: Vec<usize>,
+    /// Where the hammer struck (m).
+    pub(super) tap: Option<f64>,
+    /// Amplitude over that of the hardest configuration (1).
+    pub(super) level: f64,
+    /// Amplitude at the begin and end of the followed decay over that of its first instant, by mode.
+    pub(super) spans: Vec<(usize, f64, f64)>,
+    /// Which visit to the structure.
+    pub(super) visit: usize,
+}
+
+/// Everything that is compared, and how.
+#[derive(Debug, Clone)]
+pub(super) struct Frame {
+    pub(super) nominal: Nominal,
+    pub(super) setups: Vec<Setup>,
+    pub(super) rows: Vec<Row>,
+    pub(super) readings: Vec<Reading>,
+    pub(super) smalls: Vec<Small>,
+    /// Standard deviations of the small unknowns.
+    pub(super) small_stds: Vec<f64>,
+    /// Starting values of the small unknowns, which are the centres of their priors.
+    pub(super) small_centres: Vec<f64>,
+    /// Modes that are solved for.
+    pub(super) modes: usize,
+    /// Modes above this one are withheld.
+    pub(super) fitted_modes: usize,
+    /// Frequencies that take no part in the fit: row and reading.
+    pub(super) withheld: Vec<(Row, Reading)>,
+    /// Number of distinct tap levels.
+    pub(super) levels: usize,
+    /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
+    /// nominal optimum: shapes depend on the joint little enough for that.
+    pub(super) shape_slopes: Option<DMatrix<f64>>,
+}
+
+/// Least uncertainty of a modal constant or ratio over the root mean square of its kind (1): 1 %, what
+/// modes beyond the model and real beams leave.
+const SHAPE_FLOOR: f64 = 0.01;
+
+/// A slope along the decay that is smaller cannot be told from what the fits' own bias leaves, in
+/// relative frequency per e-fold.
+const SLOPE_FLOOR: f64 = 5e-6;
+
+/// The amplitude that counts for a frequency fitted to a whole decay, over its first one, and the
+/// scatter of its logarithm: 0.41 to 0.5 for all powers of the amplitude
+/// ([`effective_share`](crate::identify::observation::effective_share)), less certain because other
+/// modes move the joint too.
+pub(super) const SHARE: (f64, f64) = (0.45, 0.3);
+
+impl Frame {
+    /// From observations whose sensors all have places (see `with_places`).
+    pub(super) fn new(
+        observations: &Observations,
+        nominal: &Nominal,
+        settings: &GapSettings,
+    ) -> Self {
+        let highest = highest_mode(observations);
+        let fitted_modes = if highest >= settings.withhold_from {
+            highest - settings.withheld_modes
+        } else {
+            highest
+        };
+        let mut names = Vec::new();
+        let mut places = Vec::new();
+        let setups: Vec<Setup> = observations
+            .configurations
+            .iter()
+            .enumerate()
+            .map(|(index, c)| setup(index, c, nominal, (&mut names, &mut places)))
+            .collect();
+        let mut frame = Frame {
+            nominal: nominal.clone(),
+            setups,
+            rows: Vec::new(),
+            readings: Vec::new(),
+            smalls: Vec::new(),
+            small_stds: Vec::new(),
+            small_centres: Vec::new(),
+            modes: highest,
+            fitted_modes,
+            withheld: Vec::new(),
+            levels: 0,
+            shape_slopes: None,
+        };
+        frame.set_levels();
+        frame.add_frequencies(observations, settings);
+        frame.add_shapes(observations);
+        frame.add_damping(observations, settings);
+        frame.add_slopes(observations);
+        frame.add_smalls(&names, &places, settings);
+        frame
+    }
+
+    fn set_levels(&mut self) {
+        let mut levels: Vec<f64> = self.setups.iter().map(|setup| setup.level).collect();
+        levels.sort_by(f64::total_cmp);
+        levels.dedup_by(|a, b| (*a - *b).abs() < 1e-3);
+        self.levels = levels.len();
+    }
+
+    fn push(&mut self, row: Row, reading: Reading) {
+        self.rows.push(row);
+        self.readings.push(reading);
+    }
+
+    fn add_frequencies(&mut self, observations: &Observations, settings: &GapSettings) {
+        let mut rows = Vec::new();
+        let mut readings = Vec::new();
+        for (configuration, one) in observations.configurations.iter().enumerate() {
+            for mode in &one.modes {
+                let Some(std) = mode.std.filter(|std| *std > 0.0) else {
+                    continue;
+                };
+                rows.push(Row::Frequency {
+                    configuration,
+                    mode: mode.mode,
+                });
+                readings.push(Reading {
+                    value: mode.frequency.ln(),
+                    std: std / mode.frequency,
+                    freedom: mode.freedom.unwrap_or(f64::INFINITY),
+                });
+            }
+        }
+        noise::moderate(&mut readings);
+        for (row, mut reading) in rows.into_iter().zip(readings) {
+            let Row::Frequency {
+                configuration,
+                mode,
+            } = row
+            else {
+                continue;
+            };
+            let common = observations.configurations[configuration].common;
+            reading.std = reading.std.hypot(settings.frequency_floor).hypot(common);
+            if mode > self.fitted_modes {
+                self.withheld.push((row, reading));
+            } else {
+                self.push(row, reading);
+            }
+        }
+    }
+
+    fn add_shapes(&mut self, observations: &Observations) {
+        let mut constants: Vec<(Row, Reading)> = Vec::new();
+        let mut ratios: Vec<(Row, Reading)> = Vec::new();
+        for (configuration, one) in observations.configurations.iter().enumerate() {
+            for mode in one.modes.iter().filter(|m| m.mode <= self.fitted_modes) {
+                let placed = |sensor: usize| {
+                    one.sensors
+                        .get(sensor)
+                        .is_some_and(|s| s.position.is_some())
+                };
+                let Some(reference) = mode.reference.filter(|&sensor| placed(sensor)) else {
+                    continue;
+                };
+                if let (Some(constant), Some(_)) = (mode.constant, one.tap) {
+                    let row = Row::Constant {
+                        configuration,
+                        mode: mode.mode,
+                        sensor: reference,
+                    };
+                    let freedom = constant.freedom.unwrap_or(f64::INFINITY);
+                    constants.push((row, reading_of(constant.value, constant.std, freedom)));
+                }
+                let others = mode
+                    .shape
+                    .iter()
+                    .filter(|value| value.sensor != reference && placed(value.sensor));
+                for value in others.filter(|value| value.std > 0.0) {
+                    let row = Row::Ratio {
+                        configuration,
+                        mode: mode.mode,
+                        sensor: value.sensor,
+                        reference,
+                    };
+                    let freedom = mode.freedom.unwrap_or(f64::INFINITY);
+                    ratios.push((row, reading_of(value.value, value.std, freedom)));
+                }
+            }
+        }
+        for kind in [constants, ratios] {
+            let floor = SHAPE_FLOOR * root_mean_square(&kind);
+            for (row, mut reading) in kind {
+                reading.std = reading.std.hypot(floor);
+                self.push(row, reading);
+            }
+        }
+    }
+
+    /// One damping ratio for each mode: the weighted mean of all configurations, since nothing but
+    /// noise and level distinguishes them.
+    fn add_damping(&mut self, observations: &Observations, settings: &GapSettings) {
+        for mode in 1..=self.fitted_modes {
+            let seen = observations
+                .configurations
+                .iter()
+                .filter_map(|c| c.mode(mode));
+            let (mut weights, mut sum) = (0.0, 0.0);
+            for damping in seen.filter_map(|mode| mode.damping) {
+                if damping.value > 0.0 && damping.std > 0.0 {
+                    let weight = (damping.value / damping.std).powi(2);
+                    weights += weight;
+                    sum += weight * damping.value.ln();
+                }
+            }
+            if weights > 0.0 {
+                let std = weights.powf(-0.5).hypot(settings.damping_scatter);
+                let reading = reading_of(sum / weights, std, f64::INFINITY);
+                self.push(Row::Damping { mode }, reading);
+            }
+        }
+    }
+
+    fn add_slopes(&mut self, observations: &Observations) {
+        let fitted = self.fitted_modes;
+        for (configuration, one) in observations.configurations.iter().enumerate() {
+            for mode in one.modes.iter().filter(|m| m.mode <= fitted) {
+                let Some(decay) = mode.decay else { continue };
+                let slope = decay.frequency_slope;
+                if decay.verdict == DecayVerdict::Doubtful || !(slope.std > 0.0) {
+                    continue;
+                }
+                let row = Row::Slope {
+                    configuration,
+                    mode: mode.mode,
+                };
+                let std = (slope.std / mode.frequency).hypot(SLOPE_FLOOR);
+                let freedom = slope.freedom.unwrap_or(f64::INFINITY).max(3.0);
+                self.push(row, reading_of(slope.value / mode.frequency, std, freedom));
+            }
+        }
+    }
+
+    fn add_smalls(&mut self, names: &[String], places: &[(usize, f64)], settings: &GapSettings) {
+        let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
+        self.small(Small::Scale, 0.0, scale);
+        let mut visits: Vec<usize> = self.setups.iter().map(|setup| setup.visit).collect();
+        visits.sort_unstable();
+        visits.dedup();
+        if visits.len() > 1 {
+            for &visit in &visits {
+                for (direction, _) in self.nominal.sought() {
+                    self.small(
+                        Small::Drift { visit, direction },
+                        0.0,
+                        settings.drift_stds[0],
+                    );
+                }
+            }
+        }
+        for (name, text) in names.iter().enumerate() {
+            if self.nominal.mass_of(text) > 0.0 {
+                self.small(Small::SensorMass { name }, 0.0, settings.sensor_mass_std);
+            }
+        }
+        let shapes = self
+            .rows
+            .iter()
+            .any(|row| matches!(row, Row::Constant { .. }));
+        let ratios = self.rows.iter().any(|row| matches!(row, Row::Ratio { .. }));
+        if shapes || ratios {
+            for place in 0..places.len() {
+                self.small(Small::SensorPlace { place }, 0.0, settings.position_std);
+            }
+        }
+        if shapes {
+            for &visit in &visits {
+                self.small(Small::TapPlace { visit }, 0.0, settings.position_std);
+            }
+        }
+        if shapes || ratios {
+            for name in 0..names.len() {
+                self.small(Small::Gain { name }, 0.0, settings.gain_std);
+            }
+        }
+        if self
+            .rows
+            .iter()
+            .any(|row| matches!(row, Row::Damping { .. }))
+        {
+            let (count, sum) =
+                self.rows
+                    .iter()
+                    .zip(&self.readings)
+                    .fold((0.0, 0.0), |sum, (row, reading)| match row {
+                        Row::Damping { .. } => (sum.0 + 1.0, sum.1 + reading.value),
+                        _ => sum,
+                    });
+            // Wide: nobody knows the damping of a beam beforehand.
+            self.small(Small::Damping, sum / count, 2.0);
+        }
+        self.small(Small::Amplitude, SHARE.0.ln(), SHARE.1);
+    }
+
+    fn small(&mut self, small: Small, centre: f64, std: f64) {
+        self.smalls.push(small);
+        self.small_centres.push(centre);
+        self.small_stds.push(std);
+    }
+
+    /// Place of a small unknown among all, if it is there.
+    pub(super) fn small_index(&self, small: Small) -> Option<usize> {
+        self.smalls.iter().position(|&one| one == small)
+    }
+}
+
+fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {
+    Reading {
+        value,
+        std,
+        freedom,
+    }
+}
+
+fn root_mean_square(readings: &[(Row, Reading)]) -> f64 {
+    let values: Vec<f64> = readings.iter().map(|(_, reading)| reading.value).collect();
+    crate::stats::root_mean_square(&values)
+}
+
+fn highest_mode(observations: &Observations) -> usize {
+    observations
+        .configurations
+        .iter()
+        .flat_map(|c| c.modes.iter().map(|mode| mode.mode))
+        .max()
+        .unwrap_or(0)
+}
+
+/// Index of a value in a list, which grows where it is new.
+fn index_in<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    list.iter()
+        .position(|one| *one == value)
+        .unwrap_or_else(|| {
+            list.push(value);
+            list.len() - 1
+        })
+}
+
+fn setup(
+    index: usize,
+    configuration: &Configuration,
+    nominal: &Nominal,
+    (names, places): (&mut Vec<String>, &mut Vec<(usize, f64)>),
+) -> Setup {
+    let sensors: Vec<SensorPlace> = configuration
+        .sensors
+        .iter()
+        .map(|sensor| SensorPlace {
+            // Without a place it stays where it does nothing; its shape is not compared.
+            position: sensor.position.unwrap_or(0.0),
+            mass: sensor
+                .position
+                .map_or(0.0, |_| nominal.mass_of(&sensor.name)),
+        })
+        .collect();
+    let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
+    let name_indices: Vec<usize> = configuration
+        .sensors
+        .iter()
+        .map(|sensor| index_in(names, sensor.name.clone()))
+        .collect();
+    let place_indices = name_indices
+        .iter()
+        .zip(&sensors)
+        .map(|(&name, sensor)| index_in(places, (name, sensor.position)))
+        .collect();
+    Setup {
+        label: label(index, configuration),
+        specimen: nominal.with_masses(&masses),
+        sensors,
+        names: name_indices,
+        places: place_indices,
+        tap: configuration.tap,
+        level: configuration.level.unwrap_or(1.0),
+        spans: configuration.modes.iter().filter_map(span).collect(),
+        visit: configuration.recording.unwrap_or(index),
+    }
+}
+
+fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {
+    let decay = mode.decay?;
+    let first = mode.amplitude?;
+    let share = |amplitude: Option<f64>| Some(amplitude? / first);
+    let (early, late) = (share(decay.early.amplitude)?, share(decay.late.amplitude)?);
+    (late > 0.0 && early > 1.05 * late).then_some((mode.mode, early, late))
+}
+
+fn label(index: usize, configuration: &Configuration) -> String {
+    let name = configuration
+        .file
+        .clone()
+        .unwrap_or_else(|| format!("configuration {}", index + 1));
+    match configuration.level {
+        Some(level) if level < 0.999 => format!("{name} (level {level:.2})"),
+        _ => name,
+    }
+}

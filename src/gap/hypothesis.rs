@@ -1,0 +1,438 @@
+//! Fits one hypothesis: starts, signs, places, and the sum over them.
+
+use super::catalogue::{Candidate, PlaceRange};
+use super::evidence::{
+    Branch, covariance, evaluate, knowledge, linear_optimum, log_integral, log_mean, log_sum,
+    over_drifts,
+};
+use super::forward::Forward;
+use super::frame::{Frame, Small};
+use super::least_squares::{Knowledge, Optimum, factor_of, maximise};
+use super::settings::GapSettings;
+
+/// A hypothesis with its best fit.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    /// The effects it adds; none of the nominal model and of what is unknown.
+    pub(super) effects: Vec<Candidate>,
+    /// The best fit.
+    pub(super) branch: Branch,
+    /// Logarithm of the evidence of all branches together.
+    pub(super) log_evidence: f64,
+}
+
+/// The nominal model with its joint refitted.
+pub(super) fn fit_nominal(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+    let forward = Forward::new(frame, &[]);
+    let known = knowledge(
+        frame,
+        &forward.layout,
+        settings.joint_std,
+        settings.drift_stds[0],
+    );
+    let start: Vec<f64> = known.iter().map(|known| known.centre).collect();
+    let branch = evaluate(&forward, &known, &start, &settings.drift_stds)?;
+    Some(Fit {
+        effects: Vec::new(),
+        log_evidence: branch.log_evidence,
+        branch,
+    })
+}
+
+/// One effect, or a second beside a first one, from the optimum of the model without it.
+pub(super) struct Search<'a> {
+    pub(super) frame: &'a Frame,
+    pub(super) settings: &'a GapSettings,
+    /// The fit that lacks the effect.
+    pub(super) without: &'a Fit,
+}
+
+impl Search<'_> {
+    /// Fits the effect beside those of the fit that lacks it.
+    pub(super) fn add(&self, candidate: Candidate) -> Option<Fit> {
+        let mut effects = self.without.effects.clone();
+        effects.push(candidate);
+        let forward = Forward::new(self.frame, &effects);
+        match candidate.place {
+            None => self.without_place(&forward),
+            Some(range) => self.with_place(&forward, &range),
+        }
+    }
+
+    /// What is known of all parameters.
+    fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
+        let drifts = &self.settings.drift_stds;
+        let middle = drifts[drifts.len() / 2];
+        knowledge(self.frame, &forward.layout, self.settings.joint_std, middle)
+    }
+
+    /// The parameters without the effect, and the effect at a size and a place.
+    fn start(&self, forward: &Forward<'_>, size: f64, place: Option<f64>) -> Vec<f64> {
+        let at = forward.layout.size(forward.layout.effects.len() - 1);
+        let mut start = self.without.branch.optimum.parameters.clone();
+        start.insert(at, size);
+        if let Some(place) = place {
+            start.insert(at + 1, place);
+        }
+        start
+    }
+
+    fn without_place(&self, forward: &Forward<'_>) -> Option<Fit> {
+        let known = self.known(forward);
+        let mut found: Vec<Branch> = Vec::new();
+        for size in self.sizes(forward, &known) {
+            let start = self.start(forward, size, None);
+            if let Some(branch) = evaluate(forward, &known, &start, &self.settings.drift_stds) {
+                keep(
+                    &mut found,
+                    branch,
+                    &[forward.layout.size(forward.layout.effects.len() - 1)],
+                );
+            }
+        }
+        let total: Vec<f64> = found.iter().map(|branch| branch.log_evidence).collect();
+        let best = found.into_iter().max_by(|a, b| {
+            a.optimum
+                .objective
+                .total_cmp(&b.optimum.objective)
+                .reverse()
+        })?;
+        Some(self.fit(forward, best, log_sum(&total)))
+    }
+
+    fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
+        let bend = self.bend(forward, &branch);
+        Fit {
+            effects: forward.layout.effects.clone(),
+            branch,
+            log_evidence: log_evidence + bend,
+        }
+    }
+
+    /// Sizes from which the search begins: what the model linearised without the effect asks for, and
+    /// the other sign or a size well inside the range.
+    fn sizes(&self, forward: &Forward<'_>, known: &[Knowledge]) -> Vec<f64> {
+        let index = forward.layout.effects.len() - 1;
+        let size = &forward.layout.effects[index].size;
+        let asked = self
+            .linear_size(forward, known)
+            .unwrap_or(size.nothing)
+            .clamp(
+                (size.nothing - 2.0 * size.scale).max(size.low),
+                (size.nothing + 2.0 * size.scale).min(size.high),
+            );
+        let away = asked - size.nothing;
+        let other = (size.nothing - 0.5 * away).clamp(size.low, size.high);
+        if away.abs() < 1e-3 * size.scale {
+            vec![size.nothing + 0.05 * size.scale]
+        } else if (other - size.nothing).abs() < 1e-3 * size.scale {
+            vec![asked]
+        } else {
+            vec![asked, other]
+        }
+    }
+
+    /// The size by one step of Gauss-Newton from nothing of it.
+    fn linear_size(&self, forward: &Forward<'_>, known: &[Knowledge]) -> Option<f64> {
+        let mut known = known.to_vec();
+        let at = forward.layout.size(forward.layout.effects.len() - 1);
+        known[at].low = f64::NEG_INFINITY;
+        known[at].high = f64::INFINITY;
+        let optimum = self.linear_fit(forward, &known, None)?;
+        Some(optimum.parameters[at])
+    }
+
+    /// The optimum of the model linearised where there is next to nothing of the effect.
+    fn linear_fit(
+        &self,
+        forward: &Forward<'_>,
+        known: &[Knowledge],
+        place: Option<f64>,
+    ) -> Option<Optimum> {
+        let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
+        // Slopes of what vanishes at nothing (a place, a frequency) are taken a little inside.
+        let start = self.start(forward, size.nothing + 0.05 * size.scale, place);
+        let mut first = Some(forward.linearise(&start, known)?);
+        let readings = &self.frame.readings;
+        let here = maximise(readings, known, &start, &mut |_| first.take())?;
+        linear_optimum(readings, known, &here)
+    }
+
+    /// The linearised model at every node of the place's range; then the true one, free, from the best.
+    fn with_place(&self, forward: &Forward<'_>, range: &PlaceRange) -> Option<Fit> {
+        let at = forward.layout.size(forward.layout.effects.len() - 1);
+        let known = self.known(forward);
+        let (low, high) = (range.inward(range.low), range.inward(range.high));
+        let spacing = (high - low) / range.nodes as f64;
+        let mut nodes: Vec<Branch> = Vec::new();
+        for node in 0..range.nodes {
+            let mut held = known.clone();
+            let place = low + spacing * (node as f64 + 0.5);
+            held[at + 1] = Knowledge::held(place);
+            if let Some(optimum) = self.linear_fit(forward, &held, Some(place)) {
+                let drifts = &self.settings.drift_stds;
+                nodes.push(over_drifts(
+                    self.frame,
+                    &forward.layout,
+                    &held,
+                    optimum,
+                    drifts,
+                ));
+            }
+        }
+        self.refine(forward, (&known, spacing), &nodes)
+    }
+
+    /// Frees the place from the best nodes. Where the readings fix it within the nodes' spacing, the
+    /// maxima are summed; where they do not, the effect is so small that the linearised nodes hold.
+    fn refine(
+        &self,
+        forward: &Forward<'_>,
+        (known, spacing): (&[Knowledge], f64),
+        nodes: &[Branch],
+    ) -> Option<Fit> {
+        let at = forward.layout.size(forward.layout.effects.len() - 1);
+        let evidence: Vec<f64> = nodes.iter().map(|branch| branch.log_evidence).collect();
+        let mut found: Vec<Branch> = Vec::new();
+        for start in peaks(&evidence) {
+            let from = &nodes[start].optimum.parameters;
+            if let Some(branch) = evaluate(forward, known, from, &self.settings.drift_stds) {
+                keep(&mut found, branch, &[at, at + 1]);
+            }
+        }
+        found.sort_by(|a, b| a.optimum.objective.total_cmp(&b.optimum.objective));
+        let best = found.first()?.clone();
+        let place_std = covariance(&best.knowledge, &best.optimum)
+            .map_or(f64::INFINITY, |covariance| {
+                covariance[(at + 1, at + 1)].max(0.0).sqrt()
+            });
+        let of_maxima: Vec<f64> = found.iter().map(|branch| branch.log_evidence).collect();
+        let total = if place_std < 0.7 * spacing {
+            log_sum(&of_maxima)
+        } else {
+            log_mean(&evidence)
+        };
+        Some(self.fit(forward, best, total))
+    }
+
+    /// What the profile of the likelihood over the size adds to the evidence of its parabola. Only
+    /// where the size is so badly known that the parabola need not hold.
+    fn bend(&self, forward: &Forward<'_>, branch: &Branch) -> f64 {
+        let index = forward.layout.effects.len() - 1;
+        if index > 0 {
+            return 0.0;
+        }
+        let at = forward.layout.size(index);
+        let size = &forward.layout.effects[index].size;
+        let Some(covariance) = covariance(&branch.knowledge, &branch.optimum) else {
+            return 0.0;
+        };
+        let variance = covariance[(at, at)];
+        if variance.sqrt() < 0.3 * size.scale {
+            return 0.0;
+        }
+        self.profile(forward, branch, variance).unwrap_or(0.0)
+    }
+
+    fn profile(&self, forward: &Forward<'_>, branch: &Branch, variance: f64) -> Option<f64> {
+        const NODES: usize = 9;
+        let at = forward.layout.size(forward.layout.effects.len() - 1);
+        let size = &forward.layout.effects[0].size;
+        let here = branch.optimum.parameters[at];
+        let reach = 4.0 * variance.sqrt();
+        let from = (here - reach)
+            .max(size.low)
+            .max(size.nothing - 4.0 * size.scale);
+        let to = (here + reach)
+            .min(size.high)
+            .min(size.nothing + 4.0 * size.scale);
+        let mut logs = Vec::new();
+        let regular =
+            |t: f64| 0.5 * ((t - branch.knowledge[at].centre) / branch.knowledge[at].std).powi(2);
+        // The regularisation of the size is no part of its likelihood; where it is held it has none.
+        let base = marginal_log(branch, &branch.optimum, at)? + regular(here);
+        for node in 0..NODES {
+            let t = from + (to - from) * node as f64 / (NODES - 1) as f64;
+            let mut held = branch.knowledge.clone();
+            held[at] = Knowledge::held(t);
+            let mut start = branch.optimum.parameters.clone();
+            start[at] = t;
+            let optimum = maximise(&self.frame.readings, &held, &start, &mut |p| {
+                forward.linearise(p, &held)
+            });
+            let log = optimum.and_then(|optimum| marginal_log(branch, &optimum, at));
+            logs.push((t, log.map_or(f64::NEG_INFINITY, |log| log - base)));
+        }
+        let slope = branch.optimum.gradient[at];
+        let parabola = |t: f64| {
+            let away = t - here;
+            -slope * away - 0.5 * away * away / variance + regular(t) - regular(here)
+        };
+        let true_one = log_integral(size, (from, to), &|t| interpolate(&logs, t));
+        let taken = log_integral(size, (from, to), &parabola);
+        (true_one.is_finite() && taken.is_finite()).then_some(true_one - taken)
+    }
+}
+
+/// -objective - ln det/2 over all free parameters but the size.
+fn marginal_log(branch: &Branch, optimum: &Optimum, size: usize) -> Option<f64> {
+    let free: Vec<usize> = (0..branch.knowledge.len())
+        .filter(|&k| k != size && branch.knowledge[k].low < branch.knowledge[k].high)
+        .collect();
+    let factor = factor_of(&optimum.curvature, &free)?;
+    let log_det = 2.0
+        * factor
+            .l_dirty()
+            .diagonal()
+            .iter()
+            .map(|x| x.ln())
+            .sum::<f64>();
+    Some(-optimum.objective - 0.5 * log_det)
+}
+
+/// Straight lines between points; beyond them nothing.
+fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
+    let above = points
+        .partition_point(|point| point.0 < t)
+        .clamp(1, points.len() - 1);
+    let ((t0, y0), (t1, y1)) = (points[above - 1], points[above]);
+    if y0 == f64::NEG_INFINITY || y1 == f64::NEG_INFINITY {
+        return f64::NEG_INFINITY;
+    }
+    y0 + (y1 - y0) * (t - t0) / (t1 - t0)
+}
+
+/// The nodes from which a search goes on: the local maxima, best first, at most three.
+fn peaks(evidence: &[f64]) -> Vec<usize> {
+    let value = |k: Option<usize>| {
+        k.and_then(|k| evidence.get(k))
+            .copied()
+            .unwrap_or(f64::NEG_INFINITY)
+    };
+    let mut peaks: Vec<usize> = (0..evidence.len())
+        .filter(|&k| evidence[k] >= value(k.checked_sub(1)) && evidence[k] >= value(Some(k + 1)))
+        .collect();
+    peaks.sort_by(|&a, &b| evidence[b].total_cmp(&evidence[a]));
+    // A peak 12 below the best has e^-12 of its probability.
+    let best = value(peaks.first().copied());
+    peaks.retain(|&k| evidence[k] > best - 12.0);
+    peaks.truncate(3);
+    peaks
+}
+
+/// Adds a branch unless the same optimum is there already (in the parameters `which`).
+fn keep(found: &mut Vec<Branch>, branch: Branch, which: &[usize]) {
+    let spread = covariance(&branch.knowledge, &branch.optimum);
+    let same = |other: &Branch| {
+        which.iter().all(|&k| {
+            let std = spread.as_ref().map_or(0.0, |c| c[(k, k)].max(0.0).sqrt());
+            (other.optimum.parameters[k] - branch.optimum.parameters[k]).abs() < 2.0 * std
+        })
+    };
+    match found.iter().position(same) {
+        Some(index) if found[index].optimum.objective > branch.optimum.objective => {
+            found[index] = branch;
+        }
+        Some(_) => {}
+        None => found.push(branch),
+    }
+}
+
+/// Spreads of what no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
+const SPREADS: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
+
+/// Something that no effect of the catalogue is: every mode's frequency off by an amount of its own,
+/// the same in all configurations, with a tenth of it for each reading and twice of it in the shapes.
+pub(super) fn fit_unknown(frame: &Frame, settings: &GapSettings, nominal: &Fit) -> Option<Fit> {
+    let mut branches: Vec<Branch> = Vec::new();
+    for spread in SPREADS {
+        let loose = loosened(frame, spread);
+        let forward = Forward::new(&loose, &[]);
+        let drifts = &settings.drift_stds;
+        let known = knowledge(
+            &loose,
+            &forward.layout,
+            settings.joint_std,
+            drifts[drifts.len() / 2],
+        );
+        let mut start = nominal.branch.optimum.parameters.clone();
+        start.resize(known.len(), 0.0);
+        branches.extend(evaluate(&forward, &known, &start, drifts));
+    }
+    let all: Vec<f64> = branches.iter().map(|branch| branch.log_evidence).collect();
+    let best = branches
+        .into_iter()
+        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+    Some(Fit {
+        effects: Vec::new(),
+        branch: best,
+        log_evidence: log_mean(&all),
+    })
+}
+
+/// The frame in which nothing is predicted better than `spread`.
+pub(super) fn loosened(frame: &Frame, spread: f64) -> Frame {
+    use super::frame::Row;
+    let mut loose = frame.clone();
+    for mode in 1..=frame.fitted_modes {
+        loose.smalls.push(Small::Discrepancy { mode });
+        loose.small_centres.push(0.0);
+        loose.small_stds.push(spread);
+    }
+    let shapes = |row: &Row| matches!(row, Row::Constant { .. } | Row::Ratio { .. });
+    let sizes: Vec<f64> = frame
+        .rows
+        .iter()
+        .zip(&frame.readings)
+        .filter(|(row, _)| shapes(row))
+        .map(|(_, reading)| reading.value)
+        .collect();
+    let size = crate::stats::root_mean_square(&sizes);
+    for (row, reading) in loose.rows.iter().zip(&mut loose.readings) {
+        let extra = match row {
+            Row::Frequency { .. } => 0.1 * spread,
+            row if shapes(row) => 2.0 * spread * size,
+            // Damping and slopes may be anything where nothing is known.
+            Row::Damping { .. } => 50.0 * spread,
+            _ => 0.1 * spread,
+        };
+        reading.std = reading.std.hypot(extra);
+    }
+    loose
+}
+
+/// Spreads of the joint between visits that are no longer a nuisance (1).
+const LARGE_DRIFTS: [f64; 3] = [0.04, 0.07, 0.12];
+
+/// A joint that is another one at every visit: the nominal model with a wide drift.
+pub(super) fn fit_drift(frame: &Frame, nominal: &Fit) -> Option<(Fit, f64)> {
+    if !frame
+        .smalls
+        .iter()
+        .any(|small| matches!(small, Small::Drift { .. }))
+    {
+        return None;
+    }
+    let forward = Forward::new(frame, &[]);
+    let known = &nominal.branch.knowledge;
+    let mut all = Vec::new();
+    let mut best: Option<(Branch, f64)> = None;
+    for drift in LARGE_DRIFTS {
+        let optimum = nominal.branch.optimum.clone();
+        let branch = over_drifts(frame, &forward.layout, known, optimum, &[drift]);
+        all.push(branch.log_evidence);
+        if best
+            .as_ref()
+            .is_none_or(|(best, _)| branch.log_evidence > best.log_evidence)
+        {
+            best = Some((branch, drift));
+        }
+    }
+    let (branch, drift) = best?;
+    let fit = Fit {
+        effects: Vec::new(),
+        branch,
+        log_evidence: log_mean(&all),
+    };
+    Some((fit, drift))
+}

@@ -1,0 +1,64 @@
+//! The gap between model and measurement: where it lies, which effect causes it, how far it closes.
+//!
+//! ```text
+//! Observations, Nominal -> frame       readings and small unknowns in order
+//!                          forward     what a hypothesis predicts (structure, effects)
+//!                          evidence    how probable the readings are under it
+//!                          posterior   probabilities, places, what cannot be told apart
+//!                          quality     misfit overall, by block, with each mode left out
+//!                          withheld    what it predicts of readings that took no part
+//!                          verdict     an answer, or the reason why there is none
+//! ```
+//!
+//! Every hypothesis is the nominal model, one effect of the catalogue added to it, or "something else";
+//! under each, the joint's stiffnesses and all small unknowns (geometry's common scale, the joint's
+//! drift between visits, masses and places of sensors, calibration) are fitted and integrated over. The
+//! uncertainty of the readings comes from the measurement, never from a residual. This module cannot
+//! reach the simulator, so that its answers to virtual tests are answers.
+
+mod assemble;
+mod catalogue;
+mod checks;
+mod error;
+mod evidence;
+mod forward;
+mod frame;
+mod hypothesis;
+mod least_squares;
+mod noise;
+mod nominal;
+mod place_map;
+mod posterior;
+mod quality;
+mod result;
+mod search;
+mod settings;
+mod synthetic;
+mod verdict;
+mod withheld;
+
+pub use error::GapError;
+pub use nominal::{Nominal, NominalSensor};
+pub use result::{
+    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
+    PlaceMap, PlaceProbabilities, Pull, Verdict,
+};
+pub use settings::GapSettings;
+pub use synthetic::{PlannedConfiguration, TestPlan, observe};
+
+use crate::identify::observation::Observations;
+
+/// Diagnoses what a test observed against what it was described to be.
+///
+/// # Errors
+/// [`GapError`] where there is nothing to diagnose: too few modes, no uncertainties, recordings of
+/// different structures, sensors that see nothing.
+pub fn diagnose(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<Diagnosis, GapError> {
+    checks::check(observations, nominal)?;
+    let competition = search::compete(observations, nominal, settings)?;
+    Ok(assemble::diagnosis(&competition, settings))
+}

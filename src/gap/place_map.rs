@@ -1,0 +1,146 @@
+//! Where along the beam the residual asks for stiffness or mass, whatever the cause.
+//!
+//! The beam is cut into pieces. A relative change e_j of the bending stiffness of piece j moves ln f of
+//! a mode by half of that piece's share of its bending energy, a change of its mass by minus half of its
+//! share of the kinetic energy. The changes that explain the residual of the nominal model are found by
+//! regularised least squares, beside the joint and all small unknowns.
+
+use super::evidence::covariance;
+use super::forward::{Forward, Solved};
+use super::frame::{Frame, Row};
+use super::hypothesis::Fit;
+use super::least_squares::{Knowledge, Linearised, maximise};
+use super::result::PlaceMap;
+use crate::structure::specimen::Body;
+use nalgebra::DMatrix;
+use std::f64::consts::TAU;
+
+/// Pieces of the beam: twice as many as half waves of the sixth mode.
+const PIECES: usize = 12;
+/// Points in each piece for its share of the energies.
+const POINTS: usize = 8;
+/// Standard deviation of a piece's change before the data (1).
+const PRIOR: f64 = 0.1;
+
+/// Which property changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Property {
+    Stiffness,
+    Mass,
+}
+
+/// The map of the nominal fit's residual; `None` with fewer than four frequencies.
+pub(super) fn place_map(frame: &Frame, nominal: &Fit) -> Option<PlaceMap> {
+    let frequencies = frame
+        .rows
+        .iter()
+        .filter(|row| matches!(row, Row::Frequency { .. }))
+        .count();
+    if frequencies < 4 {
+        return None;
+    }
+    let length = frame.nominal.specimen.body.length();
+    let forward = Forward::new(frame, &[]);
+    let solved = forward.solve(&nominal.branch.optimum.parameters)?;
+    let (stiffness, stiffness_std) =
+        changes(frame, nominal, &shares(frame, &solved, Property::Stiffness))?;
+    let (mass, mass_std) = changes(frame, nominal, &shares(frame, &solved, Property::Mass))?;
+    let piece = length / PIECES as f64;
+    Some(PlaceMap {
+        positions: (0..PIECES).map(|j| piece * (j as f64 + 0.5)).collect(),
+        stiffness,
+        stiffness_std,
+        mass,
+        mass_std,
+        // Half a wave of the highest mode is what its energy resolves.
+        resolution: length / frame.fitted_modes as f64,
+    })
+}
+
+/// Slope of each row with respect to the change of each piece.
+fn shares(frame: &Frame, solved: &[Solved], property: Property) -> DMatrix<f64> {
+    let mut shares = DMatrix::zeros(frame.rows.len(), PIECES);
+    for (row, kind) in frame.rows.iter().enumerate() {
+        let Row::Frequency {
+            configuration,
+            mode,
+        } = *kind
+        else {
+            continue;
+        };
+        let one = &solved[configuration];
+        let Some(index) = one.index(mode) else {
+            continue;
+        };
+        for piece in 0..PIECES {
+            shares[(row, piece)] = share(one, index, (piece, property));
+        }
+    }
+    shares
+}
+
+/// d ln f = (1/2) int EI w''^2 dx / omega^2 for the stiffness of a piece, -(1/2) int rho A w^2 dx for
+/// its mass, with w of unit modal mass.
+fn share(one: &Solved, index: usize, (piece, property): (usize, Property)) -> f64 {
+    let body = &one.seen.specimen.body;
+    let step = body.length() / (PIECES * POINTS) as f64;
+    let omega = TAU * one.modes.frequencies()[index];
+    (0..POINTS)
+        .map(|point| {
+            let from = step * (piece * POINTS + point) as f64;
+            let x = from + 0.5 * step;
+            let beam = match body {
+                Body::One(beam) => beam,
+                Body::Joined([left, _]) if x < left.length => left,
+                Body::Joined([_, right]) => right,
+            };
+            match property {
+                Property::Stiffness => {
+                    let bend =
+                        (one.modes.slope(index, from + step) - one.modes.slope(index, from)) / step;
+                    0.5 * beam.bending_stiffness() * bend * bend * step / (omega * omega)
+                }
+                Property::Mass => {
+                    -0.5 * beam.mass_per_length() * one.modes.displacement(index, x).powi(2) * step
+                }
+            }
+        })
+        .sum()
+}
+
+/// Changes of the pieces and their standard uncertainties.
+fn changes(frame: &Frame, nominal: &Fit, shares: &DMatrix<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
+    let optimum = &nominal.branch.optimum;
+    let first = optimum.parameters.len();
+    let slopes = DMatrix::from_fn(frame.rows.len(), first + PIECES, |row, column| {
+        if column < first {
+            optimum.model.slopes[(row, column)]
+        } else {
+            shares[(row, column - first)]
+        }
+    });
+    let mut start = optimum.parameters.clone();
+    start.resize(first + PIECES, 0.0);
+    let mut known = nominal.branch.knowledge.clone();
+    known.resize(first + PIECES, Knowledge::normal(0.0, PRIOR));
+    let origin = start.clone();
+    let found = maximise(&frame.readings, &known, &start, &mut |parameters| {
+        let predicted = (0..frame.rows.len())
+            .map(|row| {
+                let moved: f64 = (0..parameters.len())
+                    .map(|k| slopes[(row, k)] * (parameters[k] - origin[k]))
+                    .sum();
+                optimum.model.predicted[row] + moved
+            })
+            .collect();
+        Some(Linearised {
+            predicted,
+            slopes: slopes.clone(),
+        })
+    })?;
+    let spread = covariance(&known, &found)?;
+    let std = (first..first + PIECES)
+        .map(|k| spread[(k, k)].max(0.0).sqrt())
+        .collect();
+    Some((found.parameters[first..].to_vec(), std))
+}

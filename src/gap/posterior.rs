@@ -1,0 +1,177 @@
+//! Probabilities of the hypotheses, and which of them the readings cannot tell apart.
+
+use super::evidence::{covariance, log_sum};
+use super::frame::Frame;
+use super::hypothesis::Fit;
+use super::result::{Hypothesis, PlaceProbabilities};
+use crate::effects::{EffectId, Group, Place};
+
+/// A fitted hypothesis in the competition.
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    pub(super) hypothesis: Hypothesis,
+    pub(super) fit: Fit,
+    /// Its probability (1).
+    pub(super) probability: f64,
+    /// Standard deviation of the joint's drift, where that is the hypothesis.
+    pub(super) drift: Option<f64>,
+}
+
+impl Entry {
+    pub(super) fn new(hypothesis: Hypothesis, fit: Fit) -> Self {
+        Entry {
+            hypothesis,
+            fit,
+            probability: 0.0,
+            drift: None,
+        }
+    }
+
+    /// Its effects; none of `none` and `unknown`.
+    pub(super) fn effects(&self) -> &[EffectId] {
+        match &self.hypothesis {
+            Hypothesis::Effects(effects) => effects,
+            _ => &[],
+        }
+    }
+
+    /// The groups of its effects, in order.
+    pub(super) fn groups(&self) -> Vec<Group> {
+        self.effects().iter().map(|effect| effect.group()).collect()
+    }
+}
+
+/// Gives every group the same probability beforehand, split evenly inside; `none` and `unknown` are
+/// groups. Pairs share one unit among themselves. Sorts the most probable first.
+pub(super) fn set_probabilities(entries: &mut [Entry]) {
+    let share = |entry: &Entry| -> f64 {
+        let same = |other: &&Entry| match (&entry.hypothesis, &other.hypothesis) {
+            (Hypothesis::Effects(own), Hypothesis::Effects(others)) if own.len() > 1 => {
+                others.len() > 1
+            }
+            (Hypothesis::Effects(_), Hypothesis::Effects(others)) => {
+                others.len() == 1 && other.groups() == entry.groups()
+            }
+            (own, other) => own == other,
+        };
+        entries.iter().filter(same).count() as f64
+    };
+    let logs: Vec<f64> = entries
+        .iter()
+        .map(|entry| entry.fit.log_evidence - share(entry).ln())
+        .collect();
+    let total = log_sum(&logs);
+    for (entry, log) in entries.iter_mut().zip(&logs) {
+        entry.probability = (log - total).exp();
+    }
+    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
+/// Probability of each group, pairs apart, `none` and `unknown` among them; the most probable first.
+pub(super) fn by_group(entries: &[Entry]) -> Vec<(Vec<usize>, f64)> {
+    let mut groups: Vec<(Vec<usize>, f64)> = Vec::new();
+    for (index, entry) in entries.iter().enumerate() {
+        let same = |other: &Entry| {
+            other.effects().len() == entry.effects().len()
+                && match entry.effects().len() {
+                    0 => other.hypothesis == entry.hypothesis,
+                    _ => other.groups() == entry.groups(),
+                }
+        };
+        match groups.iter_mut().find(|group| same(&entries[group.0[0]])) {
+            Some(group) => {
+                group.0.push(index);
+                group.1 += entry.probability;
+            }
+            None => groups.push((vec![index], entry.probability)),
+        }
+    }
+    groups.sort_by(|a, b| b.1.total_cmp(&a.1));
+    groups
+}
+
+/// Probability of each place, given that there is a gap.
+pub(super) fn places(entries: &[Entry]) -> PlaceProbabilities {
+    let mut places = PlaceProbabilities::default();
+    for entry in entries {
+        let share = entry.probability / entry.effects().len().max(1) as f64;
+        if entry.hypothesis == Hypothesis::Unknown {
+            places.unknown += entry.probability;
+        }
+        for effect in entry.effects() {
+            *match effect.place() {
+                Place::Joint => &mut places.joint,
+                Place::Fixture => &mut places.fixture,
+                Place::Sensor => &mut places.sensor,
+                Place::Body => &mut places.body,
+                Place::Acquisition => &mut places.acquisition,
+            } += share;
+        }
+    }
+    let all = [
+        &mut places.joint,
+        &mut places.fixture,
+        &mut places.sensor,
+        &mut places.body,
+        &mut places.acquisition,
+        &mut places.unknown,
+    ];
+    let total: f64 = all.iter().map(|place| **place).sum();
+    if total > 0.0 {
+        for place in all {
+            *place /= total;
+        }
+    }
+    places
+}
+
+/// Squared distance of what two fits predict, in standard deviations of the readings.
+pub(super) fn distance(frame: &Frame, a: &Fit, b: &Fit) -> f64 {
+    frame
+        .readings
+        .iter()
+        .zip(&a.branch.optimum.model.predicted)
+        .zip(&b.branch.optimum.model.predicted)
+        .map(|((reading, a), b)| ((a - b) / reading.std).powi(2))
+        .sum()
+}
+
+/// Chi square by which a rival fits worse, priors included.
+pub(super) fn lead(best: &Fit, rival: &Fit) -> f64 {
+    2.0 * (rival.branch.optimum.objective - best.branch.optimum.objective)
+}
+
+/// Chi square below which two hypotheses count as one on these readings: three standard deviations.
+pub(super) const APART: f64 = 9.0;
+
+/// Effects whose best fit predicts the same as this entry's.
+pub(super) fn confounded(frame: &Frame, entries: &[Entry], index: usize) -> Vec<EffectId> {
+    let own = &entries[index];
+    if own.hypothesis == Hypothesis::Unknown {
+        return Vec::new();
+    }
+    entries
+        .iter()
+        .enumerate()
+        .filter(|(other, entry)| *other != index && entry.effects().len() == 1)
+        .filter(|(_, entry)| {
+            distance(frame, &own.fit, &entry.fit) < APART
+                && lead(&own.fit, &entry.fit).abs() < APART
+        })
+        .flat_map(|(_, entry)| entry.effects().to_vec())
+        .filter(|effect| !own.effects().contains(effect))
+        .collect()
+}
+
+/// Value and standard uncertainty of every parameter of an entry's effects.
+pub(super) fn spreads(entry: &Entry) -> Vec<f64> {
+    let branch = &entry.fit.branch;
+    match covariance(&branch.knowledge, &branch.optimum) {
+        Some(covariance) => covariance
+            .diagonal()
+            .iter()
+            .map(|v| v.max(0.0).sqrt())
+            .collect(),
+        None => vec![f64::INFINITY; branch.knowledge.len()],
+    }
+}

@@ -1,0 +1,375 @@
+//! All hypotheses against each other.
+
+use super::catalogue::{Candidate, Scales, candidate};
+use super::error::GapError;
+use super::evidence::log_mean;
+use super::forward::Forward;
+use super::frame::{Frame, Setup};
+use super::hypothesis::{Fit, Search, fit_drift, fit_nominal, fit_unknown};
+use super::nominal::Nominal;
+use super::posterior::{Entry, set_probabilities};
+use super::quality::Residuals;
+use super::result::Hypothesis;
+use super::settings::GapSettings;
+use crate::effects::EffectId;
+use crate::identify::observation::Observations;
+use rayon::prelude::*;
+
+/// What the hypotheses made of the readings.
+pub(super) struct Competition {
+    pub(super) frame: Frame,
+    /// The nominal model without geometry tolerance, only its joint refitted: where the gap is
+    /// measured from.
+    pub(super) baseline: Fit,
+    /// The most probable first.
+    pub(super) entries: Vec<Entry>,
+}
+
+/// Fits everything.
+pub(super) fn compete(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<Competition, GapError> {
+    let all: Vec<Competition> = placements(observations, nominal, settings)
+        .into_iter()
+        .filter_map(|placed| compete_once(&placed, nominal, settings))
+        .collect();
+    let mut all = all.into_iter();
+    let first = all.next().ok_or(GapError::NoFit)?;
+    let rest: Vec<Competition> = all.collect();
+    let mut competition = if rest.is_empty() {
+        first
+    } else {
+        over_placements(first, rest)
+    };
+    set_probabilities(&mut competition.entries);
+    add_pairs(&mut competition, settings);
+    Ok(competition)
+}
+
+/// The observations with every place that nobody said filled in: once each for a row of places along
+/// the structure.
+fn placements(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Vec<Observations> {
+    let heavy = |name: &str| nominal.mass_of(name) > 0.0;
+    let mut filled = observations.clone();
+    let mut open = false;
+    for configuration in &mut filled.configurations {
+        // Frequencies read elsewhere name no sensors: all that were described sat somewhere.
+        if configuration.sensors.is_empty() && configuration.recording.is_none() {
+            configuration.sensors = nominal
+                .sensors
+                .iter()
+                .map(super::nominal::NominalSensor::unplaced)
+                .collect();
+        }
+        // A sensor without a place and without a mass says nothing and weighs nothing.
+        configuration
+            .sensors
+            .iter()
+            .filter(|s| s.position.is_none() && heavy(&s.name))
+            .for_each(|_| open = true);
+    }
+    if !open {
+        return vec![filled];
+    }
+    let length = nominal.specimen.body.length();
+    (0..settings.unknown_positions)
+        .map(|k| {
+            let place = length * (k as f64 + 0.5) / settings.unknown_positions as f64;
+            let mut placed = filled.clone();
+            for sensor in placed
+                .configurations
+                .iter_mut()
+                .flat_map(|c| &mut c.sensors)
+            {
+                sensor.position.get_or_insert(place);
+            }
+            placed
+        })
+        .collect()
+}
+
+/// Evidence averaged over the places; every hypothesis keeps the place that suits it best.
+fn over_placements(mut first: Competition, rest: Vec<Competition>) -> Competition {
+    let best_frame = |entries: &[Entry]| {
+        entries
+            .iter()
+            .map(|entry| entry.fit.log_evidence)
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    for index in 0..first.entries.len() {
+        let name = first.entries[index].hypothesis.clone();
+        let same = |other: &Competition| -> Option<f64> {
+            let found = other.entries.iter().find(|entry| entry.hypothesis == name);
+            found.map(|entry| entry.fit.log_evidence)
+        };
+        let mut all = vec![first.entries[index].fit.log_evidence];
+        all.extend(rest.iter().filter_map(same));
+        first.entries[index].fit.log_evidence = log_mean(&all);
+    }
+    // Residuals are shown where the readings are explained best.
+    let evidences: Vec<f64> = first
+        .entries
+        .iter()
+        .map(|entry| entry.fit.log_evidence)
+        .collect();
+    let names: Vec<Hypothesis> = first
+        .entries
+        .iter()
+        .map(|entry| entry.hypothesis.clone())
+        .collect();
+    let mut best = first;
+    let mut most = f64::NEG_INFINITY;
+    for other in rest {
+        let own = best_frame(&other.entries);
+        if own > most {
+            most = own;
+            best = other;
+        }
+    }
+    for entry in &mut best.entries {
+        if let Some(k) = names.iter().position(|name| *name == entry.hypothesis) {
+            entry.fit.log_evidence = evidences[k];
+        }
+    }
+    best
+}
+
+fn compete_once(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<Competition> {
+    let mut frame = Frame::new(observations, nominal, settings);
+    let first = fit_nominal(&frame, settings)?;
+    set_amplitudes(&mut frame, &first);
+    let forward = Forward::new(&frame, &[]);
+    let shapes = forward.joint_differences(&first.branch.optimum.parameters)?;
+    frame.shape_slopes = Some(shapes);
+    let none = fit_nominal(&frame, settings)?;
+    let candidates = candidates(&frame);
+    let search = Search {
+        frame: &frame,
+        settings,
+        without: &none,
+    };
+    let mut entries: Vec<Entry> = candidates
+        .par_iter()
+        .map(|candidate| {
+            let fit = search.add(*candidate)?;
+            Some(Entry::new(Hypothesis::Effects(vec![candidate.effect]), fit))
+        })
+        .collect::<Vec<Option<Entry>>>()
+        .into_iter()
+        .flatten()
+        .collect();
+    if let Some((fit, drift)) = fit_drift(&frame, &none) {
+        let mut entry = Entry::new(Hypothesis::Effects(vec![EffectId::JointDrift]), fit);
+        entry.drift = Some(drift);
+        entries.push(entry);
+    }
+    if let Some(fit) = fit_unknown(&frame, settings, &none) {
+        entries.push(Entry::new(Hypothesis::Unknown, fit));
+    }
+    let baseline = fit_baseline(&frame, settings).unwrap_or_else(|| none.clone());
+    entries.push(Entry::new(Hypothesis::None, none));
+    Some(Competition {
+        frame,
+        baseline,
+        entries,
+    })
+}
+
+/// The nominal model whose geometry is taken at its word.
+fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+    let mut exact = frame.clone();
+    if let Some(scale) = exact.small_index(super::frame::Small::Scale) {
+        exact.small_stds[scale] = 1e-9;
+    }
+    fit_nominal(&exact, settings)
+}
+
+/// The effects that can be hypotheses of these readings.
+fn candidates(frame: &Frame) -> Vec<Candidate> {
+    let scales = Scales::of(&frame.nominal.specimen);
+    EffectId::ALL
+        .iter()
+        .copied()
+        .filter(|effect| possible(frame, *effect))
+        .filter_map(|effect| candidate(effect, &scales))
+        .map(|mut candidate| {
+            if let (EffectId::Resolution, Some(bias)) =
+                (candidate.effect, frame.nominal.reading_bias)
+            {
+                candidate.size.scale = bias;
+            }
+            candidate
+        })
+        .collect()
+}
+
+/// Whether the test has what the effect acts on.
+fn possible(frame: &Frame, effect: EffectId) -> bool {
+    let sensors = || frame.setups.iter().flat_map(|setup| &setup.sensors);
+    let sought = frame.nominal.sought();
+    let joint = !matches!(
+        frame.nominal.specimen.joint,
+        crate::structure::specimen::SpecimenJoint::Free
+    );
+    let one_beam = frame.nominal.specimen.body.beams().len() == 1;
+    match effect {
+        EffectId::SensorMass => sensors().any(|sensor| sensor.mass == 0.0),
+        EffectId::SensorCable => sensors().count() > 0,
+        EffectId::CrossCoupling | EffectId::Fixture => joint && one_beam,
+        EffectId::JointMass | EffectId::JointDamping => joint,
+        EffectId::JointNonlinearity => sought.iter().any(|(direction, _)| *direction == 1),
+        EffectId::Resolution => frame.nominal.reading_bias.is_some(),
+        _ => true,
+    }
+}
+
+/// Amplitude of the joint's rotation in each configuration: the taps' force times what it moves, summed
+/// over the modes as sqrt(sum (phi_i(tap) theta_i/omega_i)^2), over that of the hardest. Where a tap has
+/// no place, the force alone.
+fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
+    let forward = Forward::new(frame, &[]);
+    let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
+        return;
+    };
+    let amplitude = |(setup, one): (&Setup, &super::forward::Solved)| -> Option<f64> {
+        let tap = setup.tap?;
+        let squares = (1..=frame.fitted_modes).filter_map(|mode| {
+            let index = one.index(mode)?;
+            let omega = std::f64::consts::TAU * one.modes.frequencies()[index];
+            let moved =
+                one.modes.displacement(index, tap) * one.modes.joint_motion(index)[1] / omega;
+            Some(moved * moved)
+        });
+        Some(setup.level * squares.sum::<f64>().sqrt())
+    };
+    let all: Option<Vec<f64>> = frame.setups.iter().zip(&solved).map(amplitude).collect();
+    let Some(all) = all else { return };
+    let most = all.iter().copied().fold(0.0, f64::max);
+    if most > 0.0 {
+        for (setup, amplitude) in frame.setups.iter_mut().zip(&all) {
+            setup.level = amplitude / most;
+        }
+    }
+}
+
+/// How many of the best single effects a second one is put beside.
+const FIRSTS: usize = 3;
+/// Logarithm of the Bayes factor from which a second effect is believed.
+const SECOND: f64 = 5.0;
+
+/// Where no single effect suffices: a second one beside each of the best.
+fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
+    let frame = &competition.frame;
+    let Some(best) = competition
+        .entries
+        .iter()
+        .position(|entry| entry.hypothesis != Hypothesis::Unknown)
+    else {
+        return;
+    };
+    if !misfits(frame, &competition.entries[best].fit) || frame.rows.len() < 6 {
+        return;
+    }
+    let firsts: Vec<&Entry> = competition
+        .entries
+        .iter()
+        .filter(|entry| entry.effects().len() == 1 && entry.drift.is_none())
+        .take(FIRSTS)
+        .collect();
+    let seconds = candidates(frame);
+    let tasks: Vec<(&Entry, Candidate)> = firsts
+        .iter()
+        .flat_map(|first| {
+            seconds
+                .iter()
+                .filter(|second| !first.groups().contains(&second.effect.group()))
+                .map(|second| (*first, *second))
+        })
+        .collect();
+    let found: Vec<Option<Entry>> = tasks
+        .par_iter()
+        .map(|(first, second)| {
+            let search = Search {
+                frame,
+                settings,
+                without: &first.fit,
+            };
+            let fit = search.add(*second)?;
+            // What the second effect has to beat is the better of the two by themselves.
+            let alone = competition
+                .entries
+                .iter()
+                .filter(|entry| {
+                    entry.effects() == [second.effect] || entry.effects() == first.effects()
+                })
+                .map(|entry| entry.fit.log_evidence)
+                .fold(f64::NEG_INFINITY, f64::max);
+            if fit.log_evidence < alone + SECOND || !improves(frame, &first.fit, &fit) {
+                return None;
+            }
+            let mut effects = first.effects().to_vec();
+            effects.push(second.effect);
+            Some(Entry::new(Hypothesis::Effects(effects), fit))
+        })
+        .collect();
+    let mut pairs: Vec<Entry> = Vec::new();
+    for pair in found.into_iter().flatten() {
+        let same = |other: &Entry| {
+            other
+                .effects()
+                .iter()
+                .all(|effect| pair.effects().contains(effect))
+        };
+        match pairs.iter_mut().find(|other| same(other)) {
+            Some(other) if other.fit.log_evidence < pair.fit.log_evidence => *other = pair,
+            Some(_) => {}
+            None => pairs.push(pair),
+        }
+    }
+    competition.entries.extend(pairs);
+    set_probabilities(&mut competition.entries);
+}
+
+/// Whether the readings refute a fit.
+fn misfits(frame: &Frame, fit: &Fit) -> bool {
+    Residuals::new(frame, fit).is_none_or(|residuals| {
+        let blocks = residuals.blocks(frame);
+        super::verdict::Checks {
+            goodness: residuals.goodness(),
+            blocks: &blocks,
+            closure_low: None,
+        }
+        .refuted()
+    })
+}
+
+/// Whether the readings that took no part, or each mode from the others, are predicted better.
+fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
+    use super::withheld::WithheldErrors;
+    match (
+        WithheldErrors::new(frame, before),
+        WithheldErrors::new(frame, after),
+    ) {
+        (Some(before), Some(after)) => {
+            after.rms() < before.rms() || after.rms() < 1.5 * after.floor()
+        }
+        _ => {
+            let left_out =
+                |fit: &Fit| Residuals::new(frame, fit).and_then(|r| r.left_out_rms(frame));
+            match (left_out(before), left_out(after)) {
+                (Some(before), Some(after)) => after < before,
+                _ => false,
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! What the diagnosis takes for granted where nobody says otherwise.
+
+/// Settings of the diagnosis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GapSettings {
+    /// Standard deviations that the joint's stiffnesses may have between visits (1), equally
+    /// probable: 0.2 %, untouched; 1 %, usual; 2 %, a joint that was re-tightened.
+    pub drift_stds: Vec<f64>,
+    /// Standard uncertainty of a common factor on all frequencies where no tolerance is stated (1):
+    /// 0.2 %, a modulus known to 0.3 % and a length to 0.1 %. What is larger than this counts as a gap
+    /// that has a name (`modulus`, `length`, `timebase`); whoever knows the geometry less well states it.
+    pub scale_std: f64,
+    /// Relative uncertainty of any frequency that repetition cannot show (1): 0.005 %, a steel
+    /// beam's change over a third of a kelvin.
+    pub frequency_floor: f64,
+    /// Relative standard uncertainty of a sensor's stated mass: 10 %, cable and mounting.
+    pub sensor_mass_std: f64,
+    /// Standard uncertainty of the places of sensors and taps (m): 1 mm.
+    pub position_std: f64,
+    /// Standard uncertainty of the calibration of hammer and sensor together (1): 3 %.
+    pub gain_std: f64,
+    /// Scatter of the nominal damping ratios about their common value (natural logarithm): 0.4.
+    pub damping_scatter: f64,
+    /// Standard deviation of the logarithm of the joint's stiffnesses about where the search begins:
+    /// 1.5, a factor of 20 either way in 95 % of cases.
+    pub joint_std: f64,
+    /// Number of modes from which on the highest is withheld: 6.
+    pub withhold_from: usize,
+    /// How many of the highest modes are withheld: 1.
+    pub withheld_modes: usize,
+    /// Places tried for a sensor whose position nobody said: 12.
+    pub unknown_positions: usize,
+    /// Seed of what is sampled.
+    pub seed: u64,
+}
+
+impl Default for GapSettings {
+    fn default() -> Self {
+        GapSettings {
+            drift_stds: vec![0.002, 0.01, 0.02],
+            scale_std: 0.002,
+            frequency_floor: 5e-5,
+            sensor_mass_std: 0.1,
+            position_std: 0.001,
+            gain_std: 0.03,
+            damping_scatter: 0.4,
+            joint_std: 1.5,
+            withhold_from: 6,
+            withheld_modes: 1,
+            unknown_positions: 12,
+            seed: 0,
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! Observations that a planned test would make of a given structure: drawn from the structure's modes
+//! on the finer mesh, not from the diagnosis's own predictions.
+
+use super::error::GapError;
+use super::nominal::Nominal;
+use crate::effects::{Circumstances, Effect, EffectId, SensorPlace, apply};
+use crate::identify::observation::{
+    AlongDecay, Configuration, DecayEnd, DecayVerdict, Observations, Observed, ObservedMode,
+    ObservedSensor, ShapeValue, effective_share,
+};
+use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// What a test will look at, and how well.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestPlan {
+    /// The recordings.
+    pub configurations: Vec<PlannedConfiguration>,
+    /// Modes observed, from the lowest.
+    pub modes: usize,
+    /// Taps of each recording.
+    pub taps: usize,
+    /// Relative standard deviation of a frequency, mean of all taps (1).
+    pub frequency_std: f64,
+    /// Standard deviation of a modal constant over the root mean square of all (1); `None` = not observed.
+    pub shape_std: Option<f64>,
+    /// Relative standard deviation of a damping ratio (1); `None` = not observed.
+    pub damping_std: Option<f64>,
+    /// Standard deviation of the relative change of a frequency per e-fold along the decay (1); `None` =
+    /// not observed.
+    pub slope_std: Option<f64>,
+    /// Standard deviation of the joint's stiffnesses between recordings (1).
+    pub drift: f64,
+    /// Damping ratio of the beam by itself (1).
+    pub damping: f64,
+}
+
+/// One planned recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedConfiguration {
+    /// Name and place (m) of each sensor.
+    pub sensors: Vec<(String, f64)>,
+    /// Where the hammer strikes (m).
+    pub tap: f64,
+    /// Force over that of the hardest taps (1).
+    pub level: f64,
+}
+
+/// Draws what the plan would observe of a structure with these effects.
+///
+/// # Errors
+/// [`GapError::Structure`] where the structure has no such modes.
+pub fn observe(
+    plan: &TestPlan,
+    truth: &Nominal,
+    effects: &[Effect],
+    seed: u64,
+) -> Result<Observations, GapError> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let solved = amplitudes(plan, truth)?;
+    let mut scene = Scene {
+        plan,
+        truth,
+        effects,
+        random: &mut random,
+    };
+    let configurations = (0..plan.configurations.len())
+        .map(|index| scene.configuration(index, solved[index]))
+        .collect::<Result<Vec<Configuration>, GapError>>()?;
+    Ok(Observations { configurations })
+}
+
+/// Amplitude of the joint's rotation in each recording over that of the largest.
+fn amplitudes(plan: &TestPlan, truth: &Nominal) -> Result<Vec<f64>, GapError> {
+    let modes = truth.specimen.modes(plan.modes, Mesh::SIMULATION)?;
+    let all: Vec<f64> = plan
+        .configurations
+        .iter()
+        .map(|one| {
+            let square = |mode: usize| {
+                let omega = std::f64::consts::TAU * modes.frequencies()[mode];
+                (modes.displacement(mode, one.tap) * modes.joint_motion(mode)[1] / omega).powi(2)
+            };
+            one.level * (0..plan.modes).map(square).sum::<f64>().sqrt()
+        })
+        .collect();
+    let most = all.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    Ok(all.into_iter().map(|amplitude| amplitude / most).collect())
+}
+
+struct Scene<'a> {
+    plan: &'a TestPlan,
+    truth: &'a Nominal,
+    effects: &'a [Effect],
+    random: &'a mut ChaCha8Rng,
+}
+
+impl Scene<'_> {
+    fn normal(&mut self) -> f64 {
+        self.random.sample(StandardNormal)
+    }
+
+    /// The mean of the taps and the standard deviation that their scatter suggests.
+    fn measured(&mut self, value: f64, std: f64) -> Observed {
+        let freedom = self.plan.taps as f64 - 1.0;
+        let squares: f64 = (1..self.plan.taps).map(|_| self.normal().powi(2)).sum();
+        Observed {
+            value: value + std * self.normal(),
+            std: std * (squares / freedom).sqrt().max(1e-3),
+            freedom: Some(freedom),
+        }
+    }
+
+    fn configuration(&mut self, index: usize, amplitude: f64) -> Result<Configuration, GapError> {
+        let planned = &self.plan.configurations[index];
+        let sensors: Vec<SensorPlace> = planned
+            .sensors
+            .iter()
+            .map(|(name, position)| SensorPlace {
+                position: *position,
+                mass: self.truth.mass_of(name),
+            })
+            .collect();
+        let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
+        let mut nominal = self.truth.with_masses(&masses);
+        self.drift(&mut nominal);
+        let power = self.power();
+        let circumstances = |level: f64| Circumstances {
+            sensors: &sensors,
+            level,
+            visit: index,
+            ..Circumstances::default()
+        };
+        let seen = apply(
+            self.effects,
+            &nominal,
+            &circumstances(amplitude * effective_share(power)),
+        );
+        let modes = self.solve(&seen.specimen)?;
+        // Along the decay: the frequency at two amplitudes either side.
+        let ends = [1.2, 0.3]
+            .map(|share| apply(self.effects, &nominal, &circumstances(amplitude * share)).specimen);
+        let ends = [self.solve(&ends[0])?, self.solve(&ends[1])?];
+        let scale = (
+            seen.frequency_scale,
+            seen.frequency_offset,
+            seen.joint_loss_factor,
+        );
+        let seen_modes = (0..self.plan.modes)
+            .map(|mode| self.mode((index, mode), &modes, (scale, &ends)))
+            .collect();
+        let planned = &self.plan.configurations[index];
+        Ok(Configuration {
+            file: Some(format!("recording {}", index + 1)),
+            recording: Some(index),
+            sensors: planned
+                .sensors
+                .iter()
+                .map(|(name, position)| ObservedSensor {
+                    name: name.clone(),
+                    position: Some(*position),
+                })
+                .collect(),
+            tap: Some(planned.tap),
+            peak_force: Some(planned.level),
+            level: Some(planned.level),
+            taps: self.plan.taps,
+            modes: seen_modes,
+            covariance: None,
+            common: 0.0,
+            extra_peaks: Vec::new(),
+        })
+    }
+
+    fn power(&self) -> f64 {
+        self.effects
+            .iter()
+            .find(|effect| effect.id == EffectId::JointNonlinearity)
+            .and_then(|effect| effect.value("exponent"))
+            .unwrap_or(1.0)
+    }
+
+    /// The joint as this visit finds it.
+    fn drift(&mut self, specimen: &mut Specimen) {
+        let std = self.plan.drift;
+        let factors = [(std * self.normal()).exp(), (std * self.normal()).exp()];
+        if let SpecimenJoint::Springs { kt, kr, .. } = &mut specimen.joint {
+            *kt *= factors[0];
+            *kr *= factors[1];
+        }
+    }
+
+    fn solve(&self, specimen: &Specimen) -> Result<(SpecimenModes, Vec<usize>), GapError> {
+        let based = specimen.base.is_some_and(|base| base.ratio > 0.0);
+        let count = self.plan.modes + usize::from(based);
+        let modes = specimen.modes(count, Mesh::SIMULATION)?;
+        let mut numbers: Vec<usize> = (0..count).collect();
+        if based {
+            let share = |mode: &usize| modes.base_participation(*mode);
+            let most = numbers
+                .iter()
+                .copied()
+                .max_by(|a, b| share(a).total_cmp(&share(b)));
+            numbers.retain(|mode| Some(*mode) != most);
+        }
+        Ok((modes, numbers))
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn mode(
+        &mut self,
+        (index, number): (usize, usize),
+        (modes, numbers): &(SpecimenModes, Vec<usize>),
+        ((scale, offset, loss), ends): ((f64, f64, f64), &[(SpecimenModes, Vec<usize>); 2]),
+    ) -> ObservedMode {
+        let mode = numbers[number];
+        let true_frequency = modes.frequencies()[mode] * scale + offset;
+        let frequency = self.measured(true_frequency, true_frequency * self.plan.frequency_std);
+        let planned = self.plan.configurations[index].clone();
+        let at = |x: f64| modes.displacement(mode, x);
+        let strongest = (0..planned.sensors.len()).max_by(|&a, &b| {
+            let size = |sensor: usize| at(planned.sensors[sensor].1).abs();
+            size(a).total_cmp(&size(b))
+        });
+        let shape_std = self.plan.shape_std;
+        let reference = strongest.filter(|_| shape_std.is_some());
+        // Shapes of unit modal mass are about 2/sqrt(mass) large.
+        let beams = self.truth.specimen.body.beams();
+        let size = 2.0 / beams.iter().map(crate::structure::Beam::mass).sum::<f64>();
+        let constant = reference.zip(shape_std).map(|(sensor, std)| {
+            let value = at(planned.sensors[sensor].1) * at(planned.tap);
+            self.measured(value, size * std)
+        });
+        let mut shape = Vec::new();
+        for sensor in 0..planned.sensors.len() {
+            let (Some(reference), Some(std)) = (reference, shape_std) else {
+                continue;
+            };
+            let std = if sensor == reference { 0.0 } else { std };
+            let value = at(planned.sensors[sensor].1) / at(planned.sensors[reference].1);
+            shape.push(ShapeValue {
+                sensor,
+                value: value + std * self.normal(),
+                std,
+            });
+        }
+        let damping = self.plan.damping + 0.5 * loss * modes.joint_energy_share(mode);
+        let damping_std = self.plan.damping_std;
+        let damping = damping_std.map(|std| self.measured(damping, damping * std));
+        let end = |k: usize| ends[k].0.frequencies()[ends[k].1[number]];
+        let slope = (end(0) / end(1)).ln() / (ENDS[0] / ENDS[1]).ln() * true_frequency;
+        let slope_std = self.plan.slope_std;
+        let slope = slope_std.map(|std| self.measured(slope, std * true_frequency));
+        ObservedMode {
+            mode: number + 1,
+            frequency: frequency.value,
+            std: Some(frequency.std),
+            freedom: frequency.freedom,
+            repeats: self.plan.taps,
+            damping,
+            shape,
+            reference,
+            constant,
+            amplitude: None,
+            decay: slope.map(|slope| along(slope, frequency)),
+        }
+    }
+}
+
+/// Amplitudes between which a decay is followed, over the first one.
+const ENDS: [f64; 2] = [0.9, 0.22];
+
+/// The change along the decay; its ends are not observed apart.
+fn along(slope: Observed, frequency: Observed) -> AlongDecay {
+    let nothing = Observed {
+        value: 0.0,
+        std: f64::INFINITY,
+        freedom: None,
+    };
+    let end = DecayEnd {
+        amplitude: None,
+        frequency,
+        damping: nothing,
+    };
+    AlongDecay {
+        frequency_slope: slope,
+        damping_slope: nothing,
+        early: end,
+        late: end,
+        verdict: DecayVerdict::Steady,
+    }
+}

@@ -1,0 +1,118 @@
+//! From probabilities to an answer, or to none.
+
+use super::posterior::{APART, Entry, by_group, lead};
+use super::result::{Block, Hypothesis, Verdict};
+use crate::effects::EffectId;
+
+/// Probability from which a name is given.
+const NAMED: f64 = 0.8;
+/// Goodness of fit below which an explanation is refused.
+const MISFIT: f64 = 0.01;
+/// The same for the worst of many blocks.
+const BLOCK_MISFIT: f64 = 0.001;
+/// Probability that a set has to hold, and the longest one that is still short.
+const SET: (f64, usize) = (0.9, 4);
+
+/// What the checks on a hypothesis said.
+pub(super) struct Checks<'a> {
+    /// Goodness of fit of the best hypothesis with a name or none.
+    pub(super) goodness: Option<f64>,
+    /// The same of its blocks, the worst first.
+    pub(super) blocks: &'a [Block],
+    /// Lower end of its closure on withheld readings; `None` where that says nothing.
+    pub(super) closure_low: Option<f64>,
+}
+
+impl Checks<'_> {
+    /// Whether the readings refute the hypothesis.
+    pub(super) fn refuted(&self) -> bool {
+        self.goodness.is_some_and(|p| p < MISFIT)
+            || self
+                .blocks
+                .first()
+                .is_some_and(|block| block.goodness_of_fit < BLOCK_MISFIT)
+    }
+}
+
+/// The verdict on a ranking.
+pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>) -> Verdict {
+    let groups = by_group(entries);
+    let first = &entries[groups[0].0[0]];
+    if first.hypothesis == Hypothesis::Unknown || checks.refuted() {
+        return Verdict::Unknown;
+    }
+    if first.hypothesis == Hypothesis::None && groups[0].1 > 0.5 {
+        return Verdict::NoGap;
+    }
+    let holds = checks.closure_low.is_none_or(|low| low > 0.0);
+    if groups[0].1 >= NAMED && first.hypothesis != Hypothesis::None && holds {
+        return name_of(entries, &groups[0].0);
+    }
+    let aliases = alias_group(entries);
+    if aliases.len() > 1
+        && aliases.iter().map(|&k| entries[k].probability).sum::<f64>() >= NAMED
+        && holds
+    {
+        return Verdict::Group(
+            aliases
+                .iter()
+                .flat_map(|&k| entries[k].effects().to_vec())
+                .collect(),
+        );
+    }
+    set_of(entries, &groups)
+}
+
+/// One effect by name; a group whose members the readings do not separate as a group.
+fn name_of(entries: &[Entry], members: &[usize]) -> Verdict {
+    let total: f64 = members.iter().map(|&k| entries[k].probability).sum();
+    let first = &entries[members[0]];
+    if first.probability >= NAMED * total || members.len() == 1 {
+        return Verdict::Named(first.effects().to_vec());
+    }
+    let likely = members
+        .iter()
+        .filter(|&&k| entries[k].probability > 0.02 * total);
+    Verdict::Group(
+        likely
+            .flat_map(|&k| entries[k].effects().to_vec())
+            .collect::<Vec<EffectId>>(),
+    )
+}
+
+/// The first entry and the single effects after it that fit as well.
+fn alias_group(entries: &[Entry]) -> Vec<usize> {
+    let Some(first) = entries.iter().position(|entry| entry.effects().len() == 1) else {
+        return Vec::new();
+    };
+    (0..entries.len())
+        .filter(|&k| {
+            entries[k].effects().len() == 1
+                && entries[k].probability > 0.02
+                && lead(&entries[first].fit, &entries[k].fit).abs() < APART
+        })
+        .collect()
+}
+
+/// The shortest list of groups that holds 90 %.
+fn set_of(entries: &[Entry], groups: &[(Vec<usize>, f64)]) -> Verdict {
+    let mut held = 0.0;
+    let mut set = Vec::new();
+    for (members, probability) in groups {
+        set.push(entries[members[0]].hypothesis.clone());
+        held += probability;
+        if held >= SET.0 {
+            break;
+        }
+    }
+    if set.len() <= SET.1 {
+        Verdict::Set(set)
+    } else {
+        Verdict::NotEnoughData(format!(
+            "{} explanations are needed to hold {:.0} % of the probability; more readings of another kind \
+             would separate them (see the next tests)",
+            set.len(),
+            100.0 * SET.0
+        ))
+    }
+}

@@ -1,0 +1,102 @@
+//! The readings that took no part in the fit: how far each hypothesis predicts them.
+
+use super::evidence::covariance;
+use super::forward::{Forward, Layout};
+use super::frame::{Frame, Row};
+use super::hypothesis::Fit;
+use super::result::Closure;
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// Errors of one fit on the withheld frequencies.
+#[derive(Debug, Clone)]
+pub(super) struct WithheldErrors {
+    /// Measured less predicted (%).
+    errors: DVector<f64>,
+    /// Covariance of these errors if the hypothesis is true (%^2): the withheld readings' own
+    /// uncertainty, and that of the prediction.
+    spread: DMatrix<f64>,
+}
+
+impl WithheldErrors {
+    /// `None` where nothing was withheld, or the hypothesis does not predict it.
+    pub(super) fn new(frame: &Frame, fit: &Fit) -> Option<Self> {
+        if frame.withheld.is_empty() {
+            return None;
+        }
+        let rows: Vec<Row> = frame.withheld.iter().map(|(row, _)| *row).collect();
+        let forward = Forward {
+            frame,
+            layout: Layout::new(frame, &fit.effects),
+            rows: &rows,
+        };
+        let model = forward.linearise(&fit.branch.optimum.parameters, &fit.branch.knowledge)?;
+        let posterior = covariance(&fit.branch.knowledge, &fit.branch.optimum)?;
+        let mut spread = 1e4 * &model.slopes * posterior * model.slopes.transpose();
+        let mut errors = DVector::zeros(rows.len());
+        for (row, (_, reading)) in frame.withheld.iter().enumerate() {
+            errors[row] = 100.0 * (reading.value - model.predicted[row]);
+            spread[(row, row)] += (100.0 * reading.std).powi(2);
+        }
+        Some(WithheldErrors { errors, spread })
+    }
+
+    /// Root mean square of the errors (%).
+    pub(super) fn rms(&self) -> f64 {
+        root_mean_square(&self.errors)
+    }
+
+    /// Root mean square that uncertainty alone would leave (%).
+    pub(super) fn floor(&self) -> f64 {
+        (self.spread.trace() / self.errors.len() as f64).sqrt()
+    }
+}
+
+/// Draws of the interval: 2.5 % of 400 is ten draws.
+const DRAWS: usize = 400;
+
+/// How far the hypothesis closes the gap that the nominal model leaves, with an interval from draws of
+/// what the readings and the fit leave open.
+pub(super) fn closure(
+    before: &WithheldErrors,
+    after: &WithheldErrors,
+    seed: u64,
+) -> Option<Closure> {
+    let floor = after.floor();
+    let (gap, rest) = (before.rms(), after.rms());
+    if gap < 2.0 * floor {
+        return None;
+    }
+    let share = |before: f64, after: f64| (before - after) / (before - floor * floor);
+    let value = share(gap * gap, rest * rest);
+    let factor = after.spread.clone().cholesky()?;
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut draws: Vec<f64> = (0..DRAWS)
+        .filter_map(|_| {
+            let unit = DVector::from_fn(after.errors.len(), |_, _| {
+                random.sample::<f64, _>(StandardNormal)
+            });
+            let moved = factor.l() * unit;
+            // The same draw moves both errors; its own square is what it adds on average.
+            let square = |errors: &DVector<f64>| {
+                let sum = (errors + &moved).norm_squared() / errors.len() as f64;
+                (sum - floor * floor).max(0.0)
+            };
+            let (gap, rest) = (square(&before.errors), square(&after.errors));
+            (gap > 0.0).then(|| (1.0 - rest / gap).max(-100.0))
+        })
+        .collect();
+    draws.sort_by(f64::total_cmp);
+    let at = |share: f64| draws.get((share * draws.len() as f64) as usize).copied();
+    Some(Closure {
+        value,
+        low: at(0.025)?.min(value),
+        high: at(0.975)?.max(value),
+    })
+}
+
+fn root_mean_square(values: &DVector<f64>) -> f64 {
+    (values.norm_squared() / values.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,114 @@
+//! Assignments of peaks to modes that some joint makes likely.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::EXTRA_COST;
+use super::joint::JointSearch;
+
+/// A number, or none, for each peak.
+pub(super) type Assignment = Vec<Option<usize>>;
+
+/// More modes than peaks that are looked for.
+pub(super) const MOST_MISSING: usize = 3;
+/// So many assignments are looked at closely.
+const FOLLOWED: usize = 16;
+/// Relative distances that a match may have on the grid: its step moves a frequency by up to 10 %, one
+/// that happens to be near by less.
+const WIDTHS: [f64; 2] = [0.08, 0.03];
+/// Price of a mode without a peak on the grid, the reasons for it not yet looked at: between that of
+/// one that could be seen and that of one that could not.
+const MISSING_COST: f64 = 1.5;
+
+/// Peaks (from 0) with their modes (from 1), ascending.
+pub(super) fn pairs(assignment: &Assignment) -> Vec<(usize, usize)> {
+    let numbers = assignment.iter().enumerate();
+    numbers
+        .filter_map(|(peak, number)| Some((peak, (*number)?)))
+        .collect()
+}
+
+/// The most likely assignments, each with the joint of the grid that suits it best; the plain one is
+/// always there.
+pub(super) fn find(search: &JointSearch<'_>) -> Vec<(Assignment, [f64; 3])> {
+    let peaks = search.log_frequencies();
+    let plain: Assignment = (1..=peaks.len()).map(Some).collect();
+    let grid: Vec<([f64; 3], Vec<f64>)> = search
+        .grid()
+        .into_par_iter()
+        .map(|place| (place, search.predict(place)))
+        .collect();
+    let mut best: BTreeMap<Assignment, (f64, [f64; 3])> = BTreeMap::new();
+    let mut offer = |assignment: Assignment, cost: f64, place: [f64; 3]| {
+        let known = best.entry(assignment).or_insert((f64::INFINITY, place));
+        if cost < known.0 {
+            *known = (cost, place);
+        }
+    };
+    for (place, modes) in &grid {
+        for width in WIDTHS {
+            let (assignment, cost) = align(&peaks, modes, width, |f| search.in_band(f));
+            offer(assignment, cost, *place);
+        }
+        let misfit = peaks.iter().zip(modes).map(|(a, b)| (a - b).powi(2));
+        offer(plain.clone(), misfit.sum::<f64>(), *place);
+    }
+    let mut found: Vec<(Assignment, (f64, [f64; 3]))> = best.into_iter().collect();
+    found.sort_by(|a, b| {
+        let first = |one: &Assignment| *one != plain;
+        let by_cost = a.1.0.total_cmp(&b.1.0);
+        first(&a.0).cmp(&first(&b.0)).then(by_cost)
+    });
+    found.truncate(FOLLOWED);
+    found
+        .into_iter()
+        .map(|(assignment, (_, place))| (assignment, place))
+        .collect()
+}
+
+/// The cheapest assignment that keeps the order, by dynamic programming over peaks and modes (both as
+/// logarithms of frequency). Modes above the highest peak are free.
+fn align(
+    peaks: &[f64],
+    modes: &[f64],
+    width: f64,
+    in_band: impl Fn(f64) -> bool,
+) -> (Assignment, f64) {
+    let (n, m) = (peaks.len(), modes.len());
+    // Least cost of the first i peaks with the first j modes.
+    let mut cost = vec![vec![0.0; m + 1]; n + 1];
+    let unseen: Vec<f64> = modes
+        .iter()
+        .map(|f| if in_band(f.exp()) { MISSING_COST } else { 0.0 })
+        .collect();
+    let matched =
+        |i: usize, j: usize| 0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln();
+    for i in 0..=n {
+        for j in 0..=m {
+            let extra = (i > 0).then(|| cost[i - 1][j] + EXTRA_COST);
+            let missing = (j > 0).then(|| cost[i][j - 1] + unseen[j - 1]);
+            let both = (i > 0 && j > 0).then(|| cost[i - 1][j - 1] + matched(i - 1, j - 1));
+            let ways = [extra, missing, both].into_iter().flatten();
+            let least = ways.fold(f64::INFINITY, f64::min);
+            cost[i][j] = if least.is_finite() { least } else { 0.0 };
+        }
+    }
+    let last = &cost[n];
+    let end = (0..=m)
+        .min_by(|&a, &b| last[a].total_cmp(&last[b]))
+        .unwrap_or(0);
+    let mut assignment = vec![None; n];
+    let (mut i, mut j) = (n, end);
+    while i > 0 {
+        if j > 0 && cost[i][j] == cost[i - 1][j - 1] + matched(i - 1, j - 1) {
+            assignment[i - 1] = Some(j);
+            (i, j) = (i - 1, j - 1);
+        } else if j > 0 && cost[i][j] == cost[i][j - 1] + unseen[j - 1] {
+            j -= 1;
+        } else {
+            i -= 1;
+        }
+    }
+    (assignment, last[end])
+}

@@ -1,0 +1,222 @@
+//! Which measured frequency is which mode.
+//!
+//! A structure without a joint is known but for a common factor, and its peaks are paired by frequency
+//! ([`pair_by_ratio`]). With a joint the natural frequencies themselves are unknown, so that pairing and
+//! joint are sought together ([`pair_modes`]):
+//! 1. *Candidates* (`candidates`): for every joint of a grid the assignment of peaks to modes that suits
+//!    it best, peaks left over and modes left out at a price. Mode n of any joint lies between those of
+//!    the free and of the clamped beam, so that no candidate violates that.
+//! 2. *Joint* (`joint`): for each candidate the joint whose frequencies are nearest, and how probable
+//!    the frequencies are over all joints (Laplace's approximation), so that an assignment that any joint
+//!    could have explained is not preferred for a perfect fit.
+//! 3. *Shape* (`shape`): measured shapes and signs against those of that joint; whether a mode left out
+//!    could have been seen at all.
+//! 4. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
+//!    Where the plain one (peaks numbered in ascending order) is among them it stays.
+
+mod by_frequency;
+mod candidates;
+mod joint;
+mod shape;
+
+pub use by_frequency::{WeightedPeak, pair_by_frequency, pair_by_ratio};
+
+use super::consistent::{FrequencyModel, JointedStructure, Parameter};
+use crate::structure::StructureError;
+use candidates::Assignment;
+use joint::JointSearch;
+
+/// A measured peak that may be a mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredPeak {
+    /// Frequency (Hz).
+    pub frequency: f64,
+    /// Its standard uncertainty (Hz), where known.
+    pub std: Option<f64>,
+    /// What sensors saw of its shape; empty where places or amplitudes are unknown.
+    pub shape: Vec<ShapeAt>,
+}
+
+/// A shape's value at one sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeAt {
+    /// Place of the sensor (m).
+    pub sensor: f64,
+    /// Place of the tap (m), where the value is a modal constant; `None` of a shape in free units.
+    pub tap: Option<f64>,
+    /// Modal constant (1/kg), or displacement in any unit.
+    pub value: f64,
+    /// Its standard uncertainty (same unit).
+    pub std: f64,
+    /// Values of one group share their unit; modal constants of one hammer and one group share their
+    /// signs between modes, too.
+    pub group: usize,
+}
+
+/// What pairing knows of the test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairingSettings {
+    /// Stiffnesses of the joint that are estimated: two by default; those not named are held.
+    pub fit: Vec<Parameter>,
+    /// Held stiffnesses Kt (N/m) and Kr (N m/rad), infinite for rigid: none.
+    pub held: [Option<f64>; 2],
+    /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
+    pub bands: Vec<(f64, f64)>,
+    /// What the model misses of a frequency, relative: 1.5 %, what a beam's stated dimensions, its
+    /// sensor's place and two springs for a joint usually leave (1 % and less in published tests). The
+    /// tails are those of Student's t with 4 degrees of freedom: one mode may be off by 5 %.
+    pub discrepancy: f64,
+    /// An assignment less probable than the best by this factor is out: 20.
+    pub odds: f64,
+}
+
+impl Default for PairingSettings {
+    fn default() -> Self {
+        PairingSettings {
+            fit: vec![Parameter::Kt, Parameter::Kr],
+            held: [None; 2],
+            bands: Vec::new(),
+            discrepancy: 0.015,
+            odds: 20.0,
+        }
+    }
+}
+
+/// One way to number the peaks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Numbering {
+    /// Number of each peak; `None` for one that is no mode.
+    pub numbers: Vec<Option<usize>>,
+    /// Modes below the highest numbered one that no peak is, and whether each could have been seen.
+    pub missing: Vec<MissingMode>,
+    /// How much less probable it is than the best (1 for that).
+    pub odds: f64,
+}
+
+/// A mode without a peak.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MissingMode {
+    /// Its number.
+    pub mode: usize,
+    /// Its frequency with the best joint (Hz).
+    pub frequency: f64,
+    /// Why it has no peak, if that is known.
+    pub cause: MissingCause,
+}
+
+/// Why a mode may have no peak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MissingCause {
+    /// It lies outside the bands.
+    OutsideBand,
+    /// Every sensor or every tap is near one of its nodes.
+    AtNode,
+    /// Nothing explains it.
+    Unknown,
+}
+
+/// The numbering, and what else it might be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pairing {
+    /// The one to take.
+    pub chosen: Numbering,
+    /// Others that explain the peaks comparably, the most probable first.
+    pub others: Vec<Numbering>,
+}
+
+/// Numbers the peaks (ascending) of a jointed structure.
+///
+/// # Errors
+/// [`StructureError`] where the structure cannot exist.
+pub fn pair_modes(
+    structure: &JointedStructure,
+    peaks: &[MeasuredPeak],
+    settings: &PairingSettings,
+) -> Result<Pairing, StructureError> {
+    let highest = peaks.len() + candidates::MOST_MISSING;
+    let mut bare = structure.clone();
+    bare.masses.clear();
+    bare.springs.clear();
+    let coarse = FrequencyModel::new(&bare, highest)?;
+    let fine = FrequencyModel::new(structure, highest)?;
+    let found = candidates::find(&JointSearch::new(&coarse, peaks, settings));
+    let search = JointSearch::new(&fine, peaks, settings);
+    let mut numberings: Vec<Scored> = found
+        .iter()
+        .map(|(assignment, start)| score(&search, assignment, *start))
+        .collect();
+    numberings.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    Ok(verdict(numberings, settings.odds))
+}
+
+/// A numbering with its negative logarithm of probability.
+struct Scored {
+    cost: f64,
+    numbering: Numbering,
+}
+
+/// Price of a peak that is no mode: one in twenty is none, and it may lie anywhere over five e-folds of
+/// frequency.
+const EXTRA_COST: f64 = 3.0 + 1.6;
+
+fn score(search: &JointSearch<'_>, assignment: &Assignment, start: [f64; 3]) -> Scored {
+    let pairs = candidates::pairs(assignment);
+    let fit = search.refine(&pairs, start);
+    let view = shape::View::new(search, &fit);
+    let top = pairs.last().map_or(0, |pair| pair.1);
+    let missing: Vec<MissingMode> = (1..=top)
+        .filter(|mode| pairs.iter().all(|pair| pair.1 != *mode))
+        .map(|mode| view.missing(search, &fit, mode))
+        .collect();
+    let extra = (assignment.len() - pairs.len()) as f64;
+    let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
+    Scored {
+        cost: fit.cost + extra * EXTRA_COST + unseen + view.cost(search, &pairs),
+        numbering: Numbering {
+            numbers: assignment.clone(),
+            missing,
+            odds: 1.0,
+        },
+    }
+}
+
+/// A mode that could be seen is missed once in ten times: a weak tap, a soft tip, a neighbour's flank.
+fn missing_cost(cause: MissingCause) -> f64 {
+    match cause {
+        MissingCause::OutsideBand => 0.0,
+        MissingCause::AtNode => 0.7,
+        MissingCause::Unknown => 2.3,
+    }
+}
+
+/// `sorted` by cost. The plain numbering is taken where nothing beats it clearly.
+fn verdict(sorted: Vec<Scored>, odds: f64) -> Pairing {
+    let least = sorted.first().map_or(0.0, |best| best.cost);
+    let mut kept: Vec<Numbering> = sorted
+        .into_iter()
+        .map(|scored| Numbering {
+            odds: (scored.cost - least).exp(),
+            ..scored.numbering
+        })
+        .filter(|numbering| numbering.odds < odds)
+        .collect();
+    let plain = kept.iter().position(|one| is_plain(&one.numbers));
+    let chosen = match kept.is_empty() {
+        true => Numbering {
+            numbers: Vec::new(),
+            missing: Vec::new(),
+            odds: 1.0,
+        },
+        false => kept.remove(plain.unwrap_or(0)),
+    };
+    Pairing {
+        chosen,
+        others: kept,
+    }
+}
+
+/// Whether the peaks are numbered 1, 2, 3 and so on.
+pub fn is_plain(numbers: &[Option<usize>]) -> bool {
+    let mut places = numbers.iter().enumerate();
+    places.all(|(index, number)| *number == Some(index + 1))
+}

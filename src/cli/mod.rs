@@ -11,6 +11,8 @@ mod output;
 mod terminal;
 mod wiring;
 
+mod blind_check;
+mod diagnose;
 mod frf;
 mod identify;
 mod init;
@@ -55,6 +57,8 @@ enum Command {
     Identify(identify::IdentifyArguments),
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
+    Diagnose(diagnose::DiagnoseArguments),
+    BlindCheck(blind_check::BlindCheckArguments),
     Reproduce(reproduce::ReproduceArguments),
 }
 
@@ -100,6 +104,8 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Identify(arguments) => identify::run(arguments, terminal),
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
+        Command::Diagnose(arguments) => diagnose::run(arguments, line.common.seed, terminal),
+        Command::BlindCheck(arguments) => blind_check::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
     }
 }

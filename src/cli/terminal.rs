@@ -2,7 +2,7 @@
 
 use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use tapjoint::report::{document::Document, render_json};
 
 /// Where a command's words go.
@@ -48,6 +48,16 @@ impl Terminal {
         if !self.quiet {
             let _ = writeln!(io::stderr(), "warning: {text}");
         }
+    }
+
+    /// Shows how far a long task is, on a terminal only.
+    pub(super) fn count(&self, doing: &str, done: usize, of: usize) {
+        let mut error = io::stderr();
+        if self.quiet || !error.is_terminal() {
+            return;
+        }
+        let end = if done == of { "\n" } else { "" };
+        let _ = write!(error, "\r{done} of {of} {doing}{end}");
     }
 
     /// Writes a report's document to where `--json` says, if it says anything. Call it last.

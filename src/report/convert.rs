@@ -52,6 +52,7 @@ pub fn document(analysis: &Analysis) -> Document {
         resolution_span: perturbation
             .and_then(|found| found.bounds.as_ref())
             .map(span_section),
+        gap: None,
         quality: (!analysis.verdicts.is_empty())
             .then(|| analysis.verdicts.iter().map(verdict_section).collect()),
         warnings: analysis.warnings.iter().map(warning_section).collect(),

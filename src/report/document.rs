@@ -16,6 +16,11 @@ pub use super::document_fit::{
     TapFitSection, TrendSection,
 };
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
+pub use super::document_gap::{
+    BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
+    HypothesisSection, JointShiftSection, NextTestSection, ParameterSection, PlaceMapSection,
+    PullSection,
+};
 pub use super::document_quality::VerdictSection;
 pub use super::document_resolution::{ResolutionSpanSection, SensitivitySection};
 
@@ -64,6 +69,9 @@ pub struct Document {
     /// contributes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resolution_span: Option<ResolutionSpanSection>,
+    /// The gap between model and measurement: where, which effect, how far it closes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<GapSection>,
     /// How well the test was made: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<VerdictSection>>,

@@ -2,21 +2,25 @@
 //!
 //! Everything is returned as bytes with a name; the command line writes the files.
 
+pub mod blind_check;
 mod convert;
 mod convert_datasets;
 mod convert_estimate;
 mod convert_figures;
 mod convert_fit;
+mod convert_gap;
 mod convert_quality;
 pub mod document;
 mod document_contents;
 mod document_estimate;
 mod document_fit;
 mod document_frf;
+mod document_gap;
 mod document_quality;
 mod document_resolution;
 pub mod figures;
 pub mod format;
+mod gap_text;
 pub mod html;
 pub mod plot;
 pub mod summary;
@@ -37,8 +41,10 @@ pub use convert::{
 pub use convert_datasets::datasets as datasets_of;
 pub use convert_figures::{figures as figures_of, frf_figure};
 pub use convert_frf::{frf_document, render_frf_csv};
+pub use convert_gap::gap_section;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use frf_uff::render_frf_uff;
+pub use gap_text::render_gap_text;
 pub use html::render_html;
 pub use json::render_json;
 pub use run::{render_frf_png, render_run, render_spectrum_png};

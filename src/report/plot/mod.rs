@@ -16,7 +16,7 @@ pub mod time;
 mod closeup;
 mod font;
 mod marks;
-mod panel;
+pub(super) mod panel;
 mod raster;
 mod vector;
 

@@ -2,6 +2,7 @@
 
 mod datasets;
 mod frfs;
+mod gap;
 mod joint;
 mod measured;
 mod modes;
@@ -11,6 +12,7 @@ mod uncertainty;
 
 pub use datasets::datasets;
 pub use frfs::frfs;
+pub use gap::{gap_story, hypotheses};
 pub use joint::{Parameter, estimated, methods, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};

@@ -9,6 +9,7 @@
 //! the tests. The definitions of the effects are shared, so that the score is an upper bound:
 //! tests made elsewhere ([`parse_truths`]) are the check that counts.
 
+mod answer;
 mod calibration;
 mod case;
 mod commitment;

@@ -1,0 +1,267 @@
+//! `tapjoint blind-check`: how often the diagnosis is right on tests whose effect it is not told.
+
+use super::Outcome;
+use super::input::read_test;
+use super::output::OutputFolder;
+use super::terminal::Terminal;
+use anyhow::{Context, bail};
+use clap::Args;
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use tapjoint::description::TestDescription;
+use tapjoint::gap::{Diagnosis, GapSettings};
+use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
+use tapjoint::recording::{WavFormat, write_wav};
+use tapjoint::report::blind_check::render_blind_check;
+use tapjoint::study::blind_check::{
+    Answer, Campaign, Case, DrawnTest, Extent, RecordedTest, Truth, always_scale, commitment,
+    parse_truths, render_rows, rows, score, shuffled,
+};
+
+/// Draw virtual tests with an effect withheld, diagnose each without the answer, score.
+///
+/// Each test has five recordings (two sensors, three tap positions, one sensor moved, two levels).
+/// The truths are sealed by a SHA-256 that is printed first; the diagnosis sees recordings and
+/// descriptions alone. With --folder, tests made elsewhere are diagnosed and scored.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  tapjoint blind-check --cases 100 --seed 7\n  tapjoint blind-check --folder tests --truth truth.json"
+)]
+pub(super) struct BlindCheckArguments {
+    /// Number of virtual tests: ten nineteenths with one effect, five with none, two with something
+    /// outside the catalogue, two with two effects
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 190,
+        conflicts_with = "folder"
+    )]
+    cases: usize,
+    /// One recording with one sensor and five modes instead of five recordings
+    #[arg(long, conflicts_with = "folder")]
+    one_recording: bool,
+    /// Noise of the responses below their root mean square (dB)
+    #[arg(
+        long,
+        value_name = "DB",
+        default_value_t = 60.0,
+        conflicts_with = "folder"
+    )]
+    noise: f64,
+    /// Largest standard deviation of the joint's drift between recordings (relative)
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.01,
+        conflicts_with = "folder"
+    )]
+    drift: f64,
+    /// Folder of tests made elsewhere, each a folder with test.toml and recordings
+    #[arg(long, value_name = "DIR", requires = "truth")]
+    folder: Option<PathBuf>,
+    /// What was planted in them: JSON list of {"name", "effects", "params"}
+    #[arg(long, value_name = "FILE", requires = "folder")]
+    truth: Option<PathBuf>,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "blind-check")]
+    out: PathBuf,
+}
+
+impl BlindCheckArguments {
+    fn campaign(&self, seed: u64) -> anyhow::Result<Campaign> {
+        if !(self.drift >= 0.0 && self.drift <= 0.2) {
+            bail!(
+                "--drift {}: give a relative value from 0 to 0.2",
+                self.drift
+            );
+        }
+        if !(self.noise >= 0.0 && self.noise <= 200.0) {
+            bail!("--noise {}: give decibels from 0 to 200", self.noise);
+        }
+        // The proportions of 300, 150, 60 and 60.
+        let share = |part: usize| (self.cases * part + 9) / 19;
+        let (nulls, outside, pairs) = (share(5), share(2), share(2));
+        Ok(Campaign {
+            singles: self.cases.saturating_sub(nulls + outside + pairs),
+            nulls,
+            outside,
+            pairs,
+            extent: if self.one_recording {
+                Extent::OneRecording
+            } else {
+                Extent::FiveRecordings
+            },
+            noise_db: self.noise,
+            drift: self.drift,
+            seed,
+        })
+    }
+}
+
+pub(super) fn run(
+    arguments: &BlindCheckArguments,
+    seed: u64,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
+    let output = OutputFolder::prepare(&arguments.out)?;
+    let cases = match (&arguments.folder, &arguments.truth) {
+        (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
+        _ => drawn(&arguments.campaign(seed)?, &terminal)?,
+    };
+    let scores = score(&cases);
+    terminal.say(&render_rows(&rows(&scores)))?;
+    let chance = score(&shuffled(&cases, seed)).top_1.value();
+    let scale = score(&always_scale(&cases)).top_1.value();
+    let percent =
+        |share: Option<f64>| share.map_or("-".to_owned(), |p| format!("{:.0} %", 100.0 * p));
+    terminal.say(&format!(
+        "\nFirst group right by answers dealt out to other tests: {}; by always answering one common\n\
+         factor: {}.",
+        percent(chance),
+        percent(scale)
+    ))?;
+    for file in render_blind_check(&cases, &scores)? {
+        output.add(&file.name, &file.bytes)?;
+    }
+    let folder = output.publish()?;
+    terminal.say(&format!("Results: {}", folder.display()))?;
+    terminal.write_json(&tapjoint::report::blind_check::score_json(&scores))?;
+    Ok(Outcome::Answered)
+}
+
+/// Draws, seals, records, diagnoses, opens.
+fn drawn(campaign: &Campaign, terminal: &Terminal) -> anyhow::Result<Vec<Case>> {
+    let tests = (0..campaign.len())
+        .into_par_iter()
+        .map(|index| campaign.draw(index))
+        .collect::<Result<Vec<_>, _>>()?;
+    let sealed = sealed_text(&tests)?;
+    terminal.say(&format!(
+        "{} tests drawn; SHA-256 of truth.json: {}",
+        tests.len(),
+        commitment(&sealed)
+    ))?;
+    let done = AtomicUsize::new(0);
+    let diagnosed = tests
+        .par_iter()
+        .map(|test| {
+            let recorded = test.record()?;
+            let case = diagnose_recorded(&recorded, &test.truth)?;
+            terminal.count(
+                "tests diagnosed",
+                done.fetch_add(1, Ordering::Relaxed) + 1,
+                tests.len(),
+            );
+            Ok(case)
+        })
+        .collect::<anyhow::Result<Vec<Case>>>()?;
+    check_names(&tests, &diagnosed)?;
+    Ok(diagnosed)
+}
+
+/// The truths as the file that is written at the end; a number that nobody knows before keeps the
+/// digest from being guessed.
+fn sealed_text(tests: &[DrawnTest]) -> anyhow::Result<String> {
+    let truths: Vec<Truth> = tests.iter().map(|test| test.truth.clone()).collect();
+    Ok(tapjoint::report::blind_check::truths_json(&truths)?)
+}
+
+/// The first tests again under other names: the answers must not change.
+fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<()> {
+    const AGAIN: usize = 3;
+    for (test, (_, answer)) in tests.iter().zip(cases).take(AGAIN) {
+        let mut recorded = test.record()?;
+        let mut random = ChaCha8Rng::seed_from_u64(test.seed ^ 0x5eed);
+        let mut numbers: Vec<usize> = (10..10 + recorded.recordings.len()).collect();
+        numbers.shuffle(&mut random);
+        for (recording, number) in recorded.recordings.iter_mut().zip(numbers) {
+            let name = format!("{:08x}{number}.wav", random.next_u32());
+            recorded.description = recorded.description.replace(&recording.file, &name);
+            recording.file = name;
+        }
+        recorded.description = recorded.description.replace(&test.truth.name, "another");
+        let (_, again) = diagnose_recorded(&recorded, &test.truth)?;
+        if again != *answer {
+            bail!(
+                "the answer to {} depends on the names of its files",
+                test.truth.name
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Writes a test into a folder of its own, and diagnoses what stands there.
+fn diagnose_recorded(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
+    let folder = tempfile::tempdir().context("no temporary folder can be made")?;
+    for recording in &recorded.recordings {
+        let path = folder.path().join(&recording.file);
+        write_wav(
+            &path,
+            recording.sample_rate,
+            &recording.channels,
+            WavFormat::Pcm24,
+        )?;
+    }
+    let test = TestDescription::parse(&recorded.description, "test.toml")?;
+    Ok(case_of(&test, folder.path(), truth))
+}
+
+/// A test that cannot be analysed or diagnosed is one without an answer.
+fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
+    match diagnosis_of(test, folder) {
+        Some(diagnosis) => (
+            truth.clone().with_limits(&diagnosis),
+            Answer::of(&diagnosis),
+        ),
+        None => (truth.clone(), Answer::none()),
+    }
+}
+
+fn diagnosis_of(test: &TestDescription, folder: &Path) -> Option<Diagnosis> {
+    let settings = IdentifySettings::default();
+    let analysis = run_test(test, (folder, "test.toml"), &settings).ok()?;
+    diagnose_test(test, &analysis, &GapSettings::default()).ok()
+}
+
+/// Tests made elsewhere: those that both the folder and the truth file know.
+fn elsewhere(folder: &Path, truth: &Path, terminal: &Terminal) -> anyhow::Result<Vec<Case>> {
+    let name = truth.display();
+    let text = fs::read_to_string(truth).with_context(|| format!("{name}: cannot be read"))?;
+    let truths = parse_truths(&text).with_context(|| name.to_string())?;
+    let mut found = Vec::new();
+    for truth in truths {
+        let own = folder.join(&truth.name);
+        let path = own.join("test.toml");
+        if !path.is_file() {
+            bail!(
+                "{}: not there, but {name} speaks of the test \"{}\"; each test is a folder of that \
+                 name with a test.toml",
+                path.display(),
+                truth.name
+            );
+        }
+        let file = read_test(&path, terminal)?;
+        file.check_recordings()?;
+        found.push((truth, own, file));
+    }
+    if found.is_empty() {
+        bail!("{name}: holds no test");
+    }
+    let done = AtomicUsize::new(0);
+    let cases = found.par_iter().map(|(truth, own, file)| {
+        let case = case_of(&file.test, own, truth);
+        terminal.count(
+            "tests diagnosed",
+            done.fetch_add(1, Ordering::Relaxed) + 1,
+            found.len(),
+        );
+        case
+    });
+    Ok(cases.collect())
+}

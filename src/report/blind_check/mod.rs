@@ -1,0 +1,155 @@
+//! The files of a blind check: its score as JSON, every case as CSV, the truths that were sealed, and
+//! pictures.
+
+mod closure_plot;
+mod confusion_plot;
+mod reliability_plot;
+
+use serde_json::{Value, json};
+
+use super::plot::render_png;
+use super::{ReportError, ReportFile};
+use crate::study::blind_check::{Case, Planted, Row, Scores, Target, Truth, rows};
+
+/// All files: `score.json`, `cases.csv`, `truth.json`, `confusion.png`, `reliability.png`,
+/// `closure.png`.
+///
+/// # Errors
+/// The first that cannot be made.
+pub fn render_blind_check(cases: &[Case], scores: &Scores) -> Result<Vec<ReportFile>, ReportError> {
+    let truths: Vec<Truth> = cases.iter().map(|(truth, _)| truth.clone()).collect();
+    let text = |name: &str, text: String| ReportFile {
+        name: name.to_owned(),
+        bytes: text.into_bytes(),
+    };
+    let score = serde_json::to_string_pretty(&score_json(scores)).map_err(ReportError::Json)?;
+    let mut files = vec![
+        text("score.json", score + "\n"),
+        text("cases.csv", cases_csv(cases)),
+        text("truth.json", truths_json(&truths)?),
+    ];
+    let drawings = [
+        ("confusion.png", Some(confusion_plot::draw_confusion(cases))),
+        (
+            "reliability.png",
+            Some(reliability_plot::draw_reliability(&scores.calibration)),
+        ),
+        ("closure.png", closure_plot::draw_closure(cases)),
+    ];
+    for (name, drawing) in drawings {
+        if let Some(drawing) = drawing {
+            files.push(ReportFile {
+                name: name.to_owned(),
+                bytes: render_png(&drawing)?,
+            });
+        }
+    }
+    Ok(files)
+}
+
+/// The truths as a list of `{"name", "effects", "params"}`, one line for each.
+///
+/// # Errors
+/// [`ReportError::Json`], which does not happen for finite parameters.
+pub fn truths_json(truths: &[Truth]) -> Result<String, ReportError> {
+    let lines = truths
+        .iter()
+        .map(|truth| serde_json::to_string(&truth_json(truth)))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(ReportError::Json)?;
+    Ok(format!("[\n{}\n]\n", lines.join(",\n")))
+}
+
+fn truth_json(truth: &Truth) -> Value {
+    let names: Vec<&str> = truth.effects.iter().map(name_of).collect();
+    let params: serde_json::Map<String, Value> = truth
+        .catalogue()
+        .map(|(id, values)| (id.name().to_owned(), json!(values)))
+        .collect();
+    json!({"name": truth.name, "effects": names, "params": params})
+}
+
+fn name_of(planted: &Planted) -> &str {
+    match planted {
+        Planted::Catalogue(id, _) => id.name(),
+        Planted::Outside(name) => name,
+    }
+}
+
+/// The score: every figure with its interval, its counts and what was aimed at.
+pub fn score_json(scores: &Scores) -> Value {
+    let figures: serde_json::Map<String, Value> = rows(scores)
+        .iter()
+        .map(|row| (row.key.to_owned(), figure_json(row)))
+        .collect();
+    let [nulls, singles, several, outside] = scores.counts;
+    let reliability: Vec<Value> = scores
+        .calibration
+        .reliability
+        .iter()
+        .map(|bin| json!({"from": bin.from, "cases": bin.cases, "stated": bin.stated, "right": bin.right}))
+        .collect();
+    json!({
+        "version": super::document::VERSION,
+        "cases": {"none": nulls, "one": singles, "several": several, "outside": outside},
+        "figures": figures,
+        "reliability": reliability,
+    })
+}
+
+fn figure_json(row: &Row) -> Value {
+    let target = match row.target {
+        Target::AtLeast(limit) => json!({"at_least": limit}),
+        Target::AtMost(limit) => json!({"at_most": limit}),
+        Target::None => Value::Null,
+    };
+    json!({
+        "meaning": row.meaning,
+        "value": row.value.filter(|value| value.is_finite()),
+        "low": row.interval.map(|interval| interval.0),
+        "high": row.interval.map(|interval| interval.1),
+        "hits": row.counts.map(|counts| counts.0),
+        "of": row.counts.map(|counts| counts.1),
+        "target": target,
+    })
+}
+
+/// Every case: what was planted, what was answered.
+fn cases_csv(cases: &[Case]) -> String {
+    let mut text =
+        String::from("name,planted,detectable,refutable,verdict,named,first,probability,closure\n");
+    for (truth, answer) in cases {
+        let planted: Vec<&str> = truth.effects.iter().map(name_of).collect();
+        let named: Vec<&str> = answer.effects.iter().map(|id| id.name()).collect();
+        let (first, probability) = answer.first().map_or(("", String::new()), |(class, p)| {
+            (class.name(), format!("{p:.4}"))
+        });
+        let yes_or_no = |known: Option<bool>| match known {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "",
+        };
+        let closure = answer
+            .closure
+            .map_or(String::new(), |closure| format!("{closure:.4}"));
+        text.push_str(&format!(
+            "{},{},{},{},{},{},{first},{probability},{closure}\n",
+            quoted(&truth.name),
+            quoted(&planted.join("+")),
+            yes_or_no(truth.detectable),
+            yes_or_no(truth.refutable),
+            answer.verdict.name(),
+            named.join("+"),
+        ));
+    }
+    text
+}
+
+/// A word of a CSV file; names made elsewhere may hold anything.
+fn quoted(word: &str) -> String {
+    if word.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", word.replace('"', "\"\""))
+    } else {
+        word.to_owned()
+    }
+}

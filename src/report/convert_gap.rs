@@ -1,0 +1,176 @@
+//! From a diagnosis to its part of the document.
+
+use super::document::{
+    BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
+    HypothesisSection, JointShiftSection, ParameterSection, PlaceMapSection, PullSection,
+};
+use crate::effects::EffectId;
+use crate::gap::{
+    DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift, PlaceMap,
+    PlaceProbabilities, Pull, Verdict,
+};
+
+/// The section of a diagnosis, or of the reason why there is none.
+pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
+    let found = match diagnosis {
+        Ok(found) => found,
+        Err(error) => {
+            return GapSection {
+                verdict: GapVerdictSection {
+                    kind: "not-enough-data".to_owned(),
+                    effects: Vec::new(),
+                    reason: Some(error.to_string()),
+                },
+                ..GapSection::default()
+            };
+        }
+    };
+    GapSection {
+        verdict: verdict(&found.verdict),
+        place: Some(GapPlaceSection {
+            probability: places(&found.places),
+            modes: found.pulls.iter().map(pull).collect(),
+            worst_block: found.blocks.first().map(|block| block.name.clone()),
+        }),
+        hypotheses: found.hypotheses.iter().map(hypothesis).collect(),
+        noise_floor: Some(found.noise_floor),
+        goodness_of_fit: found.goodness_of_fit,
+        joint_shift: Some(shift(&found.joint_shift)),
+        fitted_modes: Some(found.fitted_modes),
+        decided_by: Some(
+            match found.decided_by {
+                DecidedBy::Readings => "readings",
+                DecidedBy::Priors => "priors",
+            }
+            .to_owned(),
+        ),
+        map: found.map.as_ref().map(map),
+        baselines: baselines(&found.hypotheses),
+        next_test: Vec::new(),
+    }
+}
+
+fn verdict(found: &Verdict) -> GapVerdictSection {
+    let names = |effects: &[EffectId]| effects.iter().map(|id| id.name().to_owned()).collect();
+    let effects = match found {
+        Verdict::Named(effects) | Verdict::Group(effects) => names(effects),
+        Verdict::Set(list) => list.iter().map(Hypothesis::name).collect(),
+        Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
+    };
+    GapVerdictSection {
+        kind: found.kind().to_owned(),
+        effects,
+        reason: match found {
+            Verdict::NotEnoughData(reason) => Some(reason.clone()),
+            _ => None,
+        },
+    }
+}
+
+fn places(p: &PlaceProbabilities) -> std::collections::BTreeMap<String, f64> {
+    [
+        ("joint", p.joint),
+        ("fixture", p.fixture),
+        ("sensor", p.sensor),
+        ("body", p.body),
+        ("acquisition", p.acquisition),
+        ("unknown", p.unknown),
+    ]
+    .map(|(name, value)| (name.to_owned(), value))
+    .into()
+}
+
+fn pull(pull: &Pull) -> PullSection {
+    PullSection {
+        mode: pull.mode,
+        recording: pull.configuration.clone(),
+        error_percent: pull.error_percent,
+        z: pull.z,
+        error_percent_after: pull.error_percent_after,
+        z_after: pull.z_after,
+    }
+}
+
+fn shift(shift: &JointShift) -> JointShiftSection {
+    JointShiftSection {
+        kx_percent: shift.kx_percent,
+        ky_percent: shift.ky_percent,
+    }
+}
+
+fn hypothesis(found: &HypothesisResult) -> HypothesisSection {
+    let groups: Vec<&str> = found.groups.iter().map(|group| group.name()).collect();
+    let alone = found.effects.len() < 2;
+    let parameters = found.parameters.iter().map(|parameter| {
+        let name = if alone {
+            parameter.name.to_owned()
+        } else {
+            format!("{}.{}", parameter.effect.name(), parameter.name)
+        };
+        let section = ParameterSection {
+            value: parameter.value,
+            std: parameter.std,
+            smallest_detectable: parameter.smallest_detectable,
+            smallest_isolable: parameter.smallest_isolable,
+        };
+        (name, section)
+    });
+    HypothesisSection {
+        effect: found.hypothesis.name(),
+        group: (!groups.is_empty()).then(|| groups.join("+")),
+        probability: found.probability,
+        log_bayes_factor: found.log_bayes_factor,
+        confounded_with: found
+            .confounded_with
+            .iter()
+            .map(|id| id.name().to_owned())
+            .collect(),
+        parameters: parameters.collect(),
+        gap_before: Some(found.gap_before),
+        gap_after: found.gap_after,
+        left_out_after: found.left_out_after,
+        withheld_before: found.withheld_before,
+        withheld_after: found.withheld_after,
+        withheld_floor: found.withheld_floor,
+        closure: found.closure.map(|closure| ClosureSection {
+            value: closure.value,
+            low: closure.low,
+            high: closure.high,
+        }),
+        goodness_of_fit: found.goodness_of_fit,
+        joint_shift: shift(&found.joint_shift),
+        joint: found.joint,
+    }
+}
+
+fn map(map: &PlaceMap) -> PlaceMapSection {
+    PlaceMapSection {
+        positions: map.positions.clone(),
+        stiffness: map.stiffness.clone(),
+        stiffness_std: map.stiffness_std.clone(),
+        mass: map.mass.clone(),
+        mass_std: map.mass_std.clone(),
+        resolution: map.resolution,
+    }
+}
+
+/// Nothing added, and one common factor: what any diagnosis has to beat.
+fn baselines(hypotheses: &[HypothesisResult]) -> Vec<BaselineSection> {
+    let of = |name: &str, wanted: &Hypothesis| {
+        let found = hypotheses
+            .iter()
+            .find(|found| found.hypothesis == *wanted)?;
+        Some(BaselineSection {
+            name: name.to_owned(),
+            gap_after: found.gap_after,
+            withheld_after: found.withheld_after,
+        })
+    };
+    [
+        of("none", &Hypothesis::None),
+        of("scale", &Hypothesis::Effects(vec![EffectId::Modulus])),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}

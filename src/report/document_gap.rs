@@ -1,0 +1,181 @@
+//! What the diagnosis of the gap adds to the document.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// The gap between model and measurement.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct GapSection {
+    /// The answer.
+    pub verdict: GapVerdictSection,
+    /// Where the gap lies, given that there is one; null without a diagnosis.
+    #[serde(rename = "where")]
+    pub place: Option<GapPlaceSection>,
+    /// All hypotheses, the most probable first.
+    pub hypotheses: Vec<HypothesisSection>,
+    /// Root mean square of the standard uncertainties of the fitted frequencies (%).
+    pub noise_floor: Option<f64>,
+    /// Probability of a misfit as large or larger, under the best hypothesis.
+    pub goodness_of_fit: Option<f64>,
+    /// How much the joint moves when the best hypothesis is added.
+    pub joint_shift: Option<JointShiftSection>,
+    /// Modes above this number took no part in the fit; null without a diagnosis.
+    pub fitted_modes: Option<usize>,
+    /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
+    pub decided_by: Option<String>,
+    /// What the residual of the nominal model calls for along the beam.
+    pub map: Option<PlaceMapSection>,
+    /// Two plain answers beside the diagnosis: nothing added, and one common factor.
+    pub baselines: Vec<BaselineSection>,
+    /// Tests that would tell more, the most telling first.
+    pub next_test: Vec<NextTestSection>,
+}
+
+/// The answer.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct GapVerdictSection {
+    /// "no-gap", "named", "group", "set", "unknown" or "not-enough-data".
+    pub kind: String,
+    /// The effects it names.
+    pub effects: Vec<String>,
+    /// Why there is no answer; null where there is one.
+    pub reason: Option<String>,
+}
+
+/// Where the gap lies.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct GapPlaceSection {
+    /// Probability (1) of joint, fixture, sensor, body, acquisition, unknown.
+    pub probability: BTreeMap<String, f64>,
+    /// Every frequency's error.
+    pub modes: Vec<PullSection>,
+    /// The readings that fit worst.
+    pub worst_block: Option<String>,
+}
+
+/// A frequency's error.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PullSection {
+    /// The mode.
+    pub mode: usize,
+    /// The recording.
+    pub recording: String,
+    /// 100 (predicted - measured)/measured of the nominal model with its joint refitted (%).
+    pub error_percent: f64,
+    /// That over the standard uncertainty.
+    pub z: f64,
+    /// The same with the best hypothesis (%).
+    pub error_percent_after: f64,
+    /// That over the standard uncertainty.
+    pub z_after: f64,
+}
+
+/// One hypothesis.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct HypothesisSection {
+    /// Effect, "none", "unknown", or two effects joined by "+".
+    pub effect: String,
+    /// Its group; of two effects both, joined by "+".
+    pub group: Option<String>,
+    /// Its probability (1).
+    pub probability: f64,
+    /// Logarithm of its evidence over that of "none".
+    pub log_bayes_factor: f64,
+    /// Effects that predict the same within what these data resolve.
+    pub confounded_with: Vec<String>,
+    /// Its parameters (SI), by name; of two effects "effect.name".
+    pub parameters: BTreeMap<String, ParameterSection>,
+    /// Errors of the fitted frequencies with the nominal model (%, rms).
+    pub gap_before: Option<f64>,
+    /// The same with this hypothesis.
+    pub gap_after: Option<f64>,
+    /// The same with each mode predicted from the others.
+    pub left_out_after: Option<f64>,
+    /// Errors of frequencies that took no part, with the nominal model (%, rms).
+    pub withheld_before: Option<f64>,
+    /// The same with this hypothesis.
+    pub withheld_after: Option<f64>,
+    /// What measurement uncertainty alone would leave of them (%, rms).
+    pub withheld_floor: Option<f64>,
+    /// Share of the gap that is closed on withheld data.
+    pub closure: Option<ClosureSection>,
+    /// Probability of a misfit as large or larger.
+    pub goodness_of_fit: Option<f64>,
+    /// How much the joint moves when this is added.
+    pub joint_shift: JointShiftSection,
+    /// Stiffnesses of the joint with it (N/m, N m/rad).
+    pub joint: Option<[f64; 2]>,
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ParameterSection {
+    /// The value (SI).
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub std: Option<f64>,
+    /// Smallest size that would be noticed nine times out of ten.
+    pub smallest_detectable: Option<f64>,
+    /// Smallest size that these data would tell from every other effect.
+    pub smallest_isolable: Option<f64>,
+}
+
+/// Share of a gap that is closed, with its 95 % interval.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct ClosureSection {
+    /// (before^2 - after^2)/(before^2 - floor^2).
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Change of the joint (%).
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct JointShiftSection {
+    /// Of Kx.
+    pub kx_percent: Option<f64>,
+    /// Of Ky.
+    pub ky_percent: Option<f64>,
+}
+
+/// Local changes along the beam.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct PlaceMapSection {
+    /// Centres of the pieces (m).
+    pub positions: Vec<f64>,
+    /// Relative change of the bending stiffness, if stiffness alone changes.
+    pub stiffness: Vec<f64>,
+    /// Its standard uncertainty.
+    pub stiffness_std: Vec<f64>,
+    /// Relative change of the mass, if mass alone changes.
+    pub mass: Vec<f64>,
+    /// Its standard uncertainty.
+    pub mass_std: Vec<f64>,
+    /// Length over which a local change is smeared (m).
+    pub resolution: f64,
+}
+
+/// A plain answer to set the diagnosis against.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct BaselineSection {
+    /// "none" or "scale".
+    pub name: String,
+    /// Errors of the fitted frequencies (%, rms).
+    pub gap_after: Option<f64>,
+    /// Errors of withheld frequencies (%, rms).
+    pub withheld_after: Option<f64>,
+}
+
+/// A test that would tell more.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct NextTestSection {
+    /// What to do.
+    pub action: String,
+    /// Which effects it would tell apart.
+    pub separates: Vec<String>,
+    /// Information it is expected to bring (bit).
+    pub bits: f64,
+}

@@ -1,0 +1,21 @@
+//! The diagnosis of the gap for a terminal.
+
+use super::document::Document;
+use super::tables;
+use super::text::{prediction, table_or_nothing, warnings, wrapped};
+
+/// The errors of the nominal model, the story of the gap, and the hypotheses.
+pub fn render_gap_text(document: &Document) -> String {
+    let story: String = tables::gap_story(document)
+        .iter()
+        .map(|sentence| wrapped(sentence, 2) + "\n")
+        .collect();
+    let sections = [
+        prediction(document),
+        story,
+        table_or_nothing(tables::hypotheses(document)),
+        warnings(document),
+    ];
+    let said: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();
+    said.join("\n")
+}

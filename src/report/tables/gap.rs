@@ -1,0 +1,236 @@
+//! The gap between model and measurement, in sentences and as a table.
+
+use super::super::document::{Document, GapSection, HypothesisSection, ParameterSection};
+use super::super::format::{MISSING, significant};
+use super::{Table, number, words};
+
+/// Hypotheses less probable than this are not listed.
+const LEAST_PROBABILITY: f64 = 0.005;
+/// At least so many hypotheses are listed.
+const LEAST_LISTED: usize = 4;
+
+/// The diagnosis as a story of three parts: where, which, how far. Empty without one.
+pub fn gap_story(document: &Document) -> Vec<String> {
+    let Some(gap) = &document.gap else {
+        return Vec::new();
+    };
+    let mut story = vec![verdict(gap)];
+    story.extend(place(gap));
+    story.extend(how_far(gap));
+    story.extend(price(gap));
+    story.extend(
+        gap.next_test
+            .first()
+            .map(|test| format!("Next test: {} ({:.2} bit).", test.action, test.bits)),
+    );
+    story
+}
+
+fn verdict(gap: &GapSection) -> String {
+    let first = gap.hypotheses.first();
+    let odds = first.map_or_else(String::new, |first| {
+        format!(" ({})", probability(first.probability))
+    });
+    let effects = gap.verdict.effects.join(", ");
+    match gap.verdict.kind.as_str() {
+        "no-gap" => {
+            "No gap: the described model explains the frequencies within their uncertainty."
+                .to_owned()
+        }
+        "named" => {
+            let size = named(gap).map_or_else(String::new, |found| format!(": {}", sizes(found)));
+            format!("The data are consistent with one cause, {effects}{odds}{size}.")
+        }
+        "group" => {
+            format!("The cause is one of {effects}{odds}; these data cannot tell them apart.")
+        }
+        "set" => format!("The cause is most likely one of {effects}; these data do not decide."),
+        "unknown" => {
+            "Something is missing in the model, and nothing in the catalogue explains it: do not \
+                      trust the joint's stiffness beyond the misfit."
+                .to_owned()
+        }
+        _ => format!(
+            "No diagnosis: {}.",
+            gap.verdict.reason.as_deref().unwrap_or("too few data")
+        ),
+    }
+}
+
+/// The hypothesis that the verdict names.
+fn named(gap: &GapSection) -> Option<&HypothesisSection> {
+    let name = gap.verdict.effects.join("+");
+    gap.hypotheses.iter().find(|found| found.effect == name)
+}
+
+/// Where, unless there is no gap.
+fn place(gap: &GapSection) -> Option<String> {
+    if matches!(gap.verdict.kind.as_str(), "no-gap" | "not-enough-data") {
+        return None;
+    }
+    let place = gap.place.as_ref()?;
+    let mut places: Vec<(&String, &f64)> = place.probability.iter().collect();
+    places.sort_by(|a, b| b.1.total_cmp(a.1));
+    let listed: Vec<String> = places
+        .iter()
+        .take(3)
+        .filter(|(_, p)| **p >= 0.01)
+        .map(|(name, p)| format!("{name} {}", probability(**p)))
+        .collect();
+    let worst = place
+        .modes
+        .iter()
+        .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))?;
+    Some(format!(
+        "Where: {}. Largest misfit before: mode {} in {}, {:+.3} % ({:.0} standard deviations).",
+        listed.join(", "),
+        worst.mode,
+        worst.recording,
+        worst.error_percent,
+        worst.z.abs()
+    ))
+}
+
+fn how_far(gap: &GapSection) -> Option<String> {
+    let found = named(gap).or_else(|| {
+        gap.hypotheses
+            .iter()
+            .find(|found| !matches!(found.effect.as_str(), "none" | "unknown"))
+    })?;
+    if matches!(gap.verdict.kind.as_str(), "no-gap" | "not-enough-data") {
+        return None;
+    }
+    let mut text = format!(
+        "How far: with {} the errors shrink from {} to {} % (rms over fitted frequencies)",
+        found.effect,
+        percent(found.gap_before),
+        percent(found.gap_after),
+    );
+    if let Some((before, after)) = found.withheld_before.zip(found.withheld_after) {
+        text.push_str(&format!(
+            "; on frequencies that took no part from {} to {} %",
+            percent(Some(before)),
+            percent(Some(after))
+        ));
+    }
+    if let Some(closure) = &found.closure {
+        text.push_str(&format!(
+            ", {:.0} % of the gap (95 %: {:.0} to {:.0})",
+            100.0 * closure.value,
+            100.0 * closure.low,
+            100.0 * closure.high
+        ));
+    }
+    Some(format!(
+        "{text}; noise would leave {} %.",
+        percent(gap.noise_floor)
+    ))
+}
+
+/// What ignoring the effect costs.
+fn price(gap: &GapSection) -> Option<String> {
+    let found = named(gap)?;
+    let part = |name: &str, shift: Option<f64>| Some(format!("{name} by {:+.2} %", shift?));
+    let parts: Vec<String> = [
+        part("Kx", found.joint_shift.kx_percent),
+        part("Ky", found.joint_shift.ky_percent),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    (!parts.is_empty()).then(|| format!("Adding it moves the joint: {}.", parts.join(", ")))
+}
+
+/// The hypotheses, the most probable first; `None` without a diagnosis.
+pub fn hypotheses(document: &Document) -> Option<Table> {
+    let gap = document.gap.as_ref()?;
+    if gap.hypotheses.is_empty() {
+        return None;
+    }
+    let listed = gap
+        .hypotheses
+        .iter()
+        .enumerate()
+        .filter(|(index, found)| {
+            *index < LEAST_LISTED
+                || found.probability >= LEAST_PROBABILITY
+                || matches!(found.effect.as_str(), "none" | "unknown")
+        })
+        .map(|(_, found)| row(found));
+    Some(Table {
+        caption: "What may be missing".to_owned(),
+        columns: vec![
+            words("Hypothesis"),
+            number("Probability"),
+            number("Fitted (%)"),
+            number("Withheld (%)"),
+            words("Size"),
+            words("Looks like").on_page(),
+        ],
+        rows: listed.collect(),
+        note: format!(
+            "Fitted, withheld: errors of the frequencies left (rms); before {} and {} %. Size \u{b1} one \
+             standard deviation.",
+            percent(gap.hypotheses[0].gap_before),
+            percent(gap.hypotheses[0].withheld_before)
+        ),
+    })
+}
+
+fn row(found: &HypothesisSection) -> Vec<String> {
+    vec![
+        found.effect.clone(),
+        probability(found.probability),
+        percent(found.gap_after),
+        percent(found.withheld_after),
+        sizes(found),
+        found.confounded_with.join(", "),
+    ]
+}
+
+/// "mass 24.1 ± 0.3 g".
+fn sizes(found: &HypothesisSection) -> String {
+    let parts: Vec<String> = found
+        .parameters
+        .iter()
+        .map(|(name, parameter)| size(name, parameter))
+        .collect();
+    parts.join(", ")
+}
+
+fn size(name: &str, parameter: &ParameterSection) -> String {
+    let (unit, factor) = unit_of(name);
+    let value = significant(factor * parameter.value, 3);
+    let std = parameter.std.map_or_else(String::new, |std| {
+        format!(" \u{b1} {}", significant(factor * std, 2))
+    });
+    format!("{} {value}{std}{unit}", name.replace('_', " "))
+}
+
+/// The unit a parameter is read in, and how many of it one SI unit is.
+fn unit_of(name: &str) -> (&'static str, f64) {
+    match name.rsplit('.').next().unwrap_or(name) {
+        "mass" => (" g", 1e3),
+        "inertia" => (" kg mm\u{b2}", 1e6),
+        "position" => (" mm", 1e3),
+        "stiffness" => (" N/m", 1.0),
+        "frequency" | "offset" => (" Hz", 1.0),
+        "force" => (" N", 1.0),
+        "relative" | "ratio" | "std" | "loss_factor" => (" %", 1e2),
+        _ => ("", 1.0),
+    }
+}
+
+fn probability(value: f64) -> String {
+    if value > 0.9995 {
+        ">99.9 %".to_owned()
+    } else if value < 0.0005 {
+        "<0.1 %".to_owned()
+    } else {
+        format!("{:.1} %", 100.0 * value)
+    }
+}
+
+fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| MISSING.to_owned(), |value| significant(value, 2))
+}

@@ -40,6 +40,7 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
                 value: correlation.value,
             })
             .collect(),
+        log_covariance: found.stiffness_covariance,
         goodness_of_fit: goodness.probability,
         misfit: Some(MisfitSection {
             chi_squared: goodness.chi_squared,

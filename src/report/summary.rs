@@ -251,7 +251,12 @@ fn misfit(document: &Document) -> Option<String> {
 }
 
 fn resolution(document: &Document) -> Option<String> {
-    let span = document.resolution_span.as_ref()?;
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    let main = estimate.map_or("", |estimate| estimate.method.as_str());
+    let spans = document.resolution_span.as_deref()?;
+    // Of the method that the estimate is by; else of the one that there is.
+    let span = spans.iter().find(|span| span.method == main);
+    let span = span.or(spans.first())?;
     let ranges: Vec<String> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
         .into_iter()
         .filter_map(|(name, range)| {

@@ -14,11 +14,9 @@ use super::result::{
     ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, Limit, OtherMinimum,
 };
 use super::settings::{ConsistentSettings, Intervals, ResidualWeights};
+use crate::identify::estimate::NORMAL_95;
 use crate::identify::{IdentifyError, MeasuredMode};
 use crate::stats::root_mean_square;
-
-/// Half width of a 95 % interval of a normal distribution, in standard deviations.
-const NORMAL_95: f64 = 1.959_964;
 
 /// Estimates a joint from the frequencies of these modes.
 ///
@@ -72,6 +70,7 @@ impl ConsistentEstimator {
             fit: self.settings.fit.clone(),
             quantities: finished.quantities(),
             covariance: finished.covariance_matrix(),
+            stiffness_covariance: finished.stiffness_covariance(),
             correlations: finished.correlations(),
             goodness: finished.goodness,
             modes: finished.modes(),
@@ -269,12 +268,40 @@ impl Finished<'_> {
         }
     }
 
-    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
-        let factor = if self.measured() {
-            1.0
+    /// Factor from the covariance's unit to a variance: the misfit's where no uncertainty is stated.
+    fn variance_unit(&self) -> Option<f64> {
+        if self.measured() {
+            Some(1.0)
         } else {
-            self.scale()?.powi(2)
+            Some(self.scale()?.powi(2))
+        }
+    }
+
+    /// Of ln Kx and ln Ky, where both are estimated and neither is at its limit.
+    fn stiffness_covariance(&self) -> Option<[[f64; 2]; 2]> {
+        let both = [Quantity::Kx, Quantity::Ky];
+        let fit = &self.estimator.settings.fit;
+        let point = &self.best.at.point;
+        let open = |quantity: &Quantity| {
+            fit.contains(&quantity.lead())
+                && limit_of(*quantity, point).is_none()
+                && self.covariance.std(&quantity.gradient()).is_some()
         };
+        if !both.iter().all(open) {
+            return None;
+        }
+        let factor = self.variance_unit()?;
+        let entry = |first: Quantity, second: Quantity| {
+            let between = self
+                .covariance
+                .between(&first.gradient(), &second.gradient());
+            factor * between
+        };
+        Some(both.map(|first| both.map(|second| entry(first, second))))
+    }
+
+    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
+        let factor = self.variance_unit()?;
         let fit = &self.estimator.settings.fit;
         let row = |first: &Parameter| {
             let entry = |second: &Parameter| {
@@ -340,7 +367,7 @@ impl Finished<'_> {
 }
 
 /// Where a coordinate is at the end of its range but for rounding.
-fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
+pub(super) fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
     // Within a factor e^3 of the end no frequency differs from that at the end.
     const NEAR: f64 = 3.0;
     let [log_kx, log_ky] = log_nondimensional(point);

@@ -32,7 +32,7 @@ mod starts;
 mod valleys;
 
 pub use estimate::estimate_consistently;
-pub use estimator::{ConsistentEstimator, PointFit};
+pub use estimator::{ConsistentEstimator, Neighbourhood, PointFit};
 pub use goodness::{Goodness, Verdict, exceedance};
 pub use identifiability::{ExtraMode, FlatDirection, Identifiability, NeededAccuracy};
 pub use layout::{JointedStructure, LapLayout, Route};

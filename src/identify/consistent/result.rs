@@ -95,6 +95,9 @@ pub struct ConsistentEstimate {
     /// Covariance of the estimated coordinates (1), in the order of `fit`: logarithms, and atanh
     /// of the coupling. With relative weights scaled by the misfit; `None` where that is not known.
     pub covariance: Option<Vec<Vec<f64>>>,
+    /// Covariance of ln Kx and ln Ky (1), the beam's uncertainty included; scaled as above. `None`
+    /// unless both are estimated and neither is at its limit.
+    pub stiffness_covariance: Option<[[f64; 2]; 2]>,
     /// Correlations of every two estimated parameters.
     pub correlations: Vec<Correlation>,
     /// The misfit and what it says of the model.

@@ -28,24 +28,32 @@ impl ConsistentEstimator {
             all.extend(minima.iter().map(|minimum| minimum.at.point));
             minima = self.valleys(&problem, &all);
         }
+        self.renew(&self.model, frequencies, minima)
+    }
+
+    /// Follows the beam where the deepest valley has moved it far from the one that the model was
+    /// built for: the model built anew, if it was, and the valleys by it.
+    pub(super) fn renew(
+        &self,
+        model: &FrequencyModel,
+        frequencies: &[f64],
+        mut minima: Vec<Minimum>,
+    ) -> (Option<FrequencyModel>, Vec<Minimum>) {
         let mut renewed = None;
         for _ in 0..RENEWALS {
             let Some(best) = minima.first().map(|best| best.at.point) else {
                 break;
             };
-            let current = renewed.as_ref().unwrap_or(&self.model);
-            if !current.is_far(&best) {
+            if !renewed.as_ref().unwrap_or(model).is_far(&best) {
                 break;
             }
             let highest = self.modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
-            let Ok(model) = self.model.rebuilt(&best, highest) else {
+            let Ok(built) = self.model.rebuilt(&best, highest) else {
                 break;
             };
             let starts: Vec<Point> = minima.iter().map(|minimum| minimum.at.point).collect();
-            let mut problem = self.problem(&model, frequencies);
-            self.rescale(&mut problem, &starts);
-            minima = self.valleys(&problem, &starts);
-            renewed = Some(model);
+            minima = self.refit_in(&built, frequencies, &starts);
+            renewed = Some(built);
         }
         (renewed, minima)
     }

@@ -224,6 +224,10 @@ pub struct ValueSection {
     /// Standard deviation scaled by the misfit: where the model misses the frequencies by more than
     /// their uncertainties, and where none are stated.
     pub std_scaled: Option<f64>,
+    /// Lower 95 % limit by the scaled standard deviation and Student's distribution.
+    pub low_scaled: Option<f64>,
+    /// Upper 95 % limit likewise.
+    pub high_scaled: Option<f64>,
     /// Where there is no upper limit: at least this much, with 95 % confidence.
     pub at_least: Option<f64>,
     /// Where there is no lower limit: at most this much, likewise.

@@ -192,13 +192,15 @@ fn estimate(document: &Document) -> Option<String> {
                 (None, Some(_)) => format!(" (95 %: below {high})"),
                 (None, None) => String::new(),
             };
+            let limits = parameter.written_scaled_limits();
+            let limits = limits.map_or(String::new(), |[low, high]| format!(", 95 %: {low} to {high}"));
             let interval = match parameter.value.std_scaled {
                 Some(_) if parameter.value.std.is_some() => format!(
-                    "{interval}, from the readings alone; standard deviation scaled by the misfit {}",
+                    "{interval}, from the readings alone; standard deviation scaled by the misfit {}{limits}",
                     parameter.written_scaled()
                 ),
                 Some(_) => format!(
-                    " (standard deviation from the misfit {})",
+                    " (standard deviation from the misfit {}{limits})",
                     parameter.written_scaled()
                 ),
                 None => interval,

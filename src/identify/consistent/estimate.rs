@@ -4,7 +4,7 @@ use super::covariance::Covariance;
 use super::estimator::ConsistentEstimator;
 use super::goodness::Goodness;
 use super::identifiability::identifiability;
-use super::intervals::{End, ONE_SIDED_95, Profile, TWO_SIDED_95};
+use super::intervals::{End, Profile, RISE_95};
 use super::layout::JointedStructure;
 use super::least_squares::{LOG_STIFFNESS, Minimum};
 use super::model::{Parameter, Point, beam_at, log_nondimensional};
@@ -16,7 +16,7 @@ use super::result::{
 use super::settings::{ConsistentSettings, Intervals, ResidualWeights};
 use crate::identify::estimate::NORMAL_95;
 use crate::identify::{IdentifyError, MeasuredMode};
-use crate::stats::root_mean_square;
+use crate::stats::{root_mean_square, student};
 
 /// Estimates a joint from the frequencies of these modes.
 ///
@@ -173,6 +173,7 @@ impl Finished<'_> {
             std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
             low: None,
             high: None,
+            scaled: unit.and_then(|unit| self.scaled_interval(quantity, &gradient, unit)),
             at_least: None,
             at_most: None,
             limit: limit_of(quantity, point),
@@ -183,16 +184,35 @@ impl Finished<'_> {
         result
     }
 
+    /// The 95 % interval with the misfit for uncertainty: of the coordinate to first order, by
+    /// Student's distribution, because so few frequencies know the misfit only roughly.
+    fn scaled_interval(
+        &self,
+        quantity: Quantity,
+        gradient: &Point,
+        unit: f64,
+    ) -> Option<(f64, f64)> {
+        let freedom = self.goodness.degrees_of_freedom;
+        let half = student::quantile(0.05, freedom as f64) * unit * self.scale()?;
+        let now = self.coordinate(gradient);
+        let back = |coordinate: f64| self.quantity_at(quantity, gradient, coordinate);
+        Some((back(now - half), back(now + half)))
+    }
+
+    fn quantity_at(&self, quantity: Quantity, gradient: &Point, coordinate: f64) -> f64 {
+        match quantity {
+            Quantity::Coupling => coordinate.tanh(),
+            _ => self.value_at(quantity, gradient, coordinate),
+        }
+    }
+
     fn add_interval(
         &self,
         result: &mut EstimatedQuantity,
         (gradient, unit): (&Point, Option<f64>),
     ) {
         let quantity = result.quantity;
-        let back = |coordinate: f64| match quantity {
-            Quantity::Coupling => coordinate.tanh(),
-            _ => self.value_at(quantity, gradient, coordinate),
-        };
+        let back = |coordinate: f64| self.quantity_at(quantity, gradient, coordinate);
         match self.estimator.settings.intervals {
             Intervals::Linear => {
                 let now = self.coordinate(gradient);
@@ -206,15 +226,11 @@ impl Finished<'_> {
                     directions: self.directions,
                     covariance: self.covariance,
                 };
-                let end = |end: End, rise: f64| profile.end(quantity, end, rise).map(back);
-                result.low = end(End::Low, TWO_SIDED_95);
-                result.high = end(End::High, TWO_SIDED_95);
-                if result.high.is_none() {
-                    result.at_least = end(End::Low, ONE_SIDED_95);
-                }
-                if result.low.is_none() {
-                    result.at_most = end(End::High, ONE_SIDED_95);
-                }
+                let end = |end: End| profile.end(quantity, end, RISE_95).map(back);
+                (result.low, result.high) = (end(End::Low), end(End::High));
+                // Where one end is missing the other is all that is said.
+                result.at_least = result.low.filter(|_| result.high.is_none());
+                result.at_most = result.high.filter(|_| result.low.is_none());
             }
         }
     }
@@ -262,6 +278,7 @@ impl Finished<'_> {
             std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
             low: end(-1.0),
             high: end(1.0),
+            scaled: None,
             at_least: None,
             at_most: None,
             limit: coupling.limit,

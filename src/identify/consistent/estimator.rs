@@ -10,6 +10,7 @@ use super::quantities::Quantity;
 use super::result::Limit;
 use super::settings::{ConsistentSettings, ResidualWeights};
 use crate::identify::{IdentifyError, MeasuredMode, Stiffnesses};
+use crate::structure::interface::LAST_STEP;
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, Beam, JointStiffness};
 
@@ -143,6 +144,7 @@ impl ConsistentEstimator {
             data: self.modes.iter().zip(frequencies).map(datum).collect(),
             priors: self.priors(),
             loss: self.settings.loss,
+            last_step: LAST_STEP,
         }
     }
 

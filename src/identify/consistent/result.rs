@@ -35,7 +35,10 @@ pub struct EstimatedQuantity {
     pub low: Option<f64>,
     /// Upper end of the 95 % interval; `None` = unknown or unbounded.
     pub high: Option<f64>,
-    /// Where the interval has no upper end: "at least", with 95 % confidence on that side.
+    /// The 95 % interval with the misfit for uncertainty, where `std_scaled` exists; not of Kz and Ktr,
+    /// which have it by way of the coupling.
+    pub scaled: Option<(f64, f64)>,
+    /// Where the interval has no upper end: "at least", which is its lower end.
     pub at_least: Option<f64>,
     /// Where the interval has no lower end: "at most", likewise.
     pub at_most: Option<f64>,

@@ -130,7 +130,7 @@ fn inner(values: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 fn axis(values: Vec<f64>, pixels: (f64, f64)) -> Axis {
-    let range = extent(values.into_iter()).unwrap_or((0.0, 1.0));
+    let range = extent(values).unwrap_or((0.0, 1.0));
     if range.0 > 0.0 && range.1 / range.0 > WIDE {
         Axis::logarithmic((range.0 / 1.3, range.1 * 1.3), pixels)
     } else {

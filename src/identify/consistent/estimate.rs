@@ -8,11 +8,9 @@ use super::intervals::{End, Profile, RISE_95};
 use super::layout::JointedStructure;
 use super::least_squares::{LOG_STIFFNESS, Minimum};
 use super::model::{Parameter, Point, beam_at, log_nondimensional};
-use super::problem::{Problem, along};
+use super::problem::Problem;
 use super::quantities::{Quantity, joint_at};
-use super::result::{
-    ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, Limit, OtherMinimum,
-};
+use super::result::{ConsistentEstimate, EstimatedQuantity, FittedMode, Limit, OtherMinimum};
 use super::settings::{ConsistentSettings, Intervals, ResidualWeights};
 use crate::identify::estimate::NORMAL_95;
 use crate::identify::{IdentifyError, MeasuredMode};
@@ -122,12 +120,12 @@ impl Finished<'_> {
             .collect()
     }
 
-    fn measured(&self) -> bool {
+    pub(super) fn measured(&self) -> bool {
         self.estimator.settings.weights == ResidualWeights::Measured
     }
 
     /// Factor from the covariance's unit to standard uncertainties scaled by the misfit.
-    fn scale(&self) -> Option<f64> {
+    pub(super) fn scale(&self) -> Option<f64> {
         if self.measured() {
             self.goodness.uncertainty_factor()
         } else {
@@ -283,67 +281,6 @@ impl Finished<'_> {
             at_most: None,
             limit: coupling.limit,
         }
-    }
-
-    /// Factor from the covariance's unit to a variance: the misfit's where no uncertainty is stated.
-    fn variance_unit(&self) -> Option<f64> {
-        if self.measured() {
-            Some(1.0)
-        } else {
-            Some(self.scale()?.powi(2))
-        }
-    }
-
-    /// Of ln Kx and ln Ky, where both are estimated and neither is at its limit.
-    fn stiffness_covariance(&self) -> Option<[[f64; 2]; 2]> {
-        let both = [Quantity::Kx, Quantity::Ky];
-        let fit = &self.estimator.settings.fit;
-        let point = &self.best.at.point;
-        let open = |quantity: &Quantity| {
-            fit.contains(&quantity.lead())
-                && limit_of(*quantity, point).is_none()
-                && self.covariance.std(&quantity.gradient()).is_some()
-        };
-        if !both.iter().all(open) {
-            return None;
-        }
-        let factor = self.variance_unit()?;
-        let entry = |first: Quantity, second: Quantity| {
-            let between = self
-                .covariance
-                .between(&first.gradient(), &second.gradient());
-            factor * between
-        };
-        Some(both.map(|first| both.map(|second| entry(first, second))))
-    }
-
-    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
-        let factor = self.variance_unit()?;
-        let fit = &self.estimator.settings.fit;
-        let row = |first: &Parameter| {
-            let entry = |second: &Parameter| {
-                factor * self.covariance.between(&along(*first), &along(*second))
-            };
-            fit.iter().map(entry).collect()
-        };
-        Some(fit.iter().map(row).collect())
-    }
-
-    fn correlations(&self) -> Vec<Correlation> {
-        let fit = &self.estimator.settings.fit;
-        let mut found = Vec::new();
-        for (index, &first) in fit.iter().enumerate() {
-            for &second in &fit[index + 1..] {
-                let (a, b) = (along(first), along(second));
-                let size = self.covariance.between(&a, &a) * self.covariance.between(&b, &b);
-                found.push(Correlation {
-                    first,
-                    second,
-                    value: (self.covariance.between(&a, &b) / size.sqrt()).clamp(-1.0, 1.0),
-                });
-            }
-        }
-        found
     }
 
     fn modes(&self) -> Vec<FittedMode> {

@@ -27,6 +27,7 @@ pub mod quantities;
 pub mod result;
 pub mod settings;
 
+mod correlations;
 mod covariance;
 mod starts;
 mod valleys;

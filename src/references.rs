@@ -16,6 +16,8 @@
 //! - **Bathe**: "Finite Element Procedures", 11.6. Subspace iteration.
 //! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
 //!   the beam element with shear and rotary inertia.
+//! - **Feldman & Cousins 1998**: "Unified approach to the classical statistical analysis of small
+//!   signals", Physical Review D 57, 3873-3889. Why the data must not choose between two ends and one.
 //! - **Golub & Pereyra 1973**, SIAM Journal on Numerical Analysis 10, 413-432, and **Kaufman 1975**, BIT
 //!   15, 49-57. Variable projection: least squares whose linear unknowns are eliminated.
 //! - **Hausman 1978**: "Specification tests in econometrics", Econometrica 46, 1251-1271. Whether a smaller

@@ -23,6 +23,7 @@ mod measure;
 mod model;
 mod modes;
 mod neglect;
+mod perturbation;
 mod quiet;
 mod recordings;
 mod stage;

@@ -9,6 +9,7 @@ mod description;
 mod errors;
 mod identify;
 mod identify_consistent;
+mod identify_perturbation;
 mod layers;
 mod modal;
 mod modal_fit;

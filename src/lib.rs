@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   measurement                                   theory
-//!   recording -> taps -> spectral -> modal        structure (beam, joint, finite elements)
+//!   recording -> taps -> spectral -> modal        structure (beam, joint, finite elements), effects
 //!                                      \            /
 //!                                       identify  (pairs regression, perturbation)
 //!                                          |
@@ -28,6 +28,8 @@ pub mod taps;
 
 pub mod identify;
 pub mod structure;
+
+pub mod effects;
 
 pub mod pipeline;
 pub mod report;

@@ -3,7 +3,7 @@
 //! (Przemieniecki, "Theory of Matrix Structural Analysis", 5.6 and 11.5).
 
 /// One beam element, in the model's units.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Element {
     pub(super) length: f64,
     pub(super) bending_stiffness: f64,

@@ -11,6 +11,7 @@
 //! Beam, JointStiffness -> natural_lambdas / natural_frequencies -> mode_shapes
 //!                          (closed form, counted so that no root is missed)
 //! finite_elements          the same structures by an independent route
+//! specimen                 the structure with everything fastened to it -> modes
 //! interface                either of both seen from the joint, with exact derivatives
 //! ```
 //!
@@ -25,6 +26,7 @@ pub mod joint;
 pub mod mode_shape;
 pub mod receptance;
 pub mod roots;
+pub mod specimen;
 pub mod timoshenko;
 
 mod banded;
@@ -99,6 +101,16 @@ pub enum StructureError {
         count: usize,
         /// How many are allowed.
         limit: usize,
+    },
+    /// A part of a specimen that cannot exist.
+    #[error("{quantity} is {value}: {remedy}")]
+    Unphysical {
+        /// Which quantity.
+        quantity: &'static str,
+        /// The value given (SI).
+        value: f64,
+        /// What it has to be.
+        remedy: &'static str,
     },
     /// A finite-element model that cannot be solved.
     #[error("the finite-element model cannot be solved: {reason}")]

@@ -22,10 +22,18 @@ const TABLE: &[(&str, &[&str])] = &[
         &["recording", "taps", "spectral", "modal", "stats"],
     ),
     ("structure", &["quantity"]),
+    ("effects", &["structure", "quantity", "stats"]),
     ("identify", &["modal", "stats", "structure"]),
     (
         "simulate",
-        &["quantity", "description", "recording", "structure", "stats"],
+        &[
+            "quantity",
+            "description",
+            "recording",
+            "structure",
+            "effects",
+            "stats",
+        ],
     ),
     (
         "pipeline",

@@ -32,10 +32,10 @@ pub struct FiniteElementModel {
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Units {
-    length: f64,
-    mass: f64,
-    omega: f64,
+pub(super) struct Units {
+    pub(super) length: f64,
+    pub(super) mass: f64,
+    pub(super) omega: f64,
 }
 
 /// A joint between equations, each with its row in the joint's matrix and the sign of its motion.
@@ -47,12 +47,12 @@ struct JointElement {
 
 /// A run of equal elements.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
+pub(super) struct Piece {
     /// Where it starts, and its number of elements.
     start: f64,
     elements: usize,
     first_node: usize,
-    element: Element,
+    pub(super) element: Element,
 }
 
 impl FiniteElementModel {
@@ -273,7 +273,12 @@ impl FiniteElementModel {
 }
 
 impl Units {
-    fn of(beam: &Beam, length: f64) -> Self {
+    /// Unit of stiffness, that of mass times that of omega squared: E I/L^3 (N/m).
+    pub(super) fn stiffness(&self) -> f64 {
+        self.mass * self.omega * self.omega
+    }
+
+    pub(super) fn of(beam: &Beam, length: f64) -> Self {
         let (stiffness, density) = (beam.bending_stiffness(), beam.mass_per_length());
         Self {
             length,
@@ -285,7 +290,7 @@ impl Units {
 
 impl Piece {
     /// `elements` elements of a beam, from (place, node) on.
-    fn new(
+    pub(super) fn new(
         theory: BeamTheory,
         beam: &Beam,
         units: &Units,

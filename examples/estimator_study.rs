@@ -232,7 +232,18 @@ fn percent(part: usize, whole: usize) -> String {
     format!("{:.1}", 100.0 * part as f64 / whole as f64)
 }
 
-fn noisy_study(model: PairsModel, noise: f64, cases: usize) {
+/// Wilson's 95 % interval of a share (%).
+fn wilson(part: usize, whole: usize) -> (f64, f64) {
+    let (n, z) = (whole as f64, 1.959_964f64);
+    let share = part as f64 / n;
+    let middle = (share + z * z / (2.0 * n)) / (1.0 + z * z / n);
+    let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt() / (1.0 + z * z / n);
+    (100.0 * (middle - half), 100.0 * (middle + half))
+}
+
+/// Prints a cell; returns how many one-sided statements were right, and how many there were.
+fn noisy_study(model: PairsModel, noise: f64, cases: usize) -> (usize, usize) {
+    let mut statements = (0, 0);
     let rows: Vec<[Option<Sample>; 3]> = (0..cases)
         .into_par_iter()
         .filter_map(|index| noisy_case(model, noise, index))
@@ -251,6 +262,8 @@ fn noisy_study(model: PairsModel, noise: f64, cases: usize) {
         let both = || region().filter(|sample| sample.pairs_error.is_some());
         let pairs = |sample: &Sample| sample.pairs_error.unwrap_or(f64::NAN);
         let one_sided: Vec<bool> = all.iter().filter_map(|sample| sample.one_sided).collect();
+        statements.0 += one_sided.iter().filter(|right| **right).count();
+        statements.1 += one_sided.len();
         println!(
             "{model:>15} {:>6.2} {name:>9} {count:>6} {bias:>+7.3} {:>6} {:>6} {:>5} {:>6} {:>10.2e} {:>10.2e} {:>8.1} {:>8.1}",
             100.0 * noise,
@@ -271,6 +284,7 @@ fn noisy_study(model: PairsModel, noise: f64, cases: usize) {
             model = format!("{model:?}"),
         );
     }
+    statements
 }
 
 fn main() {
@@ -297,9 +311,18 @@ fn main() {
         "rms x",
         "median x"
     );
-    for model in [PairsModel::TwoParameter, PairsModel::ThreeParameter] {
-        for noise in NOISE {
-            noisy_study(model, noise, cases);
-        }
+    let mut one_sided = Vec::new();
+    for noise in NOISE {
+        let models = [PairsModel::TwoParameter, PairsModel::ThreeParameter];
+        let counts = models.map(|model| noisy_study(model, noise, cases));
+        one_sided.push((noise, counts[0].0 + counts[1].0, counts[0].1 + counts[1].1));
+    }
+    for (noise, right, count) in one_sided {
+        let (low, high) = wilson(right, count);
+        println!(
+            "one-sided statements at {:.2} %: {right} of {count} right, {} % ({low:.1} to {high:.1})",
+            100.0 * noise,
+            percent(right, count)
+        );
     }
 }

@@ -16,6 +16,8 @@
 //! - **Bathe**: "Finite Element Procedures", 11.6. Subspace iteration.
 //! - **Przemieniecki**: "Theory of Matrix Structural Analysis". Stiffness and consistent mass of
 //!   the beam element with shear and rotary inertia.
+//! - **Feldman & Cousins 1998**: "Unified approach to the classical statistical analysis of small
+//!   signals", Physical Review D 57, 3873-3889. Why the data must not choose between two ends and one.
 //! - **Golub & Pereyra 1973**, SIAM Journal on Numerical Analysis 10, 413-432, and **Kaufman 1975**, BIT
 //!   15, 49-57. Variable projection: least squares whose linear unknowns are eliminated.
 //! - **Hausman 1978**: "Specification tests in econometrics", Econometrica 46, 1251-1271. Whether a smaller
@@ -42,3 +44,9 @@
 //!   Transactions on Acoustics, Speech, and Signal Processing 33, 387-392.
 //! - **Golub & Pereyra 1973**: "The differentiation of pseudo-inverses and nonlinear least squares
 //!   problems whose variables separate", SIAM Journal on Numerical Analysis 10, 413-432.
+//! - **Lee & Schultz 2004**: "Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by
+//!   the pseudospectral method", Journal of Sound and Vibration 269, 609-621. Frequencies of thick beams.
+//! - **Iwan 1966**: "A distributed-element model for hysteresis and its steady-state dynamic response",
+//!   Journal of Applied Mechanics 33, 893-900. Sliders in parallel.
+//! - **Masing 1926**: "Eigenspannungen und Verfestigung beim Messing", Proceedings of the 2nd International
+//!   Congress of Applied Mechanics, 332-335. Branches of a hysteresis loop from the first loading.

@@ -1,5 +1,7 @@
 //! Small statistics that several stages share; knows nothing of taps or beams.
 
+pub mod student;
+
 /// Median (the upper one of an even count), in the unit of the values; 0 of nothing. Reorders them.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {

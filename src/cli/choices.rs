@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 use tapjoint::description::{JointKind, ReadingMethod, SensorKind, WindowKind};
-use tapjoint::pipeline::EstimateMethod;
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
 use tapjoint::recording::ResponseForm;
 use tapjoint::spectral::FrfEstimator;
 
@@ -145,6 +145,35 @@ pub(super) enum MethodArgument {
     Consistent,
     /// The multi-linear regression over pairs of modes alone (Euler beam, sensor masses neglected)
     Pairs,
+}
+
+/// Which estimates are perturbed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(super) enum MethodsArgument {
+    /// Both methods, side by side
+    #[default]
+    Both,
+    /// Least squares on the frequencies themselves
+    Consistent,
+    /// The multi-linear regression over pairs of modes alone (Euler beam, sensor masses neglected)
+    Pairs,
+}
+
+impl MethodsArgument {
+    /// The main estimate, and the methods to perturb.
+    pub(super) fn settings(self) -> IdentifySettings {
+        let (consistent, pairs) = (EstimateMethod::Consistent, EstimateMethod::Pairs);
+        let (method, perturbed) = match self {
+            Self::Both => (consistent, vec![pairs, consistent]),
+            Self::Consistent => (consistent, vec![consistent]),
+            Self::Pairs => (pairs, vec![pairs]),
+        };
+        IdentifySettings {
+            method,
+            perturbed,
+            ..IdentifySettings::default()
+        }
+    }
 }
 
 impl MethodArgument {

@@ -11,7 +11,7 @@ use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::MeasuredFrequencies;
 use tapjoint::pipeline::IdentifySettings;
-use tapjoint::report::{document::Document, document_of, render_text};
+use tapjoint::report::{document_of, render_text};
 
 /// Estimate joint stiffness from natural frequencies alone.
 #[derive(Debug, Args)]
@@ -97,15 +97,11 @@ pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
     let analysis = file.analyse(&IdentifySettings {
         method: arguments.method.method(),
+        // The perturbation has a command of its own.
+        perturbed: Vec::new(),
         ..IdentifySettings::default()
     })?;
-    // The perturbation has a command of its own.
-    let document = Document {
-        perturbation: None,
-        perturbation_averages: None,
-        resolution_span: None,
-        ..document_of(&analysis)
-    };
+    let document = document_of(&analysis);
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;
     Ok(outcome(&analysis))

@@ -96,7 +96,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
     line.common.set_threads()?;
     let terminal = Terminal::new(&line.common)?;
     match &line.command {
-        Command::Run(arguments) => run::run(arguments, terminal),
+        Command::Run(arguments) => run::run(arguments, line.common.seed, terminal),
         Command::Init(arguments) => init::run(arguments, terminal),
         Command::Inspect(arguments) => inspect::run(arguments, terminal),
         Command::Spectrum(arguments) => spectrum::run(arguments, terminal),

@@ -2,19 +2,24 @@
 
 use super::Outcome;
 use super::arguments::PercentList;
-use super::choices::MethodArgument;
+use super::choices::MethodsArgument;
 use super::identify::{FrequencyArguments, resolve};
+use super::output::OutputFile;
 use super::terminal::Terminal;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
-use tapjoint::report::{document_of, render_text};
+use tapjoint::pipeline::IdentifySettings;
+use tapjoint::report::{document_of, render_cloud_png, render_perturbation_csv, render_text};
+
+/// Enough for 95 % limits that are good to a tenth of their distance.
+const SAMPLES: usize = 2000;
 
 /// Show how the estimate moves when the frequencies are wrong.
 ///
-/// All frequencies by a percentage up and down, every mode by its own resolution bound (all sign
-/// patterns), and at random (Monte Carlo).
+/// All frequencies by a percentage up and down, every mode by its own resolution bound (alone, and in
+/// all sign patterns), and at random by their standard deviations (Monte Carlo); by the pair regression
+/// and by the consistent estimate, side by side.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint perturb test.toml --percent 0.05,0.1\n  tapjoint perturb test.toml --frequencies 17,118,335.6,628.8 --half-line 0.125 --seed 7"
@@ -28,12 +33,18 @@ pub(super) struct PerturbArguments {
     percent: PercentList,
     #[command(flatten)]
     frequencies: FrequencyArguments,
-    /// How to estimate
-    #[arg(long, value_enum, default_value_t)]
-    method: MethodArgument,
+    /// Whose estimate is perturbed
+    #[arg(long, value_enum, value_name = "M", default_value_t)]
+    method: MethodsArgument,
     /// Monte Carlo samples
-    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = RangedU64ValueParser::<usize>::new().range(10..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = SAMPLES, value_parser = RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
     samples: usize,
+    /// Draw the estimates, Kx against Ky, into this file
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+    /// Write all numbers as comma separated values into this file
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
 }
 
 pub(super) fn run(
@@ -42,20 +53,29 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
+    let prepare = |path: &Option<PathBuf>| path.as_deref().map(OutputFile::prepare).transpose();
+    let (png, csv) = (prepare(&arguments.png)?, prepare(&arguments.csv)?);
     let settings = IdentifySettings {
-        // What is perturbed is the pair regression.
-        method: EstimateMethod::Pairs,
         percents: arguments.percent.0.clone(),
         monte_carlo: Some((arguments.samples, seed)),
-        ..Default::default()
+        ..arguments.method.settings()
     };
     let analysis = file.analyse(&settings)?;
     let document = document_of(&analysis);
+    if let Some(file) = png {
+        match render_cloud_png(&document)? {
+            Some(bytes) => file.write(&bytes)?,
+            None => terminal.warn("there are no estimates of Kx and Ky to draw"),
+        }
+    }
+    if let Some(file) = csv {
+        file.write(render_perturbation_csv(&document)?.as_bytes())?;
+    }
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;
     let perturbed = analysis
         .identification
-        .is_some_and(|found| found.perturbation.is_some());
+        .is_some_and(|found| !found.perturbations.is_empty());
     Ok(if perturbed {
         Outcome::Answered
     } else {

@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::arguments::RecordingArguments;
 use super::bare::{BareSettings, analyse};
-use super::choices::ReadingArgument;
+use super::choices::{MethodsArgument, ReadingArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFolder;
 use super::terminal::Terminal;
@@ -15,7 +15,8 @@ use tapjoint::report::{document_of, figures_of, render_run, render_text};
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
 ///
-/// Writes report.html, report.json, parameters.csv and pictures into a folder.
+/// Writes report.html, report.json, parameters.csv, modes.csv, perturbation.csv and pictures into a
+/// folder.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
@@ -31,9 +32,15 @@ pub(super) struct RunArguments {
     /// How frequencies are read; default: as the description says, else fit
     #[arg(long, value_enum, value_name = "R")]
     reading: Option<ReadingArgument>,
+    /// Whose estimate is perturbed; with `pairs` the regression is the only estimate
+    #[arg(long, value_enum, value_name = "M", default_value_t)]
+    method: MethodsArgument,
     #[command(flatten)]
     recording: RecordingArguments,
 }
+
+/// Monte Carlo samples of the report, as many as its picture shows; `perturb` draws more.
+const SAMPLES: usize = 1000;
 
 /// What is to be run.
 #[derive(Debug)]
@@ -98,10 +105,17 @@ fn report_folder(name: &str) -> String {
     }
 }
 
-pub(super) fn run(arguments: &RunArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
+pub(super) fn run(
+    arguments: &RunArguments,
+    seed: u64,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, &terminal)?;
     let analysis = match &request.subject {
-        Subject::Test(file) => file.analyse(&IdentifySettings::default())?,
+        Subject::Test(file) => file.analyse(&IdentifySettings {
+            monte_carlo: Some((SAMPLES, seed)),
+            ..arguments.method.settings()
+        })?,
         Subject::Recording(path) => {
             let settings = BareSettings {
                 reading: arguments.reading.unwrap_or_default().into(),

@@ -7,7 +7,7 @@ use crate::structure::Beam;
 use crate::structure::joint::StiffnessUnits;
 
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
-const NORMAL_95: f64 = 1.959_964;
+pub(super) const NORMAL_95: f64 = 1.959_964;
 
 /// A measured natural frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]

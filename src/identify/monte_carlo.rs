@@ -18,6 +18,9 @@ pub struct Spread {
     pub high: f64,
 }
 
+/// So many of the estimates are kept one by one: enough for a picture.
+pub const KEPT: usize = 1000;
+
 /// Estimates from randomly disturbed frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MonteCarlo {
@@ -32,6 +35,28 @@ pub struct MonteCarlo {
     /// Kz; of 1/Kz, turned back, so that a Kz near infinity of either sign does no harm; `None`
     /// where the interval of 1/Kz contains 0.
     pub kz: Option<Spread>,
+    /// The first [`KEPT`] estimates.
+    pub cloud: Vec<Stiffnesses>,
+}
+
+impl MonteCarlo {
+    /// From the estimates of `samples` repetitions, those without one left out.
+    pub fn of(samples: usize, found: &[Stiffnesses]) -> Self {
+        let each = |pick: fn(&Stiffnesses) -> f64| spread(found.iter().map(pick));
+        let compliance = spread(found.iter().filter_map(|e| e.kz).map(f64::recip));
+        Self {
+            samples,
+            failed: samples - found.len(),
+            kx: each(|estimate| estimate.kx),
+            ky: each(|estimate| estimate.ky),
+            kz: compliance.filter(|c| c.low * c.high > 0.0).map(|c| Spread {
+                median: 1.0 / c.median,
+                low: 1.0 / c.high,
+                high: 1.0 / c.low,
+            }),
+            cloud: found.iter().take(KEPT).copied().collect(),
+        }
+    }
 }
 
 /// Repeats the estimate `samples` times with independent normal errors of the frequencies (Hz) of
@@ -64,27 +89,12 @@ pub fn monte_carlo(
             .collect();
         found.extend(estimator(&disturbed));
     }
-    let compliance = spread(
-        found
-            .iter()
-            .filter_map(|estimate| estimate.kz)
-            .map(f64::recip),
-    );
-    Ok(MonteCarlo {
-        samples,
-        failed: samples - found.len(),
-        kx: spread(found.iter().map(|estimate| estimate.kx)),
-        ky: spread(found.iter().map(|estimate| estimate.ky)),
-        kz: compliance.filter(|c| c.low * c.high > 0.0).map(|c| Spread {
-            median: 1.0 / c.median,
-            low: 1.0 / c.high,
-            high: 1.0 / c.low,
-        }),
-    })
+    Ok(MonteCarlo::of(samples, &found))
 }
 
-fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
-    let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+/// Median and 95 % interval; an infinite value, a rigid joint, counts as the largest there is.
+pub(super) fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
+    let mut sorted: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len().checked_sub(1)? as f64;
     let at = |share: f64| sorted[(share * last).round() as usize];

@@ -176,16 +176,30 @@ pub struct SignPatternSpans {
     pub failed: usize,
 }
 
-/// Estimates under each of the 2^n combinations of +bound and -bound (Hz), and unperturbed.
+/// Spans of the estimate under each of the 2^n combinations of +bound and -bound (Hz), and
+/// unperturbed.
 ///
 /// # Errors
-/// [`IdentifyError::TooManyPatterns`] beyond [`SIGN_PATTERN_MODES`] modes, and
-/// [`IdentifyError::Bounds`].
+/// As [`sign_pattern_estimates`].
 pub fn sign_pattern_spans(
     frequencies: &[f64],
     bounds: &[f64],
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
 ) -> Result<SignPatternSpans, IdentifyError> {
+    let patterns = sign_pattern_estimates(frequencies, bounds, &estimator)?;
+    Ok(spans_of(estimator(frequencies), &patterns))
+}
+
+/// The estimate under each of the 2^n combinations of +bound and -bound (Hz).
+///
+/// # Errors
+/// [`IdentifyError::TooManyPatterns`] beyond [`SIGN_PATTERN_MODES`] modes, and
+/// [`IdentifyError::Bounds`].
+pub fn sign_pattern_estimates(
+    frequencies: &[f64],
+    bounds: &[f64],
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Result<Vec<Option<Stiffnesses>>, IdentifyError> {
     check_bounds(frequencies, bounds)?;
     if frequencies.len() > SIGN_PATTERN_MODES {
         return Err(IdentifyError::TooManyPatterns {
@@ -193,43 +207,41 @@ pub fn sign_pattern_spans(
             limit: SIGN_PATTERN_MODES,
         });
     }
-    let patterns = 1usize << frequencies.len();
+    Ok(sign_patterns(frequencies, bounds)
+        .map(|shifted| estimator(&shifted))
+        .collect())
+}
+
+/// Smallest and largest values of the unperturbed estimate and those of all patterns.
+pub fn spans_of(
+    nominal: Option<Stiffnesses>,
+    patterns: &[Option<Stiffnesses>],
+) -> SignPatternSpans {
     let mut spans = SignPatternSpans {
         kx: None,
         ky: None,
         kz: None,
-        patterns,
-        failed: 0,
+        patterns: patterns.len(),
+        failed: patterns.iter().filter(|found| found.is_none()).count(),
     };
     let mut kz_signs = [false, false];
-    let mut take = |estimate: &Stiffnesses| {
+    for estimate in patterns.iter().flatten().chain(&nominal) {
         widen(&mut spans.kx, estimate.kx);
         widen(&mut spans.ky, estimate.ky);
         if let Some(kz) = estimate.kz {
             widen(&mut spans.kz, kz);
             kz_signs[usize::from(kz < 0.0)] = true;
         }
-    };
-    if let Some(nominal) = estimator(frequencies) {
-        take(&nominal);
     }
-    let mut failed = 0;
-    for shifted in sign_patterns(frequencies, bounds) {
-        match estimator(&shifted) {
-            Some(estimate) => take(&estimate),
-            None => failed += 1,
-        }
-    }
-    spans.failed = failed;
     if kz_signs == [true, true] {
         spans.kz = None;
     }
-    Ok(spans)
+    spans
 }
 
-/// The frequencies (Hz) under each of the 2^n combinations of +bound and -bound (Hz), for at most as
-/// many modes as a machine word has bits.
-pub fn sign_patterns<'a>(
+/// The frequencies (Hz) under each of the combinations, for at most as many modes as a machine word
+/// has bits.
+fn sign_patterns<'a>(
     frequencies: &'a [f64],
     bounds: &'a [f64],
 ) -> impl Iterator<Item = Vec<f64>> + 'a {

@@ -142,8 +142,8 @@ pub struct Identification {
     pub reason: Option<String>,
     /// Predicted beside measured frequencies; empty where no joint can be predicted with.
     pub prediction: Vec<PredictedMode>,
-    /// How errors in the frequencies move the estimate.
-    pub perturbation: Option<Perturbation>,
+    /// How errors in the frequencies move the estimate, by each method that has one.
+    pub perturbations: Vec<Perturbation>,
 }
 
 /// An estimate in closed form.
@@ -158,6 +158,8 @@ pub enum Estimate {
 /// How errors in the frequencies move the joint's estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Perturbation {
+    /// By which method it was estimated.
+    pub method: super::EstimateMethod,
     /// All frequencies up and down by a percentage.
     pub uniform: Vec<UniformPerturbation>,
     /// Average errors of the percentages as Ingole & Chatterjee state them.

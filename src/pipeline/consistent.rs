@@ -5,8 +5,8 @@ use crate::description::{
     FitParameter, RightHalf, SensorDescription, SensorKind, TestDescription, Weights,
 };
 use crate::identify::consistent::{
-    BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
-    HeldJoint, JointedStructure, LapLayout, Parameter, ResidualWeights, estimate_consistently,
+    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
+    JointedStructure, LapLayout, Parameter, ResidualWeights,
 };
 use crate::identify::predict::compare;
 use crate::identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
@@ -162,16 +162,16 @@ fn settings(
     }
 }
 
-/// Estimates by least squares on the frequencies of these modes.
-pub(super) fn estimate(
+/// The estimator by least squares on the frequencies of these modes.
+pub(super) fn estimator(
     structure: &TestedStructure,
     details: &StructureDetails,
     used: &[MeasuredMode],
-) -> Result<ConsistentEstimate, IdentifyError> {
+) -> Result<ConsistentEstimator, IdentifyError> {
     let jointed = jointed(structure, details);
     let mut settings = settings(structure, details, used);
     hold_cross_stiffness(structure, &jointed, used, &mut settings)?;
-    estimate_consistently(&jointed, used, &settings)
+    ConsistentEstimator::new(&jointed, used, &settings)
 }
 
 /// A known Ktr beside a fitted Kt or Kr: the estimator holds couplings, sqrt(Kt Kr)/Ktr, so that

@@ -140,12 +140,12 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
         Quantity::Kx | Quantity::Ky | Quantity::Modulus | Quantity::Density
     );
     let value = quantity.value.filter(|value| told && *value != 0.0)?;
-    let (std, scaled) = quantity.std.zip(quantity.std_scaled)?;
+    let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
     Some(format!(
         "95 % interval of {} from the readings alone +-{} %, scaled by the misfit +-{} %",
         quantity.quantity.name(),
         Rounded(PERCENT_95 * std / value.abs()),
-        Rounded(PERCENT_95 * scaled / value.abs())
+        Rounded(50.0 * (high - low) / value.abs())
     ))
 }
 

@@ -1,19 +1,14 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
-use super::analysis::{BoundPerturbation, Estimate, Identification, ModeResult, Perturbation};
+use super::analysis::{Estimate, Identification, ModeResult};
 use super::consistent::{self, StructureDetails};
 use super::doubts;
 use super::model::TestedStructure;
+use super::perturbation::perturbations;
 use super::warning::Warning;
-use crate::identify::consistent::ConsistentEstimate;
-use crate::identify::consistent::goodness;
-use crate::identify::perturbation::{
-    SIGN_PATTERN_MODES, average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_spans,
-    sign_patterns,
-};
+use crate::identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodness};
 use crate::identify::{
-    Doubt, IdentifyError, MeasuredMode, PairsModel, PredictedMode, estimate_joint,
-    estimate_modulus, monte_carlo, pairs_estimator, predict,
+    Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
 };
 use crate::structure::{Beam, JointStiffness};
 
@@ -37,6 +32,8 @@ pub struct IdentifySettings {
     pub details: StructureDetails,
     /// The first so many modes enter; `None` = all.
     pub fit_modes: Option<usize>,
+    /// Methods whose estimate is perturbed: both, so that they can be compared.
+    pub perturbed: Vec<EstimateMethod>,
     /// Changes of all frequencies for the perturbation (%).
     pub percents: Vec<f64>,
     /// Repetitions of the Monte Carlo and its seed; `None` = not wanted.
@@ -49,6 +46,7 @@ impl Default for IdentifySettings {
             method: EstimateMethod::Consistent,
             details: StructureDetails::default(),
             fit_modes: None,
+            perturbed: vec![EstimateMethod::Pairs, EstimateMethod::Consistent],
             percents: crate::identify::perturbation::PAPER_PERCENTS.to_vec(),
             monte_carlo: None,
         }
@@ -74,10 +72,9 @@ pub fn identify(
     let mut warnings = Vec::new();
     let (consistent, refused) = match settings.method {
         EstimateMethod::Pairs => (None, None),
-        EstimateMethod::Consistent => {
-            split(consistent::estimate(structure, &settings.details, &used))
-        }
+        EstimateMethod::Consistent => split(consistently(structure, &settings.details, &used)),
     };
+    let (estimator, consistent) = consistent.unzip();
     let consistent = consistent.map(Box::new);
     let (estimate, missing) = split(estimate(structure, &used));
     if let Some(reason) = refused.as_ref().filter(|_| estimate.is_some()) {
@@ -105,9 +102,7 @@ pub fn identify(
         }
     };
     warnings.extend(misfit(&prediction, &measured));
-    let perturbation = structure
-        .regression
-        .and_then(|model| perturbation(model, &structure.beam, modes, (&used, settings)));
+    let perturbations = perturbations(structure, estimator.as_ref(), (modes, &used), settings);
     (
         Identification {
             reason: match (&consistent, &estimate) {
@@ -118,7 +113,7 @@ pub fn identify(
             consistent,
             estimate,
             prediction,
-            perturbation,
+            perturbations,
         },
         warnings,
     )
@@ -136,6 +131,16 @@ fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
             })
         })
         .collect()
+}
+
+fn consistently(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+) -> Result<(ConsistentEstimator, ConsistentEstimate), IdentifyError> {
+    let estimator = consistent::estimator(structure, details, used)?;
+    let estimate = estimator.estimate()?;
+    Ok((estimator, estimate))
 }
 
 fn estimate(structure: &TestedStructure, used: &[MeasuredMode]) -> Result<Estimate, IdentifyError> {
@@ -218,54 +223,6 @@ fn misfit(prediction: &[PredictedMode], measured: &[MeasuredMode]) -> Option<War
             error_percent,
             deviations,
         })
-}
-
-fn perturbation(
-    model: PairsModel,
-    beam: &Beam,
-    modes: &[ModeResult],
-    (used, settings): (&[MeasuredMode], &IdentifySettings),
-) -> Option<Perturbation> {
-    let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
-    let frequencies: Vec<f64> = used.iter().map(|mode| mode.frequency).collect();
-    let estimator = pairs_estimator(model, beam, &numbers).ok()?;
-    let nominal = estimator(&frequencies)?;
-    let uniform = perturb_uniformly(&frequencies, &settings.percents, &estimator);
-    let bounds: Option<Vec<f64>> = numbers
-        .iter()
-        .map(|number| {
-            modes
-                .iter()
-                .find(|mode| mode.mode == Some(*number))?
-                .half_line
-        })
-        .collect();
-    let bounds = bounds.map(|bounds| BoundPerturbation {
-        spans: sign_pattern_spans(&frequencies, &bounds, &estimator).ok(),
-        cloud: if numbers.len() <= SIGN_PATTERN_MODES {
-            sign_patterns(&frequencies, &bounds)
-                .filter_map(|f| estimator(&f))
-                .collect()
-        } else {
-            Vec::new()
-        },
-        sensitivities: mode_sensitivities(&frequencies, &bounds, &estimator).unwrap_or_default(),
-        modes: numbers.clone(),
-        bounds,
-    });
-    let stds: Option<Vec<f64>> = used.iter().map(|mode| mode.std).collect();
-    let random = settings
-        .monte_carlo
-        .zip(stds)
-        .and_then(|(repetitions, stds)| {
-            monte_carlo(&frequencies, &stds, repetitions, &estimator).ok()
-        });
-    Some(Perturbation {
-        averages: average_errors(&nominal, &uniform),
-        uniform,
-        bounds,
-        random,
-    })
 }
 
 fn of_doubt(doubt: &Doubt) -> Warning {

@@ -26,6 +26,7 @@ mod modes;
 mod neglect;
 mod numbering;
 mod observations;
+mod perturbation;
 mod quiet;
 mod recordings;
 mod stage;

@@ -1,10 +1,8 @@
 //! From a finished analysis to the document and the data of the pictures.
 
-use super::convert_estimate::{
-    average_section, estimate_section, monte_carlo_section, perturbation_section,
-    prediction_section, span_section,
-};
+use super::convert_estimate::{estimate_section, prediction_section};
 use super::convert_fit::fit_section;
+use super::convert_perturbation::with_perturbations;
 use super::convert_quality::verdict_section;
 use super::document::{
     ChannelSection, Document, ModeSection, PredictionSection, RecordingSection, TapSection,
@@ -23,9 +21,8 @@ use crate::structure::{Assembly, BeamTheory, NaturalMode};
 /// The document of a whole analysis.
 pub fn document(analysis: &Analysis) -> Document {
     let identification = analysis.identification.as_ref();
-    let perturbation = identification.and_then(|found| found.perturbation.as_ref());
     let given = analysis.recordings.is_empty();
-    Document {
+    let document = Document {
         version: VERSION,
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
         recordings: (!given).then(|| analysis.recordings.iter().map(recording_section).collect()),
@@ -36,26 +33,19 @@ pub fn document(analysis: &Analysis) -> Document {
                 .map(|mode| mode_section(mode, &analysis.recordings))
                 .collect(),
         ),
-        frfs: None,
-        datasets: None,
         estimate: identification.map(estimate_section),
         estimate_reason: identification.and_then(|found| found.reason.clone()),
         prediction: identification
             .map(|found| found.prediction.iter().map(prediction_section).collect()),
-        perturbation: perturbation
-            .map(|found| found.uniform.iter().map(perturbation_section).collect()),
-        perturbation_averages: perturbation
-            .map(|found| found.averages.iter().map(average_section).collect()),
-        monte_carlo: perturbation
-            .and_then(|found| found.random.as_ref())
-            .map(monte_carlo_section),
-        resolution_span: perturbation
-            .and_then(|found| found.bounds.as_ref())
-            .map(span_section),
         gap: None,
         quality: (!analysis.verdicts.is_empty())
             .then(|| analysis.verdicts.iter().map(verdict_section).collect()),
         warnings: analysis.warnings.iter().map(warning_section).collect(),
+        ..Document::default()
+    };
+    match identification {
+        Some(found) => with_perturbations(document, &found.perturbations),
+        None => document,
     }
 }
 

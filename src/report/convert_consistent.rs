@@ -40,6 +40,7 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
                 value: correlation.value,
             })
             .collect(),
+        log_covariance: found.stiffness_covariance,
         goodness_of_fit: goodness.probability,
         misfit: Some(MisfitSection {
             chi_squared: goodness.chi_squared,
@@ -64,12 +65,15 @@ fn value_section(quantity: &EstimatedQuantity) -> Option<ValueSection> {
         return None;
     }
     let rigid = rigid && spring;
+    let scaled = quantity.scaled.filter(|_| !rigid);
     Some(ValueSection {
         value: quantity.value.filter(|_| !rigid).unwrap_or(f64::INFINITY),
         std: quantity.std.filter(|_| !rigid),
         low: quantity.low,
         high: quantity.high,
         std_scaled: quantity.std_scaled.filter(|_| !rigid),
+        low_scaled: scaled.map(|scaled| scaled.0),
+        high_scaled: scaled.map(|scaled| scaled.1),
         at_least: quantity.at_least,
         at_most: quantity.at_most,
     })

@@ -143,7 +143,7 @@ fn mode_row(mode: &ModeSection) -> Vec<String> {
 }
 
 /// The shortest digits that give the same number back; empty where there is none.
-fn number(value: Option<f64>) -> String {
+pub(super) fn number(value: Option<f64>) -> String {
     value
         .filter(|value| value.is_finite())
         .map(|value| value.to_string())

@@ -21,8 +21,11 @@ pub use super::document_gap::{
     HypothesisSection, JointShiftSection, NextTestSection, ParameterSection, PlaceMapSection,
     PullSection,
 };
+pub use super::document_perturbation::{
+    AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,
+    SensitivitySection,
+};
 pub use super::document_quality::VerdictSection;
-pub use super::document_resolution::{ResolutionSpanSection, SensitivitySection};
 
 /// Version of the document's layout.
 pub const VERSION: u32 = 1;
@@ -56,19 +59,19 @@ pub struct Document {
     /// Measured beside predicted frequencies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prediction: Option<Vec<PredictionSection>>,
-    /// Estimates under changed frequencies.
+    /// Estimates under changed frequencies, by every method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbation: Option<Vec<PerturbationSection>>,
     /// Average errors of the estimates under changed frequencies, as Ingole & Chatterjee state them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbation_averages: Option<Vec<AverageSection>>,
-    /// Estimates under random errors of the frequencies.
+    /// Estimates under random errors of the frequencies, one entry for each method.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub monte_carlo: Option<MonteCarloSection>,
+    pub monte_carlo: Option<Vec<MonteCarloSection>>,
     /// Spans of the estimates over all sign patterns of the half-line bounds, and what each mode
-    /// contributes.
+    /// contributes, one entry for each method.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub resolution_span: Option<ResolutionSpanSection>,
+    pub resolution_span: Option<Vec<ResolutionSpanSection>>,
     /// The gap between model and measurement: where, which effect, how far it closes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<GapSection>,
@@ -229,6 +232,10 @@ pub struct ValueSection {
     /// Standard deviation scaled by the misfit: where the model misses the frequencies by more than
     /// their uncertainties, and where none are stated.
     pub std_scaled: Option<f64>,
+    /// Lower 95 % limit by the scaled standard deviation and Student's distribution.
+    pub low_scaled: Option<f64>,
+    /// Upper 95 % limit likewise.
+    pub high_scaled: Option<f64>,
     /// Where there is no upper limit: at least this much, with 95 % confidence.
     pub at_least: Option<f64>,
     /// Where there is no lower limit: at most this much, likewise.
@@ -262,6 +269,9 @@ pub struct EstimateSection {
     pub modulus: Option<ValueSection>,
     /// Density (kg/m3).
     pub density: Option<ValueSection>,
+    /// Covariance of ln Kx and ln Ky, of a consistent estimate with both; scaled by the misfit where no
+    /// uncertainty is stated.
+    pub log_covariance: Option<[[f64; 2]; 2]>,
     /// Correlations between the parameters.
     pub correlations: Vec<CorrelationSection>,
     /// Probability of a larger misfit if the model is right; null where nothing is left to test with.
@@ -328,57 +338,6 @@ pub struct PredictionSection {
     pub error_percent: Option<f64>,
     /// Whether the mode entered the estimate.
     pub used: bool,
-}
-
-/// An estimate from frequencies changed by the same percentage.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct PerturbationSection {
-    /// Change of all frequencies (%), signed.
-    pub percent: f64,
-    /// "pairs".
-    pub method: String,
-    /// Kx.
-    pub kx: Option<f64>,
-    /// Ky.
-    pub ky: Option<f64>,
-    /// Kz.
-    pub kz: Option<f64>,
-}
-
-/// Average errors of +percent and -percent: the mean of their magnitudes, as in table 9 of Ingole &
-/// Chatterjee, and the error of their mean, as in table 14.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct AverageSection {
-    /// Change of all frequencies (%), its size.
-    pub percent: f64,
-    /// Of Kx (%).
-    pub kx_percent: f64,
-    /// Of Ky (%).
-    pub ky_percent: f64,
-    /// Of Kz (%).
-    pub kz_percent: Option<f64>,
-    /// Magnitude of the error of the two estimates' mean (%), as in table 14: smaller, because
-    /// opposite errors cancel. Of Kx.
-    pub kx_of_mean_percent: f64,
-    /// The same of Ky (%).
-    pub ky_of_mean_percent: f64,
-    /// The same of Kz (%).
-    pub kz_of_mean_percent: Option<f64>,
-}
-
-/// Estimates under random errors of the frequencies: median and 95 % interval.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct MonteCarloSection {
-    /// Repetitions.
-    pub samples: usize,
-    /// How many of them had no estimate.
-    pub failed: usize,
-    /// Kx.
-    pub kx: Option<ValueSection>,
-    /// Ky.
-    pub ky: Option<ValueSection>,
-    /// Kz.
-    pub kz: Option<ValueSection>,
 }
 
 /// A warning.

@@ -13,7 +13,10 @@ use super::plot::spectrum::draw_spectrum;
 use super::plot::stabilisation::draw_stabilisation;
 use super::plot::time::draw_taps;
 use super::plot::{Drawing, render_png, render_svg};
-use super::{ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv};
+use super::{
+    ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv,
+    render_perturbation_csv,
+};
 
 /// Where a picture stands in the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,8 +35,8 @@ struct Picture {
     drawing: Drawing,
 }
 
-/// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`, and the
-/// pictures that apply: `spectrum-*.png`, `frf-*.png`, `stabilisation-*.png`,
+/// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
+/// `perturbation.csv` where something was perturbed, and the pictures that apply: `spectrum-*.png`, `frf-*.png`, `stabilisation-*.png`,
 /// `amplitude-*.png`, `taps-*.png`, `frequencies.png`, `cloud.png`.
 ///
 /// # Errors
@@ -58,12 +61,15 @@ pub fn render_run(
             Shelf::Cloud => page.cloud.push(inline),
         }
     }
-    let words = [
+    let mut words = vec![
         ("report.html", render_html(document, &page)?),
         ("report.json", render_json(document)?),
         ("parameters.csv", render_parameters_csv(document)?),
         ("modes.csv", render_modes_csv(document)?),
     ];
+    if document.perturbation.is_some() {
+        words.push(("perturbation.csv", render_perturbation_csv(document)?));
+    }
     files.extend(words.into_iter().map(|(name, text)| ReportFile {
         name: name.to_owned(),
         bytes: text.into_bytes(),
@@ -86,6 +92,14 @@ pub fn render_spectrum_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, 
 /// [`ReportError::Picture`] if it cannot be drawn.
 pub fn render_frf_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
     draw_frf(figure).as_ref().map(render_png).transpose()
+}
+
+/// The estimates under changed frequencies as PNG; `None` where there are none.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_cloud_png(document: &Document) -> Result<Option<Vec<u8>>, ReportError> {
+    draw_cloud(document).as_ref().map(render_png).transpose()
 }
 
 fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), ReportError> {

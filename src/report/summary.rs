@@ -192,13 +192,15 @@ fn estimate(document: &Document) -> Option<String> {
                 (None, Some(_)) => format!(" (95 %: below {high})"),
                 (None, None) => String::new(),
             };
+            let limits = parameter.written_scaled_limits();
+            let limits = limits.map_or(String::new(), |[low, high]| format!(", 95 %: {low} to {high}"));
             let interval = match parameter.value.std_scaled {
                 Some(_) if parameter.value.std.is_some() => format!(
-                    "{interval}, from the readings alone; standard deviation scaled by the misfit {}",
+                    "{interval}, from the readings alone; standard deviation scaled by the misfit {}{limits}",
                     parameter.written_scaled()
                 ),
                 Some(_) => format!(
-                    " (standard deviation from the misfit {})",
+                    " (standard deviation from the misfit {}{limits})",
                     parameter.written_scaled()
                 ),
                 None => interval,
@@ -251,7 +253,12 @@ fn misfit(document: &Document) -> Option<String> {
 }
 
 fn resolution(document: &Document) -> Option<String> {
-    let span = document.resolution_span.as_ref()?;
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    let main = estimate.map_or("", |estimate| estimate.method.as_str());
+    let spans = document.resolution_span.as_deref()?;
+    // Of the method that the estimate is by; else of the one that there is.
+    let span = spans.iter().find(|span| span.method == main);
+    let span = span.or(spans.first())?;
     let ranges: Vec<String> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
         .into_iter()
         .filter_map(|(name, range)| {

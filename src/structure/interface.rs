@@ -258,6 +258,10 @@ fn joined(left: &InterfaceFunctions, right: &InterfaceFunctions) -> InterfaceFun
     }
 }
 
+/// Newton converges quadratically: after a relative step of this size the next is beyond the last
+/// digit.
+pub const LAST_STEP: f64 = 1e-9;
+
 /// One natural frequency of a body on a joint, with its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InterfaceRoot {
@@ -271,15 +275,14 @@ pub struct InterfaceRoot {
 
 /// Natural frequency number `mode` (from 1) of a body on a joint, looked for from `guess` (1) on:
 /// Newton's steps on the frequency equation as long as the count of frequencies below agrees with
-/// them, bisection by that count where it does not. No root is missed or taken for another.
+/// them, bisection by that count where it does not. No root is missed or taken for another. A relative
+/// step below `last_step` is the last: [`LAST_STEP`] for all digits.
 pub fn interface_root(
     body: &JointedBody,
     joint: &JointCompliance,
     mode: usize,
-    guess: f64,
+    (guess, last_step): (f64, f64),
 ) -> InterfaceRoot {
-    // Newton converges quadratically: after a step of this size the next is beyond the last digit.
-    const LAST_STEP: f64 = 1e-9;
     // Bisection alone needs 60 steps from the whole range; doubling upwards a few more.
     const STEPS: usize = 200;
     let number = mode + body.uncounted();
@@ -299,7 +302,7 @@ pub fn interface_root(
         let inside = newton > lower && newton < upper;
         // On the root itself rounding decides on which side the count is.
         let step = (newton - lambda).abs();
-        if near && step <= LAST_STEP * lambda {
+        if near && step <= last_step * lambda {
             lambda = newton;
             break;
         }

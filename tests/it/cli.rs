@@ -1042,13 +1042,18 @@ fn regress_perturb_changes_by_what_was_asked() {
         .iter()
         .map(|row| number(&row["percent"]))
         .collect();
-    assert_eq!(percents.len(), 2, "{percents:?}");
+    // By both methods.
+    assert_eq!(percents.len(), 4, "{percents:?}");
     assert!(
         percents.contains(&0.2) && percents.contains(&-0.2),
         "{percents:?}"
     );
     // All sign patterns of four modes.
-    assert_eq!(document["resolution_span"]["patterns"], 16, "{document}");
+    for (index, method) in ["pairs", "consistent"].into_iter().enumerate() {
+        let span = &document["resolution_span"][index];
+        assert_eq!(span["method"], method, "{document}");
+        assert_eq!(span["patterns"], 16, "{document}");
+    }
     assert_eq!(
         document,
         json(folder.path(), &arguments, 0),

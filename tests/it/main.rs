@@ -11,6 +11,7 @@ mod effects;
 mod errors;
 mod identify;
 mod identify_consistent;
+mod identify_perturbation;
 mod layers;
 mod modal;
 mod modal_fit;

@@ -8,8 +8,8 @@ use tapjoint::description::{ChannelRef, TestDescription};
 use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, LapLayout, Quantity};
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
-    Analysis, Estimate, Identification, IdentifySettings, KnownJoint, ModeResult, TestedStructure,
-    identify, measure_bare, modes_of_recordings, run_test,
+    Analysis, Estimate, EstimateMethod, Identification, IdentifySettings, KnownJoint, ModeResult,
+    Perturbation, TestedStructure, identify, measure_bare, modes_of_recordings, run_test,
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
@@ -176,10 +176,12 @@ fn stiffnesses(test: &VirtualTest) -> Stiffnesses {
 }
 
 fn span_holds_the_truth(test: &VirtualTest) -> bool {
+    let of_pairs = |p: &&Perturbation| p.method == EstimateMethod::Pairs;
     let bounds = test
         .found
-        .perturbation
-        .as_ref()
+        .perturbations
+        .iter()
+        .find(of_pairs)
         .unwrap()
         .bounds
         .as_ref()

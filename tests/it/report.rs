@@ -99,7 +99,7 @@ fn broken() -> Document {
         mode.interpolated_bound = Some(0.0);
         mode.std = None;
     }
-    if let Some(span) = &mut document.resolution_span {
+    for span in document.resolution_span.iter_mut().flatten() {
         span.kx = Some([0.0, f64::INFINITY]);
         span.cloud = vec![[f64::NAN, 1.0], [f64::INFINITY, 2.0]];
     }

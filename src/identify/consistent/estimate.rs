@@ -4,21 +4,17 @@ use super::covariance::Covariance;
 use super::estimator::ConsistentEstimator;
 use super::goodness::Goodness;
 use super::identifiability::identifiability;
-use super::intervals::{End, ONE_SIDED_95, Profile, TWO_SIDED_95};
+use super::intervals::{End, Profile, RISE_95};
 use super::layout::JointedStructure;
 use super::least_squares::{LOG_STIFFNESS, Minimum};
 use super::model::{Parameter, Point, beam_at, log_nondimensional};
-use super::problem::{Problem, along};
+use super::problem::Problem;
 use super::quantities::{Quantity, joint_at};
-use super::result::{
-    ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, Limit, OtherMinimum,
-};
+use super::result::{ConsistentEstimate, EstimatedQuantity, FittedMode, Limit, OtherMinimum};
 use super::settings::{ConsistentSettings, Intervals, ResidualWeights};
+use crate::identify::estimate::NORMAL_95;
 use crate::identify::{IdentifyError, MeasuredMode};
-use crate::stats::root_mean_square;
-
-/// Half width of a 95 % interval of a normal distribution, in standard deviations.
-const NORMAL_95: f64 = 1.959_964;
+use crate::stats::{root_mean_square, student};
 
 /// Estimates a joint from the frequencies of these modes.
 ///
@@ -72,6 +68,7 @@ impl ConsistentEstimator {
             fit: self.settings.fit.clone(),
             quantities: finished.quantities(),
             covariance: finished.covariance_matrix(),
+            stiffness_covariance: finished.stiffness_covariance(),
             correlations: finished.correlations(),
             goodness: finished.goodness,
             modes: finished.modes(),
@@ -123,12 +120,12 @@ impl Finished<'_> {
             .collect()
     }
 
-    fn measured(&self) -> bool {
+    pub(super) fn measured(&self) -> bool {
         self.estimator.settings.weights == ResidualWeights::Measured
     }
 
     /// Factor from the covariance's unit to standard uncertainties scaled by the misfit.
-    fn scale(&self) -> Option<f64> {
+    pub(super) fn scale(&self) -> Option<f64> {
         if self.measured() {
             self.goodness.uncertainty_factor()
         } else {
@@ -174,6 +171,7 @@ impl Finished<'_> {
             std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
             low: None,
             high: None,
+            scaled: unit.and_then(|unit| self.scaled_interval(quantity, &gradient, unit)),
             at_least: None,
             at_most: None,
             limit: limit_of(quantity, point),
@@ -184,16 +182,35 @@ impl Finished<'_> {
         result
     }
 
+    /// The 95 % interval with the misfit for uncertainty: of the coordinate to first order, by
+    /// Student's distribution, because so few frequencies know the misfit only roughly.
+    fn scaled_interval(
+        &self,
+        quantity: Quantity,
+        gradient: &Point,
+        unit: f64,
+    ) -> Option<(f64, f64)> {
+        let freedom = self.goodness.degrees_of_freedom;
+        let half = student::quantile(0.05, freedom as f64) * unit * self.scale()?;
+        let now = self.coordinate(gradient);
+        let back = |coordinate: f64| self.quantity_at(quantity, gradient, coordinate);
+        Some((back(now - half), back(now + half)))
+    }
+
+    fn quantity_at(&self, quantity: Quantity, gradient: &Point, coordinate: f64) -> f64 {
+        match quantity {
+            Quantity::Coupling => coordinate.tanh(),
+            _ => self.value_at(quantity, gradient, coordinate),
+        }
+    }
+
     fn add_interval(
         &self,
         result: &mut EstimatedQuantity,
         (gradient, unit): (&Point, Option<f64>),
     ) {
         let quantity = result.quantity;
-        let back = |coordinate: f64| match quantity {
-            Quantity::Coupling => coordinate.tanh(),
-            _ => self.value_at(quantity, gradient, coordinate),
-        };
+        let back = |coordinate: f64| self.quantity_at(quantity, gradient, coordinate);
         match self.estimator.settings.intervals {
             Intervals::Linear => {
                 let now = self.coordinate(gradient);
@@ -207,15 +224,11 @@ impl Finished<'_> {
                     directions: self.directions,
                     covariance: self.covariance,
                 };
-                let end = |end: End, rise: f64| profile.end(quantity, end, rise).map(back);
-                result.low = end(End::Low, TWO_SIDED_95);
-                result.high = end(End::High, TWO_SIDED_95);
-                if result.high.is_none() {
-                    result.at_least = end(End::Low, ONE_SIDED_95);
-                }
-                if result.low.is_none() {
-                    result.at_most = end(End::High, ONE_SIDED_95);
-                }
+                let end = |end: End| profile.end(quantity, end, RISE_95).map(back);
+                (result.low, result.high) = (end(End::Low), end(End::High));
+                // Where one end is missing the other is all that is said.
+                result.at_least = result.low.filter(|_| result.high.is_none());
+                result.at_most = result.high.filter(|_| result.low.is_none());
             }
         }
     }
@@ -263,43 +276,11 @@ impl Finished<'_> {
             std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
             low: end(-1.0),
             high: end(1.0),
+            scaled: None,
             at_least: None,
             at_most: None,
             limit: coupling.limit,
         }
-    }
-
-    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
-        let factor = if self.measured() {
-            1.0
-        } else {
-            self.scale()?.powi(2)
-        };
-        let fit = &self.estimator.settings.fit;
-        let row = |first: &Parameter| {
-            let entry = |second: &Parameter| {
-                factor * self.covariance.between(&along(*first), &along(*second))
-            };
-            fit.iter().map(entry).collect()
-        };
-        Some(fit.iter().map(row).collect())
-    }
-
-    fn correlations(&self) -> Vec<Correlation> {
-        let fit = &self.estimator.settings.fit;
-        let mut found = Vec::new();
-        for (index, &first) in fit.iter().enumerate() {
-            for &second in &fit[index + 1..] {
-                let (a, b) = (along(first), along(second));
-                let size = self.covariance.between(&a, &a) * self.covariance.between(&b, &b);
-                found.push(Correlation {
-                    first,
-                    second,
-                    value: (self.covariance.between(&a, &b) / size.sqrt()).clamp(-1.0, 1.0),
-                });
-            }
-        }
-        found
     }
 
     fn modes(&self) -> Vec<FittedMode> {
@@ -340,7 +321,7 @@ impl Finished<'_> {
 }
 
 /// Where a coordinate is at the end of its range but for rounding.
-fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
+pub(super) fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
     // Within a factor e^3 of the end no frequency differs from that at the end.
     const NEAR: f64 = 3.0;
     let [log_kx, log_ky] = log_nondimensional(point);

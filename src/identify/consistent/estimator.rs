@@ -1,14 +1,18 @@
 //! The estimator: what is free, what is known, and the fit as plain data.
 
 use super::covariance::Covariance;
+use super::estimate::limit_of;
 use super::layout::JointedStructure;
 use super::least_squares::{Minimum, StopReason};
 use super::model::{FrequencyModel, PARAMETERS, Parameter, Point};
 use super::problem::{Datum, Prior, Problem, along};
+use super::quantities::Quantity;
+use super::result::Limit;
 use super::settings::{ConsistentSettings, ResidualWeights};
-use crate::identify::{IdentifyError, MeasuredMode};
+use crate::identify::{IdentifyError, MeasuredMode, Stiffnesses};
+use crate::structure::interface::LAST_STEP;
 use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, JointStiffness};
+use crate::structure::{Assembly, Beam, JointStiffness};
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
 #[derive(Debug, Clone)]
@@ -37,6 +41,24 @@ pub struct PointFit {
     pub stop: StopReason,
     /// Other valleys: misfit and place.
     pub others: Vec<(f64, Point)>,
+}
+
+/// Where repetitions of an estimate start: the valleys of a first one, and the body as it belongs to
+/// the deepest of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Neighbourhood {
+    pub(super) model: Option<FrequencyModel>,
+    pub(super) starts: Vec<Point>,
+}
+
+impl Neighbourhood {
+    /// These places, with the body of the beam as described.
+    pub fn at(starts: &[Point]) -> Self {
+        Self {
+            model: None,
+            starts: starts.to_vec(),
+        }
+    }
 }
 
 impl PointFit {
@@ -84,6 +106,14 @@ impl ConsistentEstimator {
         })
     }
 
+    /// Whether a stiffness of the joint is estimated.
+    pub fn estimates_a_spring(&self) -> bool {
+        let springs = [Parameter::Kt, Parameter::Kr];
+        springs
+            .iter()
+            .any(|spring| self.settings.fit.contains(spring))
+    }
+
     /// The measured frequencies (Hz).
     pub fn frequencies(&self) -> Vec<f64> {
         self.modes.iter().map(|mode| mode.frequency).collect()
@@ -114,6 +144,7 @@ impl ConsistentEstimator {
             data: self.modes.iter().zip(frequencies).map(datum).collect(),
             priors: self.priors(),
             loss: self.settings.loss,
+            last_step: LAST_STEP,
         }
     }
 
@@ -138,9 +169,17 @@ impl ConsistentEstimator {
             ] {
                 gradient[part.index()] = 1.0;
             }
+            // Every piece's mass rises by the same factor as rho L b h of the described beam, of which
+            // unequal halves together are another multiple.
+            let pieces = self.model.structure().pieces().unwrap_or_default();
+            let described: f64 = pieces.iter().map(Beam::mass).sum();
+            let terms = gradient.iter().zip(&nominal);
+            let product: f64 = terms
+                .map(|(g, x)| if *g == 0.0 { 0.0 } else { g * x })
+                .sum();
             priors.push(Prior {
                 gradient,
-                value: mass.ln(),
+                value: product + (mass / described).ln(),
                 std: std / mass,
             });
         }
@@ -160,12 +199,66 @@ impl ConsistentEstimator {
         self.summary(&self.problem(model, frequencies), minima)
     }
 
-    /// The least misfit downhill of known places: for repetitions near a first fit.
-    pub fn refit(&self, frequencies: &[f64], starts: &[Point]) -> PointFit {
-        let mut problem = self.problem(&self.model, frequencies);
+    /// The places from which repetitions of the estimate start: all valleys of this one.
+    pub fn neighbourhood(&self) -> Neighbourhood {
+        let (model, minima) = self.solve(&self.frequencies());
+        Neighbourhood {
+            model,
+            starts: minima.iter().map(|minimum| minimum.at.point).collect(),
+        }
+    }
+
+    /// The least misfit downhill of known places, for other frequencies (Hz) of the same modes.
+    /// The body is that of the neighbourhood, renewed where the beam moves far from it.
+    pub fn refit(&self, frequencies: &[f64], near: &Neighbourhood) -> PointFit {
+        let model = near.model.as_ref().unwrap_or(&self.model);
+        let minima = self.refit_in(model, frequencies, &near.starts);
+        let (renewed, minima) = self.renew(model, frequencies, minima);
+        let model = renewed.as_ref().unwrap_or(model);
+        self.summary(&self.problem(model, frequencies), minima)
+    }
+
+    pub(super) fn refit_in(
+        &self,
+        model: &FrequencyModel,
+        frequencies: &[f64],
+        starts: &[Point],
+    ) -> Vec<Minimum> {
+        let mut problem = self.problem(model, frequencies);
         self.rescale(&mut problem, starts);
-        let minima = self.valleys(&problem, starts);
-        self.summary(&problem, minima)
+        self.valleys(&problem, starts)
+    }
+
+    /// The non-dimensional stiffnesses as a function of the frequencies (Hz), for
+    /// [`crate::identify::perturbation`]; `None` where the search does not come to an end.
+    pub fn stiffnesses_near<'a>(
+        &'a self,
+        near: &'a Neighbourhood,
+    ) -> impl Fn(&[f64]) -> Option<Stiffnesses> + 'a {
+        move |frequencies: &[f64]| {
+            let positive = |frequency: &f64| *frequency > 0.0 && frequency.is_finite();
+            if !frequencies.iter().all(positive) {
+                return None;
+            }
+            let fit = self.refit(frequencies, near);
+            let ended = fit.stop.converged() && fit.stop != StopReason::NothingFree;
+            ended.then(|| self.stiffnesses_at(&fit.point))
+        }
+    }
+
+    /// Kx and Ky at a point, infinite where rigid, and Kz where the coupling is estimated.
+    pub(super) fn stiffnesses_at(&self, point: &Point) -> Stiffnesses {
+        let joint = super::quantities::joint_at(point);
+        let finite = |quantity: Quantity, value: f64| match limit_of(quantity, point) {
+            Some(Limit::Rigid) => f64::INFINITY,
+            _ => value,
+        };
+        let coupled = self.settings.fit.contains(&Parameter::Coupling);
+        Stiffnesses {
+            kx: finite(Quantity::Kx, joint.kx),
+            ky: finite(Quantity::Ky, joint.ky),
+            kz: coupled.then(|| joint.cross_compliance.recip()),
+        }
     }
 
     fn summary(&self, problem: &Problem<'_>, mut minima: Vec<Minimum>) -> PointFit {

@@ -12,11 +12,12 @@ use super::model::{Parameter, Point, log_nondimensional};
 use super::problem::{Evaluation, Problem};
 use super::quantities::Quantity;
 
-/// Rise in chi-squared at the ends of a two-sided 95 % interval: the 95 % point of chi-squared with
-/// one degree of freedom.
-pub const TWO_SIDED_95: f64 = 3.841_459;
-/// The same at a one-sided 95 % limit: its 90 % point.
-pub const ONE_SIDED_95: f64 = 2.705_543;
+/// Rise in chi-squared at the ends of a 95 % interval: the 95 % point of chi-squared with one degree
+/// of freedom. The same holds where one end is missing. A limit at the 90 % point, of one side alone,
+/// would be right in 95 % only of those who had decided for it beforehand; here the data decide, and
+/// who takes the interval where it has two ends and that limit where not is wrong more often
+/// (Feldman & Cousins 1998).
+pub const RISE_95: f64 = 3.841_459;
 
 /// A minimum about which intervals are wanted.
 pub(super) struct Profile<'a> {

@@ -27,12 +27,13 @@ pub mod quantities;
 pub mod result;
 pub mod settings;
 
+mod correlations;
 mod covariance;
 mod starts;
 mod valleys;
 
 pub use estimate::estimate_consistently;
-pub use estimator::{ConsistentEstimator, PointFit};
+pub use estimator::{ConsistentEstimator, Neighbourhood, PointFit};
 pub use goodness::{Goodness, Verdict, exceedance};
 pub use identifiability::{ExtraMode, FlatDirection, Identifiability, NeededAccuracy};
 pub use layout::{JointedStructure, LapLayout, Route};

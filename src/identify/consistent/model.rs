@@ -6,7 +6,9 @@
 
 use super::layout::{JointedStructure, Route, elements_for};
 use crate::structure::finite_elements::InterfaceModes;
-use crate::structure::interface::{JoinedHalf, JointCompliance, JointedBody, interface_root};
+use crate::structure::interface::{
+    JoinedHalf, JointCompliance, JointedBody, LAST_STEP, interface_root,
+};
 use crate::structure::{
     Assembly, Beam, JointStiffness, Slenderness, StructureError, natural_lambdas, natural_modes,
 };
@@ -151,17 +153,19 @@ impl FrequencyModel {
 
     /// The mode's frequency at a point, its root looked for from `guess` (lambda) on.
     pub fn response(&self, point: &Point, mode: usize, guess: f64) -> ModeResponse {
-        self.at(point).response(mode, guess)
+        self.at(point, LAST_STEP).response(mode, guess)
     }
 
-    /// The model at a point: what all modes share.
-    pub(super) fn at(&self, point: &Point) -> ModelAt<'_> {
+    /// The model at a point: what all modes share. A relative step of lambda below `last_step` ends
+    /// the search for a root.
+    pub(super) fn at(&self, point: &Point, last_step: f64) -> ModelAt<'_> {
         let joint = self.compliance(point);
         let coupling = point[Parameter::Coupling.index()].tanh();
         ModelAt {
             model: self,
             unit_frequency: beam_at(&self.structure.beam, point).unit_frequency(),
             joint,
+            last_step,
             by_coupling: (joint.a * joint.b).sqrt() * (1.0 - coupling * coupling),
             ratios: self.attachment_ratios(point),
         }
@@ -225,6 +229,7 @@ pub(super) struct ModelAt<'a> {
     /// Frequency (Hz) at lambda = 1.
     unit_frequency: f64,
     joint: JointCompliance,
+    last_step: f64,
     /// Derivative of the cross compliance with the coupling's atanh.
     by_coupling: f64,
     /// Logarithms by which the shares of attached masses and springs have moved.
@@ -273,7 +278,7 @@ impl ModelAt<'_> {
     /// d ln f = 2 d ln lambda, with a = 1/Kx, b = 1/Ky and c = coupling sqrt(ab).
     fn jointed_mode(&self, mode: usize, guess: f64) -> (f64, [f64; 3], [f64; 2]) {
         let (joint, body) = (&self.joint, &self.model.body);
-        let root = interface_root(body, joint, mode, guess);
+        let root = interface_root(body, joint, mode, (guess, self.last_step));
         let [by_a, by_b, by_c] = root.by_compliance;
         let scale = 2.0 / root.lambda;
         let springs = [

@@ -60,6 +60,8 @@ pub(super) struct Problem<'a> {
     pub(super) data: Vec<Datum>,
     pub(super) priors: Vec<Prior>,
     pub(super) loss: Loss,
+    /// Relative step of lambda that ends the search for a root.
+    pub(super) last_step: f64,
 }
 
 /// Residuals at a point: first those of the modes, then those of the priors.
@@ -90,7 +92,7 @@ impl Problem<'_> {
             lambdas: Vec::with_capacity(self.data.len()),
             frequencies: Vec::with_capacity(self.data.len()),
         };
-        let model = self.model.at(point);
+        let model = self.model.at(point, self.last_step);
         for (datum, guess) in self.data.iter().zip(guesses) {
             let response = model.response(datum.mode, *guess);
             let residual = (response.frequency - datum.frequency) / datum.std;

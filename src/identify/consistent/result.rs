@@ -35,7 +35,10 @@ pub struct EstimatedQuantity {
     pub low: Option<f64>,
     /// Upper end of the 95 % interval; `None` = unknown or unbounded.
     pub high: Option<f64>,
-    /// Where the interval has no upper end: "at least", with 95 % confidence on that side.
+    /// The 95 % interval with the misfit for uncertainty, where `std_scaled` exists; not of Kz and Ktr,
+    /// which have it by way of the coupling.
+    pub scaled: Option<(f64, f64)>,
+    /// Where the interval has no upper end: "at least", which is its lower end.
     pub at_least: Option<f64>,
     /// Where the interval has no lower end: "at most", likewise.
     pub at_most: Option<f64>,
@@ -95,6 +98,9 @@ pub struct ConsistentEstimate {
     /// Covariance of the estimated coordinates (1), in the order of `fit`: logarithms, and atanh
     /// of the coupling. With relative weights scaled by the misfit; `None` where that is not known.
     pub covariance: Option<Vec<Vec<f64>>>,
+    /// Covariance of ln Kx and ln Ky (1), the beam's uncertainty included; scaled as above. `None`
+    /// unless both are estimated and neither is at its limit.
+    pub stiffness_covariance: Option<[[f64; 2]; 2]>,
     /// Correlations of every two estimated parameters.
     pub correlations: Vec<Correlation>,
     /// The misfit and what it says of the model.

@@ -79,8 +79,8 @@ pub struct ConsistentSettings {
     /// Uncertain properties of the beam: with measured weights they are estimated along with the
     /// joint, each held near its stated value. A property in `fit` has no such hold.
     pub tolerances: BeamTolerances,
-    /// The beam weighed: its mass and the standard uncertainty of that (kg). With it modulus and
-    /// density can be told apart.
+    /// The beam weighed, of a lap joint both halves together without what the overlap adds: its mass
+    /// and the standard uncertainty of that (kg). With it modulus and density can be told apart.
     pub weighed_mass: Option<(f64, f64)>,
     /// How intervals are found.
     pub intervals: Intervals,

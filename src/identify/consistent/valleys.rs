@@ -28,24 +28,32 @@ impl ConsistentEstimator {
             all.extend(minima.iter().map(|minimum| minimum.at.point));
             minima = self.valleys(&problem, &all);
         }
+        self.renew(&self.model, frequencies, minima)
+    }
+
+    /// Follows the beam where the deepest valley has moved it far from the one that the model was
+    /// built for: the model built anew, if it was, and the valleys by it.
+    pub(super) fn renew(
+        &self,
+        model: &FrequencyModel,
+        frequencies: &[f64],
+        mut minima: Vec<Minimum>,
+    ) -> (Option<FrequencyModel>, Vec<Minimum>) {
         let mut renewed = None;
         for _ in 0..RENEWALS {
             let Some(best) = minima.first().map(|best| best.at.point) else {
                 break;
             };
-            let current = renewed.as_ref().unwrap_or(&self.model);
-            if !current.is_far(&best) {
+            if !renewed.as_ref().unwrap_or(model).is_far(&best) {
                 break;
             }
             let highest = self.modes.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
-            let Ok(model) = self.model.rebuilt(&best, highest) else {
+            let Ok(built) = self.model.rebuilt(&best, highest) else {
                 break;
             };
             let starts: Vec<Point> = minima.iter().map(|minimum| minimum.at.point).collect();
-            let mut problem = self.problem(&model, frequencies);
-            self.rescale(&mut problem, &starts);
-            minima = self.valleys(&problem, &starts);
-            renewed = Some(model);
+            minima = self.refit_in(&built, frequencies, &starts);
+            renewed = Some(built);
         }
         (renewed, minima)
     }
@@ -104,18 +112,24 @@ impl ConsistentEstimator {
     /// Follows every start down roughly, keeps different valleys, and finishes each.
     pub(super) fn valleys(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
         let directions = self.directions();
+        // A last step of 1e-4 leaves 1e-8: enough to tell valleys apart, and half the work.
+        let rough = Problem {
+            last_step: 1e-4,
+            ..problem.clone()
+        };
         let mut found: Vec<Evaluation> = Vec::new();
         for start in starts {
             let guesses = problem.measured_lambdas(start);
-            let at = problem.evaluate(&problem.within_bounds(*start), &guesses);
-            let end = descend(problem, at, &directions, Accuracy::ROUGH).at;
+            let at = rough.evaluate(&problem.within_bounds(*start), &guesses);
+            let end = descend(&rough, at, &directions, Accuracy::ROUGH).at;
             if end.cost.is_finite() && !found.iter().any(|other| same(other, &end, &directions)) {
                 found.push(end);
             }
         }
         let mut minima: Vec<Minimum> = Vec::new();
-        for rough in found {
-            let end = descend(problem, rough, &directions, ConsistentSettings::ACCURACY);
+        for end in found {
+            let exact = problem.evaluate(&end.point, &end.lambdas);
+            let end = descend(problem, exact, &directions, ConsistentSettings::ACCURACY);
             let known = minima
                 .iter_mut()
                 .find(|other| same(&other.at, &end.at, &directions));

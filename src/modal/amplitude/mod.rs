@@ -34,7 +34,6 @@ mod fit;
 mod polynomial;
 mod segment;
 mod sensors;
-mod student;
 mod trend;
 mod walk;
 

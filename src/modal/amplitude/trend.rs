@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use super::polynomial::Polynomial;
-use super::student;
 use super::{AmplitudeCurve, AmplitudePoint};
+use crate::stats::student;
 
 /// Powers q of the amplitude in which the curve is a polynomial (0: its logarithm), and the highest
 /// degree of that polynomial. Slip in a joint changes frequencies with a power between 1/2 and 1, a

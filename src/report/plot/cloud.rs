@@ -1,57 +1,86 @@
-//! The picture of all estimates that the resolution of the readings allows: Kx against Ky.
+//! The picture of all estimates that the errors of the readings allow: Kx against Ky, a panel for each
+//! method.
 
 use std::collections::HashSet;
 
-use super::super::document::{Document, EstimateSection};
+use super::super::document::Document;
 use super::super::format::signed;
-use super::axis::{Axis, extent, padded};
+use super::cloud_points::{Cloud, clouds};
 use super::drawing::{Align, Drawing, Point, Stroke, Text};
 use super::font::{Weight, text_width};
-use super::palette::{BLUE, INK, ORANGE, SKY};
-use super::panel::{Panel, Sample, TICK_SIZE, draw_legend, draw_title};
+use super::palette::{BLUE, DATA, INK, ORANGE, SKY, VERMILION, WHITE};
+use super::panel::{LABEL_SIZE, Panel, Sample, TICK_SIZE, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
 
-/// Ratio of the largest to the smallest value above which an axis is logarithmic.
-const WIDE: f64 = 20.0;
+/// Upper and lower edge of the panels (pixels).
+const TOP: f64 = 98.0;
+const BOTTOM: f64 = 556.0;
+/// Height of a panel's own title, where there are several (pixels).
+const HEAD: f64 = 24.0;
+/// Room left of a panel for its numbers and title (pixels).
+const MARGIN: f64 = 92.0;
 
-/// Estimates under changed frequencies; `None` where there are none.
+/// Estimates under changed frequencies, the methods side by side; `None` where there are none.
 pub fn draw_cloud(document: &Document) -> Option<Drawing> {
-    let cloud = cloud(document);
-    let shifted = shifted(document);
-    if cloud.len() + shifted.len() < 2 {
+    let clouds = clouds(document);
+    if clouds.is_empty() {
         return None;
     }
     let mut drawing = Drawing::new("Estimates under changed frequencies", WIDTH, 620);
     let title = "Joint stiffness under changed frequencies";
-    draw_title(&mut drawing, title, &below(document, cloud.len()));
-    let estimate = estimate(document);
-    let points: Vec<Point> = cloud
-        .iter()
-        .chain(shifted.iter().map(|(_, point)| point))
-        .chain(&estimate)
-        .copied()
-        .collect();
-    let panel = Panel {
-        x: axis(points.iter().map(|point| point.0), (LEFT + 16.0, RIGHT)),
-        y: axis(points.iter().map(|point| point.1), (556.0, 98.0)),
-    };
-    panel.draw_axes(&mut drawing);
-    let mut dots = distinct(cloud.iter().map(|(x, y)| panel.place(*x, *y)));
+    draw_title(&mut drawing, title, &below(document, &clouds));
+    let width = (RIGHT - LEFT + MARGIN - 16.0) / clouds.len() as f64;
+    for (index, cloud) in clouds.iter().enumerate() {
+        let left = LEFT + 16.0 + width * index as f64;
+        let several = clouds.len() > 1;
+        let top = if several { TOP + HEAD } else { TOP };
+        let (x, y) = cloud.axes((left, left + width - MARGIN), (BOTTOM, top));
+        let panel = Panel { x, y };
+        if several {
+            let words = method_words(&cloud.method);
+            drawing.text(Text::new(words, (left, top - 13.0), LABEL_SIZE).bold());
+        }
+        draw_panel(&mut drawing, &panel, cloud);
+    }
+    draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &legend(&clouds));
+    Some(drawing)
+}
+
+fn method_words(method: &str) -> &'static str {
+    match method {
+        "pairs" => "Pair regression",
+        _ => "Consistent estimate",
+    }
+}
+
+fn draw_panel(drawing: &mut Drawing, panel: &Panel, cloud: &Cloud) {
+    panel.draw_axes(drawing);
+    let visible = |point: &&Point| panel.x.holds(point.0) && panel.y.holds(point.1);
+    let random = cloud.random.iter().filter(visible);
+    for at in distinct(random.map(|(x, y)| panel.place(*x, *y))) {
+        drawing.dot(at, 1.7, DATA);
+    }
+    let mut dots = distinct(cloud.patterns.iter().map(|(x, y)| panel.place(*x, *y)));
     for at in &dots {
         drawing.dot(*at, 3.2, SKY);
     }
-    dots.extend(estimate.map(|(x, y)| panel.place(x, y)));
-    draw_shifted(&mut drawing, &panel, &shifted, &dots);
-    if let Some((x, y)) = estimate {
+    let corners = cloud.ellipse.iter().map(|(x, y)| panel.place(*x, *y));
+    drawing.line(corners.collect(), Stroke::new(VERMILION, 2.0));
+    dots.extend(cloud.estimate.map(|(x, y)| panel.place(x, y)));
+    draw_shifted(drawing, panel, &cloud.shifted, &dots);
+    if let Some((x, y)) = cloud.estimate {
         let at = panel.place(x, y);
-        drawing.dot(at, 7.0, super::palette::WHITE);
+        drawing.dot(at, 7.0, WHITE);
         drawing.dot(at, 5.5, BLUE);
     }
-    panel.draw_x_title(&mut drawing, "Kx = Kt L\u{b3}/(EI) (1)");
-    panel.draw_y_title(&mut drawing, "Ky = Kr L/(EI) (1)");
-    let entries = legend(&cloud, &shifted, estimate);
-    draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &entries);
-    Some(drawing)
+    panel.draw_x_title(drawing, "Kx = Kt L\u{b3}/(EI) (1)");
+    let middle = 0.5 * (panel.y.from + panel.y.to);
+    let title = Text::new(
+        "Ky = Kr L/(EI) (1)",
+        (panel.x.from - 68.0, middle),
+        LABEL_SIZE,
+    );
+    drawing.text(title.aligned(Align::Middle).upwards());
 }
 
 /// Points without those that would be drawn over another one, two pixels apart at least.
@@ -62,92 +91,47 @@ fn distinct(points: impl Iterator<Item = Point>) -> Vec<Point> {
         .collect()
 }
 
-/// Finite points of the cloud.
-fn cloud(document: &Document) -> Vec<Point> {
-    let span = document.resolution_span.iter();
-    span.flat_map(|span| span.cloud.iter())
-        .map(|[kx, ky]| (*kx, *ky))
-        .filter(|point| point.0.is_finite() && point.1.is_finite())
-        .collect()
-}
-
-/// Estimates with all frequencies changed alike: percent and point.
-fn shifted(document: &Document) -> Vec<(f64, Point)> {
-    let rows = document.perturbation.as_deref().unwrap_or_default();
-    rows.iter()
-        .filter(|row| row.percent != 0.0)
-        .filter_map(|row| Some((row.percent, (row.kx?, row.ky?))))
-        .filter(|(_, point)| point.0.is_finite() && point.1.is_finite())
-        .collect()
-}
-
-fn estimate(document: &Document) -> Option<Point> {
-    // The cloud is the pair regression's, and so is its middle.
-    let estimate: &EstimateSection = document.estimate.as_ref()?.as_ref()?;
-    let point = match &estimate.pairs {
-        Some(pairs) => (pairs.kx?, pairs.ky?),
-        None => (estimate.kx.as_ref()?.value, estimate.ky.as_ref()?.value),
-    };
-    (point.0.is_finite() && point.1.is_finite()).then_some(point)
-}
-
-fn axis(values: impl Iterator<Item = f64>, pixels: (f64, f64)) -> Axis {
-    let range = extent(values).unwrap_or((0.0, 1.0));
-    if range.0 > 0.0 && range.1 / range.0 > WIDE {
-        Axis::logarithmic((range.0 / 1.3, range.1 * 1.3), pixels)
-    } else {
-        Axis::linear(padded(range, 0.1), pixels)
+/// What was tried.
+fn below(document: &Document, clouds: &[Cloud]) -> String {
+    let mut parts = Vec::new();
+    let spans = document.resolution_span.as_deref().unwrap_or_default();
+    if let Some(span) = spans.first() {
+        let patterns = span.patterns;
+        parts.push(format!(
+            "every mode at one end of its reading's bound or the other: {patterns} sign patterns"
+        ));
     }
-}
-
-fn below(document: &Document, drawn: usize) -> String {
-    let Some(span) = &document.resolution_span else {
+    let failed: usize = spans.iter().map(|span| span.failed).sum();
+    if failed > 0 {
+        parts.push(format!("{failed} of them leave no estimate"));
+    }
+    let drawn = clouds.iter().map(|cloud| cloud.random.len()).max();
+    if let Some(drawn) = drawn.filter(|drawn| *drawn > 0) {
+        parts.push(format!("{drawn} random draws shown"));
+    }
+    if parts.is_empty() {
         return "all frequencies changed by the same percentage".to_owned();
-    };
-    let failed = if span.failed > 0 {
-        format!(" \u{b7} {} of them leave no estimate", span.failed)
-    } else {
-        String::new()
-    };
-    let shown = if drawn > 0 && drawn + span.failed < span.patterns {
-        format!(" \u{b7} {drawn} drawn")
-    } else {
-        String::new()
-    };
-    format!(
-        "every mode at one end of its reading's bound or the other: {} sign patterns{failed}{shown}",
-        span.patterns
-    )
+    }
+    parts.join(" \u{b7} ")
 }
 
 /// Crosses with their percentage, on the side where the words cover nothing; words without such a
 /// side are left out, the table has them.
 fn draw_shifted(drawing: &mut Drawing, panel: &Panel, shifted: &[(f64, Point)], dots: &[Point]) {
-    let crosses: Vec<Point> = shifted
+    let mut crosses: Vec<(f64, Point)> = shifted
         .iter()
-        .map(|(_, (x, y))| panel.place(*x, *y))
+        .map(|(percent, (x, y))| (*percent, panel.place(*x, *y)))
         .collect();
     let mut boxes: Vec<Patch> = dots
         .iter()
-        .chain(&crosses)
+        .chain(crosses.iter().map(|(_, at)| at))
         .map(|at| Patch::around(*at, (7.0, 7.0)))
         .collect();
     // The largest changes first: they say which way the estimate moves.
-    let mut order: Vec<usize> = (0..shifted.len()).collect();
-    order.sort_by(|a, b| {
-        let size = |index: &usize| {
-            shifted
-                .get(*index)
-                .map_or(0.0, |(percent, _)| percent.abs())
-        };
-        size(b).total_cmp(&size(a))
-    });
-    for index in order {
-        let (Some((percent, _)), Some(at)) = (shifted.get(index), crosses.get(index)) else {
-            continue;
-        };
-        drawing.cross(*at, 6.0, Stroke::new(ORANGE, 2.5));
-        let words = format!("{} %", signed(*percent));
+    crosses.sort_by(|(a, _), (b, _)| b.abs().total_cmp(&a.abs()));
+    for (percent, at) in crosses {
+        drawing.cross(at, 6.0, Stroke::new(ORANGE, 2.5));
+        let words = format!("{} %", signed(percent));
         let half = text_width(&words, TICK_SIZE, Weight::Regular) / 2.0;
         let free = SIDES.iter().find_map(|(across, down)| {
             let middle = (at.0 + across * (half + 11.0), at.1 + down * 17.0);
@@ -158,8 +142,7 @@ fn draw_shifted(drawing: &mut Drawing, panel: &Panel, shifted: &[(f64, Point)], 
         });
         if let Some((middle, place)) = free {
             boxes.push(place);
-            let text = Text::new(words, middle, TICK_SIZE).colored(INK);
-            drawing.text(text.aligned(Align::Middle));
+            drawing.text_on_paper(Text::new(words, middle, TICK_SIZE).colored(INK));
         }
     }
 }
@@ -202,22 +185,37 @@ impl Patch {
     }
 }
 
-fn legend(
-    cloud: &[Point],
-    shifted: &[(f64, Point)],
-    estimate: Option<Point>,
-) -> Vec<(Sample, String)> {
-    let mut entries = Vec::new();
-    if estimate.is_some() {
-        entries.push((Sample::Dot(BLUE), "estimate".to_owned()));
-    }
-    if !cloud.is_empty() {
-        let words = "every mode at an end of its bound".to_owned();
-        entries.push((Sample::Dot(SKY), words));
-    }
-    if !shifted.is_empty() {
-        let words = "all frequencies changed alike".to_owned();
-        entries.push((Sample::Cross(ORANGE), words));
-    }
-    entries
+fn legend(clouds: &[Cloud]) -> Vec<(Sample, String)> {
+    let any = |has: fn(&Cloud) -> bool| clouds.iter().any(has);
+    let entries = [
+        (
+            any(|cloud| cloud.estimate.is_some()),
+            Sample::Dot(BLUE),
+            "estimate",
+        ),
+        (
+            any(|cloud| !cloud.ellipse.is_empty()),
+            Sample::Line(VERMILION),
+            "95 % ellipse (covariance)",
+        ),
+        (
+            any(|cloud| !cloud.random.is_empty()),
+            Sample::Dot(DATA),
+            "random errors",
+        ),
+        (
+            any(|cloud| !cloud.patterns.is_empty()),
+            Sample::Dot(SKY),
+            "every mode at an end of its bound",
+        ),
+        (
+            any(|cloud| !cloud.shifted.is_empty()),
+            Sample::Cross(ORANGE),
+            "all frequencies changed alike",
+        ),
+    ];
+    let shown = entries.into_iter().filter(|(there, _, _)| *there);
+    shown
+        .map(|(_, sample, words)| (sample, words.to_owned()))
+        .collect()
 }

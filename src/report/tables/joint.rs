@@ -91,6 +91,16 @@ impl Parameter<'_> {
             .unwrap_or_else(|| MISSING.to_owned())
     }
 
+    /// The 95 % limits scaled by the misfit, in the unit of the value; `None` where there are none.
+    pub fn written_scaled_limits(&self) -> Option<[String; 2]> {
+        let (factor, _) = self.scale();
+        let value = factor * self.value.value;
+        let (low, high) = self.value.low_scaled.zip(self.value.high_scaled)?;
+        let std = self.value.std_scaled.map(|std| factor * std);
+        let written = |limit: f64| rounded_to(factor * limit, std, self.finest_place(value)).value;
+        Some([written(low), written(high)])
+    }
+
     /// Place of the last digit that is shown: no stiffness is known to more than five digits.
     fn finest_place(&self, value: f64) -> i32 {
         if value.is_finite() {
@@ -119,7 +129,9 @@ pub fn parameters(document: &Document) -> Option<Table> {
             let name = parameter.symbol.to_owned();
             let meaning = parameter.meaning.to_owned();
             let scaled = parameter.written_scaled();
-            vec![name, meaning, value, unit, std, scaled, low, high]
+            let limits = parameter.written_scaled_limits();
+            let [from, to] = limits.unwrap_or_else(|| [MISSING.to_owned(), MISSING.to_owned()]);
+            vec![name, meaning, value, unit, std, scaled, low, high, from, to]
         })
         .collect();
     let modes: Vec<String> = estimate.modes_used.iter().map(usize::to_string).collect();
@@ -137,6 +149,8 @@ pub fn parameters(document: &Document) -> Option<Table> {
             number("Scaled std"),
             number("95 % low"),
             number("95 % high"),
+            number("Scaled low").on_page(),
+            number("Scaled high").on_page(),
         ],
         rows,
         note: format!(
@@ -149,7 +163,10 @@ pub fn parameters(document: &Document) -> Option<Table> {
     Some(if misses {
         table
     } else {
-        table.without_column("Scaled std")
+        table
+            .without_column("Scaled std")
+            .without_column("Scaled low")
+            .without_column("Scaled high")
     })
 }
 
@@ -162,7 +179,7 @@ fn scaled_note(estimate: &EstimateSection) -> String {
         (false, _) => String::new(),
         (true, true) => " Std and limits stand for the readings alone; the model misses the \
                          frequencies by more than their uncertainty, and the scaled std takes the \
-                         misfit for it."
+                         misfit for it, and so do the scaled 95 % limits, by Student's distribution."
             .to_owned(),
         (true, false) => " Not every frequency has an uncertainty, so that all weigh alike: the scaled std takes the \
                           misfit for it."

@@ -1,8 +1,10 @@
 //! Tables of how far the estimate moves when the frequencies do.
 
-use super::super::document::{Document, EstimateSection, SensitivitySection};
+use super::super::document::{
+    Document, EstimateSection, MonteCarloSection, ResolutionSpanSection, SensitivitySection,
+};
 use super::super::format::{
-    MISSING, bound_percent, optional, signed, signed_percent, significant, trimmed,
+    MISSING, RIGID, bound_percent, optional, signed, signed_percent, significant, trimmed,
 };
 use super::{Column, Table, mode_of, number, words};
 
@@ -22,6 +24,43 @@ fn own(estimate: &EstimateSection) -> [Option<f64>; 3] {
     [&estimate.kx, &estimate.ky, &estimate.kz].map(|value| value.as_ref().map(|v| v.value))
 }
 
+/// A column that says by which method, shown where there are several.
+fn method_column(methods: &[&str]) -> Column {
+    let several = methods.iter().any(|method| Some(method) != methods.first());
+    let column = words("Method");
+    if several { column } else { column.on_page() }
+}
+
+/// Rows of several methods, those about the same thing side by side: the consistent estimate first, in
+/// the order of the things as they come.
+fn side_by_side<T: Copy, K: PartialEq>(
+    rows: impl Iterator<Item = T>,
+    thing: impl Fn(T) -> K,
+    method: impl Fn(T) -> String,
+) -> Vec<T> {
+    let mut things: Vec<K> = Vec::new();
+    let mut placed: Vec<(usize, String, T)> = Vec::new();
+    for row in rows {
+        let key = thing(row);
+        let known = things.iter().position(|other| *other == key);
+        let place = known.unwrap_or(things.len());
+        if known.is_none() {
+            things.push(key);
+        }
+        placed.push((place, method(row), row));
+    }
+    placed.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+    placed.into_iter().map(|(_, _, row)| row).collect()
+}
+
+/// A stiffness in five digits; "rigid" beyond all bounds.
+fn stiffness(value: Option<f64>) -> String {
+    match value {
+        Some(value) if value.is_infinite() => RIGID.to_owned(),
+        value => optional(value, 5),
+    }
+}
+
 fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
     let (value, base) = value.zip(base)?;
     Some(100.0 * (value - base) / base)
@@ -31,18 +70,24 @@ fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
 pub fn perturbation(document: &Document) -> Option<Table> {
     let rows = document.perturbation.as_deref().filter(|p| !p.is_empty())?;
     let with_kz = rows.iter().any(|row| row.kz.is_some());
-    let mut columns = vec![number("Frequencies (%)"), words("Method").on_page()];
+    let methods: Vec<&str> = rows.iter().map(|row| row.method.as_str()).collect();
+    let mut columns = vec![number("Frequencies (%)"), method_column(&methods)];
     for name in names(with_kz) {
         columns.push(number(&format!("{name} (1)")));
         columns.push(number("change (%)"));
     }
-    let rows = rows
-        .iter()
+    let ordered = side_by_side(
+        rows.iter(),
+        |row| row.percent.to_bits(),
+        |row| row.method.clone(),
+    );
+    let rows = ordered
+        .into_iter()
         .map(|row| {
             let mut cells = vec![signed(row.percent), row.method.clone()];
             let base = base(document, &row.method);
             for (value, base) in [row.kx, row.ky, row.kz].into_iter().zip(base) {
-                cells.push(optional(value, 5));
+                cells.push(stiffness(value));
                 cells.push(signed_percent(change(value, base)));
             }
             cells.truncate(columns.len());
@@ -53,7 +98,8 @@ pub fn perturbation(document: &Document) -> Option<Table> {
         caption: "All frequencies changed by the same percentage".to_owned(),
         columns,
         rows,
-        note: "Change: against the estimate. \u{2013}: the changed frequencies leave no estimate."
+        note: "Change: against the estimate by the same method. \u{2013}: the changed frequencies leave \
+               no estimate."
             .to_owned(),
     })
 }
@@ -71,15 +117,22 @@ fn names(with_kz: bool) -> &'static [&'static str] {
 pub fn averages(document: &Document) -> Option<Table> {
     let averages = document.perturbation_averages.as_deref();
     let list = averages.filter(|list| !list.is_empty())?;
-    let rows = list.iter().map(|row| {
+    let methods: Vec<&str> = list.iter().map(|row| row.method.as_str()).collect();
+    let ordered = side_by_side(
+        list.iter(),
+        |row| row.percent.to_bits(),
+        |row| row.method.clone(),
+    );
+    let rows = ordered.into_iter().map(|row| {
         let cell = |percent: Option<f64>| optional(percent, 3);
         vec![
             format!("\u{b1}{}", trimmed(row.percent, 4)),
-            cell(Some(row.kx_percent)),
-            cell(Some(row.ky_percent)),
+            row.method.clone(),
+            cell(row.kx_percent),
+            cell(row.ky_percent),
             cell(row.kz_percent),
-            cell(Some(row.kx_of_mean_percent)),
-            cell(Some(row.ky_of_mean_percent)),
+            cell(row.kx_of_mean_percent),
+            cell(row.ky_of_mean_percent),
             cell(row.kz_of_mean_percent),
         ]
     });
@@ -87,6 +140,7 @@ pub fn averages(document: &Document) -> Option<Table> {
         caption: "Average errors of the stiffnesses".to_owned(),
         columns: vec![
             number("Frequencies (%)"),
+            method_column(&methods),
             number("Kx off by (%)"),
             number("Ky off by (%)"),
             number("Kz off by (%)"),
@@ -104,32 +158,31 @@ pub fn averages(document: &Document) -> Option<Table> {
 
 /// Median and 95 % interval under random errors of the frequencies; `None` where not computed.
 pub fn monte_carlo(document: &Document) -> Option<Table> {
-    let found = document.monte_carlo.as_ref()?;
-    let parameters = [("Kx", found.kx), ("Ky", found.ky), ("Kz", found.kz)];
-    let rows: Vec<Vec<String>> = parameters
-        .into_iter()
-        .zip(base(document, "pairs"))
-        .filter_map(|((name, value), base)| {
-            let value = value?;
-            Some(vec![
-                name.to_owned(),
-                optional(base, 5),
-                significant(value.value, 5),
-                optional(value.low, 5),
-                optional(value.high, 5),
-                signed_percent(change(value.low, base)),
-                signed_percent(change(value.high, base)),
-            ])
-        })
-        .collect();
-    let failed = match found.failed {
-        0 => String::new(),
-        failed => format!(" {failed} of them leave no estimate and are left out."),
-    };
+    let list = document.monte_carlo.as_deref().filter(|l| !l.is_empty())?;
+    let methods: Vec<&str> = list.iter().map(|found| found.method.as_str()).collect();
+    let parameters = list.iter().flat_map(|found| {
+        let values = [found.kx, found.ky, found.kz];
+        (0..3).filter_map(move |index| Some((index, found, values[index]?)))
+    });
+    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method.clone());
+    let rows = ordered.into_iter().map(|(index, found, value)| {
+        let base = base(document, &found.method)[index];
+        vec![
+            names(true)[index].to_owned(),
+            found.method.clone(),
+            stiffness(base),
+            stiffness(Some(value.value)),
+            optional(value.low, 5),
+            optional(value.high, 5),
+            signed_percent(change(value.low, base)),
+            signed_percent(change(value.high, base)),
+        ]
+    });
     let table = Table {
         caption: "Random errors of the frequencies (Monte Carlo)".to_owned(),
         columns: vec![
             words("Parameter (1)"),
+            method_column(&methods),
             number("Estimate"),
             number("Median"),
             number("95 % low"),
@@ -137,87 +190,146 @@ pub fn monte_carlo(document: &Document) -> Option<Table> {
             number("down (%)"),
             number("up (%)"),
         ],
-        rows,
-        note: format!(
-            "{} draws, each frequency with its own standard deviation.{failed}",
-            found.samples
-        ),
+        rows: rows.collect(),
+        note: draws(list),
     };
     Some(table.without_empty_columns())
 }
 
+/// How often it was repeated, and how often in vain.
+fn draws(list: &[MonteCarloSection]) -> String {
+    let samples = list.first().map_or(0, |found| found.samples);
+    let failed = list.iter().filter(|found| found.failed > 0).map(|found| {
+        let by = if list.len() > 1 {
+            format!(" by the method {}", found.method)
+        } else {
+            String::new()
+        };
+        format!(
+            " {} of them leave no estimate{by} and are left out.",
+            found.failed
+        )
+    });
+    let tolerances = if list.iter().any(|found| found.method == "consistent") {
+        " The consistent estimate draws the beam's properties that have a tolerance as well."
+    } else {
+        ""
+    };
+    format!(
+        "{samples} draws, each frequency with its own standard deviation.{}{tolerances}",
+        failed.collect::<String>()
+    )
+}
+
 /// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
 pub fn spans(document: &Document) -> Option<Table> {
-    let span = document.resolution_span.as_ref()?;
-    let base = base(document, "pairs");
-    let rows: Vec<Vec<String>> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
-        .into_iter()
-        .zip(base)
-        .filter_map(|((name, range), base)| {
-            let [low, high] = range?;
-            Some(vec![
-                name.to_owned(),
-                significant(low, 5),
-                optional(base, 5),
-                significant(high, 5),
-                signed_percent(change(Some(low), base)),
-                signed_percent(change(Some(high), base)),
-            ])
-        })
-        .collect();
-    let failed = match span.failed {
-        0 => String::new(),
-        failed => format!(" {failed} of them leave no estimate: the span is open."),
-    };
+    let list = document.resolution_span.as_deref()?;
+    let methods: Vec<&str> = list.iter().map(|span| span.method.as_str()).collect();
+    let parameters = list.iter().flat_map(|span| {
+        let ranges = [span.kx, span.ky, span.kz];
+        (0..3).filter_map(move |index| Some((index, span, ranges[index]?)))
+    });
+    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method.clone());
+    let rows = ordered.into_iter().map(|(index, span, [low, high])| {
+        let base = base(document, &span.method)[index];
+        vec![
+            names(true)[index].to_owned(),
+            span.method.clone(),
+            stiffness(Some(low)),
+            stiffness(base),
+            stiffness(Some(high)),
+            signed_percent(change(Some(low), base)),
+            signed_percent(change(Some(high), base)),
+        ]
+    });
     Some(Table {
         caption: "Every mode at one end of its bound or the other".to_owned(),
         columns: vec![
             words("Parameter (1)"),
+            method_column(&methods),
             number("Smallest"),
             number("Estimate"),
             number("Largest"),
             number("down (%)"),
             number("up (%)"),
         ],
-        rows,
-        note: format!("{} sign patterns tried.{failed}", span.patterns),
+        rows: rows.collect(),
+        note: tried(list),
     })
+}
+
+/// How many sign patterns were tried, and how many in vain.
+fn tried(list: &[ResolutionSpanSection]) -> String {
+    let patterns = list.first().map_or(0, |span| span.patterns);
+    let failed = list.iter().filter(|span| span.failed > 0).map(|span| {
+        let method = &span.method;
+        let by = if list.len() > 1 {
+            format!(" by the method {method}")
+        } else {
+            String::new()
+        };
+        format!(
+            " {} of them leave no estimate{by}: the span is open.",
+            span.failed
+        )
+    });
+    let failed: String = failed.collect();
+    format!("{patterns} sign patterns tried.{failed}")
 }
 
 /// What each mode's bound does to each parameter; `None` where not computed.
 pub fn sensitivity(document: &Document) -> Option<Table> {
-    let span = document.resolution_span.as_ref()?;
-    let list = span.sensitivity.as_slice();
-    if list.is_empty() {
+    let list = document.resolution_span.as_deref()?;
+    let methods: Vec<&str> = list.iter().map(|span| span.method.as_str()).collect();
+    let all = list
+        .iter()
+        .flat_map(|span| span.sensitivity.iter().map(move |row| (span, row)));
+    let ordered = side_by_side(all, |row| row.1.mode, |row| row.0.method.clone());
+    if ordered.is_empty() {
         return None;
     }
-    let with_kz = list.iter().any(|row| row.kz_percent.is_some());
-    let mut columns: Vec<Column> =
-        vec![number("Mode"), number("Bound (Hz)"), number("Reading (%)")];
+    let with_kz = ordered.iter().any(|(_, row)| row.kz_percent.is_some());
+    let mut columns: Vec<Column> = vec![
+        number("Mode"),
+        method_column(&methods),
+        number("Bound (Hz)"),
+        number("Reading (%)"),
+    ];
     for name in names(with_kz) {
         columns.push(number(&format!("{name} moves (%)")));
     }
-    let rows = list
-        .iter()
-        .map(|row| {
-            let mut cells = vec![
-                row.mode.to_string(),
-                significant(row.half_line, 3),
-                reading_percent(document, row),
-                signed_percent(row.kx_percent),
-                signed_percent(row.ky_percent),
-                signed_percent(row.kz_percent),
-            ];
-            cells.truncate(columns.len());
-            cells
-        })
-        .collect();
+    let rows = ordered.into_iter().map(|(span, row)| {
+        let mut cells = vec![
+            row.mode.to_string(),
+            span.method.clone(),
+            significant(row.half_line, 3),
+            reading_percent(document, row),
+            signed_percent(row.kx_percent),
+            signed_percent(row.ky_percent),
+            signed_percent(row.kz_percent),
+        ];
+        cells.truncate(columns.len());
+        cells
+    });
     Some(Table {
         caption: "Which mode drives which parameter".to_owned(),
+        rows: rows.collect(),
+        note: all_drivers(list, with_kz),
         columns,
-        rows,
-        note: drivers(list, with_kz),
     })
+}
+
+/// The drivers by each method.
+fn all_drivers(list: &[ResolutionSpanSection], with_kz: bool) -> String {
+    let sentences = list.iter().filter_map(|span| {
+        let drivers = drivers(&span.sensitivity, with_kz);
+        let said = (!drivers.is_empty()).then_some(drivers)?;
+        Some(match list.len() {
+            1 => said,
+            _ => format!("By the method {}: {said}", span.method),
+        })
+    });
+    sentences.collect::<Vec<_>>().join(" ")
 }
 
 /// The bound in percent of the mode's frequency.

@@ -32,7 +32,7 @@ pub fn document() -> Document {
         estimate_reason: None,
         prediction: Some(prediction()),
         perturbation: Some(perturbation()),
-        resolution_span: Some(span()),
+        resolution_span: Some(vec![span()]),
         quality: Some(quality()),
         warnings: vec![
             WarningSection {
@@ -263,6 +263,7 @@ fn span() -> ResolutionSpanSection {
         })
         .collect();
     ResolutionSpanSection {
+        method: "pairs".into(),
         patterns: 16,
         failed: 0,
         kx: Some([860.0, 1090.0]),

@@ -2,7 +2,7 @@
 
 /// Two-sided probability of a larger |t| with `freedom` degrees of freedom:
 /// I_x(nu/2, 1/2) with x = nu/(nu + t^2), the regularised incomplete beta function.
-pub(super) fn two_sided(t: f64, freedom: f64) -> f64 {
+pub fn two_sided(t: f64, freedom: f64) -> f64 {
     if !t.is_finite() {
         return 0.0;
     }
@@ -10,7 +10,7 @@ pub(super) fn two_sided(t: f64, freedom: f64) -> f64 {
 }
 
 /// |t| that is exceeded with the probability `level`, by halving.
-pub(super) fn quantile(level: f64, freedom: f64) -> f64 {
+pub fn quantile(level: f64, freedom: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1e6);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);

@@ -1,0 +1,302 @@
+//! The consistent estimate under errors of the frequencies and of the beam.
+
+use super::shared::steel_strip;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use tapjoint::identify::consistent::{
+    BeamTolerances, ConsistentEstimate, ConsistentEstimator, ConsistentSettings, FrequencyModel,
+    JointedStructure, LapLayout, Loss, Parameter, Point, Quantity, estimate_consistently,
+};
+use tapjoint::identify::perturbation::{
+    PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly,
+};
+use tapjoint::identify::{MeasuredMode, Stiffnesses};
+use tapjoint::structure::finite_elements::PointAttachment;
+use tapjoint::structure::joint::StiffnessUnits;
+use tapjoint::structure::{Assembly, Beam, BeamTheory};
+
+const KX: f64 = 1415.0;
+const KY: f64 = 4.83;
+
+fn cantilever() -> JointedStructure {
+    JointedStructure::new(BeamTheory::Euler, steel_strip(), Assembly::Cantilever)
+}
+
+/// A sensor at the very tip, where a mass weighs most.
+fn with_tip_sensor(beam: &Beam) -> JointedStructure {
+    JointedStructure {
+        beam: *beam,
+        masses: vec![PointAttachment {
+            position: beam.length,
+            size: 0.024,
+        }],
+        ..cantilever()
+    }
+}
+
+/// Frequencies of this structure on the joint, whose stiffness in N/m is that on the strip.
+fn frequencies(structure: &JointedStructure, count: usize) -> Vec<f64> {
+    let model = FrequencyModel::new(structure, count + 1).unwrap();
+    let units = StiffnessUnits::of(&steel_strip());
+    let mut point: Point = model.nominal();
+    point[0] = (KX * units.kt).ln();
+    point[1] = (KY * units.kr).ln();
+    let frequency = |mode: usize| model.response(&point, mode, mode as f64).frequency;
+    (1..=count).map(frequency).collect()
+}
+
+fn modes_of(frequencies: &[f64], std: f64) -> Vec<MeasuredMode> {
+    let numbered = frequencies.iter().zip(1..);
+    numbered
+        .map(|(&frequency, mode)| MeasuredMode {
+            mode,
+            frequency,
+            std: Some(std * frequency),
+        })
+        .collect()
+}
+
+fn close(found: f64, expected: f64, relative: f64, what: &str) {
+    let off = (found / expected - 1.0).abs();
+    assert!(off <= relative, "{what}: {found} against {expected}");
+}
+
+fn std_of(estimate: &ConsistentEstimate, quantity: Quantity) -> f64 {
+    let found = estimate.quantity(quantity).unwrap();
+    found.std.unwrap() / found.value.unwrap()
+}
+
+#[test]
+fn recover_a_length_tolerance_carried_along_with_a_tip_sensor() {
+    let strip = steel_strip();
+    // As many frequencies as stiffnesses: they say nothing of the length, whose tolerance then adds
+    // what moving the length does to the estimate, found here by moving it.
+    let measured = frequencies(&with_tip_sensor(&strip), 2);
+    let modes = modes_of(&measured, 1e-4);
+    let plain = ConsistentSettings::two_parameter();
+    let at = |length: f64, settings: &ConsistentSettings| {
+        let beam = Beam { length, ..strip };
+        estimate_consistently(&with_tip_sensor(&beam), &modes, settings).unwrap()
+    };
+    let tolerance = 2e-3;
+    let mut uncertain = plain.clone();
+    uncertain.tolerances = BeamTolerances {
+        length: Some(tolerance),
+        ..BeamTolerances::default()
+    };
+    let (without, with) = (at(strip.length, &plain), at(strip.length, &uncertain));
+    let step = 1e-4;
+    let (long, short) = (
+        at(strip.length * (1.0 + step), &plain),
+        at(strip.length * (1.0 - step), &plain),
+    );
+    for quantity in [Quantity::Kt, Quantity::Kr, Quantity::Kx, Quantity::Ky] {
+        let log =
+            |found: &ConsistentEstimate| found.quantity(quantity).unwrap().value.unwrap().ln();
+        let slope = (log(&long) - log(&short)) / (2.0 * step);
+        let expected = std_of(&without, quantity).hypot(slope * tolerance);
+        // The difference quotient leaves the square of its step; elements divide alike.
+        close(std_of(&with, quantity), expected, 1e-4, quantity.name());
+    }
+}
+
+#[test]
+fn recover_refits_where_the_body_was_renewed() {
+    // The modulus described is a tenth too high, and a sensor at the tip makes the body depend on it.
+    let described = Beam {
+        modulus: 1.1 * steel_strip().modulus,
+        ..steel_strip()
+    };
+    let modes = modes_of(&frequencies(&with_tip_sensor(&steel_strip()), 5), 1e-4);
+    let fit = [Parameter::Kt, Parameter::Kr, Parameter::Modulus];
+    let settings = ConsistentSettings::fitting(&fit);
+    let structure = with_tip_sensor(&described);
+    let estimator = ConsistentEstimator::new(&structure, &modes, &settings).unwrap();
+    let near = estimator.neighbourhood();
+    let (fit, again) = (
+        estimator.fit(),
+        estimator.refit(&estimator.frequencies(), &near),
+    );
+    for (first, second) in fit.point.iter().zip(&again.point) {
+        // The same minimum of the same model.
+        assert!((first - second).abs() < 1e-8, "{fit:?} against {again:?}");
+    }
+    // Elements are right to a millionth, and the body follows the modulus to 1e-4 squared.
+    close(again.joint().kx, KX, 1e-4, "kx");
+    close(again.point[3].exp(), steel_strip().modulus, 1e-4, "modulus");
+}
+
+#[test]
+fn recover_repetitions_draw_the_beams_tolerances_too() {
+    let modes = modes_of(&frequencies(&cantilever(), 5), 1e-4);
+    let mut settings = ConsistentSettings::two_parameter();
+    settings.tolerances = BeamTolerances {
+        thickness: Some(5e-3),
+        ..BeamTolerances::default()
+    };
+    let estimator = ConsistentEstimator::new(&cantilever(), &modes, &settings).unwrap();
+    let found = estimator.monte_carlo(2000, 3).unwrap();
+    let estimate = estimator.estimate().unwrap();
+    for spread in &found.spreads {
+        let half = (spread.high / spread.low).ln() / (2.0 * 1.959_964);
+        // 2000 repetitions know the ends of a 95 % interval to about 3 %.
+        let what = spread.quantity.name();
+        close(half, std_of(&estimate, spread.quantity), 0.1, what);
+    }
+    // Without the tolerance the frequencies seem to say far more.
+    let plain = ConsistentSettings::two_parameter();
+    let plain = estimate_consistently(&cantilever(), &modes, &plain).unwrap();
+    assert!(std_of(&estimate, Quantity::Kt) > 2.0 * std_of(&plain, Quantity::Kt));
+}
+
+#[test]
+fn prop_small_perturbations_are_the_covariances() {
+    let modes = modes_of(&frequencies(&cantilever(), 5), 1e-3);
+    let settings = ConsistentSettings::two_parameter();
+    let estimator = ConsistentEstimator::new(&cantilever(), &modes, &settings).unwrap();
+    let near = estimator.neighbourhood();
+    let moved = estimator.stiffnesses_near(&near);
+    let stds: Vec<f64> = modes.iter().map(|mode| mode.std.unwrap()).collect();
+    let rows = mode_sensitivities(&estimator.frequencies(), &stds, &moved).unwrap();
+    let [[xx, xy], [_, yy]] = estimator.estimate().unwrap().stiffness_covariance.unwrap();
+    // Independent errors: the covariance is the sum over the modes of what each does alone.
+    let sum = |pick: fn(Stiffnesses) -> f64| -> f64 {
+        let each = rows
+            .iter()
+            .map(|row| pick(row.percent_per_percent.unwrap()));
+        each.sum::<f64>() * 1e-6
+    };
+    // Percent per percent is the derivative of the logarithms, by differences of a thousandth percent.
+    close(sum(|k| k.kx * k.kx), xx, 1e-4, "Kx");
+    close(sum(|k| k.ky * k.ky), yy, 1e-4, "Ky");
+    close(sum(|k| k.kx * k.ky), xy, 1e-3, "both");
+}
+
+#[test]
+fn limit_uniform_changes_of_a_free_modulus_leave_the_joint_alone() {
+    // All frequencies up by p: the modulus by 2p, and with it both springs, so that Kx and Ky stay.
+    let modes = modes_of(&frequencies(&cantilever(), 5), 1e-3);
+    let settings = ConsistentSettings::fitting(&[Parameter::Kt, Parameter::Kr, Parameter::Modulus]);
+    let estimator = ConsistentEstimator::new(&cantilever(), &modes, &settings).unwrap();
+    let near = estimator.neighbourhood();
+    let moved = estimator.stiffnesses_near(&near);
+    let nominal = moved(&estimator.frequencies()).unwrap();
+    let rows = perturb_uniformly(&estimator.frequencies(), &PAPER_PERCENTS, &moved);
+    let averages = average_errors(&nominal, &rows);
+    assert_eq!(averages.len(), 2);
+    for row in averages {
+        // Percent; what the minimum's own tolerance leaves.
+        assert!(row.mean_magnitude.kx < 1e-5, "{row:?}");
+        assert!(row.mean_magnitude.ky < 1e-5, "{row:?}");
+    }
+}
+
+/// Root-mean-square over many noisy tests of the scaled standard deviation by a loss over that of the
+/// squares.
+fn scaled_by_loss(loss: Loss) -> f64 {
+    let exact = frequencies(&cantilever(), 8);
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    let mut sums = [0.0; 2];
+    for _ in 0..60 {
+        let noisy: Vec<f64> = exact
+            .iter()
+            .map(|frequency| {
+                let normal: f64 = StandardNormal.sample(&mut random);
+                frequency * (1.0 + 1e-3 * normal)
+            })
+            .collect();
+        for (sum, loss) in sums.iter_mut().zip([loss, Loss::Squares]) {
+            let mut settings = ConsistentSettings::two_parameter().with_relative_weights();
+            settings.loss = loss;
+            let modes = modes_of(&noisy, 1e-3);
+            let found = estimate_consistently(&cantilever(), &modes, &settings).unwrap();
+            let ky = found.quantity(Quantity::Ky).unwrap();
+            *sum += (ky.std_scaled.unwrap() / ky.value.unwrap()).powi(2);
+        }
+    }
+    (sums[0] / sums[1]).sqrt()
+}
+
+#[test]
+fn prop_hubers_scaled_std_is_that_of_squares_on_clean_data() {
+    let ratio = scaled_by_loss(Loss::Huber(1.345));
+    // Huber's keeps 95 % of the efficiency, 3 % of the standard deviation; eight modes less two
+    // stiffnesses know the usual misfit, and with it the weights, only roughly.
+    assert!((0.95..1.2).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn recover_density_of_a_weighed_lap_joint_of_unequal_halves() {
+    let right = Beam {
+        thickness: 0.008,
+        density: 2700.0,
+        modulus: 70e9,
+        ..steel_strip()
+    };
+    let described = JointedStructure {
+        assembly: Assembly::Lap,
+        lap: LapLayout {
+            position: Some(0.17),
+            right: Some(right),
+            overlap: None,
+        },
+        ..cantilever()
+    };
+    // Both halves denser than described by the same factor, and stiffer by another.
+    let truth = described.with_beam(&Beam {
+        density: 1.05 * steel_strip().density,
+        modulus: 0.97 * steel_strip().modulus,
+        ..steel_strip()
+    });
+    let halves = [
+        truth.beam.mass() * 0.17 / 0.423,
+        truth.lap.right.unwrap().mass() * (0.423 - 0.17) / 0.423,
+    ];
+    let mass: f64 = halves.iter().sum();
+    let modes = modes_of(&frequencies(&truth, 6), 1e-4);
+    let mut settings = ConsistentSettings::fitting(&[
+        Parameter::Kt,
+        Parameter::Kr,
+        Parameter::Modulus,
+        Parameter::Density,
+    ]);
+    settings.weighed_mass = Some((mass, 1e-4 * mass));
+    let found = estimate_consistently(&described, &modes, &settings).unwrap();
+    let value = |quantity: Quantity| found.quantity(quantity).unwrap().value.unwrap();
+    // Exact data in closed form.
+    close(
+        value(Quantity::Density),
+        truth.beam.density,
+        1e-7,
+        "density",
+    );
+    close(
+        value(Quantity::Modulus),
+        truth.beam.modulus,
+        1e-7,
+        "modulus",
+    );
+}
+
+#[test]
+fn limit_a_rigid_joint_is_infinite_under_any_change() {
+    let mut clamped = cantilever();
+    clamped.theory = BeamTheory::Euler;
+    let model = FrequencyModel::new(&clamped, 6).unwrap();
+    let mut point = model.nominal();
+    (point[0], point[1]) = (
+        f64::INFINITY,
+        (KY * StiffnessUnits::of(&steel_strip()).kr).ln(),
+    );
+    let frequency = |mode: usize| model.response(&point, mode, mode as f64).frequency;
+    let exact: Vec<f64> = (1..=5).map(frequency).collect();
+    let modes = modes_of(&exact, 1e-3);
+    let settings = ConsistentSettings::two_parameter();
+    let estimator = ConsistentEstimator::new(&clamped, &modes, &settings).unwrap();
+    let found = estimator.monte_carlo(500, 1).unwrap().joint;
+    // Half of the draws ask for more than rigid: the interval has no upper end, and does not lose them.
+    assert_eq!(found.failed, 0);
+    assert_eq!(found.kx.unwrap().high, f64::INFINITY);
+    assert!(found.kx.unwrap().low.is_finite());
+}

@@ -200,7 +200,7 @@ fn rates(assembly: Assembly, change: Change, seen: Seen, count: u64) -> Rates {
 
 #[test]
 fn recover_numbers_over_random_joints() {
-    const COUNT: u64 = 100;
+    const COUNT: u64 = 30;
     let changes = [
         (Change::Nothing, Seen::Frequencies),
         (Change::Dropped, Seen::Frequencies),

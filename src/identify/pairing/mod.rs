@@ -149,9 +149,11 @@ pub fn pair_modes(
     Ok(verdict(numberings, settings.odds))
 }
 
-/// A numbering with its negative logarithm of probability.
+/// A numbering with its negative logarithm of probability, and how much of that the data say: all but
+/// the price of modes that could have been seen.
 struct Scored {
     cost: f64,
+    by_data: f64,
     numbering: Numbering,
 }
 
@@ -170,8 +172,10 @@ fn score(search: &JointSearch<'_>, assignment: &Assignment, start: [f64; 3]) -> 
         .collect();
     let extra = (assignment.len() - pairs.len()) as f64;
     let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
+    let by_data = fit.cost + extra * EXTRA_COST + view.cost(search, &pairs);
     Scored {
-        cost: fit.cost + extra * EXTRA_COST + unseen + view.cost(search, &pairs),
+        cost: by_data + unseen,
+        by_data,
         numbering: Numbering {
             numbers: assignment.clone(),
             missing,
@@ -189,16 +193,20 @@ fn missing_cost(cause: MissingCause) -> f64 {
     }
 }
 
-/// `sorted` by cost. The plain numbering is taken where nothing beats it clearly.
+/// `sorted` by cost. The plain numbering is taken where nothing beats it clearly. Numberings are
+/// comparable where the data do not tell them apart: which of two close modes is missing is not decided
+/// by the wish that none were.
 fn verdict(sorted: Vec<Scored>, odds: f64) -> Pairing {
-    let least = sorted.first().map_or(0.0, |best| best.cost);
+    let (least, by_data) = sorted
+        .first()
+        .map_or((0.0, 0.0), |best| (best.cost, best.by_data));
     let mut kept: Vec<Numbering> = sorted
         .into_iter()
+        .filter(|scored| scored.by_data.min(scored.cost + by_data - least) - by_data < odds.ln())
         .map(|scored| Numbering {
             odds: (scored.cost - least).exp(),
             ..scored.numbering
         })
-        .filter(|numbering| numbering.odds < odds)
         .collect();
     let plain = kept.iter().position(|one| is_plain(&one.numbers));
     let chosen = match kept.is_empty() {

@@ -19,6 +19,7 @@ mod perturb;
 mod predict;
 mod reproduce;
 mod run;
+mod simulate;
 mod spectrum;
 
 use arguments::CommonArguments;
@@ -56,6 +57,7 @@ enum Command {
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
     Reproduce(reproduce::ReproduceArguments),
+    Simulate(simulate::SimulateArguments),
 }
 
 /// What a command came to, when nothing went wrong.
@@ -101,6 +103,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
+        Command::Simulate(arguments) => simulate::run(arguments, line.common.seed, terminal),
     }
 }
 

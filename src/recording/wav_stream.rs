@@ -5,9 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::RecordingError;
-use super::write::{
-    WavFormat, allow_others_to_read, check_size, pad_to_even, spec, write_value,
-};
+use super::write::{WavFormat, allow_others_to_read, check_size, pad_to_even, spec, write_value};
 
 /// What a WAV file will hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -188,7 +188,10 @@ pub(super) fn write_value(
 }
 
 /// Chunks have even length: an odd one is followed by a pad byte that counts for the whole only.
-pub(super) fn pad_to_even(writer: &mut (impl Write + Seek), data_bytes: u64) -> std::io::Result<()> {
+pub(super) fn pad_to_even(
+    writer: &mut (impl Write + Seek),
+    data_bytes: u64,
+) -> std::io::Result<()> {
     if data_bytes.is_multiple_of(2) {
         return Ok(());
     }

@@ -44,7 +44,10 @@ pub fn believed_description(
 
 fn tables<'t>(table: &'t mut Table, key: &str) -> impl Iterator<Item = &'t mut Table> {
     let entries = table.get_mut(key).and_then(Value::as_array_mut);
-    entries.into_iter().flatten().filter_map(Value::as_table_mut)
+    entries
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_table_mut)
 }
 
 fn describe_channel(table: &mut Table, channel: Option<(&Scale, i64)>) {

@@ -14,7 +14,10 @@ pub(super) fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateEr
         ("the peak force", hammer.peak_force),
         ("the number of taps", hammer.taps as f64),
         ("the time between taps", hammer.interval.unwrap_or(1.0)),
-        ("the sample rate", f64::from(recorder.sample_rate.unwrap_or(1))),
+        (
+            "the sample rate",
+            f64::from(recorder.sample_rate.unwrap_or(1)),
+        ),
     ];
     let not_negative = [
         ("the time before the first tap", hammer.lead),
@@ -36,7 +39,11 @@ pub(super) fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateEr
     ];
     check_all(&positive, |value| value > 0.0, "positive")?;
     check_all(&not_negative, |value| value >= 0.0, "at least 0")?;
-    check_all(&shares, |value| (0.0..=1.0).contains(&value), "between 0 and 1")?;
+    check_all(
+        &shares,
+        |value| (0.0..=1.0).contains(&value),
+        "between 0 and 1",
+    )?;
     let clock = [("the clock's error", recorder.clock_error)];
     check_all(&clock, |value| value.abs() < 0.5, "smaller than 0.5")?;
     check_all(&damping(laboratory), |value| value >= 0.0, "at least 0")

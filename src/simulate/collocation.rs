@@ -47,11 +47,7 @@ pub(super) struct Collocation {
 }
 
 impl Collocation {
-    pub(super) fn new(
-        structure: &ReducedStructure,
-        oscillators: &[Oscillator],
-        step: f64,
-    ) -> Self {
+    pub(super) fn new(structure: &ReducedStructure, oscillators: &[Oscillator], step: f64) -> Self {
         let mut this = Self {
             step,
             rotation: Default::default(),

@@ -15,7 +15,9 @@ pub enum SimulateError {
     #[error("there is no sensor to record with; add [[sensor]] with `name` and `position`")]
     NoSensors,
     /// The hammer's place is missing.
-    #[error("line {line}: {file}: where the hammer strikes is missing; add `tap` (m along the beam)")]
+    #[error(
+        "line {line}: {file}: where the hammer strikes is missing; add `tap` (m along the beam)"
+    )]
     NoTap {
         /// The recording.
         file: String,
@@ -55,7 +57,9 @@ pub enum SimulateError {
         name: String,
     },
     /// The joint's stiffness is not given.
-    #[error("the joint's stiffness is not given: {missing} missing; add {keys} to [joint], or give --kx and --ky")]
+    #[error(
+        "the joint's stiffness is not given: {missing} missing; add {keys} to [joint], or give --kx and --ky"
+    )]
     NoJoint {
         /// What is missing.
         missing: &'static str,

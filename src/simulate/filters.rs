@@ -51,11 +51,7 @@ impl Resonance {
         let [a1, a2] = feedback;
         let half = (0.5 * omega).sin().powi(2);
         let phi = [1.0 - half, half, 4.0 * half * (1.0 - half)];
-        let squares = [
-            (1.0 + a1 + a2).powi(2),
-            (1.0 - a1 + a2).powi(2),
-            -4.0 * a2,
-        ];
+        let squares = [(1.0 + a1 + a2).powi(2), (1.0 - a1 + a2).powi(2), -4.0 * a2];
         let at_resonance: f64 = squares.iter().zip(phi).map(|(a, phi)| a * phi).sum();
         let b0_square = squares[0];
         let wanted = at_resonance * quality * quality;

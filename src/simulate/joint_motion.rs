@@ -112,7 +112,9 @@ impl JointMotion {
                 self.division += 1;
                 continue;
             }
-            let defect = solved.as_ref().map_or(f64::INFINITY, |solved| solved.defect);
+            let defect = solved
+                .as_ref()
+                .map_or(f64::INFINITY, |solved| solved.defect);
             self.forced += u64::from(!fine);
             self.accept(solved, (oscillators, states), strikes, (now, now + step));
             ticks += WHOLE >> self.division;
@@ -215,10 +217,8 @@ impl JointMotion {
         let [first, second, end] = extras.map(|extra| -extra.moment);
         let moments = [self.moments[NODES - 1], first, second, end];
         let influence = self.collocations[self.division].influence[MIDDLE];
-        let middle = free[MIDDLE]
-            + influence[1] * first
-            + influence[2] * second
-            + influence[3] * end;
+        let middle =
+            free[MIDDLE] + influence[1] * first + influence[2] * second + influence[3] * end;
         let [before, _, _, scratch] = &mut self.trial;
         let wanted = -self.law.follow(middle, before, scratch).moment;
         let polynomial: f64 = at_middle().iter().zip(moments).map(|(w, u)| w * u).sum();
@@ -267,7 +267,11 @@ impl JointMotion {
             terms.map(|(factor, moment)| factor * moment).sum::<f64>()
         });
         let step = self.last_step;
-        [self.moments[NODES - 1], first / step, second / (step * step)]
+        [
+            self.moments[NODES - 1],
+            first / step,
+            second / (step * step),
+        ]
     }
 
     pub(super) fn stored(&self) -> f64 {

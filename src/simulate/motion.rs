@@ -53,7 +53,8 @@ impl Motion {
     ) -> Self {
         let oscillators: Vec<_> = structure.modes.iter().map(Oscillator::new).collect();
         let sensors = sensed.iter().enumerate();
-        let joint = joint.map(|law| Box::new(JointMotion::new(law, &structure, &oscillators, step)));
+        let joint =
+            joint.map(|law| Box::new(JointMotion::new(law, &structure, &oscillators, step)));
         Self {
             sensors: sensors
                 .map(|(index, sensed)| SensorRow::new(index, *sensed, &structure, &oscillators))
@@ -90,10 +91,15 @@ impl Motion {
 
     /// Moves on by one step.
     pub fn advance(&mut self) {
-        let (from, to) = (self.time(), self.start + (self.steps + 1) as f64 * self.step);
+        let (from, to) = (
+            self.time(),
+            self.start + (self.steps + 1) as f64 * self.step,
+        );
         self.strikes.retain(|strike| strike.pulse.end() > from);
         match &mut self.joint {
-            Some(joint) => joint.advance((&self.oscillators, &mut self.states), &self.strikes, from),
+            Some(joint) => {
+                joint.advance((&self.oscillators, &mut self.states), &self.strikes, from)
+            }
             None => {
                 for (state, advance) in self.states.iter_mut().zip(&self.advance) {
                     *state *= advance;
@@ -110,7 +116,10 @@ impl Motion {
     /// Force of the hammer now (N).
     pub fn force(&self) -> f64 {
         let time = self.time();
-        let pulses = self.strikes.iter().map(|strike| strike.pulse.force(time)[0]);
+        let pulses = self
+            .strikes
+            .iter()
+            .map(|strike| strike.pulse.force(time)[0]);
         pulses.sum()
     }
 
@@ -128,7 +137,11 @@ impl Motion {
         for strike in &self.strikes {
             let force = strike.pulse.force(time);
             if force[0] != 0.0 || force[2] != 0.0 {
-                self.add_direct(&strike.place.to_sensors, (&strike.place.at_modes, force), out);
+                self.add_direct(
+                    &strike.place.to_sensors,
+                    (&strike.place.at_modes, force),
+                    out,
+                );
             }
         }
         if let Some(joint) = &self.joint {
@@ -164,7 +177,9 @@ impl Motion {
             *out += compliance.copied().unwrap_or(0.0) * moment[row.derivative];
             if row.derivative == 2 {
                 let modes = self.structure.modes.iter();
-                let share: f64 = modes.map(|mode| mode.at_sensors[sensor] * mode.at_joint).sum();
+                let share: f64 = modes
+                    .map(|mode| mode.at_sensors[sensor] * mode.at_joint)
+                    .sum();
                 *out += share * moment[0];
             }
         }

@@ -85,7 +85,10 @@ fn body(test: &TestDescription) -> Body {
     Body::Joined([left, right])
 }
 
-fn joint(test: &TestDescription, given: Option<GivenJoint>) -> Result<SpecimenJoint, SimulateError> {
+fn joint(
+    test: &TestDescription,
+    given: Option<GivenJoint>,
+) -> Result<SpecimenJoint, SimulateError> {
     if test.joint.kind == JointKind::Free {
         return Ok(SpecimenJoint::Free);
     }
@@ -107,7 +110,10 @@ fn joint(test: &TestDescription, given: Option<GivenJoint>) -> Result<SpecimenJo
                 coupling: coupling(kt, kr, 1.0 / ktr),
             });
         }
-        (None, None) => ("kt and kr are", "`kt = 1.9e6` (N/m) and `kr = 1.2e3` (N m/rad)"),
+        (None, None) => (
+            "kt and kr are",
+            "`kt = 1.9e6` (N/m) and `kr = 1.2e3` (N m/rad)",
+        ),
         (None, Some(_)) => ("kt is", "`kt = 1.9e6` (N/m)"),
         (Some(_), None) => ("kr is", "`kr = 1.2e3` (N m/rad)"),
     };

@@ -1,8 +1,6 @@
 //! From a described test and what is planted in it to recordings ready to be made.
 
-use crate::description::{
-    RecordingDescription, Scale, SensorKind, TestDescription,
-};
+use crate::description::{RecordingDescription, Scale, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -75,14 +73,22 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
-    if plan.effects.iter().any(|effect| effect.id == EffectId::Resolution) {
+    if plan
+        .effects
+        .iter()
+        .any(|effect| effect.id == EffectId::Resolution)
+    {
         return Err(SimulateError::Resolution);
     }
     let mut recordings = Vec::new();
     let mut trials = Vec::new();
     for (visit, recording) in described.iter().enumerate() {
         let recording = prepare(plan, recording, visit)?;
-        trials.push(try_out(&recording.structure, &recording.session, plan.laboratory));
+        trials.push(try_out(
+            &recording.structure,
+            &recording.session,
+            plan.laboratory,
+        ));
         recordings.push(recording);
     }
     let scales = scales(test, &trials);
@@ -205,7 +211,9 @@ fn prepare(
         (seen.joint_loss_factor, session.highest_mode(laboratory)),
     )?;
     let block = described.block.filter(|_| described.band.is_none());
-    let block = block.map_or(*block_seconds, |block| block as f64 / f64::from(sample_rate));
+    let block = block.map_or(*block_seconds, |block| {
+        block as f64 / f64::from(sample_rate)
+    });
     let interval = interval(laboratory, &structure, block);
     session.taps.interval = interval;
     let seconds = laboratory.hammer.lead + laboratory.hammer.taps as f64 * interval;
@@ -246,7 +254,9 @@ fn sample_rate(
     let Some(rate) = laboratory.recorder.sample_rate else {
         // Without a band, 2000 Hz: the modes of a beam of some decimetres that the method uses.
         let needed = 2.56 * highest.unwrap_or(2000.0);
-        let usual = USUAL_RATES.into_iter().find(|rate| f64::from(*rate) >= needed);
+        let usual = USUAL_RATES
+            .into_iter()
+            .find(|rate| f64::from(*rate) >= needed);
         return Ok(usual.unwrap_or(needed.ceil() as u32));
     };
     let reach = f64::from(rate) / 2.56;

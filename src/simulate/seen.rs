@@ -71,7 +71,10 @@ impl SeenStructure {
         let elastic = (0..moving).map(|mode| ReducedMode {
             frequency: modes.frequencies()[mode],
             damping_ratio: damping(mode),
-            at_sensors: sensors.iter().map(|&x| modes.displacement(mode, x)).collect(),
+            at_sensors: sensors
+                .iter()
+                .map(|&x| modes.displacement(mode, x))
+                .collect(),
             at_joint: modes.joint_motion(mode)[1],
         });
         let suspended = rigid.iter().map(|motion| ReducedMode {

@@ -112,7 +112,12 @@ impl Session {
         // The filter looks ahead by half its length: the simulation begins so much earlier.
         let start = (-(delay as f64) * step, step);
         Self {
-            motion: Motion::new(structure.reduced().clone(), &sensed, start, plan.joint.clone()),
+            motion: Motion::new(
+                structure.reduced().clone(),
+                &sensed,
+                start,
+                plan.joint.clone(),
+            ),
             structure,
             hammer: Hammer::new(&laboratory.hammer, &plan.taps, random(0)).peekable(),
             shape: plan.taps.pulse.1,

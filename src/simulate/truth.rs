@@ -132,7 +132,10 @@ pub fn truth_of(plan: &TestPlan<'_>, test: &VirtualTest) -> Truth {
 fn planted(effect: &Effect) -> PlantedEffect {
     PlantedEffect {
         effect: effect.id.name(),
-        parameters: effect.values().map(|(info, value)| (info.name, value)).collect(),
+        parameters: effect
+            .values()
+            .map(|(info, value)| (info.name, value))
+            .collect(),
     }
 }
 

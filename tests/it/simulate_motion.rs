@@ -28,7 +28,9 @@ fn cantilever(count: usize, damping: f64) -> (ReducedStructure, StruckPlace, f64
     let rotations: Vec<f64> = shapes
         .iter()
         .map(|shape| {
-            let w: Vec<f64> = (0..5).map(|n| shape.displacement(f64::from(n) * h)).collect();
+            let w: Vec<f64> = (0..5)
+                .map(|n| shape.displacement(f64::from(n) * h))
+                .collect();
             (-25.0 * w[0] + 48.0 * w[1] - 36.0 * w[2] + 16.0 * w[3] - 3.0 * w[4]) / (12.0 * h)
         })
         .collect();
@@ -161,7 +163,13 @@ fn val_one_mode_on_a_cubic_joint_has_the_period_of_duffings_oscillator() {
 fn val_energy_stays_through_a_thousand_periods_of_a_cubic_joint() {
     for ratio in [0.3, -0.15] {
         let (structure, place, stiffness) = cantilever(5, 0.0);
-        let quiet = struck((&structure, &place), Sensed::Displacement, 1e-4, None, pulse(50.0));
+        let quiet = struck(
+            (&structure, &place),
+            Sensed::Displacement,
+            1e-4,
+            None,
+            pulse(50.0),
+        );
         let largest = largest_rotation(&quiet);
         let cubic = 4.0 * ratio / (3.0 * largest * largest);
         let law = JointMoment::Elastic {
@@ -188,7 +196,10 @@ fn val_energy_stays_through_a_thousand_periods_of_a_cubic_joint() {
                 worst = worst.max((motion.energy() / begin - 1.0).abs());
             }
         }
-        println!("ratio {ratio}: {worst:.2e}, forced {}", motion.forced_steps());
+        println!(
+            "ratio {ratio}: {worst:.2e}, forced {}",
+            motion.forced_steps()
+        );
         assert!(worst < 1e-6, "ratio {ratio}: energy strays by {worst}");
     }
 }
@@ -213,7 +224,13 @@ fn sliders(stiffness: f64, ratio: f64, hardest: f64) -> JointMoment {
 #[test]
 fn val_micro_slip_loses_the_energy_that_the_structure_loses() {
     let (structure, place, stiffness) = cantilever(5, 0.0);
-    let quiet = struck((&structure, &place), Sensed::Displacement, 1e-4, None, pulse(50.0));
+    let quiet = struck(
+        (&structure, &place),
+        Sensed::Displacement,
+        1e-4,
+        None,
+        pulse(50.0),
+    );
     let law = sliders(stiffness, -0.2, largest_rotation(&quiet));
     let mut motion = struck(
         (&structure, &place),
@@ -237,7 +254,10 @@ fn val_micro_slip_loses_the_energy_that_the_structure_loses() {
         motion.forced_steps()
     );
     assert!(lost > 0.2 * begin, "{lost} J of {begin} J is hardly a loss");
-    assert!((missing / lost - 1.0).abs() < 1e-4, "{missing} J for {lost} J");
+    assert!(
+        (missing / lost - 1.0).abs() < 1e-4,
+        "{missing} J for {lost} J"
+    );
 }
 
 #[test]
@@ -245,13 +265,19 @@ fn val_the_non_linear_joint_agrees_with_runge_and_kutta() {
     let (structure, place, stiffness) = cantilever(3, 0.003);
     let cubic = 2e4;
     let law = JointMoment::Elastic {
-            stiffness,
-            coefficient: cubic,
-            exponent: 2.0,
-        };
+        stiffness,
+        coefficient: cubic,
+        exponent: 2.0,
+    };
     let step = 1e-4;
     let strike = pulse(100.0);
-    let mut motion = struck((&structure, &place), Sensed::Displacement, step, Some(law), strike);
+    let mut motion = struck(
+        (&structure, &place),
+        Sensed::Displacement,
+        step,
+        Some(law),
+        strike,
+    );
     let mut state = vec![[0.0; 2]; 3];
     // u = -k c theta^3, theta = sum psi q + R_t F + R u, solved by Newton's method.
     let extra = |state: &[[f64; 2]], time: f64| {
@@ -273,12 +299,18 @@ fn val_the_non_linear_joint_agrees_with_runge_and_kutta() {
             .map(|((mode, at), [q, v])| {
                 let omega = TAU * mode.frequency;
                 let drive = at * force + mode.at_joint * u;
-                [*v, drive - 2.0 * mode.damping_ratio * omega * v - omega * omega * q]
+                [
+                    *v,
+                    drive - 2.0 * mode.damping_ratio * omega * v - omega * omega * q,
+                ]
             })
             .collect()
     };
     let add = |a: &[[f64; 2]], b: &[[f64; 2]], h: f64| -> Vec<[f64; 2]> {
-        a.iter().zip(b).map(|(a, b)| [a[0] + h * b[0], a[1] + h * b[1]]).collect()
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| [a[0] + h * b[0], a[1] + h * b[1]])
+            .collect()
     };
     const PARTS: usize = 40;
     let h = step / PARTS as f64;
@@ -299,13 +331,18 @@ fn val_the_non_linear_joint_agrees_with_runge_and_kutta() {
         motion.responses(&mut out);
         let time = motion.time();
         let modes = structure.modes.iter().zip(&state);
-        let expected: f64 = modes.map(|(mode, q)| mode.at_sensors[0] * q[0]).sum::<f64>()
+        let expected: f64 = modes
+            .map(|(mode, q)| mode.at_sensors[0] * q[0])
+            .sum::<f64>()
             + structure.joint_to_sensors[0] * extra(&state, time)
             + place.to_sensors[0] * strike.force(time)[0];
         worst = worst.max((out[0] - expected).abs());
         largest = largest.max(expected.abs());
     }
-    println!("{worst:.2e} of {largest:.2e}, forced {}", motion.forced_steps());
+    println!(
+        "{worst:.2e} of {largest:.2e}, forced {}",
+        motion.forced_steps()
+    );
     // Both solutions keep seven digits over the tenth of a second.
     assert!(worst < 1e-7 * largest, "{worst} m of {largest} m");
 }
@@ -326,7 +363,13 @@ fn limit_few_modes_with_their_springs_move_as_many_modes_do() {
             shape: PulseShape::SineFourth,
             ..pulse(20.0)
         };
-        let mut motion = struck((&structure, &place), Sensed::Displacement, 1e-4, Some(law), slow);
+        let mut motion = struck(
+            (&structure, &place),
+            Sensed::Displacement,
+            1e-4,
+            Some(law),
+            slow,
+        );
         let mut out = [0.0];
         let mut samples = Vec::new();
         for _ in 0..3000 {
@@ -406,7 +449,10 @@ fn val_a_pulse_moves_one_mode_as_runge_and_kutta_say() {
             let mut motion = struck((&structure, &place), Sensed::Velocity, step, None, strike);
             let omega = TAU * frequency;
             let f = |t: f64, [q, v]: [f64; 2]| {
-                [v, strike.force(t)[0] - 2.0 * damping * omega * v - omega * omega * q]
+                [
+                    v,
+                    strike.force(t)[0] - 2.0 * damping * omega * v - omega * omega * q,
+                ]
             };
             let mut state = [0.0; 2];
             let h = step / 2000.0;

@@ -229,7 +229,7 @@ fn frequency(text: &str) -> Result<f64, String> {
     quantity(text, Dimension::Frequency)
 }
 
-/// No session of taps lasts longer than a day.
+/// No test lasts longer than a day.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.trim().trim_end_matches('s').trim().parse::<f64>() {
         Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),

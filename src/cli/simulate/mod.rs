@@ -170,16 +170,16 @@ fn write(
     path: &Path,
     format: WavFormat,
 ) -> anyhow::Result<u64> {
-    let mut session = recording.begin(laboratory);
+    let mut take = recording.begin(laboratory);
     let layout = WavLayout {
-        sample_rate: recording.session.sample_rate,
-        channels: recording.session.channels.len(),
-        frames: recording.session.frames,
+        sample_rate: recording.take.sample_rate,
+        channels: recording.take.channels.len(),
+        frames: recording.take.frames,
         format,
     };
     let mut stream = WavStream::create(path, layout)?;
     let mut frame = vec![0.0; layout.channels];
-    while session.next_frame(&mut frame) {
+    while take.next_frame(&mut frame) {
         stream.write(&frame)?;
     }
     Ok(stream.finish()?)

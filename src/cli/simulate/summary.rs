@@ -17,7 +17,7 @@ pub(super) fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> Strin
         let _ = writeln!(
             text,
             "  {}",
-            of_recording(recording, made.session.taps.pulse.0)
+            of_recording(recording, made.take.taps.pulse.0)
         );
     }
     if let Some(joint) = &truth.joint {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   measurement                                   theory
-//!   recording -> taps -> spectral -> modal        structure (beam, joint, finite elements)
+//!   recording -> taps -> spectral -> modal        structure (beam, joint, finite elements), effects
 //!                                      \            /
 //!                                       identify  (pairs regression, perturbation)
 //!                                          |

@@ -42,3 +42,9 @@
 //!   Transactions on Acoustics, Speech, and Signal Processing 33, 387-392.
 //! - **Golub & Pereyra 1973**: "The differentiation of pseudo-inverses and nonlinear least squares
 //!   problems whose variables separate", SIAM Journal on Numerical Analysis 10, 413-432.
+//! - **Lee & Schultz 2004**: "Eigenvalue analysis of Timoshenko beams and axisymmetric Mindlin plates by
+//!   the pseudospectral method", Journal of Sound and Vibration 269, 609-621. Frequencies of thick beams.
+//! - **Iwan 1966**: "A distributed-element model for hysteresis and its steady-state dynamic response",
+//!   Journal of Applied Mechanics 33, 893-900. Sliders in parallel.
+//! - **Masing 1926**: "Eigenspannungen und Verfestigung beim Messing", Proceedings of the 2nd International
+//!   Congress of Applied Mechanics, 332-335. Branches of a hysteresis loop from the first loading.

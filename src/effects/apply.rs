@@ -91,24 +91,58 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
     let (first, second) = effect.pair();
     let specimen = &mut seen.specimen;
     match effect.id {
-        EffectId::SensorMass => {
-            let unknown = circumstances
-                .sensors
-                .iter()
-                .filter(|sensor| sensor.mass == 0.0);
-            specimen
-                .masses
-                .extend(unknown.map(|s| mass_at(s.position, first)));
+        EffectId::SensorMass | EffectId::SensorCable => {
+            add_at_sensors(effect, circumstances.sensors, specimen);
         }
-        EffectId::SensorCable => {
-            let spring = |sensor: &SensorPlace| PointSpring {
+        EffectId::CrossCoupling
+        | EffectId::JointMass
+        | EffectId::JointNonlinearity
+        | EffectId::JointDamping
+        | EffectId::JointDrift => add_to_joint(effect, circumstances, seen),
+        EffectId::Fixture => specimen.base = Some(base(effect, nominal, &specimen.joint)),
+        EffectId::Modulus => {
+            for beam in specimen.body.beams_mut() {
+                beam.modulus *= 1.0 + first;
+            }
+        }
+        // After all others, by `stretch`.
+        EffectId::Length => {}
+        EffectId::Timebase => seen.frequency_scale *= 1.0 + first,
+        EffectId::AddedMass => specimen.masses.push(mass_at(second, first)),
+        EffectId::LocalCrack => {
+            // c = compliance L/(E I) of the nominal (left) beam, over the whole length.
+            let beam = nominal.body.beams()[0];
+            specimen.hinges.push(Hinge {
+                position: second,
+                compliance: first * nominal.body.length() / beam.bending_stiffness(),
+            });
+        }
+        EffectId::AxialLoad => specimen.axial_force += first,
+        EffectId::ShearRotary => specimen.shear_rotary += first,
+        EffectId::Resolution => seen.frequency_offset += first,
+    }
+}
+
+fn add_at_sensors(effect: &Effect, sensors: &[SensorPlace], specimen: &mut Specimen) {
+    let (size, _) = effect.pair();
+    if effect.id == EffectId::SensorMass {
+        let unknown = sensors.iter().filter(|sensor| sensor.mass == 0.0);
+        let masses = unknown.map(|sensor| mass_at(sensor.position, size));
+        specimen.masses.extend(masses);
+    } else {
+        specimen
+            .springs
+            .extend(sensors.iter().map(|sensor| PointSpring {
                 position: sensor.position,
-                stiffness: first,
-            };
-            specimen
-                .springs
-                .extend(circumstances.sensors.iter().map(spring));
-        }
+                stiffness: size,
+            }));
+    }
+}
+
+fn add_to_joint(effect: &Effect, circumstances: &Circumstances<'_>, seen: &mut Seen) {
+    let (first, second) = effect.pair();
+    let specimen = &mut seen.specimen;
+    match effect.id {
         EffectId::CrossCoupling => add_coupling(specimen, first),
         EffectId::JointMass => {
             specimen.joint_mass.mass += first;
@@ -124,32 +158,10 @@ fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, s
         }
         EffectId::JointDamping => seen.joint_loss_factor += first,
         // An exponential, so that no draw makes a stiffness negative.
-        EffectId::JointDrift => {
-            scale_joint(
-                specimen,
-                circumstances.drift.map(|draw| (first * draw).exp()),
-            );
-        }
-        EffectId::Fixture => specimen.base = Some(base(effect, nominal, &specimen.joint)),
-        EffectId::Modulus => {
-            for beam in specimen.body.beams_mut() {
-                beam.modulus *= 1.0 + first;
-            }
-        }
-        EffectId::Length => {}
-        EffectId::Timebase => seen.frequency_scale *= 1.0 + first,
-        EffectId::AddedMass => specimen.masses.push(mass_at(second, first)),
-        EffectId::LocalCrack => {
-            // c = compliance L/(E I) of the nominal (left) beam, over the whole length.
-            let beam = nominal.body.beams()[0];
-            specimen.hinges.push(Hinge {
-                position: second,
-                compliance: first * nominal.body.length() / beam.bending_stiffness(),
-            });
-        }
-        EffectId::AxialLoad => specimen.axial_force += first,
-        EffectId::ShearRotary => specimen.shear_rotary += first,
-        EffectId::Resolution => seen.frequency_offset += first,
+        _ => scale_joint(
+            specimen,
+            circumstances.drift.map(|draw| (first * draw).exp()),
+        ),
     }
 }
 

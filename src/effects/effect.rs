@@ -1,7 +1,7 @@
 //! An effect with the values of its parameters.
 
-use super::catalogue::{EffectId, ParameterInfo};
 use super::{EffectError, nearest_name};
+use super::{EffectId, ParameterInfo};
 
 /// An effect of a certain size.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,11 +10,13 @@ mod apply;
 mod catalogue;
 mod effect;
 mod joint_law;
+mod parameters;
 
 pub use apply::{Circumstances, Seen, SensorPlace, apply};
-pub use catalogue::{Dimension, EffectId, Group, ParameterInfo, ParameterScale, Place};
+pub use catalogue::{EffectId, Group, Place};
 pub use effect::Effect;
 pub use joint_law::{JointLaw, JointLawKind};
+pub use parameters::{Dimension, ParameterInfo, ParameterScale};
 
 /// Why an effect cannot be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -21,14 +21,17 @@ pub(super) struct Pairs {
 const RESIDUAL: f64 = 1e-8;
 
 /// The lowest `count` pairs. With rigid motions K is singular and `shift` M is added to it;
-/// `locked` are rigid motions known beforehand, whose equal eigenvalues the method would confuse.
+/// `highest` is the magnitude of the highest eigenvalue, which says how far rounding goes; `locked` are rigid motions known beforehand, whose equal eigenvalues the method would confuse.
 pub(super) fn lowest_pairs(
     stiffness: &Band,
     mass: &Band,
-    shift: f64,
+    (shift, highest): (f64, f64),
     locked: &[Vec<f64>],
     count: usize,
 ) -> Result<Pairs, StructureError> {
+    // Two eigenvalues nearer than that are one: rounding moves each by some parts in 1e16 of the
+    // highest.
+    let apart = |value: f64| 1e-7 * value + 1e-15 * highest;
     if count > stiffness.size() {
         return Err(failure("more modes than degrees of freedom; divide finer"));
     }
@@ -39,12 +42,12 @@ pub(super) fn lowest_pairs(
     let found = Krylov::new(&factor, mass, locked).lowest(count);
     if let Some(pairs) = found {
         let top = pairs.values.last().copied().unwrap_or(0.0);
-        let trial = shifted.plus(-top * (1.0 + 1e-7), mass);
+        let trial = shifted.plus(-top - apart(top), mass);
         if trial.negative_eigenvalues() == count {
             return Ok(unshifted(pairs, shift));
         }
     }
-    let pairs = by_subspace(&shifted, mass, count)?;
+    let pairs = by_subspace(&shifted, mass, count, apart)?;
     Ok(unshifted(pairs, shift))
 }
 
@@ -149,9 +152,13 @@ impl<'a> Krylov<'a> {
         order.sort_by(|&a, &b| inverses[b].total_cmp(&inverses[a]));
         order.truncate(wanted);
         let coupling = self.beside[steps - 1];
+        // What rounding leaves beside the largest, where it still does no harm.
+        let largest = order.first().map_or(0.0, |&i| inverses[i].abs());
+        let rounding = 16.0 * f64::EPSILON * largest;
         let settled = |&i: &usize| {
             let residual = coupling * rotations[i][steps - 1].abs();
-            inverses[i] > 0.0 && residual <= RESIDUAL * inverses[i]
+            let least = rounding.min(1e3 * RESIDUAL * inverses[i]);
+            residual <= least.max(RESIDUAL * inverses[i])
         };
         if order.len() < wanted || !order.iter().all(settled) {
             return None;
@@ -241,7 +248,12 @@ fn normalise(vector: &mut [f64]) -> f64 {
 }
 
 /// By subspace iteration, which finds equal eigenvalues too, and takes longer.
-fn by_subspace(shifted: &Band, mass: &Band, count: usize) -> Result<Pairs, StructureError> {
+fn by_subspace(
+    shifted: &Band,
+    mass: &Band,
+    count: usize,
+    apart: impl Fn(f64) -> f64,
+) -> Result<Pairs, StructureError> {
     // Some more, so that a group of equal ones is not cut in two.
     let width = (count + 4).min(shifted.size());
     let vectors = lowest_eigenvectors(&general(shifted), &general(mass), width)?;
@@ -256,7 +268,7 @@ fn by_subspace(shifted: &Band, mass: &Band, count: usize) -> Result<Pairs, Struc
         pairs.values.push(dot(&vector, &shifted.times(&vector)));
         pairs.vectors.push(vector);
     }
-    let top = pairs.values[count - 1] * (1.0 + 1e-6);
+    let top = pairs.values[count - 1] + 10.0 * apart(pairs.values[count - 1]);
     let below = pairs.values.iter().filter(|value| **value < top).count();
     if below < width && shifted.plus(-top, mass).negative_eigenvalues() != below {
         return Err(failure(

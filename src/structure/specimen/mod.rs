@@ -16,6 +16,7 @@ mod model;
 mod modes;
 mod numbering;
 mod section;
+mod statics;
 mod tridiagonal;
 
 use super::{Beam, StructureError};

@@ -35,6 +35,19 @@ pub(super) struct Energies {
 }
 
 impl Energies {
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        Self {
+            strain: factor * self.strain,
+            kinetic: factor * self.kinetic,
+            second_order: factor * self.second_order,
+        }
+    }
+
+    /// Modal mass at this omega^2: kinetic + 2 omega^2 second_order.
+    pub(super) fn modal_mass(&self, square: f64) -> f64 {
+        self.kinetic + 2.0 * square * self.second_order
+    }
+
     /// Rayleigh's quotient omega^2: strain = omega^2 kinetic + omega^4 second_order.
     pub(super) fn quotient(&self) -> f64 {
         let root = self.kinetic.powi(2) + 4.0 * self.strain * self.second_order;
@@ -169,6 +182,12 @@ impl Model {
         self.equations(place.node)
     }
 
+    /// Whether an element that begins at a node has hinges.
+    pub(super) fn is_hinged(&self, node: usize) -> bool {
+        let first = |h: &HingedElement| self.runs[h.run].first_node + h.index;
+        self.hinged.iter().any(|h| first(h) == node)
+    }
+
     fn hinged_at(&self, run: usize, index: usize) -> Option<&HingedElement> {
         self.hinged
             .iter()
@@ -248,7 +267,9 @@ impl Model {
             }
         }
         for item in &self.masses {
-            sum.kinetic += item.energy(&motion.ends(item.place.node));
+            let ends = motion.ends(item.place.node);
+            sum.kinetic += item.energy(&ends);
+            sum.second_order += item.second_order(&ends);
         }
         for item in &self.springs {
             sum.strain += item.energy(&motion.ends(item.place.node));
@@ -277,6 +298,15 @@ impl Model {
 }
 
 impl Motion {
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
+        self.nodes
+            .as_flattened_mut()
+            .iter_mut()
+            .for_each(|value| *value *= factor);
+        self.base = self.base.map(|turn| factor * turn);
+        self
+    }
+
     pub(super) fn ends(&self, node: usize) -> [f64; 4] {
         let ([w0, t0], [w1, t1]) = (self.nodes[node], self.nodes[node + 1]);
         [w0, t0, w1, t1]

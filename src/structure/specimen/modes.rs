@@ -1,15 +1,15 @@
 //! The modes of a specimen, and what they say of changes to it.
 
-use super::band::{Band, Factor};
 use super::lanczos::{Pairs, lowest_pairs};
-use super::model::{Energies, Model, Motion, Place};
+use super::model::{Energies, Model, Motion, Place, Run};
+use super::statics::Statics;
 use super::{Mesh, Specimen};
 use crate::structure::StructureError;
 use std::f64::consts::PI;
 
 /// Added to a singular stiffness matrix, in units of mass: about the first elastic eigenvalue of a
 /// free beam, lambda^4 = 500.
-const SHIFT: f64 = 500.0;
+pub(super) const SHIFT: f64 = 500.0;
 
 /// Below this eigenvalue (the first elastic one of a free beam is 500) nothing withstands a motion.
 const NO_STIFFNESS: f64 = 1e-6;
@@ -22,20 +22,32 @@ pub struct SpecimenModes {
     mesh: Mesh,
     suspension: Vec<f64>,
     frequencies: Vec<f64>,
-    /// Of unit modal mass in the model's units.
-    motions: Vec<Motion>,
-    energies: Vec<Energies>,
+    modes: Vec<Mode>,
     statics: Statics,
 }
 
-/// What static answers need.
+/// A mode in the model's units.
 #[derive(Debug, Clone)]
-struct Statics {
-    factor: Factor,
-    /// Rigid motions of unit modal mass, with their inertia loads; empty where there are none.
-    rigid: Vec<(Vec<f64>, Vec<f64>)>,
-    mass: Band,
-    shift: f64,
+struct Mode {
+    /// omega^2.
+    square: f64,
+    /// Of unit modal mass.
+    motion: Motion,
+    energies: Energies,
+}
+
+impl Mode {
+    fn new(model: &Model, vector: &[f64]) -> Self {
+        let motion = model.motion(vector);
+        let energies = model.energies(&motion);
+        let square = energies.quotient();
+        let factor = energies.modal_mass(square).sqrt().recip();
+        Self {
+            square,
+            motion: motion.scaled(factor),
+            energies: energies.scaled(factor * factor),
+        }
+    }
 }
 
 impl SpecimenModes {
@@ -49,12 +61,13 @@ impl SpecimenModes {
         let loose = model.rigid_motions();
         let singular = loose > 0 && !model.is_supported();
         let shift = if loose > 0 { SHIFT } else { 0.0 };
+        let bounds = (shift, model.highest_square());
         let locked = if singular {
             model.rigid_vectors()
         } else {
             Vec::new()
         };
-        let pairs = lowest_pairs(&stiffness, &mass, shift, &locked, count + loose)?;
+        let pairs = lowest_pairs(&stiffness, &mass, bounds, &locked, count + loose)?;
         let Pairs { values, vectors } = pairs;
         let rigid = (0..loose).filter(|&i| values[i] < NO_STIFFNESS);
         let rigid = rigid.map(|i| vectors[i].clone()).collect();
@@ -63,15 +76,16 @@ impl SpecimenModes {
         let suspension = values[..loose]
             .iter()
             .filter(|value| **value >= NO_STIFFNESS);
-        let motions: Vec<Motion> = vectors[loose..].iter().map(|v| model.motion(v)).collect();
-        let energies: Vec<Energies> = motions.iter().map(|m| model.energies(m)).collect();
+        let modes: Vec<Mode> = vectors[loose..]
+            .iter()
+            .map(|vector| Mode::new(&model, vector))
+            .collect();
         Ok(Self {
             suspension: suspension.map(|square| frequency(*square)).collect(),
-            frequencies: energies.iter().map(|e| frequency(e.quotient())).collect(),
+            frequencies: modes.iter().map(|mode| frequency(mode.square)).collect(),
             model,
             mesh,
-            motions,
-            energies,
+            modes,
             statics,
         })
     }
@@ -100,13 +114,16 @@ impl SpecimenModes {
     /// Displacement (1/sqrt(kg)) at a position (m).
     pub fn displacement(&self, mode: usize, position: f64) -> f64 {
         let place = self.model.place(position);
-        place.displacement(&self.motions[mode].ends(place.node)) / self.model.units.mass.sqrt()
+        let Mode { square, motion, .. } = &self.modes[mode];
+        let ends = motion.ends(place.node);
+        let inner: f64 = place.inner.iter().zip(&ends).map(|(a, b)| a * b).sum();
+        (place.displacement(&ends) + square * inner) / self.model.units.mass.sqrt()
     }
 
     /// Rotation of the cross-section (rad/m per sqrt(kg)) at a position (m): dw/dx without shear.
     pub fn slope(&self, mode: usize, position: f64) -> f64 {
         let place = self.model.place(position);
-        place.rotation(&self.motions[mode].ends(place.node)) / self.rotation_unit()
+        place.rotation(&self.modes[mode].motion.ends(place.node)) / self.rotation_unit()
     }
 
     fn rotation_unit(&self) -> f64 {
@@ -116,7 +133,7 @@ impl SpecimenModes {
     /// Deformation of the joint's springs: displacement (1/sqrt(kg)) and rotation (1/(m sqrt(kg))).
     /// Of a lap joint right minus left; with a base, against the base.
     pub fn joint_motion(&self, mode: usize) -> [f64; 2] {
-        let [w, theta] = self.model.joint_motion(&self.motions[mode]);
+        let [w, theta] = self.model.joint_motion(&self.modes[mode].motion);
         [
             w / self.model.units.mass.sqrt(),
             theta / self.rotation_unit(),
@@ -125,19 +142,20 @@ impl SpecimenModes {
 
     /// Share of the joint's springs in the strain energy (1).
     pub fn joint_energy_share(&self, mode: usize) -> f64 {
-        self.model.joint_energy(&self.motions[mode]) / self.energies[mode].strain
+        // Of unit modal mass, omega^2 is twice the whole strain energy.
+        self.model.joint_energy(&self.modes[mode].motion) / self.modes[mode].square
     }
 
     /// Rotation of the base (1/(m sqrt(kg))), 0 where it does not give.
     pub fn base_rotation(&self, mode: usize) -> f64 {
-        self.motions[mode].base.unwrap_or(0.0) / self.rotation_unit()
+        self.modes[mode].motion.base.unwrap_or(0.0) / self.rotation_unit()
     }
 
     /// Share of the base in the kinetic energy (1): near 1 where the mode is the base's own.
     pub fn base_participation(&self, mode: usize) -> f64 {
-        let turn = self.motions[mode].base.unwrap_or(0.0);
+        let turn = self.modes[mode].motion.base.unwrap_or(0.0);
         let inertia = self.model.base.map_or(0.0, |base| base.inertia);
-        inertia * turn * turn / self.energies[mode].kinetic
+        inertia * turn * turn / self.modes[mode].energies.kinetic
     }
 
     /// Displacement at one position (m) per static force at another (m/N): the sum of
@@ -146,7 +164,12 @@ impl SpecimenModes {
         let (from, to) = (self.model.place(force), self.model.place(response));
         let load = self.model.load(&from);
         let answer = self.model.motion(&self.statics.solve(load));
-        to.displacement(&answer.ends(to.node)) / self.model.units.stiffness()
+        let mut displacement = to.displacement(&answer.ends(to.node));
+        if to.node == from.node && !self.model.is_hinged(to.node) {
+            let section = self.model.section_at(to.node);
+            displacement += section.inner_compliance(to.within, from.within);
+        }
+        displacement / self.model.units.stiffness()
     }
 
     /// [`Self::static_receptance`] less the part of the modes computed (m/N): what a sum over these
@@ -199,14 +222,14 @@ impl SpecimenModes {
     }
 
     fn quotient_frequency(&self, model: &Model, mode: usize) -> f64 {
-        let motion = &self.motions[mode];
+        let motion = &self.modes[mode].motion;
         let energies = match (&model.base, motion.base) {
             // The base that the other has moves as the joint's moment turns it.
             (Some(base), None) => {
-                let own = self.frequencies[mode] * 2.0 * PI / model.units.omega;
                 let [row_w, row_t] = [motion.nodes[0][0], motion.nodes[0][1]];
                 let moment = model.joint[1][0] * row_w + model.joint[1][1] * row_t;
-                let dynamic = base.stiffness + model.joint[1][1] - own * own * base.inertia;
+                let dynamic =
+                    base.stiffness + model.joint[1][1] - self.modes[mode].square * base.inertia;
                 model.energies(&Motion {
                     base: Some(moment / dynamic),
                     ..motion.clone()
@@ -218,72 +241,13 @@ impl SpecimenModes {
     }
 }
 
-impl Statics {
-    fn new(stiffness: &Band, mass: Band, rigid: Vec<Vec<f64>>) -> Result<Self, StructureError> {
-        // A hundredth of the first elastic eigenvalue: each step of `solve` gains two digits.
-        let shift = if rigid.is_empty() { 0.0 } else { 0.01 * SHIFT };
-        let factor = stiffness.plus(shift, &mass).cholesky().ok_or_else(|| {
-            StructureError::FiniteElements {
-                reason: "it is not stable: the axial force buckles it".to_owned(),
-            }
-        })?;
-        let with_load = |vector: Vec<f64>| {
-            let load = mass.times(&vector);
-            (vector, load)
-        };
-        Ok(Self {
-            factor,
-            rigid: rigid.into_iter().map(with_load).collect(),
-            mass,
-            shift,
-        })
-    }
-
-    /// Elastic answer to a load: with rigid motions, to the load less the inertia forces with which
-    /// they balance it.
-    fn solve(&self, mut load: Vec<f64>) -> Vec<f64> {
-        for (motion, inertia) in &self.rigid {
-            let share: f64 = motion.iter().zip(&load).map(|(a, b)| a * b).sum();
-            load.iter_mut()
-                .zip(inertia)
-                .for_each(|(f, i)| *f -= share * i);
-        }
-        let mut answer = self.solved(load.clone());
-        if self.rigid.is_empty() {
-            return answer;
-        }
-        // (K + s M) x = f + s M x: what the shift takes away is given back step by step.
-        const STEPS: usize = 8;
-        for _ in 0..STEPS {
-            self.remove_rigid(&mut answer);
-            let mut corrected = self.mass.times(&answer);
-            for (value, force) in corrected.iter_mut().zip(&load) {
-                *value = self.shift * *value + force;
-            }
-            answer = self.solved(corrected);
-        }
-        self.remove_rigid(&mut answer);
-        answer
-    }
-
-    fn solved(&self, mut load: Vec<f64>) -> Vec<f64> {
-        self.factor.solve_lower(&mut load);
-        self.factor.solve_upper(&mut load);
-        load
-    }
-
-    fn remove_rigid(&self, vector: &mut [f64]) {
-        for (motion, inertia) in &self.rigid {
-            let share: f64 = inertia.iter().zip(vector.iter()).map(|(a, b)| a * b).sum();
-            vector
-                .iter_mut()
-                .zip(motion)
-                .for_each(|(x, m)| *x -= share * m);
-        }
-    }
-}
-
 impl Model {
+    /// Magnitude of the highest omega^2: that of an element's end alone.
+    fn highest_square(&self) -> f64 {
+        let ratio = |run: &Run| run.section.stiffness[0][0] / run.section.mass[0][0];
+        self.runs.iter().map(ratio).fold(0.0, f64::max)
+    }
+
     /// Whether something beside the joint withstands rigid motions.
     fn is_supported(&self) -> bool {
         !self.springs.is_empty() || self.runs.iter().any(|run| run.section.axial_force != 0.0)

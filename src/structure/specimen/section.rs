@@ -24,6 +24,8 @@ pub(super) struct Section {
     pub(super) mass: Square,
     /// S of the module's text.
     pub(super) second_order: Square,
+    /// Displacement inside, over omega^2, for each end motion.
+    inner: [Polynomial; 4],
 }
 
 /// Displacement and rotation of the section at one place for a unit of each end motion.
@@ -41,13 +43,16 @@ impl Section {
             geometric_stiffness(&element, axial_force)
         };
         let elastic = element.stiffness();
+        let motions = end_motions(&element);
+        let responses = motions.map(|motion| inertia_response(&element, &motion));
         Self {
             element,
             axial_force,
             stiffness: sum(&elastic, &geometric),
             geometric,
             mass: element.mass(),
-            second_order: second_order(&element),
+            second_order: second_order(&element, &motions, &responses),
+            inner: responses.map(|response| response.displacement),
         }
     }
 
@@ -69,6 +74,32 @@ impl Section {
             displacement: self.element.displacement(x),
             rotation: std::array::from_fn(|i| slope[i] - strain[i]),
         }
+    }
+
+    /// Displacement at x (0 to 1) over omega^2 that the inertia of each end motion adds inside.
+    pub(super) fn inner_displacement(&self, x: f64) -> [f64; 4] {
+        let value =
+            |polynomial: &Polynomial| polynomial.iter().rev().fold(0.0, |sum, c| sum * x + c);
+        std::array::from_fn(|i| value(&self.inner[i]))
+    }
+
+    /// Displacement at x (0 to 1) for a unit force at another place of the element held at both
+    /// ends: [`inner_response`] for a force at one point.
+    pub(super) fn inner_compliance(&self, x: f64, force: f64) -> f64 {
+        let Element {
+            length: h,
+            bending_stiffness,
+            shear: phi,
+            ..
+        } = self.element;
+        let rest = 1.0 - force;
+        let at_end = 0.5 * rest * rest;
+        let c1 = near_shear_force(phi, at_end, rest * rest * rest / 6.0, rest);
+        let c3 = 0.5 * c1 - at_end;
+        let behind = (x - force).max(0.0);
+        let bent = (behind.powi(3) - c1 * x.powi(3)) / 6.0 + 0.5 * c3 * x * x;
+        let sheared = (c1 * x - behind) * phi / 12.0;
+        h.powi(3) / bending_stiffness * (bent + sheared)
     }
 
     /// Bending moment at x from 0 to 1, from the two ways the element is strained.
@@ -175,16 +206,15 @@ fn end_motions(element: &Element) -> [Motion; 4] {
     })
 }
 
-fn second_order(element: &Element) -> Square {
-    let motions = end_motions(element);
+/// What the inertia of an end motion causes inside, over omega^2.
+fn inertia_response(element: &Element, motion: &Motion) -> Motion {
     let (m, j) = (element.mass_per_length, element.rotary_inertia);
-    let responses = motions.map(|motion| {
-        inner_response(
-            element,
-            &motion.displacement.map(|c| m * c),
-            &motion.rotation.map(|c| j * c),
-        )
-    });
+    let force = motion.displacement.map(|c| m * c);
+    inner_response(element, &force, &motion.rotation.map(|c| j * c))
+}
+
+fn second_order(element: &Element, motions: &[Motion; 4], responses: &[Motion; 4]) -> Square {
+    let (m, j) = (element.mass_per_length, element.rotary_inertia);
     std::array::from_fn(|i| {
         std::array::from_fn(|k| {
             element.length
@@ -205,9 +235,8 @@ fn inner_response(element: &Element, force: &Polynomial, moment: &Polynomial) ->
     let bent = integral(&integral(&combine((h, &once), (-1.0, moment))));
     let (at_end, area) = (value_at_end(&bent), value_at_end(&integral(&bent)));
     let sheared = h * value_at_end(&integral(&once));
-    // From both motions at the far end, c1 being the shear force at the near end.
-    let c1 = 12.0 / (1.0 + phi) * (0.5 * at_end - area + sheared * phi / 12.0);
-    let c3 = -(at_end - 0.5 * c1);
+    let c1 = near_shear_force(phi, at_end, area, sheared);
+    let c3 = 0.5 * c1 - at_end;
     let mut rotation = bent;
     rotation[2] -= 0.5 * c1;
     rotation[1] += c3;
@@ -217,6 +246,11 @@ fn inner_response(element: &Element, force: &Polynomial, moment: &Polynomial) ->
         displacement: integral(&slope).map(|c| h * flexibility * c),
         rotation: rotation.map(|c| flexibility * c),
     }
+}
+
+/// Shear force at the near end, so that both motions vanish at the far end.
+fn near_shear_force(phi: f64, at_end: f64, area: f64, sheared: f64) -> f64 {
+    12.0 / (1.0 + phi) * (0.5 * at_end - area + sheared * phi / 12.0)
 }
 
 fn combine((a, x): (f64, &Polynomial), (b, y): (f64, &Polynomial)) -> Polynomial {
@@ -238,11 +272,23 @@ fn value_at_end(polynomial: &Polynomial) -> f64 {
     polynomial.iter().sum()
 }
 
+/// 1/(n + 1).
+const INVERSES: [f64; 11] = {
+    let mut inverses = [1.0; 11];
+    let mut n = 0;
+    while n < 11 {
+        inverses[n] = 1.0 / (n + 1) as f64;
+        n += 1;
+    }
+    inverses
+};
+
 fn integral_of_product(a: &Polynomial, b: &Polynomial) -> f64 {
+    // Shapes of end motions are cubic.
     let mut sum = 0.0;
-    for (i, x) in a.iter().enumerate().filter(|(_, x)| **x != 0.0) {
-        for (k, y) in b.iter().enumerate() {
-            sum += x * y / (i + k + 1) as f64;
+    for (i, x) in a[..4].iter().enumerate() {
+        for (y, inverse) in b.iter().zip(&INVERSES[i..]) {
+            sum += x * y * inverse;
         }
     }
     sum

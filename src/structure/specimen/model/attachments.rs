@@ -1,6 +1,6 @@
 //! What is fastened to the beam, anywhere on an element.
 
-use super::{HingedElement, Model, Square, Weights};
+use super::{HingedElement, Model, Section, Square, Weights};
 use crate::structure::StructureError;
 use crate::structure::specimen::{Body, Specimen};
 
@@ -8,7 +8,11 @@ use crate::structure::specimen::{Body, Specimen};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::structure::specimen) struct Place {
     pub(in crate::structure::specimen) node: usize,
+    /// From 0 to 1.
+    pub(in crate::structure::specimen) within: f64,
     pub(in crate::structure::specimen) weights: Weights,
+    /// Displacement over omega^2 that the element's inertia adds; none in an element with a hinge.
+    pub(in crate::structure::specimen) inner: [f64; 4],
 }
 
 /// A mass with its inertia.
@@ -17,6 +21,8 @@ pub(in crate::structure::specimen) struct Mass {
     pub(super) place: Place,
     mass: f64,
     inertia: f64,
+    /// Compliance of the element, held at both ends, at this place.
+    compliance: f64,
 }
 
 /// A spring to the ground.
@@ -50,6 +56,13 @@ impl Mass {
     pub(super) fn energy(&self, ends: &[f64; 4]) -> f64 {
         let (w, t) = (self.place.displacement(ends), self.place.rotation(ends));
         self.mass * w * w + self.inertia * t * t
+    }
+
+    /// What its load inside the element adds to the term with omega^4: its own motion
+    /// m^2 w^2 times the compliance, and the work on what the element's inertia moves.
+    pub(super) fn second_order(&self, ends: &[f64; 4]) -> f64 {
+        let load = self.mass * self.place.displacement(ends);
+        load * (load * self.compliance + 2.0 * dot(&self.place.inner, ends))
     }
 }
 
@@ -117,20 +130,35 @@ impl Model {
     fn place_in(&self, (run_index, index): (usize, usize), within: f64) -> Place {
         let run = &self.runs[run_index];
         let mut weights = run.section.weights(within);
-        if let Some(hinged) = self.hinged_at(run_index, index) {
-            hinged.add_weights(&run.section, within, &mut weights);
-        }
+        let hinged = self.hinged_at(run_index, index);
+        let inner = match hinged {
+            Some(hinged) => {
+                hinged.add_weights(&run.section, within, &mut weights);
+                [0.0; 4]
+            }
+            None => run.section.inner_displacement(within),
+        };
         Place {
             node: run.first_node + index,
+            within,
             weights,
+            inner,
         }
+    }
+
+    /// Section of the element that begins at a node.
+    pub(in crate::structure::specimen) fn section_at(&self, node: usize) -> &Section {
+        let right = self.runs.iter().rev().find(|run| run.first_node <= node);
+        &right.unwrap_or(&self.runs[0]).section
     }
 
     fn add_mass(&mut self, place: Place, (mass, inertia): (f64, f64)) {
         if mass == 0.0 && inertia == 0.0 {
             return;
         }
+        let section = self.section_at(place.node);
         self.masses.push(Mass {
+            compliance: section.inner_compliance(place.within, place.within),
             place,
             mass: mass / self.units.mass,
             inertia: inertia / (self.units.mass * self.units.length.powi(2)),

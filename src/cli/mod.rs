@@ -21,6 +21,7 @@ mod perturb;
 mod predict;
 mod reproduce;
 mod run;
+mod simulate;
 mod spectrum;
 
 use arguments::CommonArguments;
@@ -60,6 +61,7 @@ enum Command {
     Diagnose(diagnose::DiagnoseArguments),
     BlindCheck(blind_check::BlindCheckArguments),
     Reproduce(reproduce::ReproduceArguments),
+    Simulate(simulate::SimulateArguments),
 }
 
 /// What a command came to, when nothing went wrong.
@@ -107,6 +109,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Diagnose(arguments) => diagnose::run(arguments, line.common.seed, terminal),
         Command::BlindCheck(arguments) => blind_check::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
+        Command::Simulate(arguments) => simulate::run(arguments, line.common.seed, terminal),
     }
 }
 

@@ -174,6 +174,11 @@ impl OutputFolder {
         })
     }
 
+    /// Where a file is to be written that is too long to be added in one piece.
+    pub(super) fn place_of(&self, name: &str) -> PathBuf {
+        self.staging.path().join(name)
+    }
+
     /// Moves everything into its place, and says where that is.
     ///
     /// # Errors

@@ -51,10 +51,10 @@ pub(super) struct PredictArguments {
 /// Non-dimensional stiffnesses of a joint: kx and ky from 0 to infinity, 1/kz with 0 for no
 /// coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct GivenStiffness {
-    kx: f64,
-    ky: f64,
-    cross_compliance: f64,
+pub(super) struct GivenStiffness {
+    pub(super) kx: f64,
+    pub(super) ky: f64,
+    pub(super) cross_compliance: f64,
 }
 
 /// What the frequencies are wanted of.
@@ -84,7 +84,7 @@ fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<
         Subject::Test(file) => file.test.joint.kind,
         Subject::Kind(kind) => *kind,
     };
-    let stiffness = given_stiffness(arguments, kind)?;
+    let stiffness = given_stiffness((arguments.kx, arguments.ky, arguments.kz), kind)?;
     if stiffness.is_none()
         && matches!(
             subject,
@@ -100,17 +100,21 @@ fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<
     })
 }
 
-fn given_stiffness(
-    arguments: &PredictArguments,
+/// The stiffnesses that --kx, --ky and --kz give.
+///
+/// # Errors
+/// A free beam, a lap joint's coupling, a joint that would be a source of energy.
+pub(super) fn given_stiffness(
+    (kx, ky, kz): (Option<Stiffness>, Option<Stiffness>, Option<CrossStiffness>),
     kind: JointKind,
 ) -> anyhow::Result<Option<GivenStiffness>> {
-    let Some((Stiffness(kx), Stiffness(ky))) = arguments.kx.zip(arguments.ky) else {
+    let Some((Stiffness(kx), Stiffness(ky))) = kx.zip(ky) else {
         return Ok(None);
     };
     if kind == JointKind::Free {
         bail!("a free beam has no joint; leave out --kx, --ky and --kz");
     }
-    let Some(CrossStiffness(kz)) = arguments.kz else {
+    let Some(CrossStiffness(kz)) = kz else {
         return Ok(Some(GivenStiffness {
             kx,
             ky,

@@ -35,11 +35,28 @@ pub fn believed_description(
         describe_channel(sensor, scales.next());
     }
     for (recording, described) in tables(&mut table, "recording").zip(&test.recordings) {
-        recording.insert("file".into(), super::plan::wav_name(described).into());
+        let file = super::plan::wav_name(described);
+        if let (Some(band), false) = (band_above(simulated, &file), recording.contains_key("band"))
+        {
+            recording.insert("band".into(), Value::Array(band.map(Value::Float).to_vec()));
+        }
+        recording.insert("file".into(), file.into());
         recording.remove("sample_rate");
         recording.remove("level");
     }
     Ok(format!("{HEAD}{table}"))
+}
+
+/// A band (Hz) that begins above the suspension of a structure that hangs, whose motions on it are no
+/// modes of the beam.
+fn band_above(simulated: &VirtualTest, file: &str) -> Option<[f64; 2]> {
+    let mut recordings = simulated.recordings.iter();
+    let recording = recordings.find(|recording| recording.file == file)?;
+    let suspended = recording.structure.suspension_frequencies();
+    let highest = suspended.reduce(f64::max)?;
+    let reach = f64::from(recording.take.sample_rate) / 2.56;
+    // Five times the suspension's frequency, in whole hertz: it is 4 % of a resonance there.
+    Some([(5.0 * highest).ceil(), reach])
 }
 
 fn tables<'t>(table: &'t mut Table, key: &str) -> impl Iterator<Item = &'t mut Table> {

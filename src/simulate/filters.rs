@@ -158,3 +158,79 @@ fn bessel_i0(x: f64) -> f64 {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex64;
+
+    /// Gain of weights at a frequency, in parts of the rate.
+    fn gain(weights: &[f64], part: f64) -> f64 {
+        let terms = weights.iter().enumerate();
+        terms
+            .map(|(n, weight)| Complex64::from_polar(*weight, -TAU * part * n as f64))
+            .sum::<Complex64>()
+            .norm()
+    }
+
+    #[test]
+    fn val_the_decimator_passes_its_band_and_nothing_that_would_fold_into_it() {
+        for factor in [4, 10] {
+            let filter = Decimator::new(factor);
+            let rate = factor as f64;
+            for step in 0..=100 {
+                // In parts of the rate after decimation: the band ends at 1/2.56.
+                let part = 0.01 * f64::from(step) / 2.56;
+                let ripple = gain(&filter.weights, part / rate) - 1.0;
+                assert!(ripple.abs() < 1e-5, "factor {factor}, {part}: {ripple}");
+                // 105 dB; Kaiser's formula aims at 110 and errs by some.
+                let folded = gain(&filter.weights, (1.0 - part) / rate);
+                assert!(folded < 6e-6, "factor {factor}, {part}: {folded}");
+            }
+        }
+    }
+
+    #[test]
+    fn val_a_constant_passes_the_decimator_unchanged_once_it_is_full() {
+        let mut filter = Decimator::new(4);
+        for _ in 0..=2 * HALF_LENGTH * 4 {
+            filter.push(2.5);
+        }
+        assert!((filter.output() - 2.5).abs() < 1e-12, "{}", filter.output());
+    }
+
+    /// Amplitude that a filter makes of a sine of amplitude 1, by its largest value in the end.
+    fn amplitude(mut filter: impl FnMut(f64) -> f64, frequency: f64, rate: f64) -> f64 {
+        let samples = (rate * (20.0 / frequency).max(0.02)) as usize;
+        let outputs: Vec<f64> = (0..samples)
+            .map(|n| filter((TAU * frequency * n as f64 / rate).sin()))
+            .collect();
+        let end = &outputs[samples / 2..];
+        end.iter().fold(0.0, |most: f64, x| most.max(x.abs()))
+    }
+
+    #[test]
+    fn val_mounting_and_coupling_have_the_gains_of_their_continuous_models() {
+        let rate = 51_200.0;
+        for frequency in [100.0, 1000.0, 2000.0, 5000.0] {
+            let mut mounting = Resonance::new(18e3, 20.0, rate);
+            let found = amplitude(|x| mounting.push(x), frequency, rate);
+            let r: f64 = frequency / 18e3;
+            let expected = ((1.0 - r * r).powi(2) + (r / 20.0).powi(2)).sqrt().recip();
+            // The match of three points on the curve keeps 1 % of the gain in between.
+            assert!(
+                (found / expected - 1.0).abs() < 0.01,
+                "{frequency}: {found} for {expected}"
+            );
+        }
+        for frequency in [2.0, 10.0, 50.0] {
+            let mut coupling = HighPass::new(10.0, rate);
+            let found = amplitude(|x| coupling.push(x), frequency, rate);
+            let expected = frequency / 10f64.hypot(frequency);
+            assert!(
+                (found / expected - 1.0).abs() < 5e-3,
+                "{frequency}: {found} for {expected}"
+            );
+        }
+    }
+}

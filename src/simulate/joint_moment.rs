@@ -7,6 +7,8 @@ const SLIDERS: usize = 40;
 /// Sliders are distributed up to this multiple of the hardest tap's rotation, or to where the joint
 /// would slip as a whole.
 const BEYOND_HARDEST: f64 = 3.0;
+/// Least slope of a softening elastic joint, relative to that at rest.
+const LEAST_SLOPE: f64 = 0.02;
 
 /// Restoring moment of the joint's rotation, M(theta).
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +21,9 @@ pub enum JointMoment {
         coefficient: f64,
         /// p (1), positive.
         exponent: f64,
+        /// Rotation (rad) beyond which a softening moment goes on as a straight line; infinite where
+        /// it stiffens.
+        limit: f64,
     },
     /// Micro-slip: springs in parallel, each in series with a slider (Iwan 1966), beside one that never
     /// slips.
@@ -55,15 +60,28 @@ impl JointMoment {
     pub fn of_law(law: &JointLaw, stiffness: f64, hardest: f64) -> Self {
         let coefficient = law.coefficient(hardest);
         match law.kind() {
-            JointLawKind::Elastic => Self::Elastic {
-                stiffness,
-                coefficient,
-                exponent: law.exponent,
-            },
+            JointLawKind::Elastic => Self::elastic(stiffness, coefficient, law.exponent),
             JointLawKind::MicroSlip => Self::MicroSlip {
                 stiffness,
                 sliders: sliders(law, stiffness, (hardest, coefficient)),
             },
+        }
+    }
+
+    /// M = k theta (1 + c |theta|^p). A softening moment has a crest, beyond which it would let go of the
+    /// beam: from where its slope has fallen to 2 % it keeps that slope.
+    pub fn elastic(stiffness: f64, coefficient: f64, exponent: f64) -> Self {
+        let limit = if coefficient < 0.0 {
+            // 1 + c (p + 1) theta^p = 0.02
+            ((1.0 - LEAST_SLOPE) / (-coefficient * (exponent + 1.0))).powf(exponent.recip())
+        } else {
+            f64::INFINITY
+        };
+        Self::Elastic {
+            stiffness,
+            coefficient,
+            exponent,
+            limit,
         }
     }
 
@@ -89,11 +107,15 @@ impl JointMoment {
                 stiffness,
                 coefficient,
                 exponent,
+                limit,
             } => {
-                let change = coefficient * power(rotation.abs(), *exponent);
+                let bent = rotation.abs().min(*limit);
+                let change = coefficient * power(bent, *exponent);
+                let slope = (exponent + 1.0) * change;
+                let straight = slope * (rotation.abs() - bent);
                 Extra {
-                    moment: stiffness * change * rotation,
-                    slope: (exponent + 1.0) * stiffness * change,
+                    moment: stiffness * (change * bent + straight) * rotation.signum(),
+                    slope: stiffness * slope,
                     loss: 0.0,
                 }
             }
@@ -110,14 +132,18 @@ impl JointMoment {
     /// Elastic energy (J) beyond that of the linear spring, with the sliders at `memory`.
     pub(super) fn stored(&self, rotation: f64, memory: &[f64]) -> f64 {
         match self {
-            // The integral of k c theta^{p+1}.
+            // The integral of k c theta^{p+1}, and of the straight line from the limit on.
             Self::Elastic {
                 stiffness,
                 coefficient,
                 exponent,
+                limit,
             } => {
-                let change = coefficient * power(rotation.abs(), *exponent);
-                stiffness * change * rotation * rotation / (exponent + 2.0)
+                let bent = rotation.abs().min(*limit);
+                let more = rotation.abs() - bent;
+                let change = coefficient * power(bent, *exponent);
+                let straight = more * (bent + 0.5 * (exponent + 1.0) * more);
+                stiffness * change * (bent * bent / (exponent + 2.0) + straight)
             }
             Self::MicroSlip { sliders, .. } => sliders
                 .iter()

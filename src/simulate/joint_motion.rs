@@ -9,7 +9,7 @@ use super::collocation::{
 };
 use super::joint_moment::{Extra, JointMoment};
 use super::motion::{Strike, drive};
-use super::reduced::{Oscillator, ReducedStructure};
+use super::reduced::{Oscillator, ReducedStructure, seen};
 
 /// Finest division of a step: into 2^6 parts.
 const FINEST: usize = 6;
@@ -142,10 +142,7 @@ impl JointMotion {
         let collocation = &self.collocations[self.division];
         let mut rotations = [0.0; PLACES];
         for (place, rotation) in rotations.iter_mut().enumerate() {
-            let modes = collocation.rotation[place].iter().zip(states);
-            *rotation = modes
-                .map(|([real, imaginary], state)| real * state.re + imaginary * state.im)
-                .sum::<f64>()
+            *rotation = seen(&collocation.rotation[place], states)
                 + collocation.influence[place][0] * self.moments[NODES - 1];
         }
         let end = time + collocation.step;

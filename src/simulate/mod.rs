@@ -3,7 +3,7 @@
 //! ```text
 //! Specimen -> SeenStructure    modes as sensors, hammer and joint see them; what lies beyond as springs
 //!          -> Motion           their exact motion in time; a non-linear joint solved for beside it
-//!          -> Session          hammer, sensors, recorder: one sample of every channel after the other
+//!          -> Take          hammer, sensors, recorder: one sample of every channel after the other
 //! ```
 //!
 //! What the diagnosis must not see stays here: the truth is an argument and an output of its own,
@@ -25,7 +25,7 @@ mod plan;
 mod pulse;
 mod reduced;
 mod seen;
-mod session;
+mod take;
 mod tap_test;
 mod trial;
 mod truth;
@@ -45,6 +45,6 @@ pub use plan::{TestPlan, VirtualRecording, VirtualTest, plan_test, wav_name};
 pub use pulse::{Pulse, PulseShape};
 pub use reduced::{ReducedMode, ReducedStructure, Sensed, StruckPlace};
 pub use seen::SeenStructure;
-pub use session::{Session, SessionPlan};
+pub use take::{Take, TakePlan};
 pub use tap_test::{SimulatedMode, TapTest, TapTestSettings, seen_modes, simulate_tap_test};
 pub use truth::{JointTruth, LawTruth, ModeTruth, PlantedEffect, RecordingTruth, Truth, truth_of};

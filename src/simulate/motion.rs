@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use super::joint_moment::JointMoment;
 use super::joint_motion::JointMotion;
 use super::pulse::Pulse;
-use super::reduced::{Oscillator, ReducedStructure, Sensed, StruckPlace};
+use super::reduced::{Oscillator, ReducedStructure, Sensed, StruckPlace, seen};
 
 /// A pulse and where it strikes.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,12 +126,7 @@ impl Motion {
     /// What each sensor feels now, in SI units.
     pub fn responses(&self, out: &mut [f64]) {
         for (row, out) in self.sensors.iter().zip(out.iter_mut()) {
-            *out = row
-                .of_states
-                .iter()
-                .zip(&self.states)
-                .map(|([real, imaginary], state)| real * state.re + imaginary * state.im)
-                .sum();
+            *out = seen(&row.of_states, &self.states);
         }
         let time = self.time();
         for strike in &self.strikes {

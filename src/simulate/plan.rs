@@ -15,7 +15,7 @@ use super::laboratory::{Laboratory, Tip};
 use super::nominal::{GivenJoint, nominal_specimen, sensor_places};
 use super::reduced::Sensed;
 use super::seen::SeenStructure;
-use super::session::{Session, SessionPlan};
+use super::take::{Take, TakePlan};
 use super::trial::{Trial, round_scale, try_out};
 use crate::structure::specimen::{Specimen, SpecimenJoint};
 
@@ -53,8 +53,6 @@ pub struct VirtualTest {
 pub struct VirtualRecording {
     /// Name of the file: a WAV file in the test's folder.
     pub file: String,
-    /// Line of the description that names it first.
-    pub line: usize,
     /// How hard it is struck (1).
     pub level: f64,
     /// What is seen of the structure: at rest, where its joint is not linear.
@@ -62,7 +60,7 @@ pub struct VirtualRecording {
     /// The structure in its modes.
     pub structure: SeenStructure,
     /// How it is recorded.
-    pub session: SessionPlan,
+    pub take: TakePlan,
 }
 
 /// Prepares a virtual test.
@@ -86,7 +84,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
         let recording = prepare(plan, recording, visit)?;
         trials.push(try_out(
             &recording.structure,
-            &recording.session,
+            &recording.take,
             plan.laboratory,
         ));
         recordings.push(recording);
@@ -94,7 +92,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     let scales = scales(test, &trials);
     let joint_law = hardest(&recordings, &trials);
     for recording in &mut recordings {
-        let channels = recording.session.channels.iter_mut();
+        let channels = recording.take.channels.iter_mut();
         for ((_, scale), wanted) in channels.zip(&scales) {
             *scale = match wanted {
                 Scale::PerUnit(scale) | Scale::PerVolt(scale) => *scale,
@@ -102,7 +100,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
         }
         if let Some((law, hardest)) = &joint_law {
             let stiffness = turning_stiffness(&recording.seen.specimen)?;
-            recording.session.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
+            recording.take.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
         }
     }
     Ok(VirtualTest {
@@ -115,8 +113,8 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
 
 impl VirtualRecording {
     /// Begins the recording.
-    pub fn begin(&self, laboratory: &Laboratory) -> Session {
-        Session::new(self.structure.clone(), &self.session, laboratory)
+    pub fn begin(&self, laboratory: &Laboratory) -> Take {
+        Take::new(self.structure.clone(), &self.take, laboratory)
     }
 }
 
@@ -184,11 +182,14 @@ fn prepare(
     let nominal = nominal_specimen(test, described, plan.joint)?;
     let level = described.level.unwrap_or(1.0);
     let seen = see(plan, &nominal, &places, visit);
+    // Places are marked in proportion to the length, which may not be the described one.
+    let length = seen.specimen.body.length();
+    let stretched = |position: f64| (position * length / nominal.body.length()).min(length);
     let sample_rate = sample_rate(laboratory, file, *highest)?;
     let reach = f64::from(sample_rate) / 2.56;
     let tip = laboratory.hammer.tip;
     let tip = tip.unwrap_or_else(|| Tip::softest_for(highest.unwrap_or(reach)));
-    let mut session = SessionPlan {
+    let mut take = TakePlan {
         sample_rate,
         frames: 0,
         frequency_scale: seen.frequency_scale * (1.0 + laboratory.recorder.clock_error),
@@ -196,35 +197,37 @@ fn prepare(
         taps: TapPlan {
             taps: laboratory.hammer.taps,
             interval: 0.0,
-            place: (tap, seen.specimen.body.length()),
+            place: (stretched(tap), length),
             peak_force: laboratory.hammer.peak_force * level,
             pulse: tip.pulse(),
         },
         joint: None,
         seed: (plan.seed, visit as u64),
     };
-    let positions: Vec<f64> = places.iter().map(|place| place.position).collect();
+    let positions: Vec<f64> = places
+        .iter()
+        .map(|place| stretched(place.position))
+        .collect();
     let structure = SeenStructure::new(
         &seen.specimen,
         &laboratory.specimen,
         &positions,
-        (seen.joint_loss_factor, session.highest_mode(laboratory)),
+        (seen.joint_loss_factor, take.highest_mode(laboratory)),
     )?;
     let block = described.block.filter(|_| described.band.is_none());
     let block = block.map_or(*block_seconds, |block| {
         block as f64 / f64::from(sample_rate)
     });
     let interval = interval(laboratory, &structure, block);
-    session.taps.interval = interval;
+    take.taps.interval = interval;
     let seconds = laboratory.hammer.lead + laboratory.hammer.taps as f64 * interval;
-    session.frames = (seconds * f64::from(sample_rate)).round() as u64;
+    take.frames = (seconds * f64::from(sample_rate)).round() as u64;
     Ok(VirtualRecording {
         file: file.clone(),
-        line: described.line,
         level,
         seen,
         structure,
-        session,
+        take,
     })
 }
 

@@ -111,6 +111,11 @@ impl SeenStructure {
         elastic.map(|mode| (mode.frequency, mode.damping_ratio))
     }
 
+    /// Natural frequencies (Hz) of a hanging structure on its suspension.
+    pub fn suspension_frequencies(&self) -> impl Iterator<Item = f64> {
+        self.rigid.iter().map(|motion| motion.frequency)
+    }
+
     /// How it feels a strike at a position (m).
     pub fn struck(&self, position: f64) -> StruckPlace {
         let rigid = self.rigid.iter().map(|motion| motion.at(position));

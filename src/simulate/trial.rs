@@ -6,7 +6,7 @@ use super::motion::{Motion, Strike};
 use super::pulse::Pulse;
 use super::reduced::Sensed;
 use super::seen::SeenStructure;
-use super::session::SessionPlan;
+use super::take::TakePlan;
 
 /// What a mean tap brings.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,7 @@ const FOLLOWED: f64 = 0.3;
 
 pub(super) fn try_out(
     structure: &SeenStructure,
-    plan: &SessionPlan,
+    plan: &TakePlan,
     laboratory: &Laboratory,
 ) -> Trial {
     let sensed: Vec<Sensed> = plan

@@ -162,9 +162,9 @@ fn recording_of(
     laboratory: &Laboratory,
     units: &StiffnessUnits,
 ) -> RecordingTruth {
-    let plan = &recording.session;
+    let plan = &recording.take;
     let reach = f64::from(plan.sample_rate) / 2.56;
-    let session = recording.begin(laboratory);
+    let take = recording.begin(laboratory);
     let modes = recording.structure.elastic_modes().zip(1..);
     RecordingTruth {
         file: recording.file.clone(),
@@ -181,7 +181,7 @@ fn recording_of(
                 damping,
             })
             .collect(),
-        taps: session.taps(),
-        gains: session.gains(),
+        taps: take.taps(),
+        gains: take.gains(),
     }
 }

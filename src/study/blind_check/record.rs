@@ -73,7 +73,7 @@ impl DrawnTest {
             &places,
             (
                 recording.seen.joint_loss_factor,
-                recording.session.highest_mode(&self.laboratory),
+                recording.take.highest_mode(&self.laboratory),
             ),
         )?;
         Ok(())
@@ -81,8 +81,8 @@ impl DrawnTest {
 
     fn take(&self, recording: &VirtualRecording, number: usize) -> Recorded {
         let mut session = recording.begin(&self.laboratory);
-        let count = recording.session.channels.len();
-        let mut channels = vec![Vec::with_capacity(recording.session.frames as usize); count];
+        let count = recording.take.channels.len();
+        let mut channels = vec![Vec::with_capacity(recording.take.frames as usize); count];
         let mut frame = vec![0.0; count];
         while session.next_frame(&mut frame) {
             for (channel, value) in channels.iter_mut().zip(&frame) {
@@ -106,7 +106,7 @@ impl DrawnTest {
         }
         Recorded {
             file: recording.file.clone(),
-            sample_rate: recording.session.sample_rate,
+            sample_rate: recording.take.sample_rate,
             channels,
         }
     }

@@ -23,7 +23,7 @@ const RATE_OVER_RESONANCE: f64 = 2.3;
 
 /// A recording to be made.
 #[derive(Debug, Clone)]
-pub struct SessionPlan {
+pub struct TakePlan {
     /// Sample rate that the file states (Hz).
     pub sample_rate: u32,
     /// Samples per channel.
@@ -41,7 +41,7 @@ pub struct SessionPlan {
     pub seed: (u64, u64),
 }
 
-impl SessionPlan {
+impl TakePlan {
     /// Steps of the simulation for each sample.
     pub fn steps_per_sample(&self, laboratory: &Laboratory) -> usize {
         let rate = f64::from(self.sample_rate);
@@ -61,7 +61,7 @@ impl SessionPlan {
 
 /// A recording in the making.
 #[derive(Debug, Clone)]
-pub struct Session {
+pub struct Take {
     motion: Motion,
     structure: SeenStructure,
     hammer: std::iter::Peekable<Hammer>,
@@ -75,9 +75,9 @@ pub struct Session {
     responses: Vec<f64>,
 }
 
-impl Session {
+impl Take {
     /// Prepares a recording of a structure.
-    pub fn new(structure: SeenStructure, plan: &SessionPlan, laboratory: &Laboratory) -> Self {
+    pub fn new(structure: SeenStructure, plan: &TakePlan, laboratory: &Laboratory) -> Self {
         let factor = plan.steps_per_sample(laboratory);
         // The clock's seconds are too long where frequencies read high.
         let file_rate = f64::from(plan.sample_rate) / plan.frequency_scale;
@@ -192,7 +192,7 @@ impl Session {
 }
 
 /// For each channel the sensor it belongs to.
-fn sources(plan: &SessionPlan) -> Vec<Option<usize>> {
+fn sources(plan: &TakePlan) -> Vec<Option<usize>> {
     let mut sensors = 0..;
     let channels = plan.channels.iter();
     channels

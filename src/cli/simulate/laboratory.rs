@@ -1,0 +1,251 @@
+//! Options of the laboratory.
+
+use anyhow::bail;
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, ValueEnum};
+use tapjoint::quantity::{Dimension, parse_quantity};
+use tapjoint::simulate::{AntiAlias, Damping, Laboratory, Tip};
+
+/// How the test is carried out. Defaults are those of a decent laboratory; the command prints them.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Laboratory")]
+pub(super) struct LaboratoryArguments {
+    /// Nothing that disturbs: no noise, scatter, filters, errors; the other options still count
+    #[arg(long)]
+    ideal: bool,
+    /// Leave out parts of the laboratory, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,...")]
+    without: Vec<Part>,
+    /// Taps in each recording; default: 5
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
+    taps: Option<usize>,
+    /// Length of each recording (s); default: what the taps need to ring down
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Sample rate (Hz); default: the lowest usual one that covers the band
+    #[arg(long, value_name = "HZ", value_parser = sample_rate)]
+    rate: Option<u32>,
+    /// Bits of a sample, 32 for floating point; default: 24
+    #[arg(long, value_name = "N", value_parser = ["16", "24", "32"])]
+    bits: Option<String>,
+    /// Tip of the hammer; default: the softest that excites the band
+    #[arg(long, value_enum)]
+    tip: Option<TipArgument>,
+    /// Peak force of a tap (N), which each recording's `level` multiplies; default: 20
+    #[arg(long, value_name = "N", value_parser = force)]
+    level: Option<f64>,
+    /// Noise of sensors and hammer, in multiples of that of good ones; default: 1
+    #[arg(long, value_name = "X")]
+    noise: Option<f64>,
+    /// Share of the taps that strike twice; default: 0
+    #[arg(long, value_name = "SHARE", value_parser = ratio)]
+    double_hits: Option<f64>,
+    /// Share of the taps that are far too weak; default: 0
+    #[arg(long, value_name = "SHARE", value_parser = ratio)]
+    weak_hits: Option<f64>,
+    /// Quiet time before the first tap (s); default: 0.5
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    lead: Option<f64>,
+    /// Error of the recorder's clock, positive = frequencies read high; default: 5e-6
+    #[arg(long, value_name = "X", value_parser = ratio, allow_negative_numbers = true)]
+    clock_error: Option<f64>,
+    /// Resonance of an accelerometer on its mounting (Hz); default: 18000
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    mounting: Option<f64>,
+    /// Frequency of the mains (Hz); default: 50
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    mains: Option<f64>,
+    /// Damping ratio of each mode, separated by commas, the last one for all beyond; default:
+    /// 0.4%,0.3%,0.25%,0.2%
+    #[arg(long, value_name = "Z,...", value_delimiter = ',', value_parser = ratio, conflicts_with = "rayleigh")]
+    damping: Vec<f64>,
+    /// Damping in proportion to mass (1/s) and stiffness (s), instead of --damping
+    #[arg(long, value_name = "MASS,STIFFNESS", value_delimiter = ',')]
+    rayleigh: Vec<f64>,
+}
+
+/// Parts of the laboratory that can be left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Noise of sensors and hammer
+    Noise,
+    /// Mains hum
+    Hum,
+    /// Slow drift of the zero
+    Drift,
+    /// Offset of the zero
+    Offset,
+    /// Anti-alias filter
+    AntiAlias,
+    /// High-pass of AC-coupled inputs
+    AcCoupling,
+    /// Resonance of the mounted accelerometers
+    Mounting,
+    /// Errors of the sensitivities
+    SensitivityError,
+    /// Error of the clock
+    ClockError,
+    /// Scatter of level, length and place of the taps
+    Scatter,
+    /// Rigid-body motion of a free or lap-jointed beam on its suspension
+    Suspension,
+}
+
+/// Tips, as the command line names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum TipArgument {
+    /// 0.3 ms, to 3.3 kHz
+    Steel,
+    /// 1 ms, to 1 kHz
+    Nylon,
+    /// 5 ms, to 290 Hz
+    Rubber,
+}
+
+impl LaboratoryArguments {
+    /// The laboratory.
+    pub(super) fn resolve(&self) -> anyhow::Result<Laboratory> {
+        let mut laboratory = if self.ideal {
+            Laboratory::ideal()
+        } else {
+            Laboratory::default()
+        };
+        for part in &self.without {
+            part.leave_out(&mut laboratory);
+        }
+        self.set_hammer(&mut laboratory)?;
+        self.set_recorder(&mut laboratory)?;
+        set(&mut laboratory.sensors.noise, self.noise);
+        set(&mut laboratory.sensors.mounting_resonance, self.mounting);
+        if !self.damping.is_empty() {
+            laboratory.specimen.damping = Damping::Modal(self.damping.clone());
+        }
+        match self.rayleigh[..] {
+            [] => {}
+            [mass, stiffness] => {
+                laboratory.specimen.damping = Damping::Rayleigh { mass, stiffness };
+            }
+            _ => bail!(
+                "--rayleigh has {} numbers; give two, MASS (1/s) and STIFFNESS (s), such as 0.5,1e-6",
+                self.rayleigh.len()
+            ),
+        }
+        Ok(laboratory)
+    }
+
+    fn set_hammer(&self, laboratory: &mut Laboratory) -> anyhow::Result<()> {
+        let hammer = &mut laboratory.hammer;
+        set(&mut hammer.taps, self.taps);
+        set(&mut hammer.lead, self.lead);
+        set(&mut hammer.peak_force, self.level);
+        set(&mut hammer.double_hits, self.double_hits);
+        set(&mut hammer.weak_hits, self.weak_hits);
+        hammer.tip = self.tip.map(Tip::from);
+        if let Some(seconds) = self.seconds {
+            let interval = (seconds - hammer.lead) / hammer.taps as f64;
+            // A tap needs room for its pulse and some of what rings.
+            if interval < 0.05 {
+                bail!(
+                    "--seconds {seconds} leaves {interval:.3} s for each of {} taps after {} s of lead; give at least {:.1} s, or fewer --taps",
+                    hammer.taps,
+                    hammer.lead,
+                    hammer.lead + 0.05 * hammer.taps as f64
+                );
+            }
+            hammer.interval = Some(interval);
+        }
+        Ok(())
+    }
+
+    fn set_recorder(&self, laboratory: &mut Laboratory) -> anyhow::Result<()> {
+        let recorder = &mut laboratory.recorder;
+        recorder.sample_rate = self.rate;
+        if let Some(bits) = &self.bits {
+            recorder.bits = bits.parse()?;
+        }
+        set(&mut recorder.clock_error, self.clock_error);
+        set(&mut recorder.mains, self.mains);
+        Ok(())
+    }
+}
+
+fn set<T>(value: &mut T, given: Option<T>) {
+    if let Some(given) = given {
+        *value = given;
+    }
+}
+
+impl Part {
+    fn leave_out(self, laboratory: &mut Laboratory) {
+        let Laboratory {
+            hammer,
+            sensors,
+            recorder,
+            specimen,
+        } = laboratory;
+        match self {
+            Self::Noise => sensors.noise = 0.0,
+            Self::Hum => recorder.hum = 0.0,
+            Self::Drift => recorder.drift = 0.0,
+            Self::Offset => recorder.offset = 0.0,
+            Self::AntiAlias => recorder.anti_alias = AntiAlias::Off,
+            Self::AcCoupling => sensors.ac_coupling = 0.0,
+            Self::Mounting => sensors.mounting_resonance = 0.0,
+            Self::SensitivityError => sensors.sensitivity_error = 0.0,
+            Self::ClockError => recorder.clock_error = 0.0,
+            Self::Scatter => {
+                hammer.level_scatter = 0.0;
+                hammer.length_scatter = 0.0;
+                hammer.place_scatter = 0.0;
+            }
+            Self::Suspension => specimen.suspension = None,
+        }
+    }
+}
+
+impl From<TipArgument> for Tip {
+    fn from(tip: TipArgument) -> Self {
+        match tip {
+            TipArgument::Steel => Self::Steel,
+            TipArgument::Nylon => Self::Nylon,
+            TipArgument::Rubber => Self::Rubber,
+        }
+    }
+}
+
+fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
+    parse_quantity(text, dimension).map_err(|error| error.to_string())
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Ratio)
+}
+
+fn force(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Force)
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    quantity(text, Dimension::Frequency)
+}
+
+/// No test lasts longer than a day.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches('s').trim().parse::<f64>() {
+        Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),
+        _ => Err(format!(
+            "\"{text}\" is no time; give seconds from 0 to 86400"
+        )),
+    }
+}
+
+fn sample_rate(text: &str) -> Result<u32, String> {
+    let rate = quantity(text, Dimension::Rate)?;
+    if rate.fract() == 0.0 && (100.0..=1e6).contains(&rate) {
+        Ok(rate as u32)
+    } else {
+        Err(format!(
+            "{rate} Hz is no sample rate of a WAV file; give a whole number from 100 to 1000000"
+        ))
+    }
+}

@@ -1,0 +1,186 @@
+//! `tapjoint simulate`: the recordings of a virtual test.
+
+mod laboratory;
+mod planted;
+mod summary;
+
+use super::Outcome;
+use super::arguments::{CrossStiffness, Stiffness};
+use super::input::{TestFile, read_test};
+use super::output::OutputFolder;
+use super::predict::given_stiffness;
+use super::terminal::Terminal;
+use anyhow::{Context, anyhow, bail};
+use clap::Args;
+use laboratory::LaboratoryArguments;
+use planted::PlantedArgument;
+use rayon::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tapjoint::effects::Effect;
+use tapjoint::recording::{WavFormat, WavLayout, WavStream};
+use tapjoint::simulate::{
+    GivenJoint, Laboratory, TestPlan, VirtualRecording, VirtualTest, believed_description,
+    plan_test, truth_of,
+};
+
+/// Make the recordings of a virtual test: what a laboratory would record of a described structure.
+///
+/// TEST describes beam, joint (with kt and kr, or --kx and --ky), sensors and recordings. DIR gets the
+/// recordings, a test.toml that describes them as a user would believe them (what --with plants is
+/// left out, the joint is to be fitted), and truth.json.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  tapjoint simulate test.toml --out virtual --with sensor-mass:mass=24g\n  tapjoint simulate test.toml --out virtual --kx 1400 --ky 4.8 --with joint-nonlinearity:ratio=-0.1,exponent=1 --seed 7\n  tapjoint run virtual/test.toml"
+)]
+pub(super) struct SimulateArguments {
+    /// A test description (.toml); its recordings need not exist
+    #[arg(value_name = "TEST")]
+    test: PathBuf,
+    /// Folder of the recordings, test.toml and truth.json
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Plant an effect that the description leaves out, such as sensor-mass:mass=24g; may be given
+    /// several times; parameters left out have typical values
+    #[arg(long = "with", value_name = "EFFECT:KEY=VALUE,...")]
+    effects: Vec<PlantedArgument>,
+    /// Write no truth.json: a folder for whoever diagnoses
+    #[arg(long)]
+    no_truth: bool,
+    /// Translational stiffness (non-dimensional), instead of kt of TEST
+    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true)]
+    kx: Option<Stiffness>,
+    /// Rotational stiffness (non-dimensional), instead of kr of TEST
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
+    ky: Option<Stiffness>,
+    /// Cross-coupling stiffness (non-dimensional), with --kx and --ky
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
+    kz: Option<CrossStiffness>,
+    #[command(flatten)]
+    laboratory: LaboratoryArguments,
+}
+
+/// The arguments, checked.
+struct Request {
+    file: TestFile,
+    text: String,
+    output: OutputFolder,
+    effects: Vec<Effect>,
+    laboratory: Laboratory,
+    format: WavFormat,
+    joint: Option<GivenJoint>,
+}
+
+fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result<Request> {
+    let file = read_test(&arguments.test, terminal)?;
+    let text = fs::read_to_string(&arguments.test)
+        .with_context(|| format!("{}: cannot be read", file.name))?;
+    let written = arguments.out.join(DESCRIPTION);
+    if same_file(&arguments.test, &written) {
+        bail!(
+            "{}: the description itself would be overwritten; give another folder with --out",
+            written.display()
+        );
+    }
+    let stiffness = (arguments.kx, arguments.ky, arguments.kz);
+    let given = given_stiffness(stiffness, file.test.joint.kind)?;
+    let laboratory = arguments.laboratory.resolve()?;
+    Ok(Request {
+        output: OutputFolder::prepare(&arguments.out)?,
+        effects: arguments
+            .effects
+            .iter()
+            .map(|planted| planted.0.clone())
+            .collect(),
+        format: match laboratory.recorder.bits {
+            16 => WavFormat::Pcm16,
+            24 => WavFormat::Pcm24,
+            _ => WavFormat::Float32,
+        },
+        joint: given.map(|given| GivenJoint {
+            kx: given.kx,
+            ky: given.ky,
+            cross_compliance: given.cross_compliance,
+        }),
+        laboratory,
+        file,
+        text,
+    })
+}
+
+/// Name of the description beside the recordings.
+const DESCRIPTION: &str = "test.toml";
+
+fn same_file(one: &Path, other: &Path) -> bool {
+    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(a), Ok(b)) if a == b)
+}
+
+pub(super) fn run(
+    arguments: &SimulateArguments,
+    seed: u64,
+    terminal: Terminal,
+) -> anyhow::Result<Outcome> {
+    let request = resolve(arguments, &terminal)?;
+    let plan = TestPlan {
+        description: &request.file.test,
+        effects: &request.effects,
+        laboratory: &request.laboratory,
+        joint: request.joint,
+        seed,
+    };
+    let test = plan_test(&plan).map_err(|error| anyhow!("{}: {error}", request.file.name))?;
+    let truth = truth_of(&plan, &test);
+    let clipped = record(&request, &test)?;
+    let believed = believed_description(&request.text, &request.file.test, &test)?;
+    request.output.add(DESCRIPTION, believed.as_bytes())?;
+    if !arguments.no_truth {
+        let mut text = serde_json::to_string_pretty(&truth)?;
+        text.push('\n');
+        request.output.add("truth.json", text.as_bytes())?;
+    }
+    for (recording, clipped) in test.recordings.iter().zip(&clipped) {
+        if *clipped > 0 {
+            terminal.warn(&format!(
+                "{}: {clipped} samples lie beyond full scale and are clipped; give a larger `scale`, or a lower --level",
+                recording.file
+            ));
+        }
+    }
+    let folder = request.output.publish()?;
+    terminal.say(&summary::summary(&truth, &test, &folder))?;
+    terminal.write_json(&serde_json::to_value(&truth)?)?;
+    Ok(Outcome::Answered)
+}
+
+/// Writes all recordings and returns how many samples of each were clipped.
+fn record(request: &Request, test: &VirtualTest) -> anyhow::Result<Vec<u64>> {
+    test.recordings
+        .par_iter()
+        .map(|recording| {
+            let path = request.output.place_of(&recording.file);
+            let written = write(recording, &request.laboratory, &path, request.format);
+            written.with_context(|| format!("{}: could not be written", recording.file))
+        })
+        .collect()
+}
+
+fn write(
+    recording: &VirtualRecording,
+    laboratory: &Laboratory,
+    path: &Path,
+    format: WavFormat,
+) -> anyhow::Result<u64> {
+    let mut take = recording.begin(laboratory);
+    let layout = WavLayout {
+        sample_rate: recording.take.sample_rate,
+        channels: recording.take.channels.len(),
+        frames: recording.take.frames,
+        format,
+    };
+    let mut stream = WavStream::create(path, layout)?;
+    let mut frame = vec![0.0; layout.channels];
+    while take.next_frame(&mut frame) {
+        stream.write(&frame)?;
+    }
+    Ok(stream.finish()?)
+}

@@ -1,0 +1,253 @@
+//! The command `simulate`: recordings that the rest of the program reads, and what it refuses.
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+const TEST: &str = r#"
+name = "virtual"
+[beam]
+length = 0.423
+width = 0.05
+thickness = 0.005
+modulus = 207e9
+density = 7850
+[joint]
+kind = "cantilever"
+kt = 1.994e6
+kr = 1223.0
+beam = "euler"
+[hammer]
+channel = 1
+[[sensor]]
+name = "A"
+position = 0.338
+[[sensor]]
+name = "B"
+position = 0.205
+[[recording]]
+file = "taps.csv"
+tap = 0.385
+band = [0, 1000]
+"#;
+
+fn folder(text: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("source.toml"), text).unwrap();
+    folder
+}
+
+fn tapjoint(folder: &Path) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("tapjoint"));
+    command.current_dir(folder);
+    command
+}
+
+fn simulate(folder: &Path, arguments: &[&str]) {
+    tapjoint(folder)
+        .args(["simulate", "source.toml", "--out", "out", "--quiet"])
+        .args(arguments)
+        .assert()
+        .code(0)
+        .stdout("")
+        .stderr("");
+}
+
+fn read(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn recover_frequencies_and_damping_of_the_model_from_its_recordings() {
+    let folder = folder(TEST);
+    let quiet = [
+        "--ideal",
+        "--damping",
+        "0.4%,0.3%,0.25%",
+        "--taps",
+        "3",
+        "--seconds",
+        "12",
+        "--bits",
+        "32",
+    ];
+    simulate(folder.path(), &quiet);
+    tapjoint(folder.path())
+        .args(["run", "out/test.toml", "--out", "report", "--quiet"])
+        .assert()
+        .code(0);
+    let truth = read(&folder.path().join("out/truth.json"));
+    let report = read(&folder.path().join("report/report.json"));
+    let modes = report["modes"].as_array().unwrap();
+    let expected = truth["recordings"][0]["modes"].as_array().unwrap();
+    let read: Vec<&Value> = modes
+        .iter()
+        .filter(|mode| mode["method"] == "fit")
+        .collect();
+    assert_eq!(read.len(), 5, "{modes:?}");
+    for (mode, truth) in read.iter().zip(expected) {
+        let [found, wanted] = [*mode, truth].map(|mode| number(&mode["frequency"]));
+        assert!(
+            (found / wanted - 1.0).abs() < 1e-5,
+            "{found} for {wanted} Hz"
+        );
+        let [found, wanted] = [*mode, truth].map(|mode| number(&mode["damping"]));
+        assert!(
+            (found / wanted - 1.0).abs() < 1e-3,
+            "damping {found} for {wanted}"
+        );
+    }
+    for stiffness in ["kt", "kr"] {
+        let [found, wanted] = [
+            &report["estimate"][stiffness]["value"],
+            &truth["joint"][stiffness],
+        ]
+        .map(number);
+        // 2e-5 of a frequency is some 1e-4 of a stiffness.
+        assert!(
+            (found / wanted - 1.0).abs() < 1e-3,
+            "{stiffness}: {found} for {wanted}"
+        );
+    }
+}
+
+#[test]
+fn regress_the_folder_holds_what_a_user_believes_and_the_truth_beside_it() {
+    let folder = folder(TEST);
+    let short = ["--taps", "1", "--seconds", "0.8"];
+    let with = ["--with", "sensor-mass:mass=24g", "--seed", "5"];
+    simulate(folder.path(), &[&short[..], &with].concat());
+    let out = folder.path().join("out");
+    let text = fs::read_to_string(out.join("test.toml")).unwrap();
+    assert!(text.contains("file = \"taps.wav\""), "{text}");
+    for told in ["kt", "kr =", "mass", "0.024", "level"] {
+        assert!(!text.contains(told), "{told} in\n{text}");
+    }
+    let truth = read(&out.join("truth.json"));
+    assert_eq!(truth["seed"], 5);
+    assert_eq!(truth["effects"][0]["effect"], "sensor-mass");
+    assert_eq!(truth["effects"][0]["parameters"]["mass"], 0.024);
+    assert!((number(&truth["joint"]["kx"]) - 1399.836).abs() < 1e-3);
+    let bytes = fs::read(out.join("taps.wav")).unwrap();
+    fs::remove_dir_all(&out).unwrap();
+    simulate(
+        folder.path(),
+        &[&short[..], &with, &["--no-truth"]].concat(),
+    );
+    assert!(!out.join("truth.json").exists());
+    assert!(
+        fs::read(out.join("taps.wav")).unwrap() == bytes,
+        "same seed, other bytes"
+    );
+}
+
+#[test]
+fn regress_the_laboratory_is_printed_and_json_is_the_truth() {
+    let folder = folder(TEST);
+    tapjoint(folder.path())
+        .args([
+            "simulate",
+            "source.toml",
+            "--out",
+            "out",
+            "--seconds",
+            "0.8",
+            "--taps",
+            "1",
+        ])
+        .args(["--without", "hum,mounting", "--json", "truth-again.json"])
+        .assert()
+        .code(0)
+        .stdout(
+            predicate::str::contains("mains hum          off")
+                .and(predicate::str::contains("mounting           off"))
+                .and(predicate::str::contains("AC coupling        0.5 Hz"))
+                .and(predicate::str::contains("taps.wav")),
+        );
+    let [json, truth] =
+        ["truth-again.json", "out/truth.json"].map(|file| read(&folder.path().join(file)));
+    assert_eq!(json, truth);
+}
+
+#[test]
+fn regress_a_hanging_beam_is_described_above_its_suspension() {
+    let lap = TEST
+        .replace("cantilever", "lap")
+        .replace("band = [0, 1000]", "");
+    let folder = folder(&lap);
+    simulate(folder.path(), &["--taps", "1", "--seconds", "0.8"]);
+    let text = fs::read_to_string(folder.path().join("out/test.toml")).unwrap();
+    assert!(text.contains("band = [10.0, 2000.0]"), "{text}");
+    simulate(
+        folder.path(),
+        &["--taps", "1", "--seconds", "0.8", "--without", "suspension"],
+    );
+    let text = fs::read_to_string(folder.path().join("out/test.toml")).unwrap();
+    assert!(!text.contains("band"), "{text}");
+}
+
+#[test]
+fn regress_bad_orders_are_refused_and_nothing_is_written() {
+    let no_joint = TEST.replace("kt = 1.994e6", "");
+    let measured = TEST.split("[[recording]]").next().unwrap().to_owned()
+        + "[measured]\nfrequencies = [17.0, 118.0]\n";
+    let cases: [(&str, &[&str], &str); 9] = [
+        (&no_joint, &[], "kt is missing"),
+        (&measured, &[], "no recording to simulate"),
+        (
+            TEST,
+            &["--with", "sensor-mas:mass=1"],
+            "did you mean `sensor-mass`",
+        ),
+        (
+            TEST,
+            &["--with", "sensor-mass:weight=1"],
+            "no parameter `weight`",
+        ),
+        (TEST, &["--with", "sensor-mass:mass"], "has no value"),
+        (
+            TEST,
+            &["--with", "resolution:offset=0.1"],
+            "bias of reading",
+        ),
+        (TEST, &["--rate", "1000"], "band ends at 1000 Hz"),
+        (TEST, &["--seconds", "0.6"], "fewer --taps"),
+        (TEST, &["--noise", "-1"], "noise"),
+    ];
+    for (text, arguments, words) in cases {
+        let folder = folder(text);
+        tapjoint(folder.path())
+            .args(["simulate", "source.toml", "--out", "out"])
+            .args(arguments)
+            .assert()
+            .code(2)
+            .stdout("")
+            .stderr(predicate::str::contains(words));
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(left.len(), 1, "{arguments:?} left {left:?}");
+    }
+    let folder = folder(TEST);
+    fs::rename(
+        folder.path().join("source.toml"),
+        folder.path().join("test.toml"),
+    )
+    .unwrap();
+    tapjoint(folder.path())
+        .args(["simulate", "test.toml", "--out", "."])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("would be overwritten"));
+    assert_eq!(
+        fs::read_to_string(folder.path().join("test.toml")).unwrap(),
+        TEST
+    );
+}

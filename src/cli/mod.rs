@@ -6,15 +6,18 @@
 mod arguments;
 mod bare;
 mod choices;
+mod help;
 mod input;
 mod output;
 mod terminal;
 mod wiring;
 
+mod completions;
 mod frf;
 mod identify;
 mod init;
 mod inspect;
+mod man;
 mod perturb;
 mod predict;
 mod reproduce;
@@ -22,7 +25,7 @@ mod run;
 mod spectrum;
 
 use arguments::CommonArguments;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::Terminal;
 
@@ -56,6 +59,8 @@ enum Command {
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
     Reproduce(reproduce::ReproduceArguments),
+    Completions(completions::CompletionsArguments),
+    Man(man::ManArguments),
 }
 
 /// What a command came to, when nothing went wrong.
@@ -69,9 +74,13 @@ enum Outcome {
 
 /// Reads the arguments, runs the command, reports errors; the exit code says how it went.
 pub(super) fn main() -> ExitCode {
-    let line = match CommandLine::try_parse() {
+    let parsed = help::grouped::<CommandLine>()
+        .try_get_matches()
+        .and_then(|matches| CommandLine::from_arg_matches(&matches));
+    let line = match parsed {
         Ok(line) => line,
         Err(usage) => {
+            let usage = help::with_suggestion(usage, &CommandLine::command());
             // Help that nobody reads to its end (`tapjoint --help | head`) is no error.
             let _ = usage.print();
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
@@ -101,6 +110,10 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
+        Command::Completions(arguments) => {
+            completions::run(arguments, CommandLine::command(), terminal)
+        }
+        Command::Man(arguments) => man::run(arguments, CommandLine::command(), terminal),
     }
 }
 
@@ -119,7 +132,6 @@ mod tests {
 
     #[test]
     fn regress_clap_finds_no_contradiction_in_the_arguments() {
-        use clap::CommandFactory;
         CommandLine::command().debug_assert();
     }
 }

@@ -25,6 +25,7 @@ mod modes;
 mod neglect;
 mod quiet;
 mod recordings;
+mod shapes;
 mod stage;
 mod warning;
 mod wired;
@@ -45,6 +46,7 @@ pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, m
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use recordings::{PipelineError, inspect_bare, measure_bare, si_unit};
+pub use shapes::{SampledShape, sampled_shapes};
 pub use warning::{AmplitudeChange, Warning};
 pub use wired::{Wiring, run_wired};
 

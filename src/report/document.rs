@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use super::document_contents::{ChannelSection, DatasetSection};
@@ -18,12 +19,13 @@ pub use super::document_fit::{
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
 pub use super::document_quality::VerdictSection;
 pub use super::document_resolution::{ResolutionSpanSection, SensitivitySection};
+pub use super::document_shapes::ModeShapeSection;
 
 /// Version of the document's layout.
 pub const VERSION: u32 = 1;
 
 /// The whole document. Sections that a command did not compute are left out.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct Document {
     /// Version of the layout.
     pub version: u32,
@@ -51,6 +53,9 @@ pub struct Document {
     /// Measured beside predicted frequencies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prediction: Option<Vec<PredictionSection>>,
+    /// Shapes of the predicted modes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode_shapes: Option<Vec<ModeShapeSection>>,
     /// Estimates under changed frequencies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbation: Option<Vec<PerturbationSection>>,
@@ -72,7 +77,7 @@ pub struct Document {
 }
 
 /// What was tested.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TestSection {
     /// Name of the test.
     pub name: String,
@@ -91,7 +96,7 @@ pub struct TestSection {
 }
 
 /// One recording.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct RecordingSection {
     /// File as the description names it.
     pub file: String,
@@ -148,7 +153,7 @@ pub struct RecordingSection {
 }
 
 /// One tap.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TapSection {
     /// When it begins (s from the start of the recording).
     pub time: f64,
@@ -163,7 +168,7 @@ pub struct TapSection {
 }
 
 /// One resonance.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ModeSection {
     /// The model's number; null for a peak that belongs to no mode.
     pub mode: Option<usize>,
@@ -208,7 +213,7 @@ pub struct ModeSection {
 }
 
 /// A value with its uncertainty.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ValueSection {
     /// The value.
     pub value: f64,
@@ -228,7 +233,7 @@ pub struct ValueSection {
 }
 
 /// The joint, or the free beam's material.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct EstimateSection {
     /// "consistent", "pairs", or "free-beam".
     pub method: String,
@@ -272,7 +277,7 @@ pub struct EstimateSection {
 }
 
 /// What one mode says alone; a value that it cannot give is null.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct SingleModeSection {
     /// Mode number.
     pub mode: usize,
@@ -285,7 +290,7 @@ pub struct SingleModeSection {
 }
 
 /// The pair regression's values.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PairsSection {
     /// Kx.
     pub kx: Option<f64>,
@@ -306,7 +311,7 @@ pub struct PairsSection {
 }
 
 /// One measured mode beside its prediction. error_percent = 100 (predicted - measured)/measured.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PredictionSection {
     /// Mode number.
     pub mode: usize,
@@ -323,7 +328,7 @@ pub struct PredictionSection {
 }
 
 /// An estimate from frequencies changed by the same percentage.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PerturbationSection {
     /// Change of all frequencies (%), signed.
     pub percent: f64,
@@ -339,7 +344,7 @@ pub struct PerturbationSection {
 
 /// Average errors of +percent and -percent: the mean of their magnitudes, as in table 9 of Ingole &
 /// Chatterjee, and the error of their mean, as in table 14.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct AverageSection {
     /// Change of all frequencies (%), its size.
     pub percent: f64,
@@ -359,7 +364,7 @@ pub struct AverageSection {
 }
 
 /// Estimates under random errors of the frequencies: median and 95 % interval.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct MonteCarloSection {
     /// Repetitions.
     pub samples: usize,
@@ -374,7 +379,7 @@ pub struct MonteCarloSection {
 }
 
 /// A warning.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct WarningSection {
     /// Short code that scripts may look for.
     pub code: String,

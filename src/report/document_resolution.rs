@@ -1,9 +1,10 @@
 //! What the resolution of readings does to the estimate, in the document.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// What the resolution of the readings does to the estimate.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ResolutionSpanSection {
     /// Number of sign patterns tried.
     pub patterns: usize,
@@ -23,7 +24,7 @@ pub struct ResolutionSpanSection {
 }
 
 /// What one mode's bound does.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct SensitivitySection {
     /// Mode number.
     pub mode: usize,

@@ -13,9 +13,6 @@ const GAP: usize = 2;
 const NARROWEST: usize = 8;
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
-/// What the fitted frequencies are.
-const FIT_NOTE: &str = "Frequency: fit of the free decays of all taps and sensors, \u{b1} half the 95 % interval; \
-                        line: the highest spectral line \u{b1} half line; damping \u{b1} one standard deviation.";
 /// Most rows printed: a terminal is no place for a thousand taps.
 const MOST_ROWS: usize = 40;
 
@@ -74,7 +71,12 @@ pub fn modes(document: &Document) -> String {
     let modes = document.modes.as_deref().unwrap_or_default();
     let fitted = modes.iter().any(|mode| mode.method == "fit");
     let note = if fitted {
-        wrapped(FIT_NOTE, 0)
+        let note = format!(
+            "Frequency: fit of {}, \u{b1} half the 95 % interval; line: the highest spectral line \
+             \u{b1} half line; damping \u{b1} one standard deviation.",
+            tables::fitted_to(document)
+        );
+        wrapped(&note, 0)
     } else {
         String::new()
     };

@@ -11,9 +11,9 @@ mod uncertainty;
 
 pub use datasets::datasets;
 pub use frfs::frfs;
-pub use joint::{Parameter, estimated, methods, pairs, parameters, prediction};
+pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
-pub use modes::{modes, readings};
+pub use modes::{fitted_to, mode_details, modes, reading_details, readings};
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};

@@ -9,10 +9,12 @@ mod choices;
 mod help;
 mod input;
 mod output;
+mod progress;
 mod terminal;
 mod wiring;
 
 mod completions;
+mod export;
 mod frf;
 mod identify;
 mod init;
@@ -59,6 +61,7 @@ enum Command {
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
     Reproduce(reproduce::ReproduceArguments),
+    Export(export::ExportArguments),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
 }
@@ -110,6 +113,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
+        Command::Export(arguments) => export::run(arguments, terminal),
         Command::Completions(arguments) => {
             completions::run(arguments, CommandLine::command(), terminal)
         }

@@ -215,7 +215,8 @@ pub struct ModeSection {
 /// A value with its uncertainty.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ValueSection {
-    /// The value.
+    /// The value; null where it is infinite: rigid.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
     /// Standard deviation.
     pub std: Option<f64>,

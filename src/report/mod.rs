@@ -2,12 +2,14 @@
 //!
 //! Everything is returned as bytes with a name; the command line writes the files.
 
+pub mod brief;
 mod convert;
 mod convert_datasets;
 mod convert_estimate;
 mod convert_figures;
 mod convert_fit;
 mod convert_quality;
+pub mod deck;
 pub mod document;
 mod document_contents;
 mod document_estimate;
@@ -31,6 +33,7 @@ mod csv;
 mod frf_uff;
 mod json;
 mod run;
+mod schema;
 
 pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
@@ -44,6 +47,7 @@ pub use frf_uff::render_frf_uff;
 pub use html::render_html;
 pub use json::render_json;
 pub use run::{render_frf_png, render_run, render_spectrum_png};
+pub use schema::render_schema;
 pub use text::render_text;
 
 /// A finished file.

@@ -89,7 +89,7 @@
     var narrow = innerWidth < 600;
     return [
       Object.assign({}, common, { label: last ? plot.x.label + " (" + plot.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
-        values: last ? undefined : function () { return []; } }),
+        values: function (u, splits) { return last ? splits.map(digits) : []; } }),
       Object.assign({}, common, {
         label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 48 : 62, space: 28,
         values: function (u, splits) {
@@ -131,7 +131,7 @@
       series: series, axes: axes(plot, panel, last),
       scales: { x: { time: false }, y: vertical(panel) },
       bands: taps ? [{ series: [2, 1], fill: color("--data") + "55" }] : [],
-      padding: [index === 0 ? 22 : 8, 12, 0, 0],
+      padding: [index === 0 ? 22 : 8, 30, 0, 0],
       cursor: { sync: { key: figure.key, scales: ["x", null] }, drag: { x: true, y: false } },
       hooks: { draw: draw }
     };

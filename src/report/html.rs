@@ -290,6 +290,7 @@ fn recordings_section<'a>(document: &Document, figures: &'a PageFigures) -> Opti
         missing: "There is no recording.".to_owned(),
         tables: found(vec![
             tables::recordings(document),
+            tables::conditions(document),
             tables::channels(document),
             tables::taps(document),
         ]),

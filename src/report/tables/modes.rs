@@ -59,8 +59,7 @@ const DETAILS: [&str; 7] = [
 ];
 
 fn without(table: Table, names: &[&str]) -> Table {
-    let drop = |table: Table, name: &&str| table.without_column(name);
-    names.iter().fold(table, drop)
+    table.without_columns(|name| names.contains(&name))
 }
 
 fn details(table: Table) -> Option<Table> {

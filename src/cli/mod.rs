@@ -6,17 +6,22 @@
 mod arguments;
 mod bare;
 mod choices;
+mod help;
 mod input;
 mod output;
+mod progress;
 mod terminal;
 mod wiring;
 
 mod blind_check;
+mod completions;
 mod diagnose;
+mod export;
 mod frf;
 mod identify;
 mod init;
 mod inspect;
+mod man;
 mod perturb;
 mod predict;
 mod reproduce;
@@ -25,7 +30,7 @@ mod simulate;
 mod spectrum;
 
 use arguments::CommonArguments;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 use terminal::Terminal;
 
@@ -62,6 +67,9 @@ enum Command {
     BlindCheck(blind_check::BlindCheckArguments),
     Reproduce(reproduce::ReproduceArguments),
     Simulate(simulate::SimulateArguments),
+    Export(export::ExportArguments),
+    Completions(completions::CompletionsArguments),
+    Man(man::ManArguments),
 }
 
 /// What a command came to, when nothing went wrong.
@@ -75,9 +83,13 @@ enum Outcome {
 
 /// Reads the arguments, runs the command, reports errors; the exit code says how it went.
 pub(super) fn main() -> ExitCode {
-    let line = match CommandLine::try_parse() {
+    let parsed = help::grouped::<CommandLine>()
+        .try_get_matches()
+        .and_then(|matches| CommandLine::from_arg_matches(&matches));
+    let line = match parsed {
         Ok(line) => line,
         Err(usage) => {
+            let usage = help::with_suggestion(usage, &CommandLine::command());
             // Help that nobody reads to its end (`tapjoint --help | head`) is no error.
             let _ = usage.print();
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
@@ -110,6 +122,11 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::BlindCheck(arguments) => blind_check::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
         Command::Simulate(arguments) => simulate::run(arguments, line.common.seed, terminal),
+        Command::Export(arguments) => export::run(arguments, terminal),
+        Command::Completions(arguments) => {
+            completions::run(arguments, CommandLine::command(), terminal)
+        }
+        Command::Man(arguments) => man::run(arguments, CommandLine::command(), terminal),
     }
 }
 
@@ -128,7 +145,6 @@ mod tests {
 
     #[test]
     fn regress_clap_finds_no_contradiction_in_the_arguments() {
-        use clap::CommandFactory;
         CommandLine::command().debug_assert();
     }
 }

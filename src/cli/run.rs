@@ -111,6 +111,7 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, &terminal)?;
+    let progress = terminal.progress("measuring, fitting and estimating");
     let analysis = match &request.subject {
         Subject::Test(file) => file.analyse(&IdentifySettings {
             monte_carlo: Some((SAMPLES, seed)),
@@ -124,16 +125,14 @@ pub(super) fn run(
             analyse(path, &arguments.recording, &settings)?
         }
     };
+    drop(progress);
     let document = document_of(&analysis);
     for file in render_run(&document, &figures_of(&analysis))? {
         request.output.add(&file.name, &file.bytes)?;
     }
     let folder = request.output.publish()?;
     terminal.say(&render_text(&document))?;
-    terminal.say(&format!(
-        "\nReport: {}",
-        folder.join("report.html").display()
-    ))?;
+    terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;
     Ok(outcome(&analysis))
 }

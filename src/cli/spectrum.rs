@@ -22,7 +22,7 @@ use tapjoint::report::{document_of, figures_of, render_spectrum_png, render_text
     after_help = "Example:\n  tapjoint spectrum taps.wav --hammer 1 --zoom 0:200 --block 2048 --png spectrum.png"
 )]
 pub(super) struct SpectrumArguments {
-    /// A recording (WAV, CSV, UFF 58)
+    /// A recording (WAV, CSV, UFF 58), or frequency response functions (UFF 58 or text)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Block size (samples); default: what fits the shortest tap

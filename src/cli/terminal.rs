@@ -2,6 +2,7 @@
 
 use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
+use super::progress::Progress;
 use std::io::{self, IsTerminal, Write};
 use tapjoint::report::{document::Document, render_json};
 
@@ -39,7 +40,15 @@ impl Terminal {
         if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
             return Ok(());
         }
+        if io::stdout().is_terminal() && colours_wanted() {
+            return print(&coloured(text));
+        }
         print(text)
+    }
+
+    /// Shows on standard error that work goes on, if that is a terminal; until the answer is dropped.
+    pub(super) fn progress(&self, doing: &'static str) -> Option<Progress> {
+        (!self.quiet && io::stderr().is_terminal()).then(|| Progress::start(doing))
     }
 
     /// Prints a warning on standard error, unless it was asked to be quiet. A standard error that
@@ -85,6 +94,34 @@ impl Terminal {
     }
 }
 
+/// Whether colours are welcome: NO_COLOR (no-color.org) set to anything says no, and so does a
+/// terminal that calls itself dumb.
+fn colours_wanted() -> bool {
+    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    !set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
+}
+
+/// The text with its headings bold and its warnings yellow.
+fn coloured(text: &str) -> String {
+    const BOLD: &str = "\u{1b}[1m";
+    const YELLOW: &str = "\u{1b}[33m";
+    const PLAIN: &str = "\u{1b}[0m";
+    let mut warning = false;
+    let mut after_gap = true;
+    let lines = text.lines().map(|line| {
+        // A warning goes on in the lines that are indented below it.
+        warning = line.starts_with("warning (") || warning && line.starts_with("  ");
+        let heading = after_gap && !line.is_empty() && !warning;
+        after_gap = line.is_empty();
+        match (warning, heading) {
+            (true, _) => format!("{YELLOW}{line}{PLAIN}\n"),
+            (_, true) => format!("{BOLD}{line}{PLAIN}\n"),
+            _ => format!("{line}\n"),
+        }
+    });
+    lines.collect()
+}
+
 fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     out.write_all(text.as_bytes())?;
@@ -106,4 +143,22 @@ pub(super) fn print_error(error: &anyhow::Error) {
         }
     }
     let _ = writeln!(io::stderr(), "error: {text}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prop_colours_change_no_word() {
+        let text = "Modes\nMode  Hz\n----\n   1  17\n\nwarning (misfit): a\n  b\n\nWhat was found\nTaps  3\n";
+        let shown = coloured(text);
+        assert!(shown.contains("\u{1b}[33m  b"), "{shown:?}");
+        assert!(shown.starts_with("\u{1b}[1mModes"), "{shown:?}");
+        let plain = ["\u{1b}[1m", "\u{1b}[33m", "\u{1b}[0m"];
+        let stripped = plain
+            .iter()
+            .fold(shown, |text, code| text.replace(code, ""));
+        assert_eq!(stripped, text);
+    }
 }

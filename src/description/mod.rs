@@ -19,7 +19,7 @@ mod template;
 
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
 pub use parse::ChannelRefError;
-pub use template::template;
+pub use template::{runnable_template, template, template_of};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

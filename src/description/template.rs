@@ -50,6 +50,9 @@ kind = "free"                  # "cantilever": held at one end | "lap": two halv
 # beam = "timoshenko"          # "timoshenko" (default): with shear and rotary inertia | "euler": bending only
 "#;
 
+/// The line that begins the table of a recording.
+const RECORDING: &str = "[[recording]]                  # once for each file; the same file may be read in several bands";
+
 const INSTRUMENTS: &str = r#"
 [hammer]                       # remove this table for a test without an instrumented hammer
 channel = 1                    # 1-based, not counting a time column; or the name of a CSV column
@@ -97,6 +100,58 @@ const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated,
 const FIT_LAP: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\"\n";
 const FIT_FREE: &str =
     "# fit = [\"modulus\"]            # what is estimated, default: modulus; also \"density\"\n";
+
+/// What a template says of the frequencies that stand in for a test's own.
+const STAND_IN: &str = "#   Frequencies that stand in for yours, so that this file runs as it is. Fill in [[recording]] above\n\
+                        #   and remove this table, or write frequencies here that were read elsewhere:";
+
+/// A template that runs as it stands: frequencies stand in for the recordings, whose table is there
+/// but commented out.
+pub fn runnable_template(kind: JointKind) -> String {
+    let frequencies = match kind {
+        JointKind::Cantilever => "[16.625, 115.25, 323.125, 601.125, 949.25]",
+        JointKind::Lap => "[97.5, 387.125, 657.75, 1110.25, 1698.625]",
+        JointKind::Free => "[147.375, 406, 794.75, 1311.5, 1954.5]",
+    };
+    let text = template(kind);
+    let mut recording = false;
+    let lines = text.lines().map(|line| {
+        recording = (recording || line == RECORDING) && !line.is_empty();
+        match line {
+            "" => String::new(),
+            _ if recording && !line.starts_with('#') => format!("# {line}"),
+            _ if line.starts_with("#   Or, instead") => STAND_IN.to_owned(),
+            _ if line.starts_with("# [measured]") => "[measured]".to_owned(),
+            _ if line.starts_with("# frequencies = ") => {
+                format!("frequencies = {frequencies}   # Hz, ascending")
+            }
+            _ if line.starts_with("# half_line = ") => line.replacen("# ", "", 1),
+            _ => line.to_owned(),
+        }
+    });
+    lines.map(|line| line + "\n").collect()
+}
+
+/// A template that reads these recordings, a table for each.
+pub fn template_of(kind: JointKind, files: &[String]) -> String {
+    let tables: Vec<String> = files
+        .iter()
+        .map(|file| format!("{RECORDING}\nfile = {}\n", toml::Value::from(file.as_str())))
+        .collect();
+    let text = template(kind);
+    let Some((head, rest)) = text.split_once(RECORDING) else {
+        return text;
+    };
+    // The first file takes the place of the example, whose comments stay; the others follow it.
+    let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
+    let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
+    let [first, others @ ..] = tables.as_slice() else {
+        return text.clone();
+    };
+    let (comments, tail) = rest.split_once("\n\n").unwrap_or((rest, ""));
+    let others: String = others.iter().map(|table| format!("\n{table}")).collect();
+    format!("{head}{first}{comments}\n{others}\n{tail}")
+}
 
 /// A commented test description: every key with its default and unit. It parses as it stands;
 /// replace its numbers by those of the test.

@@ -29,6 +29,7 @@ mod observations;
 mod perturbation;
 mod quiet;
 mod recordings;
+mod shapes;
 mod stage;
 mod warning;
 mod wired;
@@ -51,6 +52,7 @@ pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::observations;
 pub use recordings::{PipelineError, inspect_bare, measure_bare, si_unit};
+pub use shapes::{SampledShape, sampled_shapes};
 pub use warning::{AmplitudeChange, Warning};
 pub use wired::{Wiring, run_wired};
 

@@ -51,9 +51,9 @@ pub enum RecordingError {
         /// What the first bytes say it is.
         format: &'static str,
     },
-    /// Neither a WAV file nor text.
+    /// Neither a WAV file, a universal file nor text.
     #[error(
-        "{file}: neither a WAV file nor text (first bytes {first_bytes}); export as WAV, CSV or UFF58"
+        "{file}: neither a WAV file, a universal file nor text (first bytes {first_bytes}); export as WAV, CSV or UFF58"
     )]
     UnknownFormat {
         /// The file.

@@ -5,14 +5,14 @@ use super::convert_fit::fit_section;
 use super::convert_perturbation::with_perturbations;
 use super::convert_quality::verdict_section;
 use super::document::{
-    ChannelSection, Document, ModeSection, PredictionSection, RecordingSection, TapSection,
-    TestSection, VERSION, WarningSection,
+    ChannelSection, Document, ModeSection, ModeShapeSection, PredictionSection, RecordingSection,
+    TapSection, TestSection, VERSION, WarningSection,
 };
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::{FrequencySource, ModeReading};
 use crate::pipeline::{
     AmplitudeChange, Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure,
-    Warning,
+    Warning, sampled_shapes,
 };
 use crate::recording::{Format, Separator, UffCoding};
 use crate::spectral::Window;
@@ -38,6 +38,7 @@ pub fn document(analysis: &Analysis) -> Document {
         prediction: identification
             .map(|found| found.prediction.iter().map(prediction_section).collect()),
         gap: None,
+        mode_shapes: shapes(analysis),
         quality: (!analysis.verdicts.is_empty())
             .then(|| analysis.verdicts.iter().map(verdict_section).collect()),
         warnings: analysis.warnings.iter().map(warning_section).collect(),
@@ -47,6 +48,19 @@ pub fn document(analysis: &Analysis) -> Document {
         Some(found) => with_perturbations(document, &found.perturbations),
         None => document,
     }
+}
+
+fn shapes(analysis: &Analysis) -> Option<Vec<ModeShapeSection>> {
+    let sections: Vec<ModeShapeSection> = sampled_shapes(analysis)
+        .into_iter()
+        .map(|shape| ModeShapeSection {
+            mode: shape.mode,
+            frequency: shape.frequency,
+            positions: shape.positions,
+            displacements: shape.displacements,
+        })
+        .collect();
+    (!sections.is_empty()).then_some(sections)
 }
 
 /// The document of recordings that were only looked at.
@@ -278,7 +292,7 @@ fn mode_section(mode: &ModeResult, recordings: &[RecordingResult]) -> ModeSectio
         .iter()
         .find(|recording| mode.recording.as_ref() == Some(&recording.file));
     let spectra = recording.and_then(|recording| recording.measurement.spectra.as_ref());
-    let reading = match &mode.reading {
+    let mut reading = match &mode.reading {
         Some(reading) => match spectra {
             Some(spectra) => with_quality(reading_section(reading, recording), spectra),
             None => reading_section(reading, recording),
@@ -288,6 +302,11 @@ fn mode_section(mode: &ModeResult, recordings: &[RecordingResult]) -> ModeSectio
             ..Default::default()
         },
     };
+    // The points of the curve against amplitude stand with the recording's own reading.
+    let fit = reading.fit.as_mut().and_then(|fit| fit.amplitude.as_mut());
+    if let Some(amplitude) = fit {
+        amplitude.points.clear();
+    }
     ModeSection {
         mode: mode.mode,
         frequency: mode.frequency,

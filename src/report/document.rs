@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use super::document_contents::{ChannelSection, DatasetSection};
@@ -26,12 +27,13 @@ pub use super::document_perturbation::{
     SensitivitySection,
 };
 pub use super::document_quality::VerdictSection;
+pub use super::document_shapes::ModeShapeSection;
 
 /// Version of the document's layout.
 pub const VERSION: u32 = 1;
 
 /// The whole document. Sections that a command did not compute are left out.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct Document {
     /// Version of the layout.
     pub version: u32,
@@ -59,6 +61,9 @@ pub struct Document {
     /// Measured beside predicted frequencies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prediction: Option<Vec<PredictionSection>>,
+    /// Shapes of the predicted modes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode_shapes: Option<Vec<ModeShapeSection>>,
     /// Estimates under changed frequencies, by every method.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbation: Option<Vec<PerturbationSection>>,
@@ -83,7 +88,7 @@ pub struct Document {
 }
 
 /// What was tested.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TestSection {
     /// Name of the test.
     pub name: String,
@@ -102,7 +107,7 @@ pub struct TestSection {
 }
 
 /// One recording.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct RecordingSection {
     /// File as the description names it.
     pub file: String,
@@ -159,7 +164,7 @@ pub struct RecordingSection {
 }
 
 /// One tap.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TapSection {
     /// When it begins (s from the start of the recording).
     pub time: f64,
@@ -174,7 +179,7 @@ pub struct TapSection {
 }
 
 /// One resonance.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ModeSection {
     /// The model's number; null for a peak that belongs to no mode.
     pub mode: Option<usize>,
@@ -219,9 +224,10 @@ pub struct ModeSection {
 }
 
 /// A value with its uncertainty.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ValueSection {
-    /// The value.
+    /// The value; null where it is infinite: rigid.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
     /// Standard deviation.
     pub std: Option<f64>,
@@ -243,7 +249,7 @@ pub struct ValueSection {
 }
 
 /// The joint, or the free beam's material.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct EstimateSection {
     /// "consistent", "pairs", or "free-beam".
     pub method: String,
@@ -290,7 +296,7 @@ pub struct EstimateSection {
 }
 
 /// What one mode says alone; a value that it cannot give is null.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct SingleModeSection {
     /// Mode number.
     pub mode: usize,
@@ -303,7 +309,7 @@ pub struct SingleModeSection {
 }
 
 /// The pair regression's values.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PairsSection {
     /// Kx.
     pub kx: Option<f64>,
@@ -324,7 +330,7 @@ pub struct PairsSection {
 }
 
 /// One measured mode beside its prediction. error_percent = 100 (predicted - measured)/measured.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PredictionSection {
     /// Mode number.
     pub mode: usize,
@@ -341,7 +347,7 @@ pub struct PredictionSection {
 }
 
 /// A warning.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct WarningSection {
     /// Short code that scripts may look for.
     pub code: String,

@@ -1,10 +1,11 @@
 //! What files hold, as data: channels of recordings, datasets of universal files. A part of the
 //! document.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// One dataset of a universal file, as its header describes it.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct DatasetSection {
     /// The file.
     pub file: String,
@@ -47,7 +48,7 @@ pub struct DatasetSection {
 }
 
 /// One channel of a recording, in the unit that its values have.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ChannelSection {
     /// Number, from 1.
     pub channel: usize,

@@ -1,9 +1,10 @@
 //! What the consistent estimate adds to the document.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Correlation of two estimated parameters (their logarithms; of the coupling its atanh).
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct CorrelationSection {
     /// One parameter.
     pub first: String,
@@ -14,7 +15,7 @@ pub struct CorrelationSection {
 }
 
 /// How well the model explains the frequencies.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct MisfitSection {
     /// Sum of squared residuals over their standard deviations; null without uncertainties.
     pub chi_squared: Option<f64>,
@@ -27,7 +28,7 @@ pub struct MisfitSection {
 }
 
 /// What the frequencies can and cannot tell.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct IdentifiabilitySection {
     /// Singular values of the Jacobian, descending: the inverse of each is the relative uncertainty of
     /// one combination of the parameters.
@@ -39,7 +40,7 @@ pub struct IdentifiabilitySection {
 }
 
 /// A free beam's material in closed form: either value alone, with the other as described.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct FreeBeamSection {
     /// Young's modulus (Pa) at the described density.
     pub modulus: f64,

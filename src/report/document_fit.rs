@@ -1,9 +1,10 @@
 //! The part of the document that fitted modes fill.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// The fit of one mode.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct FitSection {
     /// Lower end of the damping ratio's 95 % interval.
     pub damping_low: f64,
@@ -29,7 +30,7 @@ pub struct FitSection {
 }
 
 /// Frequency and damping of one accepted tap alone.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TapFitSection {
     /// Number of the tap among the accepted ones, from 1.
     pub tap: usize,
@@ -44,7 +45,7 @@ pub struct TapFitSection {
 }
 
 /// Modal constant of one sensor for the recording's tap.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ConstantSection {
     /// Number of the response, from 1, in the order of the recording's `responses`.
     pub sensor: usize,
@@ -57,7 +58,7 @@ pub struct ConstantSection {
 }
 
 /// Frequency and damping of a mode along its decays.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct AmplitudeSection {
     /// "changes", "steady", "beating", "unresolved" or "too-few-points".
     pub verdict: String,
@@ -70,12 +71,13 @@ pub struct AmplitudeSection {
     /// From the largest to the smallest amplitude; null where the change is within its uncertainty or too
     /// small to matter.
     pub ends: Option<AmplitudeEndsSection>,
-    /// The points, by tap and time.
+    /// The points, by tap and time; left out in the merged list of modes, whose recording has them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<AmplitudePointSection>,
 }
 
 /// Values at the largest and at the smallest amplitude at which the curve is well known.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct AmplitudeEndsSection {
     /// Amplitude (`unit`).
     pub amplitude: [f64; 2],
@@ -92,7 +94,7 @@ pub struct AmplitudeEndsSection {
 }
 
 /// A change from the largest to the smallest amplitude.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TrendSection {
     /// The change.
     pub change: f64,
@@ -103,7 +105,7 @@ pub struct TrendSection {
 }
 
 /// One segment of one decay.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct AmplitudePointSection {
     /// Number of the tap among the accepted ones, from 1.
     pub tap: usize,

@@ -1,10 +1,11 @@
 //! Frequency response functions in the document.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// The frequency response function of one sensor in one recording, one value for each line; null
 /// where a value does not exist.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct FrfSection {
     /// File of the recording.
     pub recording: String,
@@ -37,7 +38,7 @@ pub struct FrfSection {
 }
 
 /// A resonance on a frequency response function.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct FrfResonanceSection {
     /// Number of the mode; null for a peak that belongs to none.
     pub mode: Option<usize>,

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// The gap between model and measurement.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct GapSection {
     /// The answer.
     pub verdict: GapVerdictSection,
@@ -33,7 +34,7 @@ pub struct GapSection {
 }
 
 /// The answer.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct GapVerdictSection {
     /// "no-gap", "named", "group", "set", "unknown" or "not-enough-data".
     pub kind: String,
@@ -44,7 +45,7 @@ pub struct GapVerdictSection {
 }
 
 /// Where the gap lies.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct GapPlaceSection {
     /// Probability (1) of joint, fixture, sensor, body, acquisition, unknown.
     pub probability: BTreeMap<String, f64>,
@@ -55,7 +56,7 @@ pub struct GapPlaceSection {
 }
 
 /// A frequency's error.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PullSection {
     /// The mode.
     pub mode: usize,
@@ -72,7 +73,7 @@ pub struct PullSection {
 }
 
 /// One hypothesis.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct HypothesisSection {
     /// Effect, "none", "unknown", or two effects joined by "+".
     pub effect: String,
@@ -109,7 +110,7 @@ pub struct HypothesisSection {
 }
 
 /// A parameter of an effect.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ParameterSection {
     /// The value (SI).
     pub value: f64,
@@ -122,7 +123,7 @@ pub struct ParameterSection {
 }
 
 /// Share of a gap that is closed, with its 95 % interval.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
 pub struct ClosureSection {
     /// (before^2 - after^2)/(before^2 - floor^2).
     pub value: f64,
@@ -133,7 +134,7 @@ pub struct ClosureSection {
 }
 
 /// Change of the joint (%).
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
 pub struct JointShiftSection {
     /// Of Kx.
     pub kx_percent: Option<f64>,
@@ -142,7 +143,7 @@ pub struct JointShiftSection {
 }
 
 /// Local changes along the beam.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PlaceMapSection {
     /// Centres of the pieces (m).
     pub positions: Vec<f64>,
@@ -159,7 +160,7 @@ pub struct PlaceMapSection {
 }
 
 /// A plain answer to set the diagnosis against.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct BaselineSection {
     /// "none" or "scale".
     pub name: String,
@@ -170,7 +171,7 @@ pub struct BaselineSection {
 }
 
 /// A test that would tell more.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct NextTestSection {
     /// What to do.
     pub action: String,

@@ -1,11 +1,12 @@
 //! What errors in the frequencies do to the estimate, in the document.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::document::ValueSection;
 
 /// An estimate from frequencies changed by the same percentage.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PerturbationSection {
     /// Change of all frequencies (%), signed.
     pub percent: f64,
@@ -21,7 +22,7 @@ pub struct PerturbationSection {
 
 /// Average errors of +percent and -percent: the mean of their magnitudes, as in table 9 of Ingole &
 /// Chatterjee, and the error of their mean, as in table 14.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct AverageSection {
     /// "pairs" or "consistent".
     pub method: String,
@@ -43,7 +44,7 @@ pub struct AverageSection {
 }
 
 /// Estimates under random errors of the frequencies: median and 95 % interval.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct MonteCarloSection {
     /// "pairs" or "consistent".
     pub method: String,
@@ -63,7 +64,7 @@ pub struct MonteCarloSection {
 }
 
 /// What the resolution of the readings does to the estimate.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct ResolutionSpanSection {
     /// "pairs" or "consistent".
     pub method: String,
@@ -85,7 +86,7 @@ pub struct ResolutionSpanSection {
 }
 
 /// What one mode's bound does.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct SensitivitySection {
     /// Mode number.
     pub mode: usize,

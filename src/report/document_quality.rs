@@ -1,9 +1,10 @@
 //! Checks of good practice in the document.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// The result of one check.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct VerdictSection {
     /// Short code of the check: "double-hit".
     pub check: String,

@@ -15,6 +15,23 @@ pub struct InlineFigure {
     pub caption: String,
     /// An `<svg>` element that this crate made.
     pub svg: String,
+    /// The same curves for the page's script, as JSON that may stand in a `script` element.
+    pub live: Option<String>,
+}
+
+/// The plotting library, its style and the page's own script, all inside the page: a report opens
+/// from a disk without a network.
+const PLOT_LIBRARY: &str = include_str!("../../assets/uPlot.iife.min.js");
+const PLOT_STYLE: &str = include_str!("../../assets/uPlot.min.css");
+const PLOT_LICENSE: &str = include_str!("../../assets/uPlot-LICENSE.txt");
+const SCRIPT: &str = include_str!("../../templates/report.js");
+
+/// What makes pictures live; left out where there is none.
+struct Live {
+    library: &'static str,
+    style: &'static str,
+    license: &'static str,
+    script: &'static str,
 }
 
 /// The page's pictures by the section they stand in.
@@ -24,10 +41,18 @@ pub struct PageFigures {
     pub spectra: Vec<InlineFigure>,
     /// Recordings over time.
     pub taps: Vec<InlineFigure>,
-    /// Predicted beside measured frequencies.
+    /// Predicted beside measured frequencies, and the shapes of the modes.
     pub comparison: Vec<InlineFigure>,
     /// Estimates under changed frequencies.
     pub cloud: Vec<InlineFigure>,
+}
+
+impl PageFigures {
+    fn any_live(&self) -> bool {
+        let shelves = [&self.spectra, &self.taps, &self.comparison, &self.cloud];
+        let mut all = shelves.into_iter().flatten();
+        all.any(|figure| figure.live.is_some())
+    }
 }
 
 #[derive(Template)]
@@ -39,6 +64,7 @@ struct Page<'a> {
     findings: Vec<String>,
     sections: Vec<Section<'a>>,
     method: Method,
+    live: Option<Live>,
     version: &'static str,
 }
 
@@ -74,6 +100,12 @@ pub fn render_html(document: &Document, figures: &PageFigures) -> Result<String,
             recordings: document.recordings.is_some(),
             joint: document.estimate.is_some() || document.prediction.is_some(),
         },
+        live: figures.any_live().then_some(Live {
+            library: PLOT_LIBRARY,
+            style: PLOT_STYLE,
+            license: PLOT_LICENSE,
+            script: SCRIPT,
+        }),
         version: env!("CARGO_PKG_VERSION"),
     };
     page.render().map_err(ReportError::Html)
@@ -183,6 +215,7 @@ fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Se
         missing: no_estimate(document),
         tables: found(vec![
             tables::parameters(document),
+            tables::correlations(document),
             tables::methods(document),
             tables::prediction(document),
             tables::pairs(document),
@@ -220,8 +253,12 @@ fn modes_section<'a>(document: &Document, figures: &'a PageFigures) -> Section<'
             _ => "Resonances and spectra",
         },
         missing: "No resonances were found.".to_owned(),
-        tables: found(vec![tables::modes(document), tables::readings(document)]),
-        folded: Vec::new(),
+        tables: found(vec![tables::modes(document)]),
+        folded: found(vec![
+            tables::mode_details(document),
+            tables::readings(document),
+            tables::reading_details(document),
+        ]),
         figures: &figures.spectra,
     }
 }
@@ -253,6 +290,7 @@ fn recordings_section<'a>(document: &Document, figures: &'a PageFigures) -> Opti
         missing: "There is no recording.".to_owned(),
         tables: found(vec![
             tables::recordings(document),
+            tables::conditions(document),
             tables::channels(document),
             tables::taps(document),
         ]),

@@ -3,6 +3,7 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 pub mod blind_check;
+pub mod brief;
 mod convert;
 mod convert_datasets;
 mod convert_estimate;
@@ -11,6 +12,7 @@ mod convert_fit;
 mod convert_gap;
 mod convert_perturbation;
 mod convert_quality;
+pub mod deck;
 pub mod document;
 mod document_contents;
 mod document_estimate;
@@ -19,10 +21,12 @@ mod document_frf;
 mod document_gap;
 mod document_perturbation;
 mod document_quality;
+mod document_shapes;
 pub mod figures;
 pub mod format;
 mod gap_text;
 pub mod html;
+pub mod live;
 pub mod plot;
 pub mod summary;
 pub mod tables;
@@ -35,6 +39,7 @@ mod csv_perturbation;
 mod frf_uff;
 mod json;
 mod run;
+mod schema;
 
 pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
@@ -51,6 +56,7 @@ pub use gap_text::render_gap_text;
 pub use html::render_html;
 pub use json::render_json;
 pub use run::{render_cloud_png, render_frf_png, render_run, render_spectrum_png};
+pub use schema::render_schema;
 pub use text::render_text;
 
 /// A finished file.

@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use super::document::Document;
 use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
+use super::live::{LivePlot, live_frf, live_spectrum, live_taps, script_json};
 use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
 use super::plot::comparison::draw_frequencies;
 use super::plot::frf::draw_frf;
+use super::plot::shapes::draw_shapes;
 use super::plot::spectrum::draw_spectrum;
 use super::plot::stabilisation::draw_stabilisation;
 use super::plot::time::draw_taps;
@@ -33,11 +35,14 @@ struct Picture {
     name: String,
     caption: String,
     drawing: Drawing,
+    /// The same curves for the page's script.
+    live: Option<LivePlot>,
 }
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
-/// `perturbation.csv` where something was perturbed, and the pictures that apply: `spectrum-*.png`, `frf-*.png`, `stabilisation-*.png`,
-/// `amplitude-*.png`, `taps-*.png`, `frequencies.png`, `cloud.png`.
+/// `perturbation.csv` where something was perturbed, and the pictures that apply: `spectrum-*.png`,
+/// `frf-*.png`, `stabilisation-*.png`, `amplitude-*.png`, `taps-*.png`, `frequencies.png`,
+/// `mode-shapes.png`, `cloud.png`, `gap.png`, `gap-place.png`.
 ///
 /// # Errors
 /// The first [`ReportError`] of any file.
@@ -110,6 +115,12 @@ fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), Repor
     let inline = InlineFigure {
         caption: picture.caption.clone(),
         svg: render_svg(&picture.drawing)?,
+        live: picture
+            .live
+            .as_ref()
+            .map(script_json)
+            .transpose()
+            .map_err(ReportError::Json)?,
     };
     Ok((file, inline))
 }
@@ -128,6 +139,18 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
                   reading alone explains the error."
                 .to_owned(),
             drawing,
+            live: None,
+        }
+    }));
+    pictures.extend(draw_shapes(document).map(|drawing| {
+        Picture {
+            shelf: Shelf::Comparison,
+            name: "mode-shapes".to_owned(),
+            caption: "Shapes of the predicted modes, of the uniform Euler beam on the estimated joint. A sensor \
+                      or a tap near a node hardly sees the mode."
+                .to_owned(),
+            drawing,
+            live: None,
         }
     }));
     pictures.extend(draw_cloud(document).map(|drawing| {
@@ -137,6 +160,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
             caption: "Estimates when the frequencies are changed within what their readings allow."
                 .to_owned(),
             drawing,
+            live: None,
         }
     }));
     pictures
@@ -149,18 +173,21 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
             Shelf::Spectra,
             "spectrum",
             draw_spectrum(figure),
+            live_spectrum(figure),
             format!("Averaged spectra of {file} with the resonances found."),
         ),
         (
             Shelf::Spectra,
             "frf",
             draw_frf(figure),
+            live_frf(figure),
             format!("Response per force (H1) of {file}, magnitude, phase and coherence."),
         ),
         (
             Shelf::Spectra,
             "stabilisation",
             draw_stabilisation(figure),
+            None,
             format!(
                 "Stabilisation diagram of {file}: poles that the fit finds at each order, marked by \
                  what of them the order before had."
@@ -170,23 +197,26 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
             Shelf::Spectra,
             "amplitude",
             figure.amplitude.as_ref().and_then(draw_amplitude),
+            None,
             format!("Frequency and damping of the modes of {file} against amplitude."),
         ),
         (
             Shelf::Taps,
             "taps",
             draw_taps(figure),
+            live_taps(figure),
             format!("{file} over time; numbers count the taps."),
         ),
     ];
     kinds
         .into_iter()
-        .filter_map(|(shelf, kind, drawing, caption)| {
+        .filter_map(|(shelf, kind, drawing, live, caption)| {
             Some(Picture {
                 shelf,
                 name: format!("{kind}-{stem}"),
                 caption,
                 drawing: drawing?,
+                live,
             })
         })
         .collect()

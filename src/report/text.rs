@@ -1,8 +1,8 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
+use super::brief::brief;
 use super::document::Document;
 use super::format::signed_percent;
-use super::summary::sentences;
 use super::tables::{self, Kind, Place, Table};
 
 /// Width of the terminal (characters).
@@ -13,9 +13,6 @@ const GAP: usize = 2;
 const NARROWEST: usize = 8;
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
-/// What the fitted frequencies are.
-const FIT_NOTE: &str = "Frequency: fit of the free decays of all taps and sensors, \u{b1} half the 95 % interval; \
-                        line: the highest spectral line \u{b1} half line; damping \u{b1} one standard deviation.";
 /// Most rows printed: a terminal is no place for a thousand taps.
 const MOST_ROWS: usize = 40;
 
@@ -74,7 +71,12 @@ pub fn modes(document: &Document) -> String {
     let modes = document.modes.as_deref().unwrap_or_default();
     let fitted = modes.iter().any(|mode| mode.method == "fit");
     let note = if fitted {
-        wrapped(FIT_NOTE, 0)
+        let note = format!(
+            "Frequency: fit of {}, \u{b1} half the 95 % interval; line: the highest spectral line \
+             \u{b1} half line; damping \u{b1} one standard deviation.",
+            tables::fitted_to(document)
+        );
+        wrapped(&note, 0)
     } else {
         String::new()
     };
@@ -160,13 +162,15 @@ pub fn warnings(document: &Document) -> String {
         .collect()
 }
 
-/// What was found: a line or two for each finding.
+/// What was found, in five lines at most (longer where a reason has to be told).
 pub fn ending(document: &Document) -> String {
-    let sentences = sentences(document);
-    if sentences.is_empty() {
+    let lines = brief(document);
+    if lines.is_empty() {
         return String::new();
     }
-    let lines = sentences.iter().map(|sentence| wrapped(sentence, 2));
+    let lines = lines
+        .iter()
+        .map(|(about, words)| wrapped(&format!("{:\u{a0}<8}{words}", about), 8));
     format!("What was found\n{}", lines.collect::<String>())
 }
 
@@ -271,6 +275,26 @@ fn is_words(table: &Table, index: usize) -> bool {
     column.is_some_and(|column| column.kind == Kind::Words)
 }
 
+/// Whether a column holds names of files, which are shortened rather than broken.
+fn is_name(table: &Table, index: usize) -> bool {
+    let column = table.columns.get(index);
+    column.is_some_and(|column| matches!(column.name.as_str(), "Recording" | "File"))
+}
+
+/// A name of at most `width` characters: its middle gives way, for the beginning tells the test and
+/// the end the visit.
+fn shortened(name: &str, width: usize) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    if letters.len() <= width {
+        return name.to_owned();
+    }
+    let kept = width.saturating_sub(1);
+    let (head, tail) = (kept - kept / 2, kept / 2);
+    let first = letters.iter().take(head);
+    let last = letters.iter().skip(letters.len() - tail);
+    first.chain(&['\u{2026}']).chain(last).collect()
+}
+
 /// One row, on as many lines as its longest cell of words needs.
 fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[Vec<String>]) -> String {
     let columns: Vec<Vec<String>> = shown
@@ -278,7 +302,9 @@ fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[Vec<String>]) 
         .zip(widths)
         .map(|(index, width)| {
             let cell = cells.get(*index).into_iter().flatten();
-            if is_words(table, *index) {
+            if is_name(table, *index) {
+                cell.map(|text| shortened(text, *width)).collect()
+            } else if is_words(table, *index) {
                 cell.flat_map(|text| broken(text, *width)).collect()
             } else {
                 cell.map(|text| cut(text, *width)).collect()

@@ -102,6 +102,8 @@ fn regress_help_of_every_command_names_an_example() {
         "predict",
         "perturb",
         "reproduce",
+        "completions",
+        "man",
     ] {
         tapjoint(folder.path())
             .args([command, "--help"])

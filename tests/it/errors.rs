@@ -1097,7 +1097,7 @@ fn regress_bad_recordings_each_have_their_own_message() {
         SPOILED,
         b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0",
         &["run", "test.toml"],
-        "taps.csv: neither a WAV file nor text",
+        "taps.csv: neither a WAV file, a universal file nor text",
         &["export as WAV, CSV or UFF58"],
     );
 }

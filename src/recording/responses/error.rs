@@ -17,7 +17,7 @@ pub enum ResponseError {
     },
     /// Frequency response functions where a recording was expected.
     #[error(
-        "{file}:{line}: the first column is a frequency (\"{column}\"): this is a frequency response function and no time series; in a test description give its [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\")"
+        "{file}:{line}: the first column is a frequency (\"{column}\"): this is a frequency response function and no time series; in a test description give its [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\"); without one `tapjoint run FILE` and `tapjoint spectrum FILE` read it"
     )]
     NotTimeSeries {
         /// The file.

@@ -224,7 +224,7 @@ fn no_time_series(file: &UniversalFile, unusable: Option<&(Series<'_>, String)>)
         .any(|(_, f)| f.function_type == FunctionType::FREQUENCY_RESPONSE);
     let remedy = match responses {
         true => {
-            "its frequency response functions are read in a test description: give the file's [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\")"
+            "its frequency response functions are read in a test description: give the file's [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\"), or without one by `tapjoint run FILE` and `tapjoint spectrum FILE`"
         }
         false => "export the time series of hammer and sensors",
     };

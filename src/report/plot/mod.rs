@@ -10,6 +10,7 @@ pub mod drawing;
 pub mod frf;
 pub mod labels;
 pub mod palette;
+pub mod shapes;
 pub mod spectrum;
 pub mod stabilisation;
 pub mod time;
@@ -23,5 +24,6 @@ mod vector;
 
 pub use drawing::Drawing;
 pub use font::Weight;
+pub(super) use marks::frequency as frequency_words;
 pub use raster::render_png;
 pub use vector::render_svg;

@@ -3,7 +3,7 @@
 use super::super::document::{Document, EstimateSection, PredictionSection, ValueSection};
 use super::super::format::{
     MISSING, RIGID, bound_percent, last_place, optional, prefix, rounded_to, signed_percent,
-    with_decimals_of,
+    significant, with_decimals_of,
 };
 use super::modes::reading;
 use super::{Table, bound_of, mode_of, number, words};
@@ -184,6 +184,40 @@ fn scaled_note(estimate: &EstimateSection) -> String {
         (true, false) => " Not every frequency has an uncertainty, so that all weigh alike: the scaled std takes the \
                           misfit for it."
             .to_owned(),
+    }
+}
+
+/// How the estimates hang together; `None` where fewer than two parameters were estimated.
+pub fn correlations(document: &Document) -> Option<Table> {
+    let estimate = document.estimate.as_ref()?.as_ref()?;
+    let rows: Vec<Vec<String>> = estimate
+        .correlations
+        .iter()
+        .map(|found| {
+            let pair = format!("{} and {}", symbol(&found.first), symbol(&found.second));
+            // Near 1 the distance from 1 is what counts: two digits of it.
+            let digits = if found.value.abs() > 0.99 { 4 } else { 2 };
+            vec![pair, significant(found.value, digits)]
+        })
+        .collect();
+    (!rows.is_empty()).then(|| Table {
+        caption: "Correlations".to_owned(),
+        columns: vec![words("Parameters"), number("Correlation (1)")],
+        rows,
+        note: "Near 1 or \u{2212}1 the frequencies tell a combination of the two rather than each; of the \
+               logarithms of the values."
+            .to_owned(),
+    })
+}
+
+/// The symbol of a parameter by its name in descriptions.
+fn symbol(name: &str) -> &str {
+    match name {
+        "kt" => "Kt",
+        "kr" => "Kr",
+        "modulus" => "E",
+        "density" => "\u{3c1}",
+        other => other,
     }
 }
 

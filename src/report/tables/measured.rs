@@ -4,8 +4,34 @@ use super::super::document::{ChannelSection, Document, RecordingSection};
 use super::super::format::{MISSING, optional, significant, trimmed, unit_words};
 use super::{Table, number, words};
 
+/// Where taps and sensors were, and under what conditions: beside the spectra's columns these would
+/// need a page wider than a screen.
+const CONDITIONS: [&str; 5] = [
+    "Tap at (m)",
+    "Sensors at (m)",
+    "Torque (N m)",
+    "Temperature (°C)",
+    "Date",
+];
+
 /// One row for each recording; `None` without recordings.
 pub fn recordings(document: &Document) -> Option<Table> {
+    Some(all_columns(document)?.without_columns(|name| CONDITIONS.contains(&name)))
+}
+
+/// Where taps and sensors were in each recording, and under what conditions; `None` where nothing of it
+/// is stated.
+pub fn conditions(document: &Document) -> Option<Table> {
+    let kept = |name: &str| name == "Recording" || CONDITIONS.contains(&name);
+    let table = all_columns(document)?.without_columns(|name| !kept(name));
+    (table.columns.len() > 1).then(|| Table {
+        caption: "Where and how each was recorded".to_owned(),
+        note: String::new(),
+        ..table
+    })
+}
+
+fn all_columns(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
     let transformed = recordings.iter().any(|r| r.line_spacing.is_some());
     let table = Table {

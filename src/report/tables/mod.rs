@@ -13,9 +13,9 @@ mod uncertainty;
 pub use datasets::datasets;
 pub use frfs::frfs;
 pub use gap::{gap_story, hypotheses};
-pub use joint::{Parameter, estimated, methods, pairs, parameters, prediction};
-pub use measured::{channels, recordings};
-pub use modes::{modes, readings};
+pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters, prediction};
+pub use measured::{channels, conditions, recordings};
+pub use modes::{fitted_to, mode_details, modes, reading_details, readings};
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
@@ -100,6 +100,17 @@ impl Table {
             }
         }
         self
+    }
+
+    /// The same table without the columns whose names are unwanted.
+    fn without_columns(self, unwanted: impl Fn(&str) -> bool) -> Table {
+        let names: Vec<String> = self
+            .columns
+            .iter()
+            .map(|column| column.name.clone())
+            .collect();
+        let names = names.iter().filter(|name| unwanted(name));
+        names.fold(self, |table, name| table.without_column(name))
     }
 
     /// The same table without the columns in which nothing stands.

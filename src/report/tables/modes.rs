@@ -1,6 +1,6 @@
 //! Tables of resonances.
 
-use super::super::document::{Document, ModeSection};
+use super::super::document::{Document, ModeSection, RecordingSection};
 use super::super::format::{
     MISSING, Rounded, frequency_reading, last_place, line_reading, optional, rounded_digits,
     rounded_to, significant,
@@ -24,17 +24,92 @@ pub fn modes(document: &Document) -> Option<Table> {
     };
     let note = match given {
         true => "Frequency: as it was given, with its bound.".to_owned(),
-        false => note(modes, described),
+        false => note(document, modes, described),
     };
-    Some(table(caption, modes.iter().map(row).collect(), &note))
+    let table = table(caption, modes.iter().map(row).collect(), &note);
+    Some(without(table, &DETAILS))
+}
+
+/// How each resonance of the merged list was read, for who doubts it; `None` where nothing is known
+/// but the reading itself.
+pub fn mode_details(document: &Document) -> Option<Table> {
+    let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
+    let note = details_note(modes);
+    let table = table("How each was read", modes.iter().map(row).collect(), &note);
+    details(table)
+}
+
+/// The same of each recording's own readings.
+pub fn reading_details(document: &Document) -> Option<Table> {
+    let caption = "How each was read in each recording";
+    let table = table(caption, reading_rows(document)?, "");
+    details(table)
+}
+
+/// Columns that say how a resonance was read: beside the others they would need a page wider than a
+/// screen.
+const DETAILS: [&str; 7] = [
+    "Interval from",
+    "Tap deviation (Hz)",
+    "p",
+    "Prominence (dB)",
+    "Above noise (dB)",
+    "Coherence",
+    "Random error (%)",
+];
+
+fn without(table: Table, names: &[&str]) -> Table {
+    table.without_columns(|name| names.contains(&name))
+}
+
+fn details(table: Table) -> Option<Table> {
+    let table = without(
+        table,
+        &["Method", "Line (Hz)", "Damping (%)", "\u{3bb} (1)"],
+    );
+    let known = |column: &Column| DETAILS.contains(&column.name.as_str());
+    table.columns.iter().any(known).then_some(table)
+}
+
+fn details_note(modes: &[ModeSection]) -> String {
+    let mut parts = Vec::new();
+    if modes.iter().any(|mode| mode.method == "fit") {
+        parts.push(INTERVAL_NOTE);
+    }
+    if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
+        parts.push(TAPS_NOTE);
+    }
+    if modes.iter().any(|mode| mode.random_error.is_some()) {
+        parts.push(
+            "Coherence and random error: of the sensor that knows the mode best, on its line.",
+        );
+    }
+    parts.join(" ")
+}
+
+/// What fitted frequencies were fitted to.
+pub fn fitted_to(document: &Document) -> &'static str {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let functions = |recording: &&RecordingSection| recording.sample_rate.is_none();
+    match recordings.iter().filter(functions).count() {
+        0 => "the free decays of all taps and sensors",
+        count if count == recordings.len() => "the frequency response functions of all sensors",
+        _ => {
+            "the free decays of all taps and sensors, or the frequency response functions of files"
+        }
+    }
 }
 
 /// What the columns mean, of the methods that occur.
-fn note(modes: &[ModeSection], described: bool) -> String {
+fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
     let by = |method: &str| modes.iter().any(|mode| mode.method == method);
+    let fit = format!(
+        "Fit: maximum likelihood of {}; its bound is half the 95 % interval.",
+        fitted_to(document)
+    );
     let mut parts = vec!["Frequency: the best reading with its bound (about 95 %)."];
     if by("fit") {
-        parts.push(FIT_NOTE);
+        parts.push(&fit);
     }
     if by("interpolated") {
         parts.push("Interpolated: from the shape of the peak between the lines.");
@@ -43,19 +118,14 @@ fn note(modes: &[ModeSection], described: bool) -> String {
     if modes.iter().any(|mode| mode.damping_std.is_some()) {
         parts.push("Damping: \u{b1} one standard deviation.");
     }
-    if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
-        parts.push(TAPS_NOTE);
-    }
     if described {
         parts.push("\u{3bb}: non-dimensional frequency of the Euler beam.");
     }
     parts.join(" ")
 }
 
-const FIT_NOTE: &str = "Fit: maximum likelihood of the free decays of all taps and sensors after \
-                        the pulse, without a window; its bound is half the 95 % interval, which \
-                        rests on the noise that the fit leaves (residual), or on the scatter of \
-                        the taps where that is more than the noise explains (taps).";
+const INTERVAL_NOTE: &str = "Interval from: the noise that the fit leaves (residual), or the scatter of the taps \
+                             where that is more than the noise explains (taps).";
 const LINE_NOTE: &str = "Line: the highest spectral line \u{b1} half of the larger of line spacing \
                          and 1/T, as an analyser shows it.";
 const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, each fitted alone; p: \
@@ -63,6 +133,12 @@ const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, eac
 
 /// Each recording's own readings; `None` where there is at most one recording.
 pub fn readings(document: &Document) -> Option<Table> {
+    let note = "The list of modes takes each from the recording that resolves it best.";
+    let table = table("Readings of each recording", reading_rows(document)?, note);
+    Some(without(table, &DETAILS))
+}
+
+fn reading_rows(document: &Document) -> Option<Vec<Vec<String>>> {
     let recordings = document.recordings.as_deref().filter(|r| r.len() > 1)?;
     let rows: Vec<Vec<String>> = recordings
         .iter()
@@ -74,11 +150,7 @@ pub fn readings(document: &Document) -> Option<Table> {
             })
         })
         .collect();
-    if rows.is_empty() {
-        return None;
-    }
-    let note = "The list of modes takes each from the recording that resolves it best.";
-    Some(table("Readings of each recording", rows, note))
+    (!rows.is_empty()).then_some(rows)
 }
 
 /// The table; the recordings' column only where there are several.

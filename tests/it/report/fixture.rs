@@ -17,6 +17,7 @@ const LAMBDAS: [f64; 5] = [1.6061, 4.2318, 7.1372, 9.7680, 12.2817];
 /// A whole run with two recordings.
 pub fn document() -> Document {
     Document {
+        mode_shapes: None,
         frfs: None,
         monte_carlo: None,
         perturbation_averages: None,

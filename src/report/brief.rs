@@ -1,0 +1,122 @@
+//! What was found, in five lines for a terminal.
+
+use super::document::{Document, PredictionSection};
+use super::format::{signed_percent, significant};
+use super::tables::{Parameter, estimated, quality_count};
+
+/// At most five lines, each with what it is about; what was not computed has none.
+pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
+    let lines = [
+        ("Taps", taps(document)),
+        ("Modes", modes(document)),
+        ("Joint", joint(document)),
+        ("Model", model(document)),
+        ("Doubts", doubts(document)),
+    ];
+    lines
+        .into_iter()
+        .filter_map(|(about, words)| Some((about, words?)))
+        .collect()
+}
+
+fn taps(document: &Document) -> Option<String> {
+    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+    let files = match recordings.len() {
+        1 => "1 recording".to_owned(),
+        count => format!("{count} recordings"),
+    };
+    // Functions from a file have no taps to judge.
+    if recordings
+        .iter()
+        .all(|recording| recording.sample_rate.is_none())
+    {
+        return Some(format!("none: {files} of frequency response functions"));
+    }
+    let all = recordings.iter().flat_map(|recording| &recording.taps);
+    let used = all.clone().filter(|tap| tap.accepted).count();
+    let could = if document.modes.is_some() {
+        "used"
+    } else {
+        "can be used"
+    };
+    Some(format!(
+        "{used} of {} taps {could}, in {files}",
+        all.count()
+    ))
+}
+
+fn modes(document: &Document) -> Option<String> {
+    let modes = document.modes.as_deref()?;
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let frequencies: Vec<f64> = numbered.map(|mode| mode.frequency).collect();
+    let low = frequencies.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = frequencies.iter().copied().fold(0.0, f64::max);
+    Some(match frequencies.len() {
+        0 => "none".to_owned(),
+        1 => format!("1 mode at {} Hz", significant(low, 4)),
+        count => format!(
+            "{count} modes from {} to {} Hz",
+            significant(low, 4),
+            significant(high, 4)
+        ),
+    })
+}
+
+fn joint(document: &Document) -> Option<String> {
+    let Some(estimate) = document.estimate.as_ref()? else {
+        let reason = document.estimate_reason.as_deref();
+        return Some(format!(
+            "no estimate: {}",
+            reason.unwrap_or("no reason was recorded")
+        ));
+    };
+    let physical: Vec<String> = estimated(estimate)
+        .iter()
+        .filter(|parameter| parameter.unit != "1")
+        .map(with_std)
+        .collect();
+    (!physical.is_empty()).then(|| physical.join(", "))
+}
+
+/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two.
+fn with_std(parameter: &Parameter<'_>) -> String {
+    let [value, std, _, _, unit] = parameter.written();
+    let std = match parameter.value.std_scaled {
+        Some(_) => parameter.written_scaled(),
+        None => std,
+    };
+    let symbol = parameter.symbol;
+    let known = std.chars().any(|letter| letter.is_ascii_digit());
+    let spread = if known {
+        format!(" \u{b1} {std}")
+    } else {
+        String::new()
+    };
+    // A number stays on the line of its unit.
+    format!("{symbol} = {value}{spread} {unit}").replace(' ', "\u{a0}")
+}
+
+fn model(document: &Document) -> Option<String> {
+    let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
+    let rows = document.prediction.as_deref()?.iter();
+    let worst = rows
+        .filter(|row| row.error_percent.is_some_and(f64::is_finite))
+        .max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    Some(format!(
+        "largest error of a predicted frequency {} % (mode {})",
+        signed_percent(worst.error_percent),
+        worst.mode
+    ))
+}
+
+fn doubts(document: &Document) -> Option<String> {
+    let warnings = match document.warnings.len() {
+        0 => "no warnings".to_owned(),
+        1 => "1 warning, see above".to_owned(),
+        count => format!("{count} warnings, see above"),
+    };
+    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
+    // Where nothing was computed there is nothing to doubt.
+    let computed = document.modes.is_some() || document.recordings.is_some();
+    computed.then_some(warnings + &checks)
+}

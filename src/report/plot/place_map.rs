@@ -1,0 +1,64 @@
+//! The picture of where along the beam the residual calls for a change.
+
+use super::super::document::Document;
+use super::axis::{Axis, extent, padded};
+use super::drawing::{Drawing, Point, Stroke};
+use super::palette::{BLUE, INK, VERMILION};
+use super::panel::{Panel, Sample, X_SPACING, crisp, draw_legend, draw_title};
+use super::spectrum::{LEFT, RIGHT, WIDTH};
+
+/// Local change of stiffness and mass along the beam; `None` without a map.
+pub fn draw_place_map(document: &Document) -> Option<Drawing> {
+    let map = document.gap.as_ref()?.map.as_ref()?;
+    let curves = [
+        (&map.stiffness, &map.stiffness_std, VERMILION, "bending stiffness"),
+        (&map.mass, &map.mass_std, BLUE, "mass"),
+    ];
+    let ends = curves.iter().flat_map(|(values, stds, ..)| {
+        let pairs = values.iter().zip(stds.iter());
+        pairs.flat_map(|(value, std)| [100.0 * (value - std), 100.0 * (value + std)])
+    });
+    let (low, high) = extent(ends.chain([0.0]))?;
+    let last = *map.positions.last()?;
+    let step = map.positions.get(1).map_or(last, |second| second - map.positions[0]);
+    let mut drawing = Drawing::new("Where along the beam the gap calls for a change", WIDTH, 440);
+    draw_title(
+        &mut drawing,
+        "Where along the beam",
+        &format!(
+            "local change that the errors of the described model call for, if stiffness or mass alone \
+             changes; smeared over {:.0} mm; bars: one standard deviation",
+            1e3 * map.resolution
+        ),
+    );
+    let panel = Panel {
+        x: Axis::linear((0.0, 1e3 * (last + 0.5 * step)), (LEFT + 8.0, RIGHT)),
+        y: Axis::linear(padded((low, high), 0.08), (366.0, 108.0)),
+    };
+    panel.draw_y_ticks(&mut drawing, &panel.y.ticks(36.0));
+    panel.draw_x_ticks(&mut drawing, &panel.x.ticks(X_SPACING));
+    let zero = crisp(panel.y.place(0.0));
+    drawing.line(vec![(LEFT + 8.0, zero), (RIGHT, zero)], Stroke::new(INK, 1.0));
+    panel.draw_frame(&mut drawing);
+    for (values, stds, color, _) in curves {
+        let points: Vec<Point> = map
+            .positions
+            .iter()
+            .zip(values.iter())
+            .map(|(x, value)| panel.place(1e3 * x, 100.0 * value))
+            .collect();
+        for ((at, value), std) in points.iter().zip(values.iter()).zip(stds.iter()) {
+            let ends = [value - std, value + std].map(|end| panel.y.place(100.0 * end));
+            drawing.line(vec![(at.0, ends[0]), (at.0, ends[1])], Stroke::new(color, 1.0));
+        }
+        drawing.line(points, Stroke::new(color, 2.0));
+    }
+    panel.draw_x_title(&mut drawing, "position from the joint (mm)");
+    panel.draw_y_title(&mut drawing, "local change (%)");
+    let legend: Vec<(Sample, String)> = curves
+        .iter()
+        .map(|(.., color, name)| (Sample::Dot(*color), (*name).to_owned()))
+        .collect();
+    draw_legend(&mut drawing, (LEFT, 86.0), RIGHT, &legend);
+    Some(drawing)
+}

@@ -1,0 +1,172 @@
+//! The picture of mode shapes with the places of sensors and taps.
+
+use std::collections::BTreeMap;
+
+use super::super::document::{Document, ModeShapeSection};
+use super::super::format::significant;
+use super::axis::Axis;
+use super::drawing::{Align, Drawing, Stroke, Text};
+use super::palette::{BLUE, GRID, INK, ORANGE, SOFT, VERMILION, WHITE};
+use super::panel::{Panel, Sample, TICK_SIZE, draw_legend, draw_title};
+use super::spectrum::{LEFT, RIGHT, WIDTH};
+
+/// Panels in a row.
+const ACROSS: usize = 3;
+/// Most modes drawn: a dozen fits a page.
+const MOST: usize = 12;
+/// Height of a panel with its title (pixels).
+const HEIGHT: f64 = 150.0;
+/// Space between panels (pixels).
+const SPACE: f64 = 36.0;
+/// Top of the first row (pixels).
+const TOP: f64 = 104.0;
+
+/// What stands on the beam: name and place (m), each place once.
+struct Places {
+    sensors: BTreeMap<String, Vec<f64>>,
+    taps: Vec<f64>,
+}
+
+/// Shapes of the predicted modes; `None` without any.
+pub fn draw_shapes(document: &Document) -> Option<Drawing> {
+    let shapes = document
+        .mode_shapes
+        .as_deref()
+        .filter(|shapes| !shapes.is_empty())?;
+    let shown = &shapes[..shapes.len().min(MOST)];
+    let rows = shown.len().div_ceil(ACROSS);
+    let height = TOP + rows as f64 * (HEIGHT + SPACE) + 10.0;
+    let mut drawing = Drawing::new("Mode shapes with sensors and taps", WIDTH, height as u32);
+    let below = "displacement over the position along the beam, each relative to its largest";
+    draw_title(&mut drawing, "Mode shapes", below);
+    let places = places(document);
+    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
+    for (index, shape) in shown.iter().enumerate() {
+        let (column, row) = (index % ACROSS, index / ACROSS);
+        let panel = panel(shape, column, TOP + row as f64 * (HEIGHT + SPACE));
+        draw_ground(&mut drawing, &panel, kind);
+        draw_shape(&mut drawing, &panel, shape, &places);
+    }
+    draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &legend(&places));
+    Some(drawing)
+}
+
+fn panel(shape: &ModeShapeSection, column: usize, top: f64) -> Panel {
+    let width = (RIGHT - LEFT - SPACE * (ACROSS - 1) as f64) / ACROSS as f64;
+    let left = LEFT + column as f64 * (width + SPACE);
+    let end = shape.positions.last().copied().unwrap_or(1.0);
+    Panel {
+        x: Axis::linear((0.0, end), (left, left + width)),
+        y: Axis::linear((-1.15, 1.15), (top + HEIGHT, top + 22.0)),
+    }
+}
+
+/// The beam at rest, and what holds it.
+fn draw_ground(drawing: &mut Drawing, panel: &Panel, kind: Option<&str>) {
+    let y = panel.y.place(0.0);
+    drawing.line(
+        vec![(panel.x.from, y), (panel.x.to, y)],
+        Stroke::new(GRID, 2.0),
+    );
+    let middle = 0.5 * (panel.x.from + panel.x.to);
+    match kind {
+        Some("cantilever") => {
+            drawing.rectangle(
+                (panel.x.from - 9.0, y - 24.0),
+                (panel.x.from - 2.0, y + 24.0),
+                SOFT,
+                0.8,
+            );
+        }
+        Some("lap") => drawing.rectangle(
+            (middle - 3.0, y - 12.0),
+            (middle + 3.0, y + 12.0),
+            SOFT,
+            0.8,
+        ),
+        _ => {}
+    }
+}
+
+fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, places: &Places) {
+    let points = shape.positions.iter().zip(&shape.displacements);
+    panel.draw_curve(
+        drawing,
+        points.map(|(x, y)| (*x, *y)),
+        Stroke::new(BLUE, 2.5),
+    );
+    let title = format!("mode {}", shape.mode);
+    let at = (panel.x.from, panel.y.to - 8.0);
+    drawing.text(Text::new(title, at, TICK_SIZE).bold());
+    let words = format!("{} Hz", significant(shape.frequency, 4));
+    let at = (panel.x.to, panel.y.to - 8.0);
+    drawing.text(
+        Text::new(words, at, TICK_SIZE)
+            .colored(SOFT)
+            .aligned(Align::End),
+    );
+    for place in &places.taps {
+        let at = panel.place(*place, displacement(shape, *place));
+        drawing.cross(at, 6.0, Stroke::new(VERMILION, 2.5));
+    }
+    for (name, sites) in &places.sensors {
+        for place in sites {
+            let at = panel.place(*place, displacement(shape, *place));
+            drawing.dot(at, 6.5, WHITE);
+            drawing.dot(at, 5.0, ORANGE);
+            let above = if at.1 < panel.y.place(0.7) {
+                15.0
+            } else {
+                -15.0
+            };
+            let text = Text::new(name.as_str(), (at.0, at.1 + above), 12.0).colored(INK);
+            drawing.text_on_paper(text);
+        }
+    }
+}
+
+/// Displacement at a place, between the points next to it.
+fn displacement(shape: &ModeShapeSection, place: f64) -> f64 {
+    let after = shape.positions.partition_point(|x| *x < place);
+    let point = |index: usize| {
+        Some((
+            *shape.positions.get(index)?,
+            *shape.displacements.get(index)?,
+        ))
+    };
+    match (after.checked_sub(1).and_then(point), point(after)) {
+        (Some((x0, y0)), Some((x1, y1))) if x1 > x0 => y0 + (y1 - y0) * (place - x0) / (x1 - x0),
+        (_, Some((_, y))) | (Some((_, y)), None) => y,
+        (None, None) => 0.0,
+    }
+}
+
+fn places(document: &Document) -> Places {
+    let mut places = Places {
+        sensors: BTreeMap::new(),
+        taps: Vec::new(),
+    };
+    for recording in document.recordings.iter().flatten() {
+        for (name, place) in &recording.sensor_positions {
+            let sites = places.sensors.entry(name.clone()).or_default();
+            if !sites.contains(place) {
+                sites.push(*place);
+            }
+        }
+        places
+            .taps
+            .extend(recording.tap.filter(|tap| !places.taps.contains(tap)));
+    }
+    places
+}
+
+fn legend(places: &Places) -> Vec<(Sample, String)> {
+    let mut entries = vec![(Sample::Line(BLUE), "mode shape".to_owned())];
+    if !places.sensors.is_empty() {
+        entries.push((Sample::Dot(ORANGE), "sensor".to_owned()));
+    }
+    if !places.taps.is_empty() {
+        entries.push((Sample::Cross(VERMILION), "tap".to_owned()));
+    }
+    entries
+}

@@ -1,0 +1,229 @@
+//! The page in a browser: what it draws, that zoom and hover work, that nothing is asked for elsewhere.
+//!
+//! A headless Chromium opens a copy of the page to which a script is added that does what a reader would
+//! do and writes down what came of it. Without a Chromium these tests say so and pass.
+
+use super::{samples, tapjoint};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Moves and drags the mouse over the first curves, and clicks a tap.
+const VISITOR: &str = r#"
+<script>
+(function () {
+  var seen = { errors: [] };
+  addEventListener("error", function (event) { seen.errors.push(String(event.message)); });
+  addEventListener("securitypolicyviolation", function (event) { seen.errors.push("fetch " + event.blockedURI); });
+  function mouse(target, type, x, y) {
+    var box = target.getBoundingClientRect();
+    target.dispatchEvent(new MouseEvent(type, { bubbles: true, clientX: box.left + x, clientY: box.top + y, view: window, button: 0, movementX: 1, movementY: 1 }));
+  }
+  function words(figure) { return Array.from(figure.querySelectorAll(".u-legend .u-value")).map(function (v) { return v.textContent; }); }
+  function wait(milliseconds) { return new Promise(function (done) { setTimeout(done, milliseconds); }); }
+  async function visit() {
+    await wait(200);
+    var figures = document.querySelectorAll("figure.curves");
+    seen.figures = figures.length;
+    seen.pictures = document.querySelectorAll("figure svg").length;
+    seen.live = document.querySelectorAll("figure.live canvas").length;
+    seen.width = document.documentElement.scrollWidth;
+    seen.window = innerWidth;
+    seen.wide = Array.from(document.querySelectorAll("div.table .box")).filter(function (box) { return box.scrollWidth > box.clientWidth + 1; }).length;
+    seen.background = getComputedStyle(document.body).backgroundColor;
+    seen.resources = performance.getEntriesByType("resource").map(function (entry) { return entry.name; });
+    var over = figures[0].querySelector(".u-over");
+    var wide = over.clientWidth;
+    mouse(over, "mouseenter", 0.3 * wide, 40);
+    mouse(over, "mousemove", 0.3 * wide, 40);
+    await wait(100);
+    seen.hover = words(figures[0]);
+    mouse(over, "mousedown", 0.3 * wide, 40);
+    mouse(over, "mousemove", 0.6 * wide, 40);
+    mouse(document.querySelector("figure.curves .u-over"), "mouseup", 0.6 * wide, 40);
+    await wait(100);
+    mouse(over, "mousemove", 1, 40);
+    await wait(100);
+    seen.zoomed = words(figures[0])[0];
+    figures[0].querySelector(".chips .reset").click();
+    await wait(100);
+    mouse(over, "mousemove", 1, 40);
+    await wait(100);
+    seen.reset = words(figures[0])[0];
+    var taps = Array.from(figures).filter(function (figure) { return /● tap 1/.test(figure.textContent); })[0];
+    Array.from(taps.querySelectorAll(".chips button")).filter(function (b) { return /tap 2/.test(b.textContent); })[0].click();
+    seen.tap = taps.querySelector(".said").textContent;
+    var written = document.createElement("pre");
+    written.id = "seen";
+    written.textContent = JSON.stringify(seen);
+    document.body.appendChild(written);
+    if (parent !== window) parent.postMessage(written.textContent, "*");
+  }
+  visit().catch(function (problem) { seen.errors.push(String(problem)); document.body.insertAdjacentHTML("beforeend", "<pre id=seen></pre>"); document.getElementById("seen").textContent = JSON.stringify(seen); });
+})();
+</script>
+"#;
+
+/// A page that shows the report in a frame, because a browser's window has a least width.
+const FRAME: &str = r#"<!DOCTYPE html><meta name="color-scheme" content="light dark"><body>
+<iframe src="report.html" style="width: WIDTHpx; height: 900px; border: 0"></iframe>
+<script>addEventListener("message", function (event) {
+  var written = document.createElement("pre"); written.id = "seen"; written.textContent = event.data;
+  document.body.appendChild(written);
+});</script>"#;
+
+/// A Chromium: the one that TAPJOINT_CHROMIUM names, or the first known name on the path.
+fn chromium() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os("TAPJOINT_CHROMIUM") {
+        return Some(named.into());
+    }
+    let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
+    let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH")?).collect();
+    let files = names
+        .iter()
+        .flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let found = files.into_iter().find(|file| file.is_file());
+    if found.is_none() {
+        eprintln!("skipped: no Chromium on the path; install one or name it in TAPJOINT_CHROMIUM");
+    }
+    found
+}
+
+/// What a visitor saw of the page, and what the browser complained of.
+fn visited(chromium: &Path, page: &Path, width: u32, dark: bool) -> (Value, String) {
+    let profile = tempfile::tempdir().unwrap();
+    let framed = page.with_file_name("frame.html");
+    std::fs::write(&framed, FRAME.replace("WIDTH", &width.to_string())).unwrap();
+    let shown = if width < 500 { &framed } else { page };
+    let scheme = if dark {
+        "--blink-settings=preferredColorScheme=0"
+    } else {
+        "--blink-settings=preferredColorScheme=1"
+    };
+    let output = Command::new(chromium)
+        .args([
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+        ])
+        .args(["--virtual-time-budget=20000", "--dump-dom", scheme])
+        .arg(format!("--window-size={width},900"))
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(format!("file://{}", shown.display()))
+        .output()
+        .unwrap();
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    let written = dom
+        .split("<pre id=\"seen\">")
+        .nth(1)
+        .and_then(|rest| rest.split("</pre>").next());
+    let written = written.unwrap_or_else(|| panic!("the visitor wrote nothing down: {error}"));
+    let written = written
+        .replace("&lt;", "<")
+        .replace("&gt;", ">")
+        .replace("&amp;", "&");
+    let console = error
+        .lines()
+        .filter(|line| line.contains("CONSOLE"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    (serde_json::from_str(&written).unwrap(), console)
+}
+
+/// The page of the sample with the visitor's script, in a folder of its own.
+fn page_with_visitor() -> (tempfile::TempDir, PathBuf) {
+    let folder = samples();
+    tapjoint(
+        folder.path(),
+        &["run", "recordings/cantilever/test.toml", "--out", "report"],
+        0,
+    );
+    let file = folder.path().join("report/report.html");
+    let html = std::fs::read_to_string(&file).unwrap();
+    let (head, tail) = html.rsplit_once("</body>").unwrap();
+    std::fs::write(&file, format!("{head}{VISITOR}</body>{tail}")).unwrap();
+    (folder, file)
+}
+
+fn number(words: &str) -> f64 {
+    words
+        .split_whitespace()
+        .next()
+        .unwrap_or_default()
+        .parse()
+        .unwrap_or(f64::NAN)
+}
+
+#[test]
+fn regress_the_page_works_in_a_browser() {
+    let Some(chromium) = chromium() else { return };
+    let (_folder, page) = page_with_visitor();
+    for (width, dark) in [(1280, false), (1280, true), (400, false), (400, true)] {
+        let case = format!("{width} px, dark {dark}");
+        let (seen, console) = visited(&chromium, &page, width, dark);
+        assert_eq!(console, "", "{case}: the console complains");
+        assert_eq!(seen["errors"], Value::Array(vec![]), "{case}");
+        assert_eq!(
+            seen["resources"],
+            Value::Array(vec![]),
+            "{case}: something was fetched"
+        );
+        // Of each of two recordings: spectra, responses, taps.
+        assert_eq!(seen["figures"], 6, "{case}");
+        assert!(seen["live"].as_u64() >= Some(10), "{case}: {seen}");
+        assert!(seen["pictures"].as_u64() >= Some(11), "{case}: {seen}");
+        assert!(
+            seen["width"].as_u64() <= seen["window"].as_u64(),
+            "{case}: scrolls sideways {seen}"
+        );
+        if width >= 1280 {
+            assert_eq!(seen["wide"], 0, "{case}: tables scroll sideways");
+        }
+        let light = seen["background"] == "rgb(255, 255, 255)";
+        assert_eq!(light, !dark, "{case}: {}", seen["background"]);
+        let hover: Vec<&str> = seen["hover"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter_map(Value::as_str)
+            .collect();
+        assert!(
+            hover[0].ends_with(" Hz") && hover[1].ends_with(" m/s² s"),
+            "{case}: {hover:?}"
+        );
+        // The band is 0 to 200 Hz; dragged over was the part from 30 to 60 %.
+        assert!(
+            (number(hover[0]) - 60.0).abs() < 4.0,
+            "{case}: hover at {hover:?}"
+        );
+        let zoomed = number(seen["zoomed"].as_str().unwrap());
+        assert!(
+            (zoomed - 60.0).abs() < 4.0,
+            "{case}: zoomed view begins at {zoomed}"
+        );
+        let reset = number(seen["reset"].as_str().unwrap());
+        assert!(reset < 2.0, "{case}: the whole view begins at {reset}");
+        assert!(
+            seen["tap"].as_str().unwrap().starts_with("tap 2: used, "),
+            "{case}: {}",
+            seen["tap"]
+        );
+    }
+}
+
+#[test]
+fn prop_the_page_of_a_test_stays_small() {
+    let folder = samples();
+    tapjoint(
+        folder.path(),
+        &["run", "recordings/cantilever/test.toml", "--out", "report"],
+        0,
+    );
+    let size = std::fs::metadata(folder.path().join("report/report.html"))
+        .unwrap()
+        .len();
+    // Two recordings; five have to stay below 3 MB.
+    assert!(size < 1_200_000, "{size} bytes");
+}

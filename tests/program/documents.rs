@@ -1,0 +1,80 @@
+//! What the documents say: every command that they show runs as printed.
+
+use super::{program, samples};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The commands of a document's `console` blocks, with the code that they end with: lines that begin
+/// with "$ ", and "# exits with 1" behind those that have no answer.
+fn commands(text: &str) -> Vec<(String, i32)> {
+    let blocks = text.split("```console\n").skip(1);
+    let lines = blocks.flat_map(|block| block.split("```").next().unwrap_or_default().lines());
+    lines
+        .filter_map(|line| line.strip_prefix("$ "))
+        .map(|line| match line.split_once("# exits with ") {
+            Some((command, code)) => (command.trim().to_owned(), code.trim().parse().unwrap()),
+            None => (line.to_owned(), 0),
+        })
+        .collect()
+}
+
+fn documents() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guide = std::fs::read_dir(root.join("docs")).unwrap();
+    let mut all: Vec<PathBuf> = guide
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "md"))
+        .collect();
+    all.push(root.join("README.md"));
+    all.sort();
+    all
+}
+
+#[test]
+fn prop_every_command_in_the_documents_runs_as_printed() {
+    let binary = program();
+    let path = std::env::var("PATH").unwrap_or_default();
+    let path = format!("{}:{path}", binary.parent().unwrap().display());
+    let mut tried = 0;
+    for document in documents() {
+        let text = std::fs::read_to_string(&document).unwrap();
+        // One after the other in one folder, as a reader types them.
+        let folder = samples();
+        for (command, code) in commands(&text) {
+            let run = Command::new("sh")
+                .args(["-c", &command])
+                .current_dir(folder.path())
+                .env("PATH", &path)
+                .output()
+                .unwrap();
+            let error = String::from_utf8_lossy(&run.stderr).into_owned();
+            let place = document.display();
+            assert_eq!(run.status.code(), Some(code), "{place}: {command}\n{error}");
+            tried += 1;
+        }
+    }
+    assert!(tried >= 20, "only {tried} commands were found");
+}
+
+#[test]
+fn prop_links_between_documents_lead_somewhere() {
+    for document in documents() {
+        let text = std::fs::read_to_string(&document).unwrap();
+        for link in text
+            .split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+        {
+            let file = link.split('#').next().unwrap_or_default();
+            if file.is_empty() || file.contains("://") {
+                continue;
+            }
+            let target = document.parent().unwrap().join(file);
+            assert!(
+                target.exists(),
+                "{}: {link} leads nowhere",
+                document.display()
+            );
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The first minutes with the program: help, slips of the pen, templates, completions, manual pages.
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn tapjoint(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("tapjoint").unwrap();
+    command.current_dir(folder);
+    command
+}
+
+/// Standard output and standard error of a command that ends with this code.
+fn told(folder: &Path, arguments: &[&str], code: i32) -> (String, String) {
+    let done = tapjoint(folder).args(arguments).assert().code(code);
+    let output = done.get_output();
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+/// Names of all commands, from the completion script of fish: one line names each.
+fn commands(folder: &Path) -> Vec<String> {
+    let (script, _) = told(folder, &["completions", "fish"], 0);
+    let mut names: Vec<String> = script
+        .lines()
+        .filter(|line| line.contains("__fish_tapjoint_needs_command"))
+        .filter_map(|line| line.split_once("-a \"")?.1.split_once('"'))
+        .map(|(name, _)| name.to_owned())
+        .collect();
+    names.sort();
+    names.dedup();
+    names
+}
+
+#[test]
+fn prop_help_lists_every_command_once_under_a_task() {
+    let folder = tempfile::tempdir().unwrap();
+    let (help, _) = told(folder.path(), &["help"], 0);
+    let names = commands(folder.path());
+    assert!(names.len() >= 12, "{names:?}");
+    for name in names {
+        let lines = help.lines().filter(|line| {
+            line.starts_with("  ") && line.split_whitespace().next() == Some(name.as_str())
+        });
+        assert_eq!(lines.count(), 1, "{name} in:\n{help}");
+    }
+    let tasks = [
+        "A test from recordings to report:",
+        "Spectra:",
+        "The joint:",
+    ];
+    for task in tasks {
+        assert!(help.contains(task), "{task} is missing");
+    }
+    let list = help.split("Options:").next().unwrap_or_default();
+    let longest = list.lines().skip_while(|line| !line.ends_with("report:"));
+    assert!(longest.clone().count() > 10, "the list was found");
+    for line in longest {
+        assert!(line.chars().count() <= 80, "wider than 80 columns: {line}");
+    }
+}
+
+#[test]
+fn regress_mistyped_commands_are_suggested() {
+    let folder = tempfile::tempdir().unwrap();
+    for (slip, meant) in [
+        ("rnu", "run"),
+        ("specturm", "spectrum"),
+        ("idntify", "identify"),
+        ("rfr", "frf"),
+    ] {
+        let (_, error) = told(folder.path(), &[slip], 2);
+        assert!(error.contains(&format!("'{meant}'")), "{slip}: {error}");
+    }
+    let (_, error) = told(folder.path(), &["xyzzyxyzzy"], 2);
+    assert!(!error.contains("tip:"), "nothing is near: {error}");
+}
+
+#[test]
+fn regress_the_printed_template_runs_as_it_is() {
+    for kind in ["cantilever", "lap", "free"] {
+        let folder = tempfile::tempdir().unwrap();
+        let (template, _) = told(folder.path(), &["init", "--kind", kind], 0);
+        std::fs::write(folder.path().join("test.toml"), template).unwrap();
+        let (text, error) = told(folder.path(), &["run", "test.toml"], 0);
+        assert_eq!(error, "", "{kind}");
+        assert!(text.contains("report.html"), "{kind}: {text}");
+        assert!(!text.contains("warning (misfit)"), "{kind}: {text}");
+    }
+}
+
+#[test]
+fn regress_a_template_of_recordings_names_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = ["a.wav", "b \"c\".wav"];
+    let (template, _) = told(folder.path(), &["init", files[0], files[1]], 0);
+    let test = tapjoint::description::TestDescription::parse(&template, "test.toml")
+        .unwrap_or_else(|error| panic!("{error}"));
+    let named: Vec<_> = test.recordings.iter().map(|r| r.file.clone()).collect();
+    assert_eq!(named, files.map(std::path::PathBuf::from));
+    // Nothing but the table of the file itself has gone.
+    let plain = tapjoint::description::template(tapjoint::description::JointKind::Cantilever);
+    for line in plain.lines().filter(|line| !line.starts_with("file = ")) {
+        assert!(template.contains(line), "lost: {line}");
+    }
+    std::fs::write(folder.path().join("test.toml"), &template).unwrap();
+    let (_, error) = told(folder.path(), &["run", "test.toml"], 2);
+    assert!(
+        error.contains("test.toml:") && error.contains("a.wav"),
+        "{error}"
+    );
+}
+
+#[test]
+fn prop_completions_of_every_shell_name_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = commands(folder.path());
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let (script, _) = told(folder.path(), &["completions", shell], 0);
+        for name in &names {
+            assert!(script.contains(name.as_str()), "{shell} lacks {name}");
+        }
+    }
+}
+
+#[test]
+fn prop_every_command_has_a_manual_page() {
+    let folder = tempfile::tempdir().unwrap();
+    told(folder.path(), &["man", "--out", "man1"], 0);
+    for name in commands(folder.path())
+        .iter()
+        .filter(|name| *name != "help")
+    {
+        let file = folder.path().join(format!("man1/tapjoint-{name}.1"));
+        let page = std::fs::read_to_string(&file).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let (printed, _) = told(folder.path(), &["man", name], 0);
+        assert_eq!(page.trim_end(), printed.trim_end(), "{name}");
+        assert!(page.contains(".SH OPTIONS") || page.contains(".SH \"COMMON OPTIONS\""));
+    }
+    let (own, _) = told(folder.path(), &["man"], 0);
+    assert!(own.contains("tapjoint\\-run"), "{own}");
+    let (_, error) = told(folder.path(), &["man", "rnu"], 2);
+    assert!(error.contains("no command rnu"), "{error}");
+}

@@ -10,8 +10,9 @@ use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
-use tapjoint::pipeline::{Analysis, IdentifySettings};
-use tapjoint::report::{document_of, figures_of, render_run, render_text};
+use tapjoint::gap::GapSettings;
+use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
+use tapjoint::report::{document_of, figures_of, gap_section, render_run, render_text};
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
 ///
@@ -125,8 +126,12 @@ pub(super) fn run(
             analyse(path, &arguments.recording, &settings)?
         }
     };
+    let mut document = document_of(&analysis);
+    if let Subject::Test(file) = &request.subject {
+        let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
+        document.gap = Some(gap_section(diagnosis.as_ref()));
+    }
     drop(progress);
-    let document = document_of(&analysis);
     for file in render_run(&document, &figures_of(&analysis))? {
         request.output.add(&file.name, &file.bytes)?;
     }

@@ -102,8 +102,13 @@ fn model(document: &Document) -> Option<String> {
     let worst = rows
         .filter(|row| row.error_percent.is_some_and(f64::is_finite))
         .max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
+        let effects = gap.verdict.effects.join(", ");
+        let colon = if effects.is_empty() { "" } else { ": " };
+        format!("; gap: {}{colon}{effects}", gap.verdict.kind)
+    });
     Some(format!(
-        "largest error of a predicted frequency {} % (mode {})",
+        "largest error of a predicted frequency {} % (mode {}){gap}",
         signed_percent(worst.error_percent),
         worst.mode
     ))

@@ -6,16 +6,20 @@ use super::text::{prediction, table_or_nothing, warnings, wrapped};
 
 /// The errors of the nominal model, the story of the gap, and the hypotheses.
 pub fn render_gap_text(document: &Document) -> String {
+    let sections = [prediction(document), gap(document), warnings(document)];
+    let said: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();
+    said.join("\n")
+}
+
+/// The story of the gap and the hypotheses; empty without a diagnosis.
+pub(super) fn gap(document: &Document) -> String {
     let story: String = tables::gap_story(document)
         .iter()
         .map(|sentence| wrapped(sentence, 2) + "\n")
         .collect();
-    let sections = [
-        prediction(document),
-        story,
-        table_or_nothing(tables::hypotheses(document)),
-        warnings(document),
-    ];
-    let said: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();
-    said.join("\n")
+    let table = table_or_nothing(tables::hypotheses(document));
+    if story.is_empty() || table.is_empty() {
+        return story + &table;
+    }
+    format!("{story}\n{table}")
 }

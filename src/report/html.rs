@@ -43,13 +43,21 @@ pub struct PageFigures {
     pub taps: Vec<InlineFigure>,
     /// Predicted beside measured frequencies, and the shapes of the modes.
     pub comparison: Vec<InlineFigure>,
+    /// The gap between model and measurement.
+    pub gap: Vec<InlineFigure>,
     /// Estimates under changed frequencies.
     pub cloud: Vec<InlineFigure>,
 }
 
 impl PageFigures {
     fn any_live(&self) -> bool {
-        let shelves = [&self.spectra, &self.taps, &self.comparison, &self.cloud];
+        let shelves = [
+            &self.spectra,
+            &self.taps,
+            &self.comparison,
+            &self.gap,
+            &self.cloud,
+        ];
         let mut all = shelves.into_iter().flatten();
         all.any(|figure| figure.live.is_some())
     }
@@ -79,6 +87,8 @@ struct Section<'a> {
     id: &'static str,
     title: &'static str,
     missing: String,
+    /// What the section says before its tables, a paragraph each.
+    story: Vec<String>,
     tables: Vec<Table>,
     /// Long tables that open on demand.
     folded: Vec<Table>,
@@ -188,6 +198,7 @@ fn recording_facts(recording: &RecordingSection) -> Vec<(&'static str, Option<St
 fn sections<'a>(document: &Document, figures: &'a PageFigures) -> Vec<Section<'a>> {
     let all = [
         joint_section(document, figures),
+        gap_section(document, figures),
         uncertainty_section(document, figures),
         Some(modes_section(document, figures)),
         quality_section(document),
@@ -213,6 +224,7 @@ fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Se
             "The joint"
         },
         missing: no_estimate(document),
+        story: Vec::new(),
         tables: found(vec![
             tables::parameters(document),
             tables::correlations(document),
@@ -222,6 +234,19 @@ fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Se
         ]),
         folded: Vec::new(),
         figures: &figures.comparison,
+    })
+}
+
+fn gap_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Section<'a>> {
+    document.gap.as_ref()?;
+    Some(Section {
+        id: "gap",
+        title: "What the model still misses",
+        missing: String::new(),
+        story: tables::gap_story(document),
+        tables: found(vec![tables::hypotheses(document)]),
+        folded: Vec::new(),
+        figures: &figures.gap,
     })
 }
 
@@ -237,6 +262,7 @@ fn uncertainty_section<'a>(document: &Document, figures: &'a PageFigures) -> Opt
         id: "uncertainty",
         title: "How sure is the stiffness",
         missing: String::new(),
+        story: Vec::new(),
         tables,
         folded: Vec::new(),
         figures: &figures.cloud,
@@ -253,6 +279,7 @@ fn modes_section<'a>(document: &Document, figures: &'a PageFigures) -> Section<'
             _ => "Resonances and spectra",
         },
         missing: "No resonances were found.".to_owned(),
+        story: Vec::new(),
         tables: found(vec![tables::modes(document)]),
         folded: found(vec![
             tables::mode_details(document),
@@ -276,6 +303,7 @@ fn quality_section<'a>(document: &Document) -> Option<Section<'a>> {
         id: "quality",
         title: "How well it was measured",
         missing: String::new(),
+        story: Vec::new(),
         tables,
         folded: found(vec![tables::quality_all(document)]),
         figures: &[],
@@ -288,6 +316,7 @@ fn recordings_section<'a>(document: &Document, figures: &'a PageFigures) -> Opti
         id: "recordings",
         title: "Recordings and taps",
         missing: "There is no recording.".to_owned(),
+        story: Vec::new(),
         tables: found(vec![
             tables::recordings(document),
             tables::conditions(document),
@@ -317,6 +346,6 @@ impl Section<'_> {
 
     /// Whether there is nothing to show but the reason why.
     fn is_empty(&self) -> bool {
-        self.tables.is_empty() && self.figures.is_empty()
+        self.tables.is_empty() && self.figures.is_empty() && self.story.is_empty()
     }
 }

@@ -10,6 +10,8 @@ use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
 use super::plot::comparison::draw_frequencies;
 use super::plot::frf::draw_frf;
+use super::plot::gap::draw_gap;
+use super::plot::place_map::draw_place_map;
 use super::plot::shapes::draw_shapes;
 use super::plot::spectrum::draw_spectrum;
 use super::plot::stabilisation::draw_stabilisation;
@@ -26,6 +28,7 @@ enum Shelf {
     Spectra,
     Taps,
     Comparison,
+    Gap,
     Cloud,
 }
 
@@ -63,6 +66,7 @@ pub fn render_run(
             Shelf::Spectra => page.spectra.push(inline),
             Shelf::Taps => page.taps.push(inline),
             Shelf::Comparison => page.comparison.push(inline),
+            Shelf::Gap => page.gap.push(inline),
             Shelf::Cloud => page.cloud.push(inline),
         }
     }
@@ -153,6 +157,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
             live: None,
         }
     }));
+    pictures.extend(gap_pictures(document));
     pictures.extend(draw_cloud(document).map(|drawing| {
         Picture {
             shelf: Shelf::Cloud,
@@ -164,6 +169,32 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
         }
     }));
     pictures
+}
+
+fn gap_pictures(document: &Document) -> Vec<Picture> {
+    let kinds = [
+        (
+            "gap",
+            draw_gap(document),
+            "The gap: every frequency's error with the described model and with the best hypothesis, and \
+             how probable each hypothesis is.",
+        ),
+        (
+            "gap-place",
+            draw_place_map(document),
+            "Where along the beam a local change of stiffness or of mass would explain the errors.",
+        ),
+    ];
+    let picture = |(name, drawing, caption): (&str, Option<_>, &str)| {
+        Some(Picture {
+            shelf: Shelf::Gap,
+            name: name.to_owned(),
+            caption: caption.to_owned(),
+            drawing: drawing?,
+            live: None,
+        })
+    };
+    kinds.into_iter().filter_map(picture).collect()
 }
 
 fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {

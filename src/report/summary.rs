@@ -2,7 +2,7 @@
 
 use super::document::{Document, ModeSection, PredictionSection, RecordingSection};
 use super::format::{bound_percent, signed_percent, significant, trimmed};
-use super::tables::{estimated, quality_count, reading_bound};
+use super::tables::{estimated, gap_story, quality_count, reading_bound};
 use crate::pipeline::AmplitudeChange;
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -12,6 +12,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
         quality_count(document).map(|count| capital(&count) + "."),
         estimate(document),
         misfit(document),
+        gap_story(document).into_iter().next(),
         resolution(document),
     ];
     let first = first.into_iter().flatten();

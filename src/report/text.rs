@@ -26,6 +26,7 @@ pub fn render_text(document: &Document) -> String {
         frfs(document),
         estimate(document),
         prediction(document),
+        super::gap_text::gap(document),
         perturbation(document),
         quality(document),
         warnings(document),

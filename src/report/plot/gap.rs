@@ -25,7 +25,11 @@ pub fn draw_gap(document: &Document) -> Option<Drawing> {
     if pulls.is_empty() {
         return None;
     }
-    let mut drawing = Drawing::new("The gap before and after the best hypothesis", WIDTH, HEIGHT);
+    let mut drawing = Drawing::new(
+        "The gap before and after the best hypothesis",
+        WIDTH,
+        HEIGHT,
+    );
     let best = gap
         .hypotheses
         .iter()
@@ -58,7 +62,10 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
     };
     panel.draw_y_ticks(drawing, &panel.y.ticks(36.0));
     let y = crisp(panel.y.place(0.0));
-    drawing.line(vec![(LEFT + 8.0, y), (ERRORS_RIGHT, y)], Stroke::new(INK, 1.0));
+    drawing.line(
+        vec![(LEFT + 8.0, y), (ERRORS_RIGHT, y)],
+        Stroke::new(INK, 1.0),
+    );
     panel.draw_frame(drawing);
     let count = recordings(pulls).len().max(1) as f64;
     for pull in pulls {
@@ -79,9 +86,14 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
     let withheld = gap
         .fitted_modes
         .filter(|fitted| *fitted < last)
-        .map_or_else(String::new, |fitted| format!("; modes above {fitted} took no part"));
+        .map_or_else(String::new, |fitted| {
+            format!("; modes above {fitted} took no part")
+        });
     let legend = [
-        (Sample::Ring(VERMILION), "described model, joint fitted".to_owned()),
+        (
+            Sample::Ring(VERMILION),
+            "described model, joint fitted".to_owned(),
+        ),
         (Sample::Dot(BLUE), format!("with the effect{withheld}")),
     ];
     draw_legend(drawing, (LEFT, 88.0), ERRORS_RIGHT, &legend);
@@ -108,7 +120,12 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
         drawing.rectangle((ODDS.0, top), (ODDS.1, bottom), GRID, 0.6);
         let end = ODDS.0 + found.probability * (ODDS.1 - ODDS.0);
         let named = gap.verdict.effects.contains(&found.effect);
-        drawing.rectangle((ODDS.0, top), (end, bottom), if named { BLUE } else { SKY }, 1.0);
+        drawing.rectangle(
+            (ODDS.0, top),
+            (end, bottom),
+            if named { BLUE } else { SKY },
+            1.0,
+        );
         let middle = 0.5 * (top + bottom) + 5.0;
         let name = Text::new(&found.effect, (ODDS.0 - 10.0, middle), TICK_SIZE);
         drawing.text(name.aligned(Align::End));

@@ -11,7 +11,12 @@ use super::spectrum::{LEFT, RIGHT, WIDTH};
 pub fn draw_place_map(document: &Document) -> Option<Drawing> {
     let map = document.gap.as_ref()?.map.as_ref()?;
     let curves = [
-        (&map.stiffness, &map.stiffness_std, VERMILION, "bending stiffness"),
+        (
+            &map.stiffness,
+            &map.stiffness_std,
+            VERMILION,
+            "bending stiffness",
+        ),
         (&map.mass, &map.mass_std, BLUE, "mass"),
     ];
     let ends = curves.iter().flat_map(|(values, stds, ..)| {
@@ -20,8 +25,15 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
     });
     let (low, high) = extent(ends.chain([0.0]))?;
     let last = *map.positions.last()?;
-    let step = map.positions.get(1).map_or(last, |second| second - map.positions[0]);
-    let mut drawing = Drawing::new("Where along the beam the gap calls for a change", WIDTH, 440);
+    let step = map
+        .positions
+        .get(1)
+        .map_or(last, |second| second - map.positions[0]);
+    let mut drawing = Drawing::new(
+        "Where along the beam the gap calls for a change",
+        WIDTH,
+        440,
+    );
     draw_title(
         &mut drawing,
         "Where along the beam",
@@ -38,7 +50,10 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
     panel.draw_y_ticks(&mut drawing, &panel.y.ticks(36.0));
     panel.draw_x_ticks(&mut drawing, &panel.x.ticks(X_SPACING));
     let zero = crisp(panel.y.place(0.0));
-    drawing.line(vec![(LEFT + 8.0, zero), (RIGHT, zero)], Stroke::new(INK, 1.0));
+    drawing.line(
+        vec![(LEFT + 8.0, zero), (RIGHT, zero)],
+        Stroke::new(INK, 1.0),
+    );
     panel.draw_frame(&mut drawing);
     for (values, stds, color, _) in curves {
         let points: Vec<Point> = map
@@ -49,7 +64,10 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
             .collect();
         for ((at, value), std) in points.iter().zip(values.iter()).zip(stds.iter()) {
             let ends = [value - std, value + std].map(|end| panel.y.place(100.0 * end));
-            drawing.line(vec![(at.0, ends[0]), (at.0, ends[1])], Stroke::new(color, 1.0));
+            drawing.line(
+                vec![(at.0, ends[0]), (at.0, ends[1])],
+                Stroke::new(color, 1.0),
+            );
         }
         drawing.line(points, Stroke::new(color, 2.0));
     }

@@ -18,6 +18,7 @@ mod inspect;
 mod perturb;
 mod predict;
 mod reproduce;
+mod resolution;
 mod run;
 mod spectrum;
 
@@ -55,6 +56,7 @@ enum Command {
     Identify(identify::IdentifyArguments),
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
+    Resolution(resolution::ResolutionArguments),
     Reproduce(reproduce::ReproduceArguments),
 }
 
@@ -100,6 +102,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Identify(arguments) => identify::run(arguments, terminal),
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
+        Command::Resolution(arguments) => resolution::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
     }
 }

@@ -51,7 +51,7 @@ pub(super) struct PredictArguments {
 /// Non-dimensional stiffnesses of a joint: kx and ky from 0 to infinity, 1/kz with 0 for no
 /// coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct GivenStiffness {
+pub(super) struct GivenStiffness {
     kx: f64,
     ky: f64,
     cross_compliance: f64,
@@ -84,7 +84,7 @@ fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<
         Subject::Test(file) => file.test.joint.kind,
         Subject::Kind(kind) => *kind,
     };
-    let stiffness = given_stiffness(arguments, kind)?;
+    let stiffness = given_stiffness(arguments.kx.zip(arguments.ky), arguments.kz, kind)?;
     if stiffness.is_none()
         && matches!(
             subject,
@@ -100,17 +100,22 @@ fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<
     })
 }
 
-fn given_stiffness(
-    arguments: &PredictArguments,
+/// The joint of --kx, --ky and --kz, where they were given.
+///
+/// # Errors
+/// Stiffnesses that this kind of structure does not have, or that no passive joint has.
+pub(super) fn given_stiffness(
+    springs: Option<(Stiffness, Stiffness)>,
+    cross: Option<CrossStiffness>,
     kind: JointKind,
 ) -> anyhow::Result<Option<GivenStiffness>> {
-    let Some((Stiffness(kx), Stiffness(ky))) = arguments.kx.zip(arguments.ky) else {
+    let Some((Stiffness(kx), Stiffness(ky))) = springs else {
         return Ok(None);
     };
     if kind == JointKind::Free {
         bail!("a free beam has no joint; leave out --kx, --ky and --kz");
     }
-    let Some(CrossStiffness(kz)) = arguments.kz else {
+    let Some(CrossStiffness(kz)) = cross else {
         return Ok(Some(GivenStiffness {
             kx,
             ky,
@@ -168,7 +173,8 @@ pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::R
 }
 
 impl GivenStiffness {
-    fn joint(self) -> JointStiffness {
+    /// In the theory's terms.
+    pub(super) fn joint(self) -> JointStiffness {
         JointStiffness {
             kx: self.kx,
             ky: self.ky,

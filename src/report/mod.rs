@@ -28,6 +28,7 @@ mod convert_frf;
 mod csv;
 mod frf_uff;
 mod json;
+mod resolution;
 mod run;
 
 pub use convert::{
@@ -41,6 +42,7 @@ pub use csv::{render_modes_csv, render_parameters_csv};
 pub use frf_uff::render_frf_uff;
 pub use html::render_html;
 pub use json::render_json;
+pub use resolution::{render_resolution, render_resolution_csv, render_resolution_png};
 pub use run::{render_frf_png, render_run, render_spectrum_png};
 pub use text::render_text;
 

@@ -347,7 +347,7 @@ fn is_gap(c: char) -> bool {
 }
 
 /// A text broken into lines of at most 80 characters; lines after the first are indented.
-fn wrapped(text: &str, indent: usize) -> String {
+pub(super) fn wrapped(text: &str, indent: usize) -> String {
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split(is_gap).filter(|word| !word.is_empty()) {
         let word = cut(word, WIDTH - indent);

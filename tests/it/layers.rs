@@ -42,7 +42,19 @@ const TABLE: &[(&str, &[&str])] = &[
             "stats",
         ],
     ),
-    ("study", &["structure", "identify", "pipeline", "simulate"]),
+    (
+        "study",
+        &[
+            "description",
+            "spectral",
+            "modal",
+            "structure",
+            "identify",
+            "pipeline",
+            "simulate",
+            "stats",
+        ],
+    ),
     (
         "report",
         &[

@@ -9,6 +9,7 @@ pub mod drawing;
 pub mod frf;
 pub mod labels;
 pub mod palette;
+pub mod resolution;
 pub mod spectrum;
 pub mod stabilisation;
 pub mod time;

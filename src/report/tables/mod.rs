@@ -6,6 +6,7 @@ mod joint;
 mod measured;
 mod modes;
 mod quality;
+mod resolution;
 mod taps;
 mod uncertainty;
 
@@ -15,6 +16,7 @@ pub use joint::{Parameter, estimated, methods, pairs, parameters, prediction};
 pub use measured::{channels, recordings};
 pub use modes::{modes, readings};
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
+pub use resolution::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 

@@ -52,9 +52,9 @@ pub(super) struct PredictArguments {
 /// coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct GivenStiffness {
-    kx: f64,
-    ky: f64,
-    cross_compliance: f64,
+    pub(super) kx: f64,
+    pub(super) ky: f64,
+    pub(super) cross_compliance: f64,
 }
 
 /// What the frequencies are wanted of.
@@ -84,7 +84,7 @@ fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<
         Subject::Test(file) => file.test.joint.kind,
         Subject::Kind(kind) => *kind,
     };
-    let stiffness = given_stiffness(arguments.kx.zip(arguments.ky), arguments.kz, kind)?;
+    let stiffness = given_stiffness((arguments.kx, arguments.ky, arguments.kz), kind)?;
     if stiffness.is_none()
         && matches!(
             subject,
@@ -100,22 +100,21 @@ fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<
     })
 }
 
-/// The joint of --kx, --ky and --kz, where they were given.
+/// The stiffnesses that --kx, --ky and --kz give.
 ///
 /// # Errors
-/// Stiffnesses that this kind of structure does not have, or that no passive joint has.
+/// A free beam, a lap joint's coupling, a joint that would be a source of energy.
 pub(super) fn given_stiffness(
-    springs: Option<(Stiffness, Stiffness)>,
-    cross: Option<CrossStiffness>,
+    (kx, ky, kz): (Option<Stiffness>, Option<Stiffness>, Option<CrossStiffness>),
     kind: JointKind,
 ) -> anyhow::Result<Option<GivenStiffness>> {
-    let Some((Stiffness(kx), Stiffness(ky))) = springs else {
+    let Some((Stiffness(kx), Stiffness(ky))) = kx.zip(ky) else {
         return Ok(None);
     };
     if kind == JointKind::Free {
         bail!("a free beam has no joint; leave out --kx, --ky and --kz");
     }
-    let Some(CrossStiffness(kz)) = cross else {
+    let Some(CrossStiffness(kz)) = kz else {
         return Ok(Some(GivenStiffness {
             kx,
             ky,

@@ -134,8 +134,8 @@ fn resolve(
 ) -> anyhow::Result<Request> {
     let file = read_test(&arguments.test, terminal)?;
     let structure = tested_structure(&file.test);
-    let springs = arguments.kx.zip(arguments.ky);
-    let given = given_stiffness(springs, arguments.kz, file.test.joint.kind)?;
+    let stiffness = (arguments.kx, arguments.ky, arguments.kz);
+    let given = given_stiffness(stiffness, file.test.joint.kind)?;
     let prepare = |path: &Option<PathBuf>| path.as_deref().map(OutputFile::prepare).transpose();
     let (png, csv) = (prepare(&arguments.png)?, prepare(&arguments.csv)?);
     let joint = match given {

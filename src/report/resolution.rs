@@ -71,7 +71,7 @@ fn conditions(study: &ResolutionStudy) -> String {
             study.draws,
             study.fit_draws,
             study.sample_rate,
-            super::format::significant(100.0 * study.damping, 3),
+            super::format::trimmed(100.0 * study.damping, 3),
             study.noise_db,
             study.seed
         ),

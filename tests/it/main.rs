@@ -21,6 +21,7 @@ mod real_data;
 mod recording;
 mod recording_uff;
 mod report;
+mod resolution;
 mod shared;
 mod simulate;
 mod spectral;

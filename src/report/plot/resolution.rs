@@ -1,6 +1,6 @@
 //! The picture of the study of resolution: rms errors over block size, a panel for each reading.
 
-use super::super::format::significant;
+use super::super::format::{significant, trimmed};
 use super::axis::{Axis, Tick, extent};
 use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{Color, INK, SOFT, curve};
@@ -45,7 +45,7 @@ pub fn draw_resolution(study: &ResolutionStudy) -> Drawing {
         study.draws,
         study.fit_draws,
         window.name(),
-        significant(100.0 * study.damping, 3),
+        trimmed(100.0 * study.damping, 3),
         study.noise_db
     );
     draw_title(&mut drawing, title, &below);
@@ -268,7 +268,7 @@ fn stiffness_legend(study: &ResolutionStudy) -> Vec<(Sample, String)> {
         Sample::Dashed(SOFT),
         "half-line bound, consistent".to_owned(),
     ));
-    let wanted = format!("wanted: {} %", significant(study.accuracy_percent, 3));
+    let wanted = format!("wanted: {} %", trimmed(study.accuracy_percent, 3));
     entries.push((Sample::Line(INK), wanted));
     entries
 }

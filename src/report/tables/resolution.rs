@@ -1,6 +1,6 @@
 //! Tables of the study of resolution.
 
-use super::super::format::{MISSING, optional, significant};
+use super::super::format::{MISSING, optional, significant, trimmed};
 use super::{Column, Table, number};
 use crate::study::resolution::{
     EstimateMethod, FrequencyError, ReadingName, ResolutionStudy, StiffnessError, StudiedMode,
@@ -18,11 +18,11 @@ pub fn resolution_lines(study: &ResolutionStudy) -> Table {
     for band in bands {
         let name = format!(
             "{}\u{2013}{} Hz",
-            significant(band.low, 4),
-            significant(band.high, 4)
+            trimmed(band.low, 4),
+            trimmed(band.high, 4)
         );
-        columns.push(number(&format!("{name} spacing (Hz)")));
-        columns.push(number("Record (s)"));
+        columns.push(number(&format!("{name}: spacing (Hz)")));
+        columns.push(number("record (s)"));
     }
     let row = |block: &crate::study::resolution::BlockLines| {
         let mut row = vec![
@@ -104,8 +104,8 @@ pub fn resolution_frequencies(
             "Mode {}, {} Hz, read in {}\u{2013}{} Hz{}: rms error of the frequency (Hz)",
             mode.mode,
             significant(mode.frequency, 5),
-            significant(mode.band[0], 4),
-            significant(mode.band[1], 4),
+            trimmed(mode.band[0], 4),
+            trimmed(mode.band[1], 4),
             if mode.used {
                 ""
             } else {

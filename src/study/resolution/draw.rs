@@ -1,5 +1,7 @@
 //! One virtual test: its truth, its recording, its readings and estimates.
 
+use std::f64::consts::TAU;
+
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -9,7 +11,7 @@ use super::plan::{BlockPlan, readings_of};
 use super::reading::{Read, read_band};
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
 use crate::identify::consistent::{FrequencyModel, Parameter, Point};
-use crate::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
+use crate::simulate::{SimulatedMode, TapTestSettings, seen_modes, simulate_tap_test};
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, JointStiffness, ModeShape, mode_shapes};
 
@@ -17,6 +19,8 @@ use crate::structure::{Assembly, JointStiffness, ModeShape, mode_shapes};
 const MOST_MODES: usize = 12;
 /// Modes above this share of the sample rate are left out of a recording, as its filter would.
 const PASSED: f64 = 0.48;
+/// A mode is silent when it has decayed by e to this power: 2e-22 is left.
+const SILENT: f64 = 50.0;
 /// Samples before the tap in each record.
 const AHEAD: usize = 4;
 
@@ -176,31 +180,49 @@ fn virtual_record(
         force_to_noise_db: f64::INFINITY,
         ..TapTestSettings::default()
     };
-    let recorded = simulate_tap_test(&modes, &tap, random.random());
-    let time = recorded.tap_times.first().copied().unwrap_or(0.0);
-    let begin = ((time * sample_rate) as usize).saturating_sub(AHEAD);
-    let piece = |x: &Vec<f64>| {
-        x.iter()
-            .skip(begin)
-            .take(samples)
-            .copied()
-            .collect::<Vec<f64>>()
-    };
-    let force = piece(&recorded.force);
-    let mut responses: Vec<Vec<f64>> = recorded.responses.iter().map(piece).collect();
+    let (force, mut responses) = struck(&modes, &tap, (random.random(), samples));
     let noise = responses
         .iter_mut()
         .map(|x| add_noise(x, settings.noise_db, random));
+    let last = force.iter().rposition(|&f| f != 0.0);
     VirtualRecord {
         sample_rate,
-        pulse_end: force
-            .iter()
-            .rposition(|&f| f != 0.0)
-            .map_or(0, |last| last + 1),
+        pulse_end: last.map_or(0, |last| last + 1),
         noise: noise.collect(),
         force,
         responses,
     }
+}
+
+/// Force and responses of one tap, from just before it on. Each mode is simulated for as long as
+/// anything is left of it: beyond that its numbers become so small that processors take a hundred times
+/// as long for them. The seed makes it the same tap for all modes.
+fn struck(
+    modes: &[SimulatedMode],
+    settings: &TapTestSettings,
+    (seed, samples): (u64, usize),
+) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let rate = settings.sample_rate;
+    let sensors = modes.first().map_or(0, |mode| mode.shape_at_sensors.len());
+    let mut force = vec![0.0; samples];
+    let mut responses = vec![vec![0.0; samples]; sensors];
+    for mode in modes {
+        let decay = TAU * mode.frequency * mode.damping_ratio;
+        let alone = TapTestSettings {
+            interval: settings.interval.min(SILENT / decay + 0.1),
+            ..settings.clone()
+        };
+        let recorded = simulate_tap_test(std::slice::from_ref(mode), &alone, seed);
+        let time = recorded.tap_times.first().copied().unwrap_or(0.0);
+        let begin = ((time * rate) as usize).saturating_sub(AHEAD);
+        let pulse = recorded.force.iter().skip(begin);
+        force.iter_mut().zip(pulse).for_each(|(f, new)| *f = *new);
+        for (sum, response) in responses.iter_mut().zip(&recorded.responses) {
+            let added = sum.iter_mut().zip(response.iter().skip(begin));
+            added.for_each(|(sum, x)| *sum += x);
+        }
+    }
+    (force, responses)
 }
 
 /// Adds white noise so many dB below the peak; its rms.

@@ -101,11 +101,10 @@ pub(super) fn read_band(
         fit(band, record, &mut readings, &places);
     }
     let read = |place: &Option<usize>| {
-        let all = ReadingName::ALL.map(|name| {
+        ReadingName::ALL.map(|name| {
             let reading = readings.get((*place)?).filter(|_| wanted.contains(&name))?;
             Some(read_as(reading, name))
-        });
-        all
+        })
     };
     places.iter().map(read).collect()
 }

@@ -25,6 +25,7 @@ mod man;
 mod perturb;
 mod predict;
 mod reproduce;
+mod resolution;
 mod run;
 mod simulate;
 mod spectrum;
@@ -65,6 +66,7 @@ enum Command {
     Perturb(perturb::PerturbArguments),
     Diagnose(diagnose::DiagnoseArguments),
     BlindCheck(blind_check::BlindCheckArguments),
+    Resolution(resolution::ResolutionArguments),
     Reproduce(reproduce::ReproduceArguments),
     Simulate(simulate::SimulateArguments),
     Export(export::ExportArguments),
@@ -120,6 +122,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, line.common.seed, terminal),
         Command::BlindCheck(arguments) => blind_check::run(arguments, line.common.seed, terminal),
+        Command::Resolution(arguments) => resolution::run(arguments, line.common.seed, terminal),
         Command::Reproduce(arguments) => reproduce::run(arguments, terminal),
         Command::Simulate(arguments) => simulate::run(arguments, line.common.seed, terminal),
         Command::Export(arguments) => export::run(arguments, terminal),

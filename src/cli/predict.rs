@@ -172,7 +172,8 @@ pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::R
 }
 
 impl GivenStiffness {
-    fn joint(self) -> JointStiffness {
+    /// In the theory's terms.
+    pub(super) fn joint(self) -> JointStiffness {
         JointStiffness {
             kx: self.kx,
             ky: self.ky,

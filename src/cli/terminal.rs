@@ -35,6 +35,11 @@ impl Terminal {
         })
     }
 
+    /// Whether it was asked to print nothing but errors.
+    pub(super) fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// Prints an answer, unless it was asked to be quiet or standard output belongs to JSON.
     pub(super) fn say(&self, text: &str) -> io::Result<()> {
         if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {

@@ -38,6 +38,7 @@ mod csv;
 mod csv_perturbation;
 mod frf_uff;
 mod json;
+mod resolution;
 mod run;
 mod schema;
 
@@ -55,6 +56,7 @@ pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;
 pub use html::render_html;
 pub use json::render_json;
+pub use resolution::{render_resolution, render_resolution_csv, render_resolution_png};
 pub use run::{render_cloud_png, render_frf_png, render_run, render_spectrum_png};
 pub use schema::render_schema;
 pub use text::render_text;

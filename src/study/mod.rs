@@ -1,4 +1,6 @@
-//! Studies that need both sides: the published paper's tables beside ours, and the blind check.
+//! Studies that need both sides: the published paper's tables beside ours, the blind check, and what
+//! the spectral resolution of a virtual test does to the stiffness estimated from it.
 
 pub mod blind_check;
 pub mod paper;
+pub mod resolution;

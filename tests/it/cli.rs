@@ -101,6 +101,7 @@ fn regress_help_of_every_command_names_an_example() {
         "identify",
         "predict",
         "perturb",
+        "resolution",
         "reproduce",
         "completions",
         "man",

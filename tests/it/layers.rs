@@ -25,6 +25,10 @@ const TABLE: &[(&str, &[&str])] = &[
     ("effects", &["structure", "quantity", "stats"]),
     ("identify", &["modal", "stats", "structure"]),
     (
+        "gap",
+        &["identify", "modal", "stats", "structure", "effects"],
+    ),
+    (
         "simulate",
         &[
             "quantity",
@@ -47,6 +51,7 @@ const TABLE: &[(&str, &[&str])] = &[
             "quality",
             "structure",
             "identify",
+            "gap",
             "stats",
         ],
     ),
@@ -54,12 +59,15 @@ const TABLE: &[(&str, &[&str])] = &[
         "study",
         &[
             "description",
-            "stats",
-            "structure",
             "effects",
+            "gap",
             "identify",
+            "modal",
             "pipeline",
             "simulate",
+            "spectral",
+            "stats",
+            "structure",
         ],
     ),
     (
@@ -73,7 +81,9 @@ const TABLE: &[(&str, &[&str])] = &[
             "modal",
             "quality",
             "structure",
+            "effects",
             "identify",
+            "gap",
             "pipeline",
             "study",
         ],

@@ -24,6 +24,7 @@ mod real_data;
 mod recording;
 mod recording_uff;
 mod report;
+mod resolution;
 mod shared;
 mod simulate;
 mod simulate_cli;

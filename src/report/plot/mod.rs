@@ -12,6 +12,7 @@ pub mod gap;
 pub mod labels;
 pub mod palette;
 pub mod place_map;
+pub mod resolution;
 pub mod shapes;
 pub mod spectrum;
 pub mod stabilisation;

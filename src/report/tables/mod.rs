@@ -7,6 +7,7 @@ mod joint;
 mod measured;
 mod modes;
 mod quality;
+mod resolution;
 mod taps;
 mod uncertainty;
 
@@ -17,6 +18,7 @@ pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters, 
 pub use measured::{channels, conditions, recordings};
 pub use modes::{fitted_to, mode_details, modes, reading_details, readings};
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
+pub use resolution::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 

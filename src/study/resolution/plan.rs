@@ -1,0 +1,246 @@
+//! Which mode is read in which band, and what each block size needs.
+
+use super::draw::{Truths, sample_draw};
+use super::reading::window_of;
+use super::result::{Omitted, ReadingName};
+use super::{ResolutionError, ResolutionSettings, StudiedTest};
+use crate::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
+
+/// Room between a mode and the upper end of its band, as a share of the band's end: truths vary by some
+/// lines, and a peak on the last line is none.
+const ROOM: f64 = 0.05;
+/// Longest record (samples): 17 min at 64 kHz would be more than a test has.
+const MOST_SAMPLES: usize = 1 << 24;
+/// Widest variation of the natural frequencies (1): beyond it the drawn beam is another one.
+const WIDEST: f64 = 0.2;
+
+/// What is the same for all block sizes.
+#[derive(Debug)]
+pub(super) struct Layout {
+    /// Sample rate of the recordings (Hz): 2.56 times the highest band's end, as an analyser takes it.
+    pub sample_rate: f64,
+    /// Bands (Hz), the narrowest first.
+    pub bands: Vec<(f64, f64)>,
+    /// Modes, ascending.
+    pub modes: Vec<ModePlan>,
+    /// Modes left out.
+    pub omitted: Vec<Omitted>,
+}
+
+/// A mode of the study.
+#[derive(Debug)]
+pub(super) struct ModePlan {
+    /// Number.
+    pub number: usize,
+    /// Nominal frequency (Hz).
+    pub frequency: f64,
+    /// Band from which estimates take it.
+    pub band: usize,
+    /// Whether they take it.
+    pub used: bool,
+}
+
+impl Layout {
+    pub fn new(test: &StudiedTest, truths: &Truths) -> Result<Self, ResolutionError> {
+        let bands = bands_of(test, &truths.frequencies);
+        let highest = bands.iter().map(|band| band.1).fold(0.0, f64::max);
+        let mut modes: Vec<ModePlan> = Vec::new();
+        let mut omitted = Vec::new();
+        for (index, &frequency) in truths.frequencies.iter().enumerate() {
+            if frequency >= highest {
+                break;
+            }
+            let number = index + 1;
+            match bands.iter().position(|band| holds(band, frequency)) {
+                Some(band) => modes.push(ModePlan {
+                    number,
+                    frequency,
+                    band,
+                    used: test.fit_modes.is_none_or(|most| modes.len() < most),
+                }),
+                None => omitted.push(Omitted {
+                    mode: number,
+                    frequency,
+                    reason: format!(
+                        "{frequency:.1} Hz lies in no band, or within {:.0} % of its end",
+                        100.0 * ROOM
+                    ),
+                }),
+            }
+        }
+        if modes.is_empty() {
+            let lowest: Vec<String> = truths
+                .frequencies
+                .iter()
+                .take(3)
+                .map(|f| format!("{f:.1}"))
+                .collect();
+            return Err(ResolutionError::NoModes {
+                lowest: lowest.join(", "),
+                room: 100.0 * ROOM,
+            });
+        }
+        Ok(Layout {
+            sample_rate: DISPLAY_RATIO * highest,
+            bands,
+            modes,
+            omitted,
+        })
+    }
+
+    pub fn band(&self, index: usize) -> [f64; 2] {
+        self.bands
+            .get(index)
+            .map_or([0.0; 2], |band| [band.0, band.1])
+    }
+
+    /// The modes that enter an estimate.
+    pub fn used(&self) -> impl Iterator<Item = (usize, &ModePlan)> {
+        self.modes.iter().enumerate().filter(|(_, mode)| mode.used)
+    }
+}
+
+/// The bands wanted, the narrowest first; of none, one to a quarter above the highest mode wanted.
+fn bands_of(test: &StudiedTest, frequencies: &[f64]) -> Vec<(f64, f64)> {
+    let mut bands = test.bands.clone();
+    if bands.is_empty() {
+        let last = test.modes.clamp(1, frequencies.len().max(1)) - 1;
+        let top = 1.25 * frequencies.get(last).copied().unwrap_or(1000.0);
+        // Two digits, upwards: what one would set on an analyser.
+        let step = 10f64.powf(top.log10().floor() - 1.0);
+        bands.push((0.0, (top / step).ceil() * step));
+    }
+    bands.sort_by(|a, b| {
+        (a.1 - a.0)
+            .total_cmp(&(b.1 - b.0))
+            .then(a.0.total_cmp(&b.0))
+    });
+    bands.dedup();
+    bands
+}
+
+fn holds(band: &(f64, f64), frequency: f64) -> bool {
+    let low_room = if band.0 > 0.0 { 1.0 + ROOM } else { 1.0 };
+    frequency > band.0 * low_room && frequency < band.1 * (1.0 - ROOM)
+}
+
+/// What one block size needs.
+#[derive(Debug)]
+pub(super) struct BlockPlan {
+    /// Block (samples).
+    pub block: usize,
+    /// Each band.
+    pub bands: Vec<BandPlan>,
+    /// Length of a record (samples).
+    pub samples: usize,
+    /// Width of the uniform variation of the natural frequencies (1); the variation is the sum of three.
+    pub variation: f64,
+}
+
+/// A band of one block size.
+#[derive(Debug)]
+pub(super) struct BandPlan {
+    /// The axis.
+    pub lines: Lines,
+    /// The transform onto it.
+    pub transformer: Transformer,
+    /// The study's windows as applied.
+    pub windows: Vec<Window>,
+    /// Samples of a block at the recording's rate.
+    pub gate: usize,
+    /// Indices of the modes in the band.
+    pub modes: Vec<usize>,
+}
+
+impl BlockPlan {
+    pub fn new(
+        block: usize,
+        layout: &Layout,
+        settings: &ResolutionSettings,
+        (test, truths): (&StudiedTest, &Truths),
+    ) -> Result<Self, ResolutionError> {
+        let bands = layout
+            .bands
+            .iter()
+            .map(|&band| BandPlan::new(block, band, layout))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut plan = BlockPlan {
+            block,
+            samples: bands.iter().map(|band| band.gate).max().unwrap_or(0),
+            variation: 0.0,
+            bands,
+        };
+        plan.variation = plan.variation(layout, truths);
+        // The decay hardly differs between draws; the window is chosen on the nominal test.
+        let record = sample_draw(&plan, layout.sample_rate, settings, (test, truths));
+        for band in &mut plan.bands {
+            let windows = settings.windows.iter();
+            band.windows = windows
+                .map(|&name| window_of(name, &band.lines, &record))
+                .collect();
+        }
+        Ok(plan)
+    }
+
+    /// One line of the mode whose lines are coarsest beside its frequency, so that each mode's
+    /// frequency is spread over one line at least; less where a mode would leave its band.
+    fn variation(&self, layout: &Layout, truths: &Truths) -> f64 {
+        let mut wanted = 0.0f64;
+        let mut possible = WIDEST / 1.5;
+        for mode in &layout.modes {
+            let lines = &self.bands[mode.band].lines;
+            wanted = wanted.max(lines.spacing / mode.frequency);
+            // The three uniform parts reach 1.5 widths, the joint's stiffnesses twice that.
+            let share = truths
+                .joint_shares
+                .get(mode.number - 1)
+                .copied()
+                .unwrap_or(0.0);
+            let reach = 1.5 + 3.0 * share;
+            let top = (lines.high - lines.spacing) / mode.frequency;
+            possible = possible.min(top.ln().max(0.0) / reach);
+            if lines.low > 0.0 {
+                let bottom = mode.frequency / (lines.low + lines.spacing);
+                possible = possible.min(bottom.ln().max(0.0) / reach);
+            }
+        }
+        wanted.min(possible)
+    }
+}
+
+impl BandPlan {
+    fn new(block: usize, band: (f64, f64), layout: &Layout) -> Result<Self, ResolutionError> {
+        let rate = layout.sample_rate;
+        let seconds = block as f64 / (DISPLAY_RATIO * (band.1 - band.0));
+        let lines = Lines::zoom(band, rate, block, seconds)?;
+        let gate = (lines.duration * rate).round() as usize;
+        if gate > MOST_SAMPLES {
+            return Err(ResolutionError::TooLong {
+                block,
+                low: band.0,
+                high: band.1,
+                seconds,
+                rate,
+                most: MOST_SAMPLES,
+            });
+        }
+        let inside = |frequency: f64| holds(&band, frequency);
+        let modes = layout.modes.iter().enumerate();
+        Ok(BandPlan {
+            transformer: Transformer::new(rate, lines, gate),
+            lines,
+            windows: Vec::new(),
+            gate,
+            modes: modes
+                .filter(|(_, mode)| inside(mode.frequency))
+                .map(|(index, _)| index)
+                .collect(),
+        })
+    }
+}
+
+/// What a draw reads: fits are made of the first draws only.
+pub(super) fn readings_of(settings: &ResolutionSettings, draw: usize) -> Vec<ReadingName> {
+    let fitted = |reading: &ReadingName| *reading != ReadingName::Fit || draw < settings.fit_draws;
+    settings.readings.iter().copied().filter(fitted).collect()
+}

@@ -289,7 +289,8 @@ impl Frame {
             for mode in one.modes.iter().filter(|m| m.mode <= fitted) {
                 let Some(decay) = mode.decay else { continue };
                 let slope = decay.frequency_slope;
-                if decay.verdict == DecayVerdict::Doubtful || !(slope.std > 0.0) {
+                if decay.verdict == DecayVerdict::Doubtful || slope.std.is_nan() || slope.std <= 0.0
+                {
                     continue;
                 }
                 let row = Row::Slope {

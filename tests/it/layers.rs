@@ -25,6 +25,10 @@ const TABLE: &[(&str, &[&str])] = &[
     ("effects", &["structure", "quantity", "stats"]),
     ("identify", &["modal", "stats", "structure"]),
     (
+        "gap",
+        &["identify", "modal", "stats", "structure", "effects"],
+    ),
+    (
         "simulate",
         &[
             "quantity",

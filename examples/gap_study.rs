@@ -649,7 +649,7 @@ fn by_effect(cases: &[Case]) {
                 None => others.push((label, 1)),
             }
         }
-        others.sort_by(|a, b| b.1.cmp(&a.1));
+        others.sort_by_key(|other| std::cmp::Reverse(other.1));
         let list: Vec<String> = others
             .iter()
             .take(5)

@@ -154,7 +154,17 @@ impl Scales {
 /// Prior of an effect; `None` for one that is no hypothesis of this kind (joint drift changes the
 /// spread of a nuisance and not a prediction).
 pub(super) fn candidate(effect: EffectId, scales: &Scales) -> Option<Candidate> {
-    let (size, place) = match effect {
+    let (size, place) = of_joint(effect, scales).or_else(|| of_body(effect, scales))?;
+    Some(Candidate {
+        effect,
+        size,
+        place,
+    })
+}
+
+/// Size and place of effects at sensors, joint and fixture.
+fn of_joint(effect: EffectId, scales: &Scales) -> Option<(Size, Option<PlaceRange>)> {
+    Some(match effect {
         EffectId::SensorMass => (Size::positive("mass", 0.015, 0.3 * scales.mass), None),
         EffectId::SensorCable => {
             let unit = scales.bending / scales.length.powi(3);
@@ -189,6 +199,13 @@ pub(super) fn candidate(effect: EffectId, scales: &Scales) -> Option<Candidate> 
                 nodes: 14,
             }),
         ),
+        _ => return None,
+    })
+}
+
+/// Size and place of effects in the beam and in the acquisition.
+fn of_body(effect: EffectId, scales: &Scales) -> Option<(Size, Option<PlaceRange>)> {
+    Some(match effect {
         EffectId::Modulus => (Size::signed("relative", 0.03, 0.3), None),
         EffectId::Length => (Size::signed("relative", 0.007, 0.1), None),
         EffectId::Timebase => (Size::signed("relative", 0.001, 0.05), None),
@@ -213,12 +230,7 @@ pub(super) fn candidate(effect: EffectId, scales: &Scales) -> Option<Candidate> 
         }
         EffectId::ShearRotary => (Size::positive("factor", 1.5, 10.0), None),
         EffectId::Resolution => (Size::signed("offset", 0.125, 2.0), None),
-        EffectId::JointDrift => return None,
-    };
-    Some(Candidate {
-        effect,
-        size,
-        place,
+        _ => return None,
     })
 }
 

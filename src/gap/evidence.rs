@@ -4,7 +4,7 @@
 use super::catalogue::Size;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Small};
-use super::least_squares::{Knowledge, Linearised, Optimum, factor_of, maximise};
+use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear};
 use super::noise::{self, Reading};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -150,27 +150,12 @@ pub(super) fn linear_optimum(
     known: &[Knowledge],
     at: &Optimum,
 ) -> Option<Optimum> {
-    let mut model = |parameters: &[f64]| {
-        let step = DVector::from_iterator(
-            parameters.len(),
-            parameters
-                .iter()
-                .zip(&at.parameters)
-                .map(|(new, old)| new - old),
-        );
-        let moved = &at.model.slopes * step;
-        Some(Linearised {
-            predicted: at
-                .model
-                .predicted
-                .iter()
-                .zip(moved.iter())
-                .map(|(p, d)| p + d)
-                .collect(),
-            slopes: at.model.slopes.clone(),
-        })
-    };
-    maximise(readings, known, &at.parameters, &mut model)
+    maximise_linear(
+        readings,
+        known,
+        (&at.parameters, &at.model.predicted),
+        &at.model.slopes,
+    )
 }
 
 /// Logarithm of the mean of exponentials.
@@ -329,4 +314,155 @@ pub(super) fn covariance(known: &[Knowledge], optimum: &Optimum) -> Option<DMatr
         }
     }
     Some(full)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::catalogue::Candidate;
+    use super::super::least_squares::Linearised;
+    use super::*;
+    use crate::effects::EffectId;
+
+    /// One stiffness and one size, with readings that need not be linear in either.
+    struct Small {
+        readings: Vec<Reading>,
+        size: Size,
+        model: fn(f64, f64) -> Vec<f64>,
+    }
+
+    impl Small {
+        fn linearised(&self, parameters: &[f64]) -> Linearised {
+            const STEP: f64 = 1e-6;
+            let [a, t] = [parameters[0], parameters[1]];
+            let predicted = (self.model)(a, t);
+            let columns = [(self.model)(a + STEP, t), (self.model)(a, t + STEP)];
+            let slopes = DMatrix::from_fn(predicted.len(), 2, |row, column| {
+                (columns[column][row] - predicted[row]) / STEP
+            });
+            Linearised { predicted, slopes }
+        }
+
+        fn by_laplace(&self) -> f64 {
+            let layout = Layout {
+                joint: vec![0],
+                effects: vec![Candidate {
+                    effect: EffectId::SensorMass,
+                    size: self.size,
+                    place: None,
+                }],
+            };
+            let size = Knowledge {
+                low: self.size.low,
+                high: self.size.high,
+                ..Knowledge::normal(0.0, 3.0 * self.size.scale)
+            };
+            let known = [Knowledge::normal(0.0, 1.5), size];
+            let start = [0.0, 0.1 * self.size.scale];
+            let optimum = maximise(&self.readings, &known, &start, &mut |p| {
+                Some(self.linearised(p))
+            })
+            .unwrap();
+            log_evidence(&self.readings, &layout, &known, &optimum)
+        }
+
+        /// The integral as a sum over a fine grid.
+        fn by_force(&self) -> f64 {
+            const STEPS: usize = 700;
+            let (low, high) = (
+                self.size.low.max(-6.0 * self.size.scale),
+                self.size.high.min(6.0 * self.size.scale),
+            );
+            let width = [12.0 / STEPS as f64, (high - low) / STEPS as f64];
+            let mut logs = Vec::with_capacity(STEPS * STEPS);
+            for i in 0..STEPS {
+                let a = -6.0 + width[0] * (i as f64 + 0.5);
+                for j in 0..STEPS {
+                    let t = low + width[1] * (j as f64 + 0.5);
+                    let likelihood: f64 = (self.model)(a, t)
+                        .iter()
+                        .zip(&self.readings)
+                        .map(|(predicted, reading)| {
+                            noise::log_density_peak(reading.std, reading.freedom)
+                                + noise::log_density_drop(
+                                    (reading.value - predicted) / reading.std,
+                                    reading.freedom,
+                                )
+                        })
+                        .sum();
+                    let prior = -0.5 * (a / 1.5).powi(2) - (1.5 * (2.0 * PI).sqrt()).ln();
+                    logs.push(likelihood + prior + self.size.log_density(t));
+                }
+            }
+            log_sum(&logs) + (width[0] * width[1]).ln()
+        }
+    }
+
+    fn readings(values: &[f64], std: f64, freedom: f64) -> Vec<Reading> {
+        let reading = |value: &f64| Reading {
+            value: *value,
+            std,
+            freedom,
+        };
+        values.iter().map(reading).collect()
+    }
+
+    fn size(low: f64) -> Size {
+        Size {
+            name: "mass",
+            scale: 1.0,
+            nothing: 0.0,
+            low,
+            high: 8.0,
+        }
+    }
+
+    fn linear(a: f64, t: f64) -> Vec<f64> {
+        vec![a + t, a - t, 0.5 * a + 2.0 * t, 0.3 * t]
+    }
+
+    #[test]
+    fn val_evidence_of_a_size_that_stands_out_is_the_integral() {
+        let case = Small {
+            readings: readings(&[1.25, -0.55, 1.75, 0.3], 0.2, f64::INFINITY),
+            size: size(0.0),
+            model: linear,
+        };
+        // Everything but the prior of the size is Gaussian: what differs is the grid's own error.
+        let (laplace, force) = (case.by_laplace(), case.by_force());
+        assert!((laplace - force).abs() < 5e-3, "{laplace} {force}");
+    }
+
+    #[test]
+    fn val_evidence_at_the_end_of_the_range_is_the_integral() {
+        // The readings ask for a negative size, which there is not.
+        let case = Small {
+            readings: readings(&[0.3, 0.5, 0.1, -0.1], 0.2, f64::INFINITY),
+            size: size(0.0),
+            model: linear,
+        };
+        let (laplace, force) = (case.by_laplace(), case.by_force());
+        assert!((laplace - force).abs() < 1e-2, "{laplace} {force}");
+    }
+
+    #[test]
+    fn val_evidence_of_bent_models_with_few_taps_is_nearly_the_integral() {
+        let case = Small {
+            readings: readings(&[0.9, -0.4, 1.2, 0.35, 0.6], 0.15, 8.0),
+            size: size(-8.0),
+            model: |a, t| {
+                let root = (1.0 + 0.3 * t + 0.2 * a).max(1e-3).ln();
+                vec![
+                    a + t,
+                    a - t + 0.1 * t * t,
+                    0.5 * a + 1.5 * t,
+                    root,
+                    0.8 * t + 0.1 * a * t,
+                ]
+            },
+        };
+        // Student's t and the bends make the integrand no Gaussian: 0.2 is a factor of 1.2 where
+        // evidence is judged by factors of 3 and more.
+        let (laplace, force) = (case.by_laplace(), case.by_force());
+        assert!((laplace - force).abs() < 0.2, "{laplace} {force}");
+    }
 }

@@ -1,9 +1,11 @@
 //! What a hypothesis predicts: all readings, with their slopes.
 
 use super::catalogue::{Candidate, PlaceKind};
-use super::frame::{Frame, Row, Setup, Small};
+use super::frame::{Frame, Row, Small};
+use super::joint_energy::{joint_shares, stiffened_slope};
 use super::least_squares::{Knowledge, Linearised};
-use crate::effects::{Circumstances, Effect, EffectId, Seen, apply};
+use super::setup::Setup;
+use crate::effects::{Circumstances, Effect, Seen, apply};
 use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -204,7 +206,7 @@ impl<'a> Forward<'a> {
     }
 
     /// Effective amplitude over the first one.
-    fn share(&self, parameters: &[f64]) -> f64 {
+    pub(super) fn share(&self, parameters: &[f64]) -> f64 {
         self.frame
             .small_index(Small::Amplitude)
             .map_or(1.0, |index| parameters[self.layout.smalls() + index].exp())
@@ -244,7 +246,7 @@ impl<'a> Forward<'a> {
     }
 
     /// All rows without the small unknowns.
-    fn rows_of(&self, solved: &[Solved], parameters: &[f64]) -> Option<Vec<f64>> {
+    pub(super) fn rows_of(&self, solved: &[Solved], parameters: &[f64]) -> Option<Vec<f64>> {
         self.rows
             .iter()
             .map(|row| self.row_of(row, solved, parameters))
@@ -298,65 +300,6 @@ impl<'a> Forward<'a> {
         }
     }
 
-    /// Damping ratio: the nominal level and eta/2 times the joint's share of the strain energy; and the
-    /// nominal level alone.
-    fn damping(&self, mode: usize, solved: &Solved, parameters: &[f64]) -> Option<(f64, f64)> {
-        let level = self.frame.small_index(Small::Damping)?;
-        let nominal = parameters[self.layout.smalls() + level].exp();
-        let shares = joint_shares(solved, solved.index(mode)?);
-        Some((
-            nominal + 0.5 * solved.seen.joint_loss_factor * (shares[0] + shares[1]).max(0.0),
-            nominal,
-        ))
-    }
-
-    /// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr and
-    /// kr(a) = kr0 (1 + ratio a^p), averaged over the followed part of the decay.
-    fn slope_along_decay(
-        &self,
-        (configuration, mode): (usize, usize),
-        solved: &Solved,
-        parameters: &[f64],
-    ) -> f64 {
-        let Some((ratio, power)) = self.softening(parameters) else {
-            return 0.0;
-        };
-        let Some(index) = solved.index(mode) else {
-            return 0.0;
-        };
-        let setup = &self.frame.setups[configuration];
-        let sensitivity = 0.5 * joint_shares(solved, index)[1];
-        let spans = setup.spans.iter().find(|span| span.0 == mode);
-        let stiffness = |amplitude: f64| {
-            (1.0 + ratio * (setup.level * amplitude).powf(power))
-                .max(0.05)
-                .ln()
-        };
-        match spans {
-            Some(&(_, early, late)) => {
-                sensitivity * (stiffness(early) - stiffness(late)) / (early / late).ln()
-            }
-            None => {
-                let a = self.share(parameters);
-                // A factor of 1 % either way: the derivative at the effective amplitude.
-                sensitivity * (stiffness(a * 1.01) - stiffness(a / 1.01)) / (2.0 * 1.01_f64.ln())
-            }
-        }
-    }
-
-    /// Relative stiffness change at the hardest tap and its exponent, where that is a hypothesis.
-    fn softening(&self, parameters: &[f64]) -> Option<(f64, f64)> {
-        let index = self
-            .layout
-            .effects
-            .iter()
-            .position(|one| one.effect == EffectId::JointNonlinearity)?;
-        Some((
-            parameters[self.layout.size(index)],
-            parameters[self.layout.place(index)?],
-        ))
-    }
-
     /// d ln f/d ln k = half the strain energy of that spring, as the mode has it, over that of the
     /// structure (Rayleigh's quotient is stationary in the shape).
     fn joint_slopes(&self, solved: &[Solved], parameters: &[f64], slopes: &mut DMatrix<f64>) {
@@ -396,221 +339,10 @@ impl<'a> Forward<'a> {
         }
         0.5 * joint_shares(one, index)[direction]
     }
-
-    /// Adds the small unknowns to the predictions, and their columns to the slopes.
-    fn add_smalls(
-        &self,
-        solved: &[Solved],
-        mut predicted: Vec<f64>,
-        (parameters, slopes): (&[f64], &mut DMatrix<f64>),
-    ) -> Vec<f64> {
-        let first = self.layout.smalls();
-        for (row, kind) in self.rows.iter().enumerate() {
-            for (k, small) in self.frame.smalls.iter().enumerate() {
-                if *small != Small::Amplitude {
-                    let slope = self.small_slope(kind, small, (solved, predicted[row]), parameters);
-                    slopes[(row, first + k)] = slope;
-                }
-            }
-        }
-        for (k, small) in self.frame.smalls.iter().enumerate() {
-            // These two enter the solution itself.
-            if matches!(small, Small::Damping | Small::Amplitude) {
-                continue;
-            }
-            let value = parameters[first + k];
-            for (row, predicted) in predicted.iter_mut().enumerate() {
-                *predicted += value * slopes[(row, first + k)];
-            }
-        }
-        predicted
-    }
-
-    /// Slopes with respect to the effective amplitude, by finite differences.
-    fn amplitude_slopes(&self, parameters: &[f64], base: &[f64], slopes: &mut DMatrix<f64>) {
-        const STEP: f64 = 1e-2;
-        let Some(k) = self.frame.small_index(Small::Amplitude) else {
-            return;
-        };
-        let column = self.layout.smalls() + k;
-        let mut moved = parameters.to_vec();
-        moved[column] += STEP;
-        let solved = self.solve(&moved);
-        if let Some(new) = solved.and_then(|solved| self.rows_of(&solved, &moved)) {
-            for (row, (new, old)) in new.iter().zip(base).enumerate() {
-                slopes[(row, column)] = (new - old) / STEP;
-            }
-        }
-    }
-
-    /// Derivative of a row with respect to a small unknown.
-    fn small_slope(
-        &self,
-        row: &Row,
-        small: &Small,
-        (solved, predicted): (&[Solved], f64),
-        parameters: &[f64],
-    ) -> f64 {
-        match *row {
-            Row::Frequency {
-                configuration,
-                mode,
-            } => self.frequency_slope(small, (configuration, mode), &solved[configuration]),
-            Row::Constant {
-                configuration,
-                mode,
-                sensor,
-            } => self.constant_slope(
-                small,
-                (configuration, mode, sensor),
-                (&solved[configuration], predicted),
-            ),
-            Row::Ratio {
-                configuration,
-                mode,
-                sensor,
-                reference,
-            } => {
-                let one = &solved[configuration];
-                let towards = self.ratio_slope(small, (configuration, mode, sensor), one);
-                let away = self.ratio_slope(small, (configuration, mode, reference), one);
-                predicted * (towards - away)
-            }
-            Row::Damping { mode } if *small == Small::Damping => {
-                let (all, nominal) = self
-                    .damping(mode, &solved[0], parameters)
-                    .unwrap_or((1.0, 1.0));
-                nominal / all
-            }
-            Row::Damping { .. } | Row::Slope { .. } => 0.0,
-        }
-    }
-
-    fn frequency_slope(
-        &self,
-        small: &Small,
-        (configuration, mode): (usize, usize),
-        one: &Solved,
-    ) -> f64 {
-        let setup = &self.frame.setups[configuration];
-        let Some(index) = one.index(mode) else {
-            return 0.0;
-        };
-        let displacement = |x: f64| one.modes.displacement(index, x);
-        match *small {
-            Small::Scale => 1.0,
-            Small::Discrepancy { mode: own } if own == mode => 1.0,
-            Small::Drift { visit, direction } if visit == setup.visit => {
-                0.5 * joint_shares(one, index)[direction]
-            }
-            // d ln f/d m = -phi^2/2 for a mass-normalised shape.
-            Small::SensorMass { name } => setup
-                .names
-                .iter()
-                .zip(&setup.sensors)
-                .filter(|(own, _)| **own == name)
-                .map(|(_, sensor)| -0.5 * sensor.mass * displacement(sensor.position).powi(2))
-                .sum(),
-            Small::SensorPlace { place } => setup
-                .places
-                .iter()
-                .zip(&setup.sensors)
-                .filter(|(own, _)| **own == place)
-                .map(|(_, sensor)| {
-                    -sensor.mass
-                        * displacement(sensor.position)
-                        * one.modes.slope(index, sensor.position)
-                })
-                .sum(),
-            _ => 0.0,
-        }
-    }
-
-    fn constant_slope(
-        &self,
-        small: &Small,
-        (configuration, mode, sensor): (usize, usize, usize),
-        (one, predicted): (&Solved, f64),
-    ) -> f64 {
-        let setup = &self.frame.setups[configuration];
-        let (Some(index), Some(tap)) = (one.index(mode), setup.tap) else {
-            return 0.0;
-        };
-        let x = setup.sensors[sensor].position;
-        match *small {
-            Small::Gain { name } if setup.names[sensor] == name => predicted,
-            Small::SensorPlace { place } if setup.places[sensor] == place => {
-                one.modes.slope(index, x) * one.modes.displacement(index, tap)
-            }
-            Small::TapPlace { visit } if setup.visit == visit => {
-                one.modes.displacement(index, x) * one.modes.slope(index, tap)
-            }
-            _ => 0.0,
-        }
-    }
-
-    /// Relative derivative of the displacement at one sensor.
-    fn ratio_slope(
-        &self,
-        small: &Small,
-        (configuration, mode, sensor): (usize, usize, usize),
-        one: &Solved,
-    ) -> f64 {
-        let setup = &self.frame.setups[configuration];
-        let Some(index) = one.index(mode) else {
-            return 0.0;
-        };
-        match *small {
-            Small::Gain { name } if setup.names[sensor] == name => 1.0,
-            Small::SensorPlace { place } if setup.places[sensor] == place => {
-                let x = setup.sensors[sensor].position;
-                one.modes.slope(index, x) / one.modes.displacement(index, x)
-            }
-            _ => 0.0,
-        }
-    }
 }
 
 /// A constant bias does not move with the structure: d ln(s f + b)/d ln f = s f/(s f + b).
 fn offset_factor(one: &Solved, index: usize) -> f64 {
     let own = one.modes.frequencies()[index] * one.seen.frequency_scale;
     own / (own + one.seen.frequency_offset)
-}
-
-/// Share of each spring of the joint in the strain energy of a mode, q_t F_t/omega^2 for a shape of
-/// unit modal mass that deforms the joint by q against the forces F = K q. With coupled springs the
-/// shares belong to the stiffnesses at a fixed coupling: dK/d ln k_t = (E_t K + K E_t)/2.
-pub(super) fn joint_shares(one: &Solved, index: usize) -> [f64; 2] {
-    let SpecimenJoint::Springs { kt, kr, coupling } = one.seen.specimen.joint else {
-        return [0.0; 2];
-    };
-    let q = one.modes.joint_motion(index);
-    let omega = std::f64::consts::TAU * one.modes.frequencies()[index];
-    let square = 1.0 - coupling * coupling;
-    // A rigid spring holds no energy; its deformation is 0 and its stiffness infinite.
-    let part = |own: f64, other: f64, own_k: f64, other_k: f64| {
-        if !own_k.is_finite() {
-            return 0.0;
-        }
-        let cross = if coupling == 0.0 {
-            0.0
-        } else {
-            coupling * (own_k * other_k).sqrt() * other
-        };
-        own * (own_k * own + cross) / square / (omega * omega)
-    };
-    [part(q[0], q[1], kt, kr), part(q[1], q[0], kr, kt)]
-}
-
-/// d ln f/d ln k of a spring of the joint by Rayleigh's quotient of the stiffened structure.
-fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f64 {
-    const STEP: f64 = 1e-4;
-    let mut other = one.seen.specimen.clone();
-    if let SpecimenJoint::Springs { kt, kr, .. } = &mut other.joint {
-        *(if direction == 0 { kt } else { kr }) *= STEP.exp();
-    }
-    match one.modes.rayleigh_frequency(index, &other) {
-        Ok(frequency) => (frequency / one.modes.frequencies()[index]).ln() / STEP,
-        Err(_) => 0.0,
-    }
 }

@@ -104,6 +104,28 @@ pub(super) fn maximise(
     Some(optimum)
 }
 
+/// The same of a model that is linear: at `origin` it predicts `there`.
+pub(super) fn maximise_linear(
+    readings: &[Reading],
+    knowledge: &[Knowledge],
+    (origin, there): (&[f64], &[f64]),
+    slopes: &DMatrix<f64>,
+) -> Option<Optimum> {
+    let mut model = |parameters: &[f64]| {
+        let steps = parameters.iter().zip(origin).map(|(new, old)| new - old);
+        let moved = slopes * DVector::from_iterator(origin.len(), steps);
+        Some(Linearised {
+            predicted: there
+                .iter()
+                .zip(moved.iter())
+                .map(|(at, by)| at + by)
+                .collect(),
+            slopes: slopes.clone(),
+        })
+    };
+    maximise(readings, knowledge, origin, &mut model)
+}
+
 /// The full step or a part of it, whichever first lowers the objective.
 fn advance(
     readings: &[Reading],

@@ -16,14 +16,17 @@
 //! uncertainty of the readings comes from the measurement, never from a residual. This module cannot
 //! reach the simulator, so that its answers to virtual tests are answers.
 
+mod along_decay;
 mod assemble;
 mod catalogue;
+mod catch_all;
 mod checks;
 mod error;
 mod evidence;
 mod forward;
 mod frame;
 mod hypothesis;
+mod joint_energy;
 mod least_squares;
 mod noise;
 mod nominal;
@@ -33,6 +36,8 @@ mod quality;
 mod result;
 mod search;
 mod settings;
+mod setup;
+mod small_slopes;
 mod synthetic;
 mod verdict;
 mod withheld;

@@ -6,7 +6,7 @@
 //! come from all of them, and each is moved towards the common value as far as its repeats allow.
 //! What remains uncertain makes the likelihood a Student t one, never a Gaussian.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
 
 /// A measured value with what its repeats and its fit say about it.
@@ -107,14 +107,12 @@ pub(super) fn gaussian_square(residual: f64, freedom: f64) -> f64 {
     let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else {
         return residual * residual;
     };
-    // Beyond 1e-14 the tail is no longer resolved: 60 = 7.7 standard deviations squared.
-    let tail = (2.0 * student.cdf(-residual.abs())).max(1e-14);
-    chi_square_quantile(tail, 1.0)
-}
-
-/// The value that chi square exceeds with the probability `tail`.
-fn chi_square_quantile(tail: f64, freedom: f64) -> f64 {
-    ChiSquared::new(freedom).map_or(f64::NAN, |chi| chi.inverse_cdf(1.0 - tail))
+    let Ok(normal) = Normal::new(0.0, 1.0) else {
+        return residual * residual;
+    };
+    // Beyond 1e-14 the tail is no longer resolved: it is 7.7 standard deviations.
+    let tail = student.cdf(-residual.abs()).clamp(1e-14, 0.5);
+    normal.inverse_cdf(tail).powi(2)
 }
 
 /// Probability that chi square exceeds a value; `None` without a degree of freedom.

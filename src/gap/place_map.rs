@@ -9,7 +9,7 @@ use super::evidence::covariance;
 use super::forward::{Forward, Solved};
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
-use super::least_squares::{Knowledge, Linearised, maximise};
+use super::least_squares::{Knowledge, Optimum, maximise_linear};
 use super::result::PlaceMap;
 use crate::structure::specimen::Body;
 use nalgebra::DMatrix;
@@ -42,16 +42,19 @@ pub(super) fn place_map(frame: &Frame, nominal: &Fit) -> Option<PlaceMap> {
     let length = frame.nominal.specimen.body.length();
     let forward = Forward::new(frame, &[]);
     let solved = forward.solve(&nominal.branch.optimum.parameters)?;
-    let (stiffness, stiffness_std) =
-        changes(frame, nominal, &shares(frame, &solved, Property::Stiffness))?;
-    let (mass, mass_std) = changes(frame, nominal, &shares(frame, &solved, Property::Mass))?;
+    let of_stiffness = shares(frame, &solved, Property::Stiffness);
+    let of_mass = shares(frame, &solved, Property::Mass);
+    let (stiffness, stiffness_std) = changes(frame, nominal, &of_stiffness)?;
+    let (mass, mass_std) = changes(frame, nominal, &of_mass)?;
     let piece = length / PIECES as f64;
     Some(PlaceMap {
         positions: (0..PIECES).map(|j| piece * (j as f64 + 0.5)).collect(),
         stiffness,
         stiffness_std,
+        stiffness_alone: alone(frame, nominal, &of_stiffness)?,
         mass,
         mass_std,
+        mass_alone: alone(frame, nominal, &of_mass)?,
         // Half a wave of the highest mode is what its energy resolves.
         resolution: length / frame.fitted_modes as f64,
     })
@@ -108,39 +111,51 @@ fn share(one: &Solved, index: usize, (piece, property): (usize, Property)) -> f6
         .sum()
 }
 
-/// Changes of the pieces and their standard uncertainties.
+/// Changes of all pieces together and their standard uncertainties.
 fn changes(frame: &Frame, nominal: &Fit, shares: &DMatrix<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
-    let optimum = &nominal.branch.optimum;
-    let first = optimum.parameters.len();
-    let slopes = DMatrix::from_fn(frame.rows.len(), first + PIECES, |row, column| {
-        if column < first {
-            optimum.model.slopes[(row, column)]
-        } else {
-            shares[(row, column - first)]
-        }
-    });
-    let mut start = optimum.parameters.clone();
-    start.resize(first + PIECES, 0.0);
-    let mut known = nominal.branch.knowledge.clone();
-    known.resize(first + PIECES, Knowledge::normal(0.0, PRIOR));
-    let origin = start.clone();
-    let found = maximise(&frame.readings, &known, &start, &mut |parameters| {
-        let predicted = (0..frame.rows.len())
-            .map(|row| {
-                let moved: f64 = (0..parameters.len())
-                    .map(|k| slopes[(row, k)] * (parameters[k] - origin[k]))
-                    .sum();
-                optimum.model.predicted[row] + moved
-            })
-            .collect();
-        Some(Linearised {
-            predicted,
-            slopes: slopes.clone(),
-        })
-    })?;
+    let first = nominal.branch.optimum.parameters.len();
+    let (known, found) = with_pieces(frame, nominal, (shares, PRIOR))?;
     let spread = covariance(&known, &found)?;
-    let std = (first..first + PIECES)
+    let last = first + shares.ncols();
+    let std = (first..last)
         .map(|k| spread[(k, k)].max(0.0).sqrt())
         .collect();
     Some((found.parameters[first..].to_vec(), std))
+}
+
+/// By how much chi square falls if one piece alone changes, for each piece.
+fn alone(frame: &Frame, nominal: &Fit, shares: &DMatrix<f64>) -> Option<Vec<f64>> {
+    // Nothing holds a single piece back: what counts is where, not how much.
+    const FREE: f64 = 3.0;
+    (0..PIECES)
+        .map(|piece| {
+            let own = shares.columns(piece, 1).into_owned();
+            let (_, found) = with_pieces(frame, nominal, (&own, FREE))?;
+            Some(2.0 * (nominal.branch.optimum.objective - found.objective).max(0.0))
+        })
+        .collect()
+}
+
+/// The nominal fit, linearised, with changes of pieces beside its parameters.
+fn with_pieces(
+    frame: &Frame,
+    nominal: &Fit,
+    (shares, prior): (&DMatrix<f64>, f64),
+) -> Option<(Vec<Knowledge>, Optimum)> {
+    let optimum = &nominal.branch.optimum;
+    let first = optimum.parameters.len();
+    let count = first + shares.ncols();
+    let mut slopes = optimum.model.slopes.clone().resize_horizontally(count, 0.0);
+    slopes.columns_mut(first, shares.ncols()).copy_from(shares);
+    let mut start = optimum.parameters.clone();
+    start.resize(count, 0.0);
+    let mut known = nominal.branch.knowledge.clone();
+    known.resize(count, Knowledge::normal(0.0, prior));
+    let found = maximise_linear(
+        &frame.readings,
+        &known,
+        (&start, &optimum.model.predicted),
+        &slopes,
+    )?;
+    Some((known, found))
 }

@@ -216,10 +216,15 @@ pub struct PlaceMap {
     pub stiffness: Vec<f64>,
     /// Its standard uncertainty.
     pub stiffness_std: Vec<f64>,
+    /// By how much chi square falls if the stiffness of this piece alone changes: it peaks where the
+    /// cause sits, while changes of all pieces together share it out among look-alikes.
+    pub stiffness_alone: Vec<f64>,
     /// Relative change of the mass of each piece (1), if mass alone changes.
     pub mass: Vec<f64>,
     /// Its standard uncertainty.
     pub mass_std: Vec<f64>,
+    /// By how much chi square falls if the mass of this piece alone changes.
+    pub mass_alone: Vec<f64>,
     /// Length over which a local change is smeared (m).
     pub resolution: f64,
 }

@@ -1,16 +1,18 @@
 //! All hypotheses against each other.
 
 use super::catalogue::{Candidate, Scales, candidate};
+use super::catch_all::{fit_drift, fit_unknown};
 use super::error::GapError;
 use super::evidence::log_mean;
 use super::forward::Forward;
-use super::frame::{Frame, Setup};
-use super::hypothesis::{Fit, Search, fit_drift, fit_nominal, fit_unknown};
+use super::frame::Frame;
+use super::hypothesis::{Fit, Search, fit_nominal};
 use super::nominal::Nominal;
 use super::posterior::{Entry, set_probabilities};
 use super::quality::Residuals;
 use super::result::Hypothesis;
 use super::settings::GapSettings;
+use super::setup::Setup;
 use crate::effects::EffectId;
 use crate::identify::observation::Observations;
 use rayon::prelude::*;

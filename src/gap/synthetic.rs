@@ -90,6 +90,9 @@ fn amplitudes(plan: &TestPlan, truth: &Nominal) -> Result<Vec<f64>, GapError> {
     Ok(all.into_iter().map(|amplitude| amplitude / most).collect())
 }
 
+/// Modes, and which of them is the model's mode 1, 2, ...
+type Numbered = (SpecimenModes, Vec<usize>);
+
 struct Scene<'a> {
     plan: &'a TestPlan,
     truth: &'a Nominal,
@@ -192,7 +195,7 @@ impl Scene<'_> {
         }
     }
 
-    fn solve(&self, specimen: &Specimen) -> Result<(SpecimenModes, Vec<usize>), GapError> {
+    fn solve(&self, specimen: &Specimen) -> Result<Numbered, GapError> {
         let based = specimen.base.is_some_and(|base| base.ratio > 0.0);
         let count = self.plan.modes + usize::from(based);
         let modes = specimen.modes(count, Mesh::SIMULATION)?;
@@ -208,12 +211,11 @@ impl Scene<'_> {
         Ok((modes, numbers))
     }
 
-    #[allow(clippy::type_complexity)]
     fn mode(
         &mut self,
         (index, number): (usize, usize),
-        (modes, numbers): &(SpecimenModes, Vec<usize>),
-        ((scale, offset, loss), ends): ((f64, f64, f64), &[(SpecimenModes, Vec<usize>); 2]),
+        (modes, numbers): &Numbered,
+        ((scale, offset, loss), ends): ((f64, f64, f64), &[Numbered; 2]),
     ) -> ObservedMode {
         let mode = numbers[number];
         let true_frequency = modes.frequencies()[mode] * scale + offset;

@@ -41,11 +41,13 @@ pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>) -> Verdict {
     if first.hypothesis == Hypothesis::Unknown || checks.refuted() {
         return Verdict::Unknown;
     }
-    if first.hypothesis == Hypothesis::None && groups[0].1 > 0.5 {
+    // An effect too small to matter always competes with its absence; where nothing explains the
+    // readings better than the nominal model, there is no gap.
+    if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
     }
     let holds = checks.closure_low.is_none_or(|low| low > 0.0);
-    if groups[0].1 >= NAMED && first.hypothesis != Hypothesis::None && holds {
+    if groups[0].1 >= NAMED && holds {
         return name_of(entries, &groups[0].0);
     }
     let aliases = alias_group(entries);

@@ -9,7 +9,7 @@ use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, LapLayout
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
     Analysis, Estimate, EstimateMethod, Identification, IdentifySettings, KnownJoint, ModeResult,
-    Perturbation, TestedStructure, identify, measure_bare, modes_of_recordings, run_test,
+    Perturbation, StructureDetails, TestedStructure, identify, measure_bare, modes_of_recordings, run_test,
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
@@ -80,7 +80,11 @@ fn virtual_test(seed: u64) -> VirtualTest {
         regression: Some(PairsModel::TwoParameter),
         known: KnownJoint::default(),
     };
-    let (modes, _) = modes_of_recordings(&mut recordings, &[0, 1], &structure);
+    let (modes, _) = modes_of_recordings(
+        &mut recordings,
+        &[0, 1],
+        (&structure, &StructureDetails::default()),
+    );
     let (found, _) = identify(&structure, &modes, &IdentifySettings::default());
     let truth = shapes.iter().map(|shape| shape.frequency).collect();
     VirtualTest {

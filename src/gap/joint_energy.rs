@@ -1,0 +1,42 @@
+//! How much of a mode's energy sits in the joint's springs, and what that does to its frequency.
+
+use super::forward::Solved;
+use crate::structure::specimen::SpecimenJoint;
+
+/// Share of each spring of the joint in the strain energy of a mode, q_t F_t/omega^2 for a shape of
+/// unit modal mass that deforms the joint by q against the forces F = K q. With coupled springs the
+/// shares belong to the stiffnesses at a fixed coupling: dK/d ln k_t = (E_t K + K E_t)/2.
+pub(super) fn joint_shares(one: &Solved, index: usize) -> [f64; 2] {
+    let SpecimenJoint::Springs { kt, kr, coupling } = one.seen.specimen.joint else {
+        return [0.0; 2];
+    };
+    let q = one.modes.joint_motion(index);
+    let omega = std::f64::consts::TAU * one.modes.frequencies()[index];
+    let square = 1.0 - coupling * coupling;
+    // A rigid spring holds no energy; its deformation is 0 and its stiffness infinite.
+    let part = |own: f64, other: f64, own_k: f64, other_k: f64| {
+        if !own_k.is_finite() {
+            return 0.0;
+        }
+        let cross = if coupling == 0.0 {
+            0.0
+        } else {
+            coupling * (own_k * other_k).sqrt() * other
+        };
+        own * (own_k * own + cross) / square / (omega * omega)
+    };
+    [part(q[0], q[1], kt, kr), part(q[1], q[0], kr, kt)]
+}
+
+/// d ln f/d ln k of a spring of the joint by Rayleigh's quotient of the stiffened structure.
+pub(super) fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f64 {
+    const STEP: f64 = 1e-4;
+    let mut other = one.seen.specimen.clone();
+    if let SpecimenJoint::Springs { kt, kr, .. } = &mut other.joint {
+        *(if direction == 0 { kt } else { kr }) *= STEP.exp();
+    }
+    match one.modes.rayleigh_frequency(index, &other) {
+        Ok(frequency) => (frequency / one.modes.frequencies()[index]).ln() / STEP,
+        Err(_) => 0.0,
+    }
+}

@@ -1,0 +1,100 @@
+//! One configuration of the test as the model needs it.
+
+use super::nominal::Nominal;
+use crate::effects::SensorPlace;
+use crate::identify::observation::{Configuration, ObservedMode};
+use crate::structure::specimen::Specimen;
+
+/// One configuration as the model needs it.
+#[derive(Debug, Clone)]
+pub(super) struct Setup {
+    /// What it is called: file and level.
+    pub(super) label: String,
+    /// The structure with all masses that are known.
+    pub(super) specimen: Specimen,
+    /// Places and masses of the sensors.
+    pub(super) sensors: Vec<SensorPlace>,
+    /// Names of the sensors, as indices.
+    pub(super) names: Vec<usize>,
+    /// Distinct stated places of the sensors, as indices.
+    pub(super) places: Vec<usize>,
+    /// Where the hammer struck (m).
+    pub(super) tap: Option<f64>,
+    /// Amplitude over that of the hardest configuration (1).
+    pub(super) level: f64,
+    /// Amplitude at the begin and end of the followed decay over that of its first instant, by mode.
+    pub(super) spans: Vec<(usize, f64, f64)>,
+    /// Which visit to the structure.
+    pub(super) visit: usize,
+}
+
+/// Index of a value in a list, which grows where it is new.
+fn index_in<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    list.iter()
+        .position(|one| *one == value)
+        .unwrap_or_else(|| {
+            list.push(value);
+            list.len() - 1
+        })
+}
+
+/// A configuration with its sensors on the structure; grows the lists of names and places.
+pub(super) fn setup(
+    index: usize,
+    configuration: &Configuration,
+    nominal: &Nominal,
+    (names, places): (&mut Vec<String>, &mut Vec<(usize, f64)>),
+) -> Setup {
+    let sensors: Vec<SensorPlace> = configuration
+        .sensors
+        .iter()
+        .map(|sensor| SensorPlace {
+            // Without a place it stays where it does nothing; its shape is not compared.
+            position: sensor.position.unwrap_or(0.0),
+            mass: sensor
+                .position
+                .map_or(0.0, |_| nominal.mass_of(&sensor.name)),
+        })
+        .collect();
+    let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
+    let name_indices: Vec<usize> = configuration
+        .sensors
+        .iter()
+        .map(|sensor| index_in(names, sensor.name.clone()))
+        .collect();
+    let place_indices = name_indices
+        .iter()
+        .zip(&sensors)
+        .map(|(&name, sensor)| index_in(places, (name, sensor.position)))
+        .collect();
+    Setup {
+        label: label(index, configuration),
+        specimen: nominal.with_masses(&masses),
+        sensors,
+        names: name_indices,
+        places: place_indices,
+        tap: configuration.tap,
+        level: configuration.level.unwrap_or(1.0),
+        spans: configuration.modes.iter().filter_map(span).collect(),
+        visit: configuration.recording.unwrap_or(index),
+    }
+}
+
+fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {
+    let decay = mode.decay?;
+    let first = mode.amplitude?;
+    let share = |amplitude: Option<f64>| Some(amplitude? / first);
+    let (early, late) = (share(decay.early.amplitude)?, share(decay.late.amplitude)?);
+    (late > 0.0 && early > 1.05 * late).then_some((mode.mode, early, late))
+}
+
+fn label(index: usize, configuration: &Configuration) -> String {
+    let name = configuration
+        .file
+        .clone()
+        .unwrap_or_else(|| format!("configuration {}", index + 1));
+    match configuration.level {
+        Some(level) if level < 0.999 => format!("{name} (level {level:.2})"),
+        _ => name,
+    }
+}

@@ -1,0 +1,186 @@
+//! What the small unknowns do to each reading.
+
+use super::forward::{Forward, Solved};
+use super::frame::{Row, Small};
+use super::joint_energy::joint_shares;
+use nalgebra::DMatrix;
+
+impl Forward<'_> {
+    /// Adds the small unknowns to the predictions, and their columns to the slopes.
+    pub(super) fn add_smalls(
+        &self,
+        solved: &[Solved],
+        mut predicted: Vec<f64>,
+        (parameters, slopes): (&[f64], &mut DMatrix<f64>),
+    ) -> Vec<f64> {
+        let first = self.layout.smalls();
+        for (row, kind) in self.rows.iter().enumerate() {
+            for (k, small) in self.frame.smalls.iter().enumerate() {
+                if *small != Small::Amplitude {
+                    let slope = self.small_slope(kind, small, (solved, predicted[row]), parameters);
+                    slopes[(row, first + k)] = slope;
+                }
+            }
+        }
+        for (k, small) in self.frame.smalls.iter().enumerate() {
+            // These two enter the solution itself.
+            if matches!(small, Small::Damping | Small::Amplitude) {
+                continue;
+            }
+            let value = parameters[first + k];
+            for (row, predicted) in predicted.iter_mut().enumerate() {
+                *predicted += value * slopes[(row, first + k)];
+            }
+        }
+        predicted
+    }
+
+    /// Slopes with respect to the effective amplitude, by finite differences.
+    pub(super) fn amplitude_slopes(
+        &self,
+        parameters: &[f64],
+        base: &[f64],
+        slopes: &mut DMatrix<f64>,
+    ) {
+        const STEP: f64 = 1e-2;
+        let Some(k) = self.frame.small_index(Small::Amplitude) else {
+            return;
+        };
+        let column = self.layout.smalls() + k;
+        let mut moved = parameters.to_vec();
+        moved[column] += STEP;
+        let solved = self.solve(&moved);
+        if let Some(new) = solved.and_then(|solved| self.rows_of(&solved, &moved)) {
+            for (row, (new, old)) in new.iter().zip(base).enumerate() {
+                slopes[(row, column)] = (new - old) / STEP;
+            }
+        }
+    }
+
+    /// Derivative of a row with respect to a small unknown.
+    fn small_slope(
+        &self,
+        row: &Row,
+        small: &Small,
+        (solved, predicted): (&[Solved], f64),
+        parameters: &[f64],
+    ) -> f64 {
+        match *row {
+            Row::Frequency {
+                configuration,
+                mode,
+            } => self.frequency_slope(small, (configuration, mode), &solved[configuration]),
+            Row::Constant {
+                configuration,
+                mode,
+                sensor,
+            } => self.constant_slope(
+                small,
+                (configuration, mode, sensor),
+                (&solved[configuration], predicted),
+            ),
+            Row::Ratio {
+                configuration,
+                mode,
+                sensor,
+                reference,
+            } => {
+                let one = &solved[configuration];
+                let towards = self.ratio_slope(small, (configuration, mode, sensor), one);
+                let away = self.ratio_slope(small, (configuration, mode, reference), one);
+                predicted * (towards - away)
+            }
+            Row::Damping { mode } if *small == Small::Damping => {
+                let (all, nominal) = self
+                    .damping(mode, &solved[0], parameters)
+                    .unwrap_or((1.0, 1.0));
+                nominal / all
+            }
+            Row::Damping { .. } | Row::Slope { .. } => 0.0,
+        }
+    }
+
+    fn frequency_slope(
+        &self,
+        small: &Small,
+        (configuration, mode): (usize, usize),
+        one: &Solved,
+    ) -> f64 {
+        let setup = &self.frame.setups[configuration];
+        let Some(index) = one.index(mode) else {
+            return 0.0;
+        };
+        let displacement = |x: f64| one.modes.displacement(index, x);
+        match *small {
+            Small::Scale => 1.0,
+            Small::Discrepancy { mode: own } if own == mode => 1.0,
+            Small::Drift { visit, direction } if visit == setup.visit => {
+                0.5 * joint_shares(one, index)[direction]
+            }
+            // d ln f/d m = -phi^2/2 for a mass-normalised shape.
+            Small::SensorMass { name } => setup
+                .names
+                .iter()
+                .zip(&setup.sensors)
+                .filter(|(own, _)| **own == name)
+                .map(|(_, sensor)| -0.5 * sensor.mass * displacement(sensor.position).powi(2))
+                .sum(),
+            Small::SensorPlace { place } => setup
+                .places
+                .iter()
+                .zip(&setup.sensors)
+                .filter(|(own, _)| **own == place)
+                .map(|(_, sensor)| {
+                    -sensor.mass
+                        * displacement(sensor.position)
+                        * one.modes.slope(index, sensor.position)
+                })
+                .sum(),
+            _ => 0.0,
+        }
+    }
+
+    fn constant_slope(
+        &self,
+        small: &Small,
+        (configuration, mode, sensor): (usize, usize, usize),
+        (one, predicted): (&Solved, f64),
+    ) -> f64 {
+        let setup = &self.frame.setups[configuration];
+        let (Some(index), Some(tap)) = (one.index(mode), setup.tap) else {
+            return 0.0;
+        };
+        let x = setup.sensors[sensor].position;
+        match *small {
+            Small::Gain { name } if setup.names[sensor] == name => predicted,
+            Small::SensorPlace { place } if setup.places[sensor] == place => {
+                one.modes.slope(index, x) * one.modes.displacement(index, tap)
+            }
+            Small::TapPlace { visit } if setup.visit == visit => {
+                one.modes.displacement(index, x) * one.modes.slope(index, tap)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Relative derivative of the displacement at one sensor.
+    fn ratio_slope(
+        &self,
+        small: &Small,
+        (configuration, mode, sensor): (usize, usize, usize),
+        one: &Solved,
+    ) -> f64 {
+        let setup = &self.frame.setups[configuration];
+        let Some(index) = one.index(mode) else {
+            return 0.0;
+        };
+        match *small {
+            Small::Gain { name } if setup.names[sensor] == name => 1.0,
+            Small::SensorPlace { place } if setup.places[sensor] == place => {
+                let x = setup.sensors[sensor].position;
+                one.modes.slope(index, x) / one.modes.displacement(index, x)
+            }
+            _ => 0.0,
+        }
+    }
+}

@@ -57,7 +57,7 @@ enum Command {
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
     Reproduce(reproduce::ReproduceArguments),
-    Simulate(simulate::SimulateArguments),
+    Simulate(Box<simulate::SimulateArguments>),
 }
 
 /// What a command came to, when nothing went wrong.

@@ -68,10 +68,10 @@ enum Command {
     BlindCheck(blind_check::BlindCheckArguments),
     Resolution(resolution::ResolutionArguments),
     Reproduce(reproduce::ReproduceArguments),
-    Simulate(simulate::SimulateArguments),
     Export(export::ExportArguments),
     Completions(completions::CompletionsArguments),
     Man(man::ManArguments),
+    Simulate(Box<simulate::SimulateArguments>),
 }
 
 /// What a command came to, when nothing went wrong.

@@ -107,10 +107,10 @@ fn lagrange_coefficients() -> [[f64; NODES]; NODES] {
         for (_, &node) in nodes.iter().enumerate().filter(|(m, _)| *m != j) {
             let scale = 1.0 / (nodes[j] - node);
             let old = coefficients;
-            for power in 0..NODES {
+            coefficients = std::array::from_fn(|power| {
                 let lower = if power > 0 { old[power - 1] } else { 0.0 };
-                coefficients[power] = scale * (lower - node * old[power]);
-            }
+                scale * (lower - node * old[power])
+            });
         }
         coefficients
     })

@@ -129,8 +129,8 @@ impl Decimator {
         let (weights, rest) = self.weights.as_chunks::<8>();
         let (inputs, others) = window.as_chunks::<8>();
         for (weights, inputs) in weights.iter().zip(inputs) {
-            for lane in 0..8 {
-                sums[lane] += weights[lane] * inputs[lane];
+            for ((sum, weight), input) in sums.iter_mut().zip(weights).zip(inputs) {
+                *sum += weight * input;
             }
         }
         let tail: f64 = rest.iter().zip(others).map(|(w, x)| w * x).sum();

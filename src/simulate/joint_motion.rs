@@ -177,12 +177,12 @@ impl JointMotion {
             extras = self.follow(&rotations);
             let mut error = Vector3::zeros();
             let mut slope = Matrix3::identity();
-            for row in 0..3 {
+            for (row, influence) in influence.iter().take(3).enumerate() {
                 error[row] = rotations[row] - free[row];
                 for (column, extra) in extras.iter().enumerate() {
                     // rotation = free + influence (-extra moment).
-                    error[row] += influence[row][column + 1] * extra.moment;
-                    slope[(row, column)] += influence[row][column + 1] * extra.slope;
+                    error[row] += influence[column + 1] * extra.moment;
+                    slope[(row, column)] += influence[column + 1] * extra.slope;
                 }
             }
             let change = slope.lu().solve(&error)?;

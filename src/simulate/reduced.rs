@@ -88,20 +88,20 @@ impl Oscillator {
 /// Sum over the modes of factors of their states' real and imaginary parts.
 pub(super) fn seen(factors: &[[f64; 2]], states: &[Complex64]) -> f64 {
     // Sums of their own for each lane keep the processor's units busy.
-    let mut sums = [0.0; 8];
+    let mut sums = [[0.0; 2]; 4];
     let (fours, rest) = factors.as_chunks::<4>();
     let (state_fours, others) = states.as_chunks::<4>();
     for (factors, states) in fours.iter().zip(state_fours) {
-        for lane in 0..4 {
-            sums[2 * lane] += factors[lane][0] * states[lane].re;
-            sums[2 * lane + 1] += factors[lane][1] * states[lane].im;
+        for ((sum, factor), state) in sums.iter_mut().zip(factors).zip(states) {
+            sum[0] += factor[0] * state.re;
+            sum[1] += factor[1] * state.im;
         }
     }
     let tail = rest.iter().zip(others);
     let tail: f64 = tail
         .map(|([real, imaginary], z)| real * z.re + imaginary * z.im)
         .sum();
-    sums.iter().sum::<f64>() + tail
+    sums.as_flattened().iter().sum::<f64>() + tail
 }
 
 impl Sensed {

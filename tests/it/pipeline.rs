@@ -9,7 +9,8 @@ use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, LapLayout
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
     Analysis, Estimate, EstimateMethod, Identification, IdentifySettings, KnownJoint, ModeResult,
-    Perturbation, StructureDetails, TestedStructure, identify, measure_bare, modes_of_recordings, run_test,
+    Perturbation, StructureDetails, TestedStructure, identify, measure_bare, modes_of_recordings,
+    run_test,
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};

@@ -2,6 +2,7 @@
 
 use super::document::{Document, PredictionSection};
 use super::format::{signed_percent, significant};
+use super::summary::channels;
 use super::tables::{Parameter, estimated, quality_count};
 
 /// At most five lines, each with what it is about; what was not computed has none.
@@ -39,8 +40,10 @@ fn taps(document: &Document) -> Option<String> {
     } else {
         "can be used"
     };
+    // Without a hammer it matters on what taps were looked for.
+    let channels = channels(document).map_or(String::new(), |words| format!(". {words}"));
     Some(format!(
-        "{used} of {} taps {could}, in {files}",
+        "{used} of {} taps {could}, in {files}{channels}",
         all.count()
     ))
 }

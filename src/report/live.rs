@@ -6,9 +6,9 @@ use serde::Serialize;
 use super::figures::{FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TimeOverview};
 use super::format::significant;
 
-/// Most points of a curve: two to three for each pixel of a wide screen, so that zooming finds more
+/// Most points of a curve: more than two for each pixel of a wide screen, so that zooming finds more
 /// than the whole view shows, while five recordings stay far below the page's limit of 3 MB.
-const MOST_POINTS: usize = 6000;
+const MOST_POINTS: usize = 3000;
 /// Significant digits of a value: hovering shows four.
 const DIGITS: usize = 4;
 

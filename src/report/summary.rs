@@ -88,7 +88,7 @@ fn counted(count: usize, word: &str) -> String {
 }
 
 /// On what taps were looked for where there is no hammer.
-fn channels(document: &Document) -> Option<String> {
+pub(super) fn channels(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref()?;
     let mut names: Vec<&str> = Vec::new();
     for recording in recordings.iter().filter(|recording| !recording.has_hammer) {

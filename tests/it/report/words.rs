@@ -249,7 +249,8 @@ fn prop_terminal_ends_with_what_was_found() {
     for part in [
         "8 of 12 taps",
         "5 modes",
-        "1.382 MN/m",
+        "Kt = 1.382",
+        "MN/m",
         "−0.32 %",
         "warning",
     ] {
@@ -358,12 +359,8 @@ fn prop_terminal_cuts_nothing_off() {
         // Names of files alone give way, in their middle.
         let cut = text
             .lines()
-            .find(|line| line.contains('…') && !line.contains("full_"));
+            .find(|line| line.contains('…') && !(line.contains("ful") && line.contains("wav")));
         assert_eq!(cut, None, "{case}: something was cut off:\n{text}");
-        assert!(
-            text.lines()
-                .all(|line| !line.contains('…') || line.contains("wav"))
-        );
     }
 }
 

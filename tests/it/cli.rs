@@ -102,6 +102,7 @@ fn regress_help_of_every_command_names_an_example() {
         "predict",
         "perturb",
         "reproduce",
+        "simulate",
     ] {
         tapjoint(folder.path())
             .args([command, "--help"])

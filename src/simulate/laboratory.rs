@@ -53,7 +53,7 @@ impl Laboratory {
 pub enum Tip {
     /// 0.3 ms, excites to 3.3 kHz.
     Steel,
-    /// 1.44 ms, excites to 1 kHz.
+    /// 1.4 ms, excites to 1 kHz.
     Nylon,
     /// 5 ms, excites to 290 Hz.
     Rubber,
@@ -67,7 +67,7 @@ impl Tip {
     pub fn pulse(self) -> (f64, PulseShape) {
         match self {
             Self::Steel => (0.3e-3, PulseShape::SineSquared),
-            Self::Nylon => (1.44e-3, PulseShape::SineFourth),
+            Self::Nylon => (1.4e-3, PulseShape::SineFourth),
             Self::Rubber => (5e-3, PulseShape::SineFourth),
         }
     }

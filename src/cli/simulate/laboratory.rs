@@ -97,7 +97,7 @@ enum Part {
 enum TipArgument {
     /// 0.3 ms, to 3.3 kHz
     Steel,
-    /// 1.44 ms, to 1 kHz
+    /// 1.4 ms, to 1 kHz
     Nylon,
     /// 5 ms, to 290 Hz
     Rubber,

@@ -19,8 +19,8 @@ pub struct Laboratory {
 }
 
 impl Laboratory {
-    /// Nothing that disturbs: no noise, filters, errors, scatter or limits of resolution but those
-    /// of the file.
+    /// Nothing that disturbs: no noise, errors or scatter, and no filter but the one against aliasing,
+    /// without which modes beyond half the rate would appear below it.
     pub fn ideal() -> Self {
         Self {
             hammer: HammerSettings {
@@ -36,7 +36,6 @@ impl Laboratory {
                 mounting_resonance: 0.0,
             },
             recorder: RecorderSettings {
-                anti_alias: AntiAlias::Off,
                 hum: 0.0,
                 drift: 0.0,
                 offset: 0.0,
@@ -54,7 +53,7 @@ impl Laboratory {
 pub enum Tip {
     /// 0.3 ms, excites to 3.3 kHz.
     Steel,
-    /// 1 ms, excites to 1 kHz.
+    /// 1.4 ms, excites to 1 kHz.
     Nylon,
     /// 5 ms, excites to 290 Hz.
     Rubber,
@@ -68,7 +67,7 @@ impl Tip {
     pub fn pulse(self) -> (f64, PulseShape) {
         match self {
             Self::Steel => (0.3e-3, PulseShape::SineSquared),
-            Self::Nylon => (1e-3, PulseShape::SineSquared),
+            Self::Nylon => (1.4e-3, PulseShape::SineFourth),
             Self::Rubber => (5e-3, PulseShape::SineFourth),
         }
     }

@@ -8,6 +8,11 @@ use super::joint_motion::JointMotion;
 use super::pulse::Pulse;
 use super::reduced::{Oscillator, ReducedStructure, Sensed, StruckPlace, seen};
 
+/// So often (steps) states are looked at that may have died down.
+const FORGET_EVERY: u64 = 256;
+/// Square of a state (m2 kg/s2) that is nothing beside any that was struck.
+const NOTHING: f64 = 1e-200;
+
 /// A pulse and where it strikes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Strike {
@@ -111,6 +116,19 @@ impl Motion {
             }
         }
         self.steps += 1;
+        if self.steps.is_multiple_of(FORGET_EVERY) {
+            self.forget_what_has_died_down();
+        }
+    }
+
+    /// Sets states to zero that have decayed beyond all meaning. Left alone they would end as the
+    /// smallest numbers there are, which rounding keeps from vanishing and processors handle slowly.
+    fn forget_what_has_died_down(&mut self) {
+        let gone = self
+            .states
+            .iter_mut()
+            .filter(|state| state.norm_sqr() < NOTHING);
+        gone.for_each(|state| *state = Complex64::ZERO);
     }
 
     /// Force of the hammer now (N).

@@ -186,9 +186,6 @@ fn prepare(
     let length = seen.specimen.body.length();
     let stretched = |position: f64| (position * length / nominal.body.length()).min(length);
     let sample_rate = sample_rate(laboratory, file, *highest)?;
-    let reach = f64::from(sample_rate) / 2.56;
-    let tip = laboratory.hammer.tip;
-    let tip = tip.unwrap_or_else(|| Tip::softest_for(highest.unwrap_or(reach)));
     let mut take = TakePlan {
         sample_rate,
         frames: 0,
@@ -199,7 +196,7 @@ fn prepare(
             interval: 0.0,
             place: (stretched(tap), length),
             peak_force: laboratory.hammer.peak_force * level,
-            pulse: tip.pulse(),
+            pulse: tip(laboratory, *highest, sample_rate).pulse(),
         },
         joint: None,
         seed: (plan.seed, visit as u64),
@@ -229,6 +226,13 @@ fn prepare(
         structure,
         take,
     })
+}
+
+/// The tip that is asked for, or the softest for the band.
+fn tip(laboratory: &Laboratory, highest: Option<f64>, sample_rate: u32) -> Tip {
+    let reach = f64::from(sample_rate) / 2.56;
+    let softest = || Tip::softest_for(highest.unwrap_or(reach));
+    laboratory.hammer.tip.unwrap_or_else(softest)
 }
 
 /// What is seen of the specimen on one visit; a joint that is not linear is seen at rest.

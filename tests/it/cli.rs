@@ -103,8 +103,12 @@ fn regress_help_of_every_command_names_an_example() {
         "perturb",
         "resolution",
         "reproduce",
+        "export",
+        "diagnose",
+        "blind-check",
         "completions",
         "man",
+        "simulate",
     ] {
         tapjoint(folder.path())
             .args([command, "--help"])

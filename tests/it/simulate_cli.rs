@@ -221,7 +221,7 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
         ),
         (TEST, &["--rate", "1000"], "band ends at 1000 Hz"),
         (TEST, &["--seconds", "0.6"], "fewer --taps"),
-        (TEST, &["--noise", "-1"], "noise"),
+        (TEST, &["--noise=-1"], "the noise is -1"),
     ];
     for (text, arguments, words) in cases {
         let folder = folder(text);

@@ -10,7 +10,8 @@ use tapjoint::simulate::{AntiAlias, Damping, Laboratory, Tip};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Laboratory")]
 pub(super) struct LaboratoryArguments {
-    /// Nothing that disturbs: no noise, scatter, filters, errors; the other options still count
+    /// Nothing that disturbs: no noise, scatter, errors, and no filter but the one against aliasing;
+    /// the other options still count
     #[arg(long)]
     ideal: bool,
     /// Leave out parts of the laboratory, separated by commas
@@ -96,7 +97,7 @@ enum Part {
 enum TipArgument {
     /// 0.3 ms, to 3.3 kHz
     Steel,
-    /// 1 ms, to 1 kHz
+    /// 1.4 ms, to 1 kHz
     Nylon,
     /// 5 ms, to 290 Hz
     Rubber,

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 use tapjoint::simulate::{
-    AntiAlias, Damping, JointTruth, Laboratory, RecordingTruth, Truth, VirtualTest,
+    AntiAlias, Damping, HammerSettings, JointTruth, Laboratory, RecorderSettings, RecordingTruth,
+    SensorSettings, Truth, VirtualTest,
 };
 
 /// Recordings, joint, what was planted, and the laboratory.
@@ -81,87 +82,72 @@ fn of_joint(joint: &JointTruth) -> String {
     text
 }
 
+/// A part of the laboratory and what is said of it.
+type Line = (&'static str, String);
+
 /// One line for each part, `off` where it is left out.
 fn of_laboratory(laboratory: &Laboratory) -> String {
-    let (hammer, sensors, recorder) = (
-        &laboratory.hammer,
-        &laboratory.sensors,
-        &laboratory.recorder,
-    );
-    let off = |value: f64, text: String| if value == 0.0 { "off".to_owned() } else { text };
-    let percent = |value: f64| off(value, format!("{} %", 100.0 * value));
-    let lines = [
+    let damping = ("damping", of_damping(&laboratory.specimen.damping));
+    of_hammer(&laboratory.hammer)
+        .into_iter()
+        .chain(of_sensors(&laboratory.sensors))
+        .chain(of_recorder(&laboratory.recorder))
+        .chain([damping])
+        .map(|(name, value)| format!("  {name:<18} {value}\n"))
+        .collect()
+}
+
+fn off(value: f64, text: String) -> String {
+    if value == 0.0 { "off".to_owned() } else { text }
+}
+
+fn percent(value: f64) -> String {
+    off(value, format!("{} %", 100.0 * value))
+}
+
+fn of_hammer(hammer: &HammerSettings) -> Vec<Line> {
+    let place = format!("{} mm", 1e3 * hammer.place_scatter);
+    vec![
         ("hammer", format!("{} N at level 1", hammer.peak_force)),
         ("scatter of level", percent(hammer.level_scatter)),
         ("scatter of length", percent(hammer.length_scatter)),
-        (
-            "scatter of place",
-            off(
-                hammer.place_scatter,
-                format!("{} mm", 1e3 * hammer.place_scatter),
-            ),
-        ),
+        ("scatter of place", off(hammer.place_scatter, place)),
         ("double hits", percent(hammer.double_hits)),
         ("weak hits", percent(hammer.weak_hits)),
         ("lead", format!("{} s", hammer.lead)),
+    ]
+}
+
+fn of_sensors(sensors: &SensorSettings) -> Vec<Line> {
+    let good = "times 0.003 m/s2, 2e-6 m/s, 1e-7 m, 0.005 N (rms)";
+    let hertz = |value: f64| off(value, format!("{value} Hz"));
+    vec![
         (
             "noise",
-            off(
-                sensors.noise,
-                format!(
-                    "{} times 0.003 m/s2, 2e-6 m/s, 1e-7 m, 0.005 N (rms)",
-                    sensors.noise
-                ),
-            ),
+            off(sensors.noise, format!("{} {good}", sensors.noise)),
         ),
         ("sensitivities", percent(sensors.sensitivity_error)),
-        (
-            "AC coupling",
-            off(sensors.ac_coupling, format!("{} Hz", sensors.ac_coupling)),
-        ),
-        (
-            "mounting",
-            off(
-                sensors.mounting_resonance,
-                format!("{} Hz", sensors.mounting_resonance),
-            ),
-        ),
-        (
-            "anti-alias filter",
-            match recorder.anti_alias {
-                AntiAlias::On => "flat to rate/2.56".to_owned(),
-                AntiAlias::Off => "off".to_owned(),
-            },
-        ),
+        ("AC coupling", hertz(sensors.ac_coupling)),
+        ("mounting", hertz(sensors.mounting_resonance)),
+    ]
+}
+
+fn of_recorder(recorder: &RecorderSettings) -> Vec<Line> {
+    let part = |value: f64| off(value, format!("{value:e} of full scale"));
+    let hum = format!("{:e} of full scale at {} Hz", recorder.hum, recorder.mains);
+    let filter = match recorder.anti_alias {
+        AntiAlias::On => "flat to rate/2.56".to_owned(),
+        AntiAlias::Off => "off".to_owned(),
+    };
+    let clock = format!("{:+e}", recorder.clock_error);
+    vec![
+        ("anti-alias filter", filter),
         ("bits", recorder.bits.to_string()),
-        (
-            "mains hum",
-            off(
-                recorder.hum,
-                format!("{} of full scale at {} Hz", recorder.hum, recorder.mains),
-            ),
-        ),
-        (
-            "drift",
-            off(recorder.drift, format!("{} of full scale", recorder.drift)),
-        ),
-        (
-            "offset",
-            off(
-                recorder.offset,
-                format!("{} of full scale", recorder.offset),
-            ),
-        ),
-        (
-            "clock",
-            off(recorder.clock_error, format!("{:+e}", recorder.clock_error)),
-        ),
-        ("damping", of_damping(&laboratory.specimen.damping)),
-    ];
-    lines
-        .iter()
-        .map(|(name, value)| format!("  {name:<18} {value}\n"))
-        .collect()
+        ("mains hum", off(recorder.hum, hum)),
+        ("drift", part(recorder.drift)),
+        ("offset", part(recorder.offset)),
+        ("clock", off(recorder.clock_error, clock)),
+    ]
 }
 
 fn of_damping(damping: &Damping) -> String {

@@ -4,8 +4,11 @@ use super::{samples, tapjoint};
 use serde_json::Value;
 use std::path::Path;
 
+/// A grid and its component.
+type End = (usize, usize);
+
 /// Stiffness, first and second (grid, component) of each CELAS2 of a deck; no second = ground.
-fn celas(deck: &str) -> Vec<(f64, (usize, usize), Option<(usize, usize)>)> {
+fn celas(deck: &str) -> Vec<(f64, End, Option<End>)> {
     let lines: Vec<&str> = deck.lines().collect();
     let springs = lines
         .iter()
@@ -86,17 +89,14 @@ fn recover_three_springs_are_the_inverse_of_the_compliance() {
         [1.0 / of(&found, "kt"), cross],
         [cross, 1.0 / of(&found, "kr")],
     ];
-    for i in 0..2 {
-        for j in 0..2 {
-            let product: f64 = (0..2).map(|m| stiffness[i][m] * compliance[m][j]).sum();
-            let size: f64 = (0..2)
-                .map(|m| (stiffness[i][m] * compliance[m][j]).abs())
-                .sum();
+    let column = |j: usize| compliance.map(|row| row[j]);
+    for (i, row) in stiffness.iter().enumerate() {
+        for j in [0, 1] {
+            let terms = || row.iter().zip(column(j)).map(|(k, c)| k * c);
+            let (product, size) = (terms().sum::<f64>(), terms().map(f64::abs).sum::<f64>());
             let unit = if i == j { 1.0 } else { 0.0 };
-            assert!(
-                (product - unit).abs() < DIGITS * size,
-                "[{i}][{j}] {product}"
-            );
+            let off = (product - unit).abs();
+            assert!(off < DIGITS * size, "[{i}][{j}] {product}");
         }
     }
 }

@@ -4,7 +4,7 @@
 use super::catalogue::Size;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Small};
-use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear};
+use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear, optimum_at};
 use super::noise::{self, Reading};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -120,8 +120,7 @@ pub(super) fn over_drifts(
     let mut all = Vec::new();
     for &drift in drifts {
         let own = with_drift(frame, layout, known, drift);
-        let moved =
-            linear_optimum(&frame.readings, &own, &optimum).unwrap_or_else(|| optimum.clone());
+        let moved = moved_optimum(&frame.readings, layout, (&own, &optimum));
         let log_evidence = log_evidence(&frame.readings, layout, &own, &moved);
         all.push(log_evidence);
         if best
@@ -156,6 +155,23 @@ pub(super) fn linear_optimum(
         (&at.parameters, &at.model.predicted),
         &at.model.slopes,
     )
+}
+
+/// The same with the effects kept as they are: the other parameters are so nearly linear that another
+/// spread of the drift moves them as the linearised model says, sizes and places are not.
+fn moved_optimum(
+    readings: &[Reading],
+    layout: &Layout,
+    (known, at): (&[Knowledge], &Optimum),
+) -> Optimum {
+    let mut held = known.to_vec();
+    for k in layout.joint.len()..layout.smalls() {
+        held[k] = Knowledge::held(at.parameters[k]);
+    }
+    match linear_optimum(readings, &held, at) {
+        Some(moved) => optimum_at(readings, known, moved.parameters, moved.model),
+        None => at.clone(),
+    }
 }
 
 /// Logarithm of the mean of exponentials.

@@ -202,12 +202,8 @@ impl Search<'_> {
         }
         found.sort_by(|a, b| a.optimum.objective.total_cmp(&b.optimum.objective));
         let best = found.first()?.clone();
-        let place_std = covariance(&best.knowledge, &best.optimum)
-            .map_or(f64::INFINITY, |covariance| {
-                covariance[(at + 1, at + 1)].max(0.0).sqrt()
-            });
         let of_maxima: Vec<f64> = found.iter().map(|branch| branch.log_evidence).collect();
-        let total = if place_std < 0.7 * spacing {
+        let total = if stands_out(&best, at, spacing) {
             log_sum(&of_maxima)
         } else {
             log_mean(&evidence)
@@ -219,7 +215,8 @@ impl Search<'_> {
     /// where the size is so badly known that the parabola need not hold.
     fn bend(&self, forward: &Forward<'_>, branch: &Branch) -> f64 {
         let index = forward.layout.effects.len() - 1;
-        if index > 0 {
+        // Beside another effect, or at a place that is itself sought, the parabola has to do.
+        if index > 0 || forward.layout.effects[index].place.is_some() {
             return 0.0;
         }
         let at = forward.layout.size(index);
@@ -288,6 +285,17 @@ fn marginal_log(branch: &Branch, optimum: &Optimum, size: usize) -> Option<f64> 
             .map(|x| x.ln())
             .sum::<f64>();
     Some(-optimum.objective - 0.5 * log_det)
+}
+
+/// Whether the readings fix an effect's place within the nodes' spacing, and its size so far from
+/// nothing that size and place are Gaussian together.
+fn stands_out(branch: &Branch, size: usize, spacing: f64) -> bool {
+    let Some(covariance) = covariance(&branch.knowledge, &branch.optimum) else {
+        return false;
+    };
+    let std = |k: usize| covariance[(k, k)].max(0.0).sqrt();
+    let away = (branch.optimum.parameters[size] - branch.knowledge[size].centre).abs();
+    std(size + 1) < 0.7 * spacing && away > 4.0 * std(size)
 }
 
 /// Straight lines between points; beyond them nothing.

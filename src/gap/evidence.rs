@@ -266,6 +266,13 @@ const POINTS: usize = 160;
 /// ln of the integral of prior(t) exp(-g (t - t0) - h (t - t0)^2/2 + regularisation(t)) dt, where the
 /// objective with its normal regularisation has slope g and curvature h at t0.
 fn over_size(size: &Size, known: &Knowledge, (at, slope, curvature): (f64, f64, f64)) -> f64 {
+    // Only at an end of the range may the optimum have a slope, and only outwards; elsewhere a slope
+    // says that the search got stuck, and promises what no structure has.
+    let slope = match slope {
+        slope if at <= size.low => slope.max(0.0),
+        slope if at >= size.high => slope.min(0.0),
+        _ => 0.0,
+    };
     let log_likelihood = |t: f64| {
         let away = t - at;
         let regular = (t - known.centre) / known.std;

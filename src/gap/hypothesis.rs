@@ -39,6 +39,9 @@ pub(super) fn fit_nominal(frame: &Frame, settings: &GapSettings) -> Option<Fit> 
     })
 }
 
+/// Nodes of a place at which the true model is fitted.
+const CORRECTED: usize = 6;
+
 /// One effect, or a second beside a first one, from the optimum of the model without it.
 pub(super) struct Search<'a> {
     pub(super) frame: &'a Frame,
@@ -180,7 +183,30 @@ impl Search<'_> {
                 ));
             }
         }
+        self.correct(forward, &mut nodes);
         self.refine(forward, (&known, spacing), &nodes)
+    }
+
+    /// Puts the true model in the place of the linearised one at the most promising nodes: a fixture near
+    /// a mode's frequency promises what it does not hold. The others are worth at most as much as these.
+    fn correct(&self, forward: &Forward<'_>, nodes: &mut [Branch]) {
+        let mut order: Vec<usize> = (0..nodes.len()).collect();
+        order.sort_by(|&a, &b| nodes[b].log_evidence.total_cmp(&nodes[a].log_evidence));
+        let (first, others) = order.split_at(CORRECTED.min(nodes.len()));
+        let mut least = f64::INFINITY;
+        for &node in first {
+            let linear = &nodes[node];
+            let start = linear.optimum.parameters.clone();
+            let drifts = &self.settings.drift_stds;
+            match evaluate(forward, &linear.knowledge.clone(), &start, drifts) {
+                Some(branch) => nodes[node] = branch,
+                None => nodes[node].log_evidence = f64::NEG_INFINITY,
+            }
+            least = least.min(nodes[node].log_evidence);
+        }
+        for &node in others {
+            nodes[node].log_evidence = nodes[node].log_evidence.min(least);
+        }
     }
 
     /// Frees the place from the best nodes. Where the readings fix it within the nodes' spacing, the

@@ -165,8 +165,12 @@ fn moved_optimum(
     (known, at): (&[Knowledge], &Optimum),
 ) -> Optimum {
     let mut held = known.to_vec();
-    for k in layout.joint.len()..layout.smalls() {
-        held[k] = Knowledge::held(at.parameters[k]);
+    let effects = layout.joint.len()..layout.smalls();
+    for (known, value) in held[effects.clone()]
+        .iter_mut()
+        .zip(&at.parameters[effects])
+    {
+        *known = Knowledge::held(*value);
     }
     match linear_optimum(readings, &held, at) {
         Some(moved) => optimum_at(readings, known, moved.parameters, moved.model),

@@ -88,7 +88,7 @@ impl PlaceRange {
 }
 
 /// Parts of the prior of a size, as shares of its scale.
-const WIDTHS: [f64; 3] = [1.0, 0.25, 0.0625];
+const WIDTHS: [f64; 2] = [1.0, 0.4];
 
 impl Size {
     /// Logarithm of the prior density (1 over the unit of the size).

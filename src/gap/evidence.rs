@@ -4,7 +4,7 @@
 use super::catalogue::Size;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Small};
-use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear};
+use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear, optimum_at};
 use super::noise::{self, Reading};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -120,8 +120,7 @@ pub(super) fn over_drifts(
     let mut all = Vec::new();
     for &drift in drifts {
         let own = with_drift(frame, layout, known, drift);
-        let moved =
-            linear_optimum(&frame.readings, &own, &optimum).unwrap_or_else(|| optimum.clone());
+        let moved = moved_optimum(&frame.readings, layout, (&own, &optimum));
         let log_evidence = log_evidence(&frame.readings, layout, &own, &moved);
         all.push(log_evidence);
         if best
@@ -156,6 +155,27 @@ pub(super) fn linear_optimum(
         (&at.parameters, &at.model.predicted),
         &at.model.slopes,
     )
+}
+
+/// The same with the effects kept as they are: the other parameters are so nearly linear that another
+/// spread of the drift moves them as the linearised model says, sizes and places are not.
+fn moved_optimum(
+    readings: &[Reading],
+    layout: &Layout,
+    (known, at): (&[Knowledge], &Optimum),
+) -> Optimum {
+    let mut held = known.to_vec();
+    let effects = layout.joint.len()..layout.smalls();
+    for (known, value) in held[effects.clone()]
+        .iter_mut()
+        .zip(&at.parameters[effects])
+    {
+        *known = Knowledge::held(*value);
+    }
+    match linear_optimum(readings, &held, at) {
+        Some(moved) => optimum_at(readings, known, moved.parameters, moved.model),
+        None => at.clone(),
+    }
 }
 
 /// Logarithm of the mean of exponentials.
@@ -250,6 +270,13 @@ const POINTS: usize = 160;
 /// ln of the integral of prior(t) exp(-g (t - t0) - h (t - t0)^2/2 + regularisation(t)) dt, where the
 /// objective with its normal regularisation has slope g and curvature h at t0.
 fn over_size(size: &Size, known: &Knowledge, (at, slope, curvature): (f64, f64, f64)) -> f64 {
+    // Only at an end of the range may the optimum have a slope, and only outwards; elsewhere a slope
+    // says that the search got stuck, and promises what no structure has.
+    let slope = match slope {
+        slope if at <= size.low => slope.max(0.0),
+        slope if at >= size.high => slope.min(0.0),
+        _ => 0.0,
+    };
     let log_likelihood = |t: f64| {
         let away = t - at;
         let regular = (t - known.centre) / known.std;

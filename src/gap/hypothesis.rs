@@ -39,6 +39,9 @@ pub(super) fn fit_nominal(frame: &Frame, settings: &GapSettings) -> Option<Fit> 
     })
 }
 
+/// Nodes of a place at which the true model is fitted.
+const CORRECTED: usize = 6;
+
 /// One effect, or a second beside a first one, from the optimum of the model without it.
 pub(super) struct Search<'a> {
     pub(super) frame: &'a Frame,
@@ -180,7 +183,30 @@ impl Search<'_> {
                 ));
             }
         }
+        self.correct(forward, &mut nodes);
         self.refine(forward, (&known, spacing), &nodes)
+    }
+
+    /// Puts the true model in the place of the linearised one at the most promising nodes: a fixture near
+    /// a mode's frequency promises what it does not hold. The others are worth at most as much as these.
+    fn correct(&self, forward: &Forward<'_>, nodes: &mut [Branch]) {
+        let mut order: Vec<usize> = (0..nodes.len()).collect();
+        order.sort_by(|&a, &b| nodes[b].log_evidence.total_cmp(&nodes[a].log_evidence));
+        let (first, others) = order.split_at(CORRECTED.min(nodes.len()));
+        let mut least = f64::INFINITY;
+        for &node in first {
+            let linear = &nodes[node];
+            let start = linear.optimum.parameters.clone();
+            let drifts = &self.settings.drift_stds;
+            match evaluate(forward, &linear.knowledge.clone(), &start, drifts) {
+                Some(branch) => nodes[node] = branch,
+                None => nodes[node].log_evidence = f64::NEG_INFINITY,
+            }
+            least = least.min(nodes[node].log_evidence);
+        }
+        for &node in others {
+            nodes[node].log_evidence = nodes[node].log_evidence.min(least);
+        }
     }
 
     /// Frees the place from the best nodes. Where the readings fix it within the nodes' spacing, the
@@ -202,12 +228,8 @@ impl Search<'_> {
         }
         found.sort_by(|a, b| a.optimum.objective.total_cmp(&b.optimum.objective));
         let best = found.first()?.clone();
-        let place_std = covariance(&best.knowledge, &best.optimum)
-            .map_or(f64::INFINITY, |covariance| {
-                covariance[(at + 1, at + 1)].max(0.0).sqrt()
-            });
         let of_maxima: Vec<f64> = found.iter().map(|branch| branch.log_evidence).collect();
-        let total = if place_std < 0.7 * spacing {
+        let total = if stands_out(&best, at, spacing) {
             log_sum(&of_maxima)
         } else {
             log_mean(&evidence)
@@ -219,7 +241,8 @@ impl Search<'_> {
     /// where the size is so badly known that the parabola need not hold.
     fn bend(&self, forward: &Forward<'_>, branch: &Branch) -> f64 {
         let index = forward.layout.effects.len() - 1;
-        if index > 0 {
+        // Beside another effect, or at a place that is itself sought, the parabola has to do.
+        if index > 0 || forward.layout.effects[index].place.is_some() {
             return 0.0;
         }
         let at = forward.layout.size(index);
@@ -288,6 +311,17 @@ fn marginal_log(branch: &Branch, optimum: &Optimum, size: usize) -> Option<f64> 
             .map(|x| x.ln())
             .sum::<f64>();
     Some(-optimum.objective - 0.5 * log_det)
+}
+
+/// Whether the readings fix an effect's place within the nodes' spacing, and its size so far from
+/// nothing that size and place are Gaussian together.
+fn stands_out(branch: &Branch, size: usize, spacing: f64) -> bool {
+    let Some(covariance) = covariance(&branch.knowledge, &branch.optimum) else {
+        return false;
+    };
+    let std = |k: usize| covariance[(k, k)].max(0.0).sqrt();
+    let away = (branch.optimum.parameters[size] - branch.knowledge[size].centre).abs();
+    std(size + 1) < 0.7 * spacing && away > 4.0 * std(size)
 }
 
 /// Straight lines between points; beyond them nothing.

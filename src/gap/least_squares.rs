@@ -154,7 +154,8 @@ fn advance(
     None
 }
 
-fn optimum_at(
+/// What the readings say of a point.
+pub(super) fn optimum_at(
     readings: &[Reading],
     knowledge: &[Knowledge],
     parameters: Vec<f64>,

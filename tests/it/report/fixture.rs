@@ -34,6 +34,7 @@ pub fn document() -> Document {
         prediction: Some(prediction()),
         perturbation: Some(perturbation()),
         resolution_span: Some(vec![span()]),
+        gap: None,
         quality: Some(quality()),
         warnings: vec![
             WarningSection {

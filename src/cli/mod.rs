@@ -23,6 +23,7 @@ mod init;
 mod inspect;
 mod man;
 mod perturb;
+mod plan;
 mod predict;
 mod reproduce;
 mod resolution;
@@ -64,6 +65,7 @@ enum Command {
     Identify(identify::IdentifyArguments),
     Predict(predict::PredictArguments),
     Perturb(perturb::PerturbArguments),
+    Plan(plan::PlanArguments),
     Diagnose(diagnose::DiagnoseArguments),
     BlindCheck(blind_check::BlindCheckArguments),
     Resolution(resolution::ResolutionArguments),
@@ -120,6 +122,7 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
         Command::Identify(arguments) => identify::run(arguments, terminal),
         Command::Predict(arguments) => predict::run(arguments, terminal),
         Command::Perturb(arguments) => perturb::run(arguments, line.common.seed, terminal),
+        Command::Plan(arguments) => plan::run(arguments, line.common.seed, terminal),
         Command::Diagnose(arguments) => diagnose::run(arguments, line.common.seed, terminal),
         Command::BlindCheck(arguments) => blind_check::run(arguments, line.common.seed, terminal),
         Command::Resolution(arguments) => resolution::run(arguments, line.common.seed, terminal),

@@ -28,8 +28,17 @@ pub fn diagnose_test(
 
 /// The structure as described, with the joint as estimated: where the diagnosis begins.
 pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
+    let found = analysis.identification.as_ref().and_then(|found| {
+        let estimate = found.consistent.as_ref()?;
+        Some([estimate.joint.kx, estimate.joint.ky])
+    });
+    nominal_with(test, found)
+}
+
+/// The structure as described; a joint whose stiffnesses are not described has these Kx and Ky (1).
+pub fn nominal_with(test: &TestDescription, found: Option<[f64; 2]>) -> Nominal {
     let beam = described_beam(test);
-    let mut specimen = Specimen::new(body(test, beam), joint(test, analysis, &beam));
+    let mut specimen = Specimen::new(body(test, beam), joint(test, found, &beam));
     specimen.shear_rotary = match test.joint.beam {
         BeamTheory::Euler => 0.0,
         BeamTheory::Timoshenko => 1.0,
@@ -76,14 +85,10 @@ fn body(test: &TestDescription, whole: Beam) -> Body {
 }
 
 /// Known stiffnesses, else the estimate's, else usual ones.
-fn joint(test: &TestDescription, analysis: &Analysis, beam: &Beam) -> SpecimenJoint {
+fn joint(test: &TestDescription, found: Option<[f64; 2]>, beam: &Beam) -> SpecimenJoint {
     if test.joint.kind == JointKind::Free {
         return SpecimenJoint::Free;
     }
-    let found = analysis.identification.as_ref().and_then(|found| {
-        let estimate = found.consistent.as_ref()?;
-        Some([estimate.joint.kx, estimate.joint.ky])
-    });
     let units = StiffnessUnits::of(beam);
     let start = |known: Option<KnownStiffness>, index: usize, unit: f64| match known {
         Some(KnownStiffness::Rigid) => f64::INFINITY,

@@ -45,7 +45,7 @@ pub use analysis::{
 pub use consistent::{StructureDetails, structure_details};
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use functions::{FunctionSettings, run_functions};
-pub use gap::{diagnose_test, nominal};
+pub use gap::{diagnose_test, nominal, nominal_with};
 pub use identification::{EstimateMethod, IdentifySettings, identify};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use model::{KnownJoint, TestedStructure, tested_structure};

@@ -105,6 +105,7 @@ fn regress_help_of_every_command_names_an_example() {
         "reproduce",
         "export",
         "diagnose",
+        "plan",
         "blind-check",
         "completions",
         "man",

@@ -69,7 +69,7 @@ fn draw_cell(drawing: &mut Drawing, (x, y): (f64, f64), (count, total): (usize, 
 }
 
 /// All classes in the catalogue's order, each group once; `resolution` shares its group.
-fn classes() -> Vec<Class> {
+pub(super) fn classes() -> Vec<Class> {
     let mut classes = vec![Class::None];
     for id in EffectId::ALL {
         let class = Class::Group(id.group());

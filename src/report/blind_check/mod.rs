@@ -4,6 +4,9 @@
 mod closure_plot;
 mod confusion_plot;
 mod reliability_plot;
+mod tell_apart;
+
+pub use tell_apart::tell_apart;
 
 use serde_json::{Value, json};
 
@@ -45,6 +48,14 @@ pub fn render_blind_check(cases: &[Case], scores: &Scores) -> Result<Vec<ReportF
         }
     }
     Ok(files)
+}
+
+/// The confusion matrix as PNG.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn.
+pub fn render_confusion_png(cases: &[Case]) -> Result<Vec<u8>, ReportError> {
+    render_png(&confusion_plot::draw_confusion(cases))
 }
 
 /// The truths as a list of `{"name", "effects", "params"}`, one line for each.

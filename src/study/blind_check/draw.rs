@@ -8,13 +8,13 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::case::{Planted, Truth};
 use super::outside::{Fastened, OutsideKind};
+use super::sizes::{GROUPS, draw_effect};
 use crate::description::{DescriptionError, TestDescription};
 use crate::effects::{Effect, EffectError, EffectId};
 use crate::simulate::{Damping, Laboratory, SimulateError};
@@ -145,7 +145,7 @@ impl Campaign {
         let mut effects = Vec::new();
         let mut fastened = Fastened::default();
         for group in groups_of(plant, &mut random) {
-            let effect = subject.draw_effect(GROUPS[group], &mut random)?;
+            let effect = draw_effect(&subject.beam, GROUPS[group], &mut random)?;
             let values = effect
                 .values()
                 .map(|(info, value)| (info.name.to_owned(), value));
@@ -192,23 +192,6 @@ impl Campaign {
     }
 }
 
-/// The groups that single effects are dealt from; `resolution` is a reading bias that recordings
-/// cannot hold, `joint-drift` a nuisance that every test has.
-const GROUPS: [&[EffectId]; 12] = [
-    &[EffectId::SensorMass],
-    &[EffectId::SensorCable],
-    &[EffectId::CrossCoupling],
-    &[EffectId::JointMass],
-    &[EffectId::JointNonlinearity],
-    &[EffectId::JointDamping],
-    &[EffectId::Fixture],
-    &[EffectId::Modulus, EffectId::Length, EffectId::Timebase],
-    &[EffectId::AddedMass],
-    &[EffectId::LocalCrack],
-    &[EffectId::AxialLoad],
-    &[EffectId::ShearRotary],
-];
-
 fn groups_of(plant: Plant, random: &mut ChaCha8Rng) -> Vec<usize> {
     match plant {
         Plant::Single(number) => vec![number % GROUPS.len()],
@@ -251,64 +234,6 @@ impl Subject {
             kx: 1400.0 * normal(0.5, random),
             ky: 4.8 * normal(0.3, random),
         }
-    }
-
-    /// One effect of a group with a size between what is small and what is large.
-    fn draw_effect(
-        &self,
-        group: &[EffectId],
-        random: &mut ChaCha8Rng,
-    ) -> Result<Effect, EffectError> {
-        let id = *group.choose(random).unwrap_or(&group[0]);
-        let beam = &self.beam;
-        // Masses as they would be on a beam of 0.83 kg.
-        let gram = 1e-3 * beam.mass() / 0.83;
-        let (stiffness, length) = (beam.bending_stiffness(), beam.length);
-        let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
-        let mut size = |low: f64, high: f64| (random.random_range(low.ln()..high.ln())).exp();
-        let pairs: Vec<(&str, f64)> = match id {
-            EffectId::SensorMass => vec![("mass", gram * size(2.0, 24.0))],
-            EffectId::SensorCable => {
-                vec![("stiffness", size(0.01, 0.3) * stiffness / length.powi(3))]
-            }
-            EffectId::CrossCoupling => vec![("coupling", sign * size(0.03, 0.35))],
-            EffectId::JointMass => {
-                let mass = gram * size(10.0, 100.0);
-                // Bolts and washers: 15 mm radius of gyration.
-                vec![("mass", mass), ("inertia", mass * 0.015f64.powi(2))]
-            }
-            EffectId::JointNonlinearity => {
-                let slips = size(0.1, 10.0) < 1.0;
-                let ratio = size(0.008, 0.08);
-                let exponent = if slips { 1.0 } else { 2.0 };
-                vec![
-                    ("ratio", if slips { -ratio } else { sign * ratio }),
-                    ("exponent", exponent),
-                ]
-            }
-            EffectId::JointDamping => vec![("loss_factor", size(0.003, 0.05))],
-            EffectId::Fixture => vec![
-                ("frequency", size(65.0, 800.0)),
-                ("ratio", size(0.005, 0.08)),
-            ],
-            EffectId::Modulus => vec![("relative", sign * size(0.003, 0.03))],
-            EffectId::Length => vec![("relative", sign * size(0.0012, 0.007))],
-            EffectId::Timebase => vec![("relative", sign * size(2e-5, 1e-3))],
-            EffectId::AddedMass => vec![
-                ("mass", gram * size(2.0, 24.0)),
-                ("position", length * random.random_range(0.15..1.0)),
-            ],
-            EffectId::LocalCrack => vec![
-                ("compliance", size(0.003, 0.04)),
-                ("position", length * random.random_range(0.08..0.75)),
-            ],
-            EffectId::AxialLoad => {
-                vec![("force", sign * size(0.02, 0.5) * stiffness / length.powi(2))]
-            }
-            EffectId::ShearRotary => vec![("factor", size(0.5, 3.0))],
-            EffectId::JointDrift | EffectId::Resolution => Vec::new(),
-        };
-        Effect::from_pairs(id, &pairs)
     }
 
     fn describe(&self, name: &str, extent: Extent, random: &mut ChaCha8Rng) -> String {

@@ -19,6 +19,7 @@ mod outside;
 mod rate;
 mod record;
 mod score;
+mod sizes;
 mod table;
 mod truth_file;
 
@@ -31,5 +32,6 @@ pub use outside::{Fastened, OutsideKind};
 pub use rate::Rate;
 pub use record::{Recorded, RecordedTest};
 pub use score::{Case, SET_SHARE, Scores, score};
+pub use sizes::{GROUPS, draw_effect};
 pub use table::{Row, Target, render_rows, rows};
 pub use truth_file::{TruthError, parse_truths};

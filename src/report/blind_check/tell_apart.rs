@@ -1,0 +1,65 @@
+//! What a test could tell apart, as a table for a terminal.
+
+use std::collections::BTreeMap;
+
+use super::confusion_plot::classes;
+use crate::study::blind_check::{Case, Class, Verdict, render_rows, rows, score};
+
+/// For each kind of effect: how often it came first, how often it was named, and what came first
+/// instead; then the figures.
+pub fn tell_apart(cases: &[Case]) -> String {
+    let mut text = format!(
+        "{:<20}{:>7}{:>8}  {}\n",
+        "planted", "first", "named", "else first"
+    );
+    for class in classes() {
+        let own: Vec<&Case> = cases
+            .iter()
+            .filter(|(truth, _)| truth.class() == Some(class))
+            .collect();
+        if own.is_empty() {
+            continue;
+        }
+        let first = own
+            .iter()
+            .filter(|(_, answer)| answer.first().is_some_and(|found| found.0 == class))
+            .count();
+        let named = own
+            .iter()
+            .filter(|(_, answer)| match answer.verdict {
+                Verdict::Named => answer
+                    .named_groups()
+                    .iter()
+                    .any(|g| Class::Group(*g) == class),
+                Verdict::NoGap => class == Class::None,
+                _ => false,
+            })
+            .count();
+        let line = format!(
+            "{:<20}{:>7}{:>8}  {}",
+            class.name(),
+            format!("{first}/{}", own.len()),
+            format!("{named}/{}", own.len()),
+            others(&own, class)
+        );
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    format!("{text}\n{}", render_rows(&rows(&score(cases))))
+}
+
+/// "cross-coupling 2, none 1".
+fn others(cases: &[&Case], own: Class) -> String {
+    let mut counts: BTreeMap<Class, usize> = BTreeMap::new();
+    for (_, answer) in cases {
+        match answer.first() {
+            Some((class, _)) if class != own => *counts.entry(class).or_insert(0) += 1,
+            _ => {}
+        }
+    }
+    let words: Vec<String> = counts
+        .iter()
+        .map(|(class, count)| format!("{} {count}", class.name()))
+        .collect();
+    words.join(", ")
+}

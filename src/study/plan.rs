@@ -1,0 +1,189 @@
+//! What a planned test could tell apart: effects are drawn, the plan observes them, and the diagnosis
+//! that will judge the real test judges these.
+//!
+//! Observations are drawn, not recordings: the plan states how well frequencies, shapes, damping and
+//! changes along the decay will be known.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
+use crate::description::{JointKind, TestDescription};
+use crate::effects::{Effect, EffectError};
+use crate::gap::{
+    GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, observe,
+};
+use crate::pipeline::nominal_with;
+use crate::structure::specimen::Body;
+
+/// How a plan is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanSettings {
+    /// Tests drawn for each effect group and for none. 4.
+    pub draws: usize,
+    /// Modes that will be observed. 6.
+    pub modes: usize,
+    /// Relative standard uncertainty of a frequency (1). 0.03 %, five taps with fits.
+    pub frequency_std: f64,
+    /// Taps of each recording. 5.
+    pub taps: usize,
+    /// Standard deviation of the joint's stiffnesses between recordings (1). 0.5 %.
+    pub drift: f64,
+    /// Kx and Ky (1) of a joint that the description does not state.
+    pub joint: Option<[f64; 2]>,
+    /// Seed of what is drawn.
+    pub seed: u64,
+}
+
+impl Default for PlanSettings {
+    fn default() -> Self {
+        Self {
+            draws: 4,
+            modes: 6,
+            frequency_std: 3e-4,
+            taps: 5,
+            drift: 0.005,
+            joint: None,
+            seed: 0,
+        }
+    }
+}
+
+/// Why a plan cannot be judged.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The description names no recordings.
+    #[error(
+        "the description plans no recordings; give a [[recording]] with `file` and `tap` for each"
+    )]
+    NoRecordings,
+    /// A recording without a tap position.
+    #[error("recording \"{file}\" does not say where it will be tapped; give `tap` (m)")]
+    NoTap {
+        /// Its file.
+        file: String,
+    },
+    /// A sensor without a position.
+    #[error("sensor \"{name}\" has no position; give `position` (m)")]
+    NoPosition {
+        /// Its name.
+        name: String,
+    },
+    /// A structure of which the catalogue's sizes say nothing.
+    #[error("only cantilevers can be planned yet: sizes of effects are known for those alone")]
+    NotACantilever,
+    /// An effect out of its range.
+    #[error("an effect of usual size is out of range on this beam: {0}")]
+    Effect(#[from] EffectError),
+    /// The plan sees nothing that could be diagnosed.
+    #[error(transparent)]
+    Gap(#[from] GapError),
+}
+
+/// Draws, observes and diagnoses; `progress` is told how many tests are done.
+///
+/// # Errors
+/// [`PlanError`]: what the description must say and does not.
+pub fn judge_plan(
+    test: &TestDescription,
+    settings: &PlanSettings,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<Case>, PlanError> {
+    let nominal = nominal_with(test, settings.joint);
+    let plan = plan_of(test, settings)?;
+    let total = (GROUPS.len() + 1) * settings.draws;
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    (0..total)
+        .into_par_iter()
+        .map(|number| {
+            let case = case(&plan, &nominal, number, settings)?;
+            let before = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            progress(before + 1, total);
+            Ok(case)
+        })
+        .collect()
+}
+
+/// The recordings of the description as the diagnosis will see them.
+fn plan_of(test: &TestDescription, settings: &PlanSettings) -> Result<TestPlan, PlanError> {
+    if test.joint.kind != JointKind::Cantilever {
+        return Err(PlanError::NotACantilever);
+    }
+    if test.recordings.is_empty() {
+        return Err(PlanError::NoRecordings);
+    }
+    let levels = test
+        .recordings
+        .iter()
+        .map(|recording| recording.level.unwrap_or(1.0));
+    let hardest = levels.fold(0.0, f64::max);
+    let configurations = test.recordings.iter().map(|recording| {
+        let sensors = test.sensors.iter().map(|sensor| {
+            let place = recording.at.get(&sensor.name).copied().or(sensor.position);
+            let place = place.ok_or_else(|| PlanError::NoPosition {
+                name: sensor.name.clone(),
+            })?;
+            Ok((sensor.name.clone(), place))
+        });
+        Ok(PlannedConfiguration {
+            sensors: sensors.collect::<Result<_, PlanError>>()?,
+            tap: recording.tap.ok_or_else(|| PlanError::NoTap {
+                file: recording.file.display().to_string(),
+            })?,
+            level: recording.level.unwrap_or(1.0) / hardest,
+        })
+    });
+    Ok(TestPlan {
+        configurations: configurations.collect::<Result<_, PlanError>>()?,
+        modes: settings.modes,
+        taps: settings.taps,
+        frequency_std: settings.frequency_std,
+        // What fits of calibrated sensors reach: 3 % of the largest constant, 3 % of the damping.
+        shape_std: test.hammer.is_some().then_some(0.03),
+        damping_std: Some(0.03),
+        // A decay is followed over two e-folds with the accuracy of the frequency itself.
+        slope_std: Some(0.5 * settings.frequency_std),
+        drift: settings.drift,
+        damping: 0.003,
+    })
+}
+
+fn case(
+    plan: &TestPlan,
+    nominal: &Nominal,
+    number: usize,
+    settings: &PlanSettings,
+) -> Result<Case, PlanError> {
+    let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
+    random.set_stream(number as u64 + 1);
+    let effects: Vec<Effect> = match GROUPS.get(number / settings.draws) {
+        Some(group) => {
+            let (Body::One(beam) | Body::Joined([beam, _])) = &nominal.specimen.body;
+            vec![draw_effect(beam, group, &mut random)?]
+        }
+        None => Vec::new(),
+    };
+    let observed = observe(plan, nominal, &effects, random.random())?;
+    let truth = truth(number, &effects);
+    Ok(
+        match diagnose(&observed, nominal, &GapSettings::default()) {
+            Ok(diagnosis) => (truth.with_limits(&diagnosis), Answer::of(&diagnosis)),
+            Err(_) => (truth, Answer::none()),
+        },
+    )
+}
+
+fn truth(number: usize, effects: &[Effect]) -> Truth {
+    let planted = |effect: &Effect| {
+        let values = effect.values();
+        let values = values.map(|(info, value)| (info.name.to_owned(), value));
+        Planted::Catalogue(effect.id, values.collect())
+    };
+    Truth {
+        name: format!("draw-{number:03}"),
+        effects: effects.iter().map(planted).collect(),
+        detectable: None,
+        refutable: None,
+    }
+}

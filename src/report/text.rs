@@ -289,6 +289,10 @@ fn shortened(name: &str, width: usize) -> String {
     if letters.len() <= width {
         return name.to_owned();
     }
+    // The column's own head is a word, not a name: a shorter word stands for it.
+    if name == "Recording" {
+        return "File".to_owned();
+    }
     let kept = width.saturating_sub(1);
     let (head, tail) = (kept - kept / 2, kept / 2);
     let first = letters.iter().take(head);

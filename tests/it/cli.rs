@@ -489,8 +489,8 @@ fn regress_a_run_has_the_keys_that_scripts_read() {
             assert_keys(tap, &["time", "peak_force", "accepted", "reason"], "tap");
             assert_eq!(tap["accepted"], true, "{tap}");
             assert_eq!(tap["reason"], Value::Null, "{tap}");
-            // 20 N with 10 % scatter: three standard deviations.
-            assert!((14.0..26.0).contains(&number(&tap["peak_force"])), "{tap}");
+            // 20 N with 10 % scatter; the anti-alias filter rounds the short pulse off to two thirds.
+            assert!((9.0..26.0).contains(&number(&tap["peak_force"])), "{tap}");
         }
         for mode in recording["modes"].as_array().unwrap() {
             assert_keys(

@@ -162,8 +162,8 @@ impl Frame {
                     configuration,
                     mode: mode.mode,
                 });
-                // Uniform between the two poles of a decay that was split.
-                let split = twin(one, mode).unwrap_or(0.0) / 12.0_f64.sqrt();
+                // Anywhere between the poles of a decay that was split, on either side of this one.
+                let split = twin(one, mode).unwrap_or(0.0) / 3.0_f64.sqrt();
                 readings.push(Reading {
                     value: mode.frequency.ln(),
                     std: (std / mode.frequency).hypot(split),

@@ -10,7 +10,7 @@ use super::settings::GapSettings;
 use rayon::prelude::*;
 
 /// How many of the best single effects a second one is put beside.
-const FIRSTS: usize = 3;
+const FIRSTS: usize = 2;
 /// Logarithm of the Bayes factor from which a second effect is believed.
 const SECOND: f64 = 5.0;
 

@@ -83,8 +83,8 @@ pub(super) fn setup(
 /// Two poles nearer than this, relative, share one decay: 1 %.
 const TWIN: f64 = 0.01;
 
-/// Relative distance of the nearest peak that belongs to no mode, where it is so near that the fit has
-/// split one decay between the two: what is then read of the mode alone is unreliable. A joint whose
+/// Relative distance of the farthest peak that belongs to no mode and is so near that the fit has split
+/// one decay between the two: what is then read of the mode alone is unreliable. A joint whose
 /// stiffness changes with amplitude makes such pairs.
 pub(super) fn twin(configuration: &Configuration, mode: &ObservedMode) -> Option<f64> {
     let distance = |peak: &ExtraPeak| (peak.frequency / mode.frequency - 1.0).abs();
@@ -93,7 +93,7 @@ pub(super) fn twin(configuration: &Configuration, mode: &ObservedMode) -> Option
         .filter(|peak| peak.label == "unpaired")
         .map(distance)
         .filter(|distance| *distance < TWIN)
-        .min_by(f64::total_cmp)
+        .max_by(f64::total_cmp)
 }
 
 fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {

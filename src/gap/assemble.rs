@@ -36,7 +36,19 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks: &blocks,
         closure_low: hypotheses[best].closure.map(|closure| closure.low),
     };
-    let verdict = verdict(entries, &checks);
+    let nominal = entries
+        .iter()
+        .find(|entry| entry.hypothesis == Hypothesis::None)
+        .and_then(|none| Residuals::new(frame, &none.fit));
+    let nominal_blocks = nominal
+        .as_ref()
+        .map_or_else(Vec::new, |residuals| residuals.blocks(frame));
+    let none = Checks {
+        goodness: nominal.as_ref().and_then(Residuals::goodness),
+        blocks: &nominal_blocks,
+        closure_low: None,
+    };
+    let verdict = verdict(entries, &checks, &none);
     let pulls = match (&context.before, &after) {
         (Some(before), Some(after)) => pulls(frame, before, after),
         _ => Vec::new(),

@@ -4,7 +4,7 @@
 use super::noise::{self, Reading};
 use super::nominal::Nominal;
 use super::settings::GapSettings;
-use super::setup::{Setup, setup};
+use super::setup::{Setup, setup, twin};
 use crate::identify::observation::{DecayVerdict, Observations};
 use nalgebra::DMatrix;
 
@@ -162,9 +162,11 @@ impl Frame {
                     configuration,
                     mode: mode.mode,
                 });
+                // Anywhere between the poles of a decay that was split, on either side of this one.
+                let split = twin(one, mode).unwrap_or(0.0) / 3.0_f64.sqrt();
                 readings.push(Reading {
                     value: mode.frequency.ln(),
-                    std: std / mode.frequency,
+                    std: (std / mode.frequency).hypot(split),
                     freedom: mode.freedom.unwrap_or(f64::INFINITY),
                 });
             }
@@ -193,6 +195,9 @@ impl Frame {
         let mut ratios: Vec<(Row, Reading)> = Vec::new();
         for (configuration, one) in observations.configurations.iter().enumerate() {
             for mode in one.modes.iter().filter(|m| m.mode <= self.fitted_modes) {
+                if twin(one, mode).is_some() {
+                    continue;
+                }
                 let placed = |sensor: usize| {
                     one.sensors
                         .get(sensor)

@@ -2,10 +2,10 @@
 
 use super::catalogue::{Candidate, PlaceRange};
 use super::evidence::{
-    Branch, covariance, evaluate, knowledge, linear_optimum, log_integral, log_mean, log_sum,
-    over_drifts,
+    Branch, covariance, evaluate, knowledge, linear_optimum, log_integral, log_likelihood,
+    log_mean, log_sum, over_drifts,
 };
-use super::forward::Forward;
+use super::forward::{Forward, Layout};
 use super::frame::Frame;
 use super::least_squares::{Knowledge, Optimum, factor_of, maximise};
 use super::settings::GapSettings;
@@ -62,6 +62,27 @@ impl Search<'_> {
         }
     }
 
+    /// The same from where the second effect has its own optimum and the first is next to nothing, if
+    /// that leads further: two effects explain no less than each of them.
+    pub(super) fn add_from(&self, alone: &Fit) -> Option<Fit> {
+        let mut effects = self.without.effects.clone();
+        effects.extend_from_slice(&alone.effects);
+        let forward = Forward::new(self.frame, &effects);
+        let joint = forward.layout.joint.len();
+        let first = &self.without.branch.optimum.parameters;
+        let mut start = alone.branch.optimum.parameters.clone();
+        let own = Layout::new(self.frame, &self.without.effects).smalls() - joint;
+        for k in (joint..joint + own).rev() {
+            start.insert(joint, first[k]);
+        }
+        let size = &effects[0].size;
+        start[joint] = size.nothing + 0.02 * size.scale;
+        let known = self.known(&forward);
+        let branch = evaluate(&forward, &known, &start, &self.settings.drift_stds)?;
+        let evidence = branch.log_evidence;
+        Some(self.fit(&forward, branch, evidence))
+    }
+
     /// What is known of all parameters.
     fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
         let drifts = &self.settings.drift_stds;
@@ -105,10 +126,11 @@ impl Search<'_> {
 
     fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
         let bend = self.bend(forward, &branch);
+        let most = log_likelihood(&self.frame.readings, &branch.optimum);
         Fit {
             effects: forward.layout.effects.clone(),
             branch,
-            log_evidence: log_evidence + bend,
+            log_evidence: (log_evidence + bend).min(most),
         }
     }
 
@@ -347,9 +369,12 @@ fn peaks(evidence: &[f64]) -> Vec<usize> {
         .filter(|&k| evidence[k] >= value(k.checked_sub(1)) && evidence[k] >= value(Some(k + 1)))
         .collect();
     peaks.sort_by(|&a, &b| evidence[b].total_cmp(&evidence[a]));
-    // A peak 12 below the best has e^-12 of its probability.
+    // A peak 12 below the best has e^-12 of its probability. Where the nodes differ by far more than
+    // that, they lie too far apart to say which valley is the deepest.
     let best = value(peaks.first().copied());
-    peaks.retain(|&k| evidence[k] > best - 12.0);
+    let worst = evidence.iter().copied().filter(|e| e.is_finite());
+    let depth = best - worst.fold(best, f64::min);
+    peaks.retain(|&k| evidence[k] > best - f64::max(12.0, 0.5 * depth));
     peaks.truncate(3);
     peaks
 }

@@ -67,10 +67,13 @@ pub(super) struct Optimum {
     pub(super) gradient: DVector<f64>,
 }
 
-/// Steps of Gauss-Newton: from starts within the valley five suffice.
-const STEPS: usize = 12;
+/// Steps of Gauss-Newton: from starts within the valley five suffice, along bent valleys (a place and a
+/// size that trade against each other) thirty.
+const STEPS: usize = 30;
 /// The search ends when a step can gain no more than this in log probability.
 const GAIN: f64 = 1e-4;
+/// It also ends after two steps that lower the objective by less than this share of it.
+const IDLE: f64 = 1e-3;
 
 /// The parameters that maximise likelihood times prior. `model` says what is predicted at a point,
 /// `None` where there is no such structure.
@@ -87,21 +90,32 @@ pub(super) fn maximise(
         .collect();
     let first = model(&parameters)?;
     let mut optimum = optimum_at(readings, knowledge, parameters, first);
+    let mut damping = 0;
+    let mut idle = 0;
     for _ in 0..STEPS {
-        let Some(step) = bounded_step(&optimum, knowledge) else {
-            break;
-        };
-        // What the quadratic model promises: half the gradient along the step.
-        let promised = -0.5 * step.dot(&optimum.gradient);
-        if promised < GAIN {
+        if promised_gain(&optimum, knowledge).is_none_or(|gain| gain < GAIN) {
             break;
         }
-        match advance(readings, knowledge, &optimum, &step, model) {
-            Some(better) => optimum = better,
-            None => break,
+        let Some((better, used)) = advance(readings, knowledge, (&optimum, damping), model) else {
+            break;
+        };
+        // What hardly moves far from any agreement is no explanation; it need not be exact.
+        let moves = optimum.objective - better.objective > IDLE * better.objective;
+        idle = if moves { 0 } else { idle + 1 };
+        optimum = better;
+        damping = used.saturating_sub(1);
+        if idle > 1 {
+            break;
         }
     }
     Some(optimum)
+}
+
+/// What the quadratic model promises of a full step, half the gradient along it; `None` where no
+/// parameter is free.
+fn promised_gain(optimum: &Optimum, knowledge: &[Knowledge]) -> Option<f64> {
+    let step = bounded_step(optimum, knowledge, 0.0)?;
+    Some(-0.5 * step.dot(&optimum.gradient))
 }
 
 /// The same of a model that is linear: at `origin` it predicts `there`.
@@ -126,30 +140,33 @@ pub(super) fn maximise_linear(
     maximise(readings, knowledge, origin, &mut model)
 }
 
-/// The full step or a part of it, whichever first lowers the objective.
+/// Dampings of the step, as shares of the curvature's diagonal (Levenberg & Marquardt): they shorten it
+/// and turn it towards the steepest descent.
+const DAMPINGS: [f64; 7] = [0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
+
+/// The full step or a damped one, whichever first lowers the objective, and which damping it has; the
+/// weaker ones before `first` are not tried.
 fn advance(
     readings: &[Reading],
     knowledge: &[Knowledge],
-    from: &Optimum,
-    step: &DVector<f64>,
+    (from, first): (&Optimum, usize),
     model: &mut dyn FnMut(&[f64]) -> Option<Linearised>,
-) -> Option<Optimum> {
-    let mut share = 1.0;
-    for _ in 0..6 {
+) -> Option<(Optimum, usize)> {
+    for (used, damping) in DAMPINGS.iter().enumerate().skip(first) {
+        let step = bounded_step(from, knowledge, *damping)?;
         let parameters: Vec<f64> = from
             .parameters
             .iter()
             .zip(step.iter())
             .zip(knowledge)
-            .map(|((value, step), known)| (value + share * step).clamp(known.low, known.high))
+            .map(|((value, step), known)| (value + step).clamp(known.low, known.high))
             .collect();
         if let Some(linearised) = model(&parameters) {
             let trial = optimum_at(readings, knowledge, parameters, linearised);
             if trial.objective < from.objective {
-                return Some(trial);
+                return Some((trial, used));
             }
         }
-        share *= 0.3;
     }
     None
 }
@@ -198,15 +215,20 @@ pub(super) fn optimum_at(
     }
 }
 
-/// Newton's step on the parameters that are not pressed against a bound.
-fn bounded_step(optimum: &Optimum, knowledge: &[Knowledge]) -> Option<DVector<f64>> {
+/// Newton's step on the parameters that are not pressed against a bound, the curvature's diagonal
+/// raised by the share `damping`.
+fn bounded_step(optimum: &Optimum, knowledge: &[Knowledge], damping: f64) -> Option<DVector<f64>> {
     let count = optimum.parameters.len();
+    let mut curvature = optimum.curvature.clone();
+    for k in 0..count {
+        curvature[(k, k)] *= 1.0 + damping;
+    }
     let mut free: Vec<usize> = (0..count).filter(|&k| !knowledge[k].is_held()).collect();
     loop {
         if free.is_empty() {
             return None;
         }
-        let solution = factor_of(&optimum.curvature, &free)?.solve(&-DVector::from_iterator(
+        let solution = factor_of(&curvature, &free)?.solve(&-DVector::from_iterator(
             free.len(),
             free.iter().map(|&k| optimum.gradient[k]),
         ));

@@ -30,6 +30,7 @@ mod joint_energy;
 mod least_squares;
 mod noise;
 mod nominal;
+mod pairs;
 mod place_map;
 mod posterior;
 mod quality;

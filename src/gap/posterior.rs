@@ -41,8 +41,13 @@ impl Entry {
     }
 }
 
-/// Gives every group the same probability beforehand, split evenly inside; `none` and `unknown` are
-/// groups. Pairs share one unit among themselves. Sorts the most probable first.
+/// Probability beforehand that there is no gap, over that of one group of effects. The priors of all
+/// sizes reach zero, and an effect too small to be noticed is as good as none; and of a dozen things that
+/// may be wrong with a test mostly none is.
+const NONE_SHARE: f64 = 4.0;
+
+/// Gives every group the same probability beforehand, split evenly inside; `unknown` is a group, `none`
+/// has [`NONE_SHARE`] of them. Pairs share one unit among themselves. Sorts the most probable first.
 pub(super) fn set_probabilities(entries: &mut [Entry]) {
     let share = |entry: &Entry| -> f64 {
         let same = |other: &&Entry| match (&entry.hypothesis, &other.hypothesis) {
@@ -54,7 +59,11 @@ pub(super) fn set_probabilities(entries: &mut [Entry]) {
             }
             (own, other) => own == other,
         };
-        entries.iter().filter(same).count() as f64
+        let weight = match entry.hypothesis {
+            Hypothesis::None => NONE_SHARE,
+            _ => 1.0,
+        };
+        entries.iter().filter(same).count() as f64 / weight
     };
     let logs: Vec<f64> = entries
         .iter()

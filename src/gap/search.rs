@@ -8,8 +8,8 @@ use super::forward::Forward;
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search, fit_nominal};
 use super::nominal::Nominal;
+use super::pairs::add_pairs;
 use super::posterior::{Entry, set_probabilities};
-use super::quality::Residuals;
 use super::result::Hypothesis;
 use super::settings::GapSettings;
 use super::setup::Setup;
@@ -260,118 +260,6 @@ fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
     if most > 0.0 {
         for (setup, amplitude) in frame.setups.iter_mut().zip(&all) {
             setup.level = amplitude / most;
-        }
-    }
-}
-
-/// How many of the best single effects a second one is put beside.
-const FIRSTS: usize = 3;
-/// Logarithm of the Bayes factor from which a second effect is believed.
-const SECOND: f64 = 5.0;
-
-/// Where no single effect suffices: a second one beside each of the best.
-fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
-    let frame = &competition.frame;
-    let Some(best) = competition
-        .entries
-        .iter()
-        .position(|entry| entry.hypothesis != Hypothesis::Unknown)
-    else {
-        return;
-    };
-    if !misfits(frame, &competition.entries[best].fit) || frame.rows.len() < 6 {
-        return;
-    }
-    let firsts: Vec<&Entry> = competition
-        .entries
-        .iter()
-        .filter(|entry| entry.effects().len() == 1 && entry.drift.is_none())
-        .take(FIRSTS)
-        .collect();
-    let seconds = candidates(frame);
-    let tasks: Vec<(&Entry, Candidate)> = firsts
-        .iter()
-        .flat_map(|first| {
-            seconds
-                .iter()
-                .filter(|second| !first.groups().contains(&second.effect.group()))
-                .map(|second| (*first, *second))
-        })
-        .collect();
-    let found: Vec<Option<Entry>> = tasks
-        .par_iter()
-        .map(|(first, second)| {
-            let search = Search {
-                frame,
-                settings,
-                without: &first.fit,
-            };
-            let fit = search.add(*second)?;
-            // What the second effect has to beat is the better of the two by themselves.
-            let alone = competition
-                .entries
-                .iter()
-                .filter(|entry| {
-                    entry.effects() == [second.effect] || entry.effects() == first.effects()
-                })
-                .map(|entry| entry.fit.log_evidence)
-                .fold(f64::NEG_INFINITY, f64::max);
-            if fit.log_evidence < alone + SECOND || !improves(frame, &first.fit, &fit) {
-                return None;
-            }
-            let mut effects = first.effects().to_vec();
-            effects.push(second.effect);
-            Some(Entry::new(Hypothesis::Effects(effects), fit))
-        })
-        .collect();
-    let mut pairs: Vec<Entry> = Vec::new();
-    for pair in found.into_iter().flatten() {
-        let same = |other: &Entry| {
-            other
-                .effects()
-                .iter()
-                .all(|effect| pair.effects().contains(effect))
-        };
-        match pairs.iter_mut().find(|other| same(other)) {
-            Some(other) if other.fit.log_evidence < pair.fit.log_evidence => *other = pair,
-            Some(_) => {}
-            None => pairs.push(pair),
-        }
-    }
-    competition.entries.extend(pairs);
-    set_probabilities(&mut competition.entries);
-}
-
-/// Whether the readings refute a fit.
-fn misfits(frame: &Frame, fit: &Fit) -> bool {
-    Residuals::new(frame, fit).is_none_or(|residuals| {
-        let blocks = residuals.blocks(frame);
-        super::verdict::Checks {
-            goodness: residuals.goodness(),
-            blocks: &blocks,
-            closure_low: None,
-        }
-        .refuted()
-    })
-}
-
-/// Whether the readings that took no part, or each mode from the others, are predicted better.
-fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
-    use super::withheld::WithheldErrors;
-    match (
-        WithheldErrors::new(frame, before),
-        WithheldErrors::new(frame, after),
-    ) {
-        (Some(before), Some(after)) => {
-            after.rms() < before.rms() || after.rms() < 1.5 * after.floor()
-        }
-        _ => {
-            let left_out =
-                |fit: &Fit| Residuals::new(frame, fit).and_then(|r| r.left_out_rms(frame));
-            match (left_out(before), left_out(after)) {
-                (Some(before), Some(after)) => after < before,
-                _ => false,
-            }
         }
     }
 }

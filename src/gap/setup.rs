@@ -2,7 +2,7 @@
 
 use super::nominal::Nominal;
 use crate::effects::SensorPlace;
-use crate::identify::observation::{Configuration, ObservedMode};
+use crate::identify::observation::{Configuration, ExtraPeak, ObservedMode};
 use crate::structure::specimen::Specimen;
 
 /// One configuration as the model needs it.
@@ -78,6 +78,22 @@ pub(super) fn setup(
         spans: configuration.modes.iter().filter_map(span).collect(),
         visit: configuration.recording.unwrap_or(index),
     }
+}
+
+/// Two poles nearer than this, relative, share one decay: 1 %.
+const TWIN: f64 = 0.01;
+
+/// Relative distance of the farthest peak that belongs to no mode and is so near that the fit has split
+/// one decay between the two: what is then read of the mode alone is unreliable. A joint whose
+/// stiffness changes with amplitude makes such pairs.
+pub(super) fn twin(configuration: &Configuration, mode: &ObservedMode) -> Option<f64> {
+    let distance = |peak: &ExtraPeak| (peak.frequency / mode.frequency - 1.0).abs();
+    let peaks = configuration.extra_peaks.iter();
+    peaks
+        .filter(|peak| peak.label == "unpaired")
+        .map(distance)
+        .filter(|distance| *distance < TWIN)
+        .max_by(f64::total_cmp)
 }
 
 fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {

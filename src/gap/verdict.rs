@@ -13,6 +13,10 @@ const BLOCK_MISFIT: f64 = 0.001;
 /// Probability that a set has to hold, and the longest one that is still short.
 const SET: (f64, usize) = (0.9, 4);
 
+/// Logarithm of the Bayes factor against the nominal model from which an effect counts as seen: 20 to 1
+/// (Kass & Raftery 1995, "strong").
+const SEEN: f64 = 3.0;
+
 /// What the checks on a hypothesis said.
 pub(super) struct Checks<'a> {
     /// Goodness of fit of the best hypothesis with a name or none.
@@ -35,7 +39,11 @@ impl Checks<'_> {
 }
 
 /// The verdict on a ranking.
-pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>) -> Verdict {
+pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>, none: &Checks<'_>) -> Verdict {
+    // Many weak hypotheses share out the probability; together they are no effect either.
+    if !none.refuted() && most_over_none(entries) < SEEN {
+        return Verdict::NoGap;
+    }
     let groups = by_group(entries);
     let first = &entries[groups[0].0[0]];
     if first.hypothesis == Hypothesis::Unknown || checks.refuted() {
@@ -63,6 +71,18 @@ pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>) -> Verdict {
         );
     }
     set_of(entries, &groups)
+}
+
+/// Logarithm of the largest Bayes factor against the nominal model.
+fn most_over_none(entries: &[Entry]) -> f64 {
+    let evidence = |entry: &Entry| entry.fit.log_evidence;
+    let is_none = |entry: &&Entry| entry.hypothesis == Hypothesis::None;
+    let none = entries.iter().find(is_none);
+    let most = entries
+        .iter()
+        .map(evidence)
+        .fold(f64::NEG_INFINITY, f64::max);
+    none.map_or(f64::INFINITY, |none| most - evidence(none))
 }
 
 /// One effect by name; a group whose members the readings do not separate as a group.

@@ -1,0 +1,133 @@
+//! Two effects at once, where no single one suffices.
+
+use super::frame::Frame;
+use super::hypothesis::{Fit, Search};
+use super::posterior::{Entry, set_probabilities};
+use super::quality::Residuals;
+use super::result::Hypothesis;
+use super::search::Competition;
+use super::settings::GapSettings;
+use rayon::prelude::*;
+
+/// How many of the best single effects a second one is put beside.
+const FIRSTS: usize = 2;
+/// Logarithm of the Bayes factor from which a second effect is believed.
+const SECOND: f64 = 5.0;
+
+/// Where no single effect suffices: a second one beside each of the best.
+pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
+    let frame = &competition.frame;
+    let suffices = |entry: &Entry| {
+        entry.hypothesis != Hypothesis::Unknown
+            && entry.drift.is_none()
+            && !misfits(frame, &entry.fit)
+    };
+    if frame.rows.len() < 6 || competition.entries.iter().any(suffices) {
+        return;
+    }
+    let singles: Vec<&Entry> = competition
+        .entries
+        .iter()
+        .filter(|entry| entry.effects().len() == 1 && entry.drift.is_none())
+        .collect();
+    let tasks: Vec<(&Entry, &Entry)> = singles
+        .iter()
+        .take(FIRSTS)
+        .flat_map(|first| {
+            singles
+                .iter()
+                .filter(|second| first.groups() != second.groups())
+                .map(|second| (*first, *second))
+        })
+        .collect();
+    let found: Vec<Option<Entry>> = tasks
+        .par_iter()
+        .map(|(first, second)| pair(frame, settings, (first, second)))
+        .collect();
+    let pairs = distinct(found.into_iter().flatten().collect());
+    competition.entries.extend(pairs);
+    set_probabilities(&mut competition.entries);
+}
+
+/// A second effect beside a first one, if it is believed: it has to beat the better of the two by
+/// themselves, in evidence and on readings that took no part.
+fn pair(frame: &Frame, settings: &GapSettings, (first, second): (&Entry, &Entry)) -> Option<Entry> {
+    let search = Search {
+        frame,
+        settings,
+        without: &first.fit,
+    };
+    let objective = |fit: &Fit| fit.branch.optimum.objective;
+    let candidate = *second.fit.effects.first()?;
+    let fit = [search.add(candidate), search.add_from(&second.fit)]
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| objective(a).total_cmp(&objective(b)))?;
+    let alone = if first.fit.log_evidence > second.fit.log_evidence {
+        &first.fit
+    } else {
+        &second.fit
+    };
+    // What explains less than one of its members has not reached its optimum.
+    if objective(&fit) > objective(&first.fit).min(objective(&second.fit))
+        || fit.log_evidence < alone.log_evidence + SECOND
+        || !improves(frame, alone, &fit)
+    {
+        return None;
+    }
+    let effects = vec![first.effects()[0], second.effects()[0]];
+    Some(Entry::new(Hypothesis::Effects(effects), fit))
+}
+
+/// Of the same two effects in either order, the more probable.
+fn distinct(found: Vec<Entry>) -> Vec<Entry> {
+    let mut pairs: Vec<Entry> = Vec::new();
+    for pair in found {
+        let same = |other: &Entry| {
+            other
+                .effects()
+                .iter()
+                .all(|effect| pair.effects().contains(effect))
+        };
+        match pairs.iter_mut().find(|other| same(other)) {
+            Some(other) if other.fit.log_evidence < pair.fit.log_evidence => *other = pair,
+            Some(_) => {}
+            None => pairs.push(pair),
+        }
+    }
+    pairs
+}
+
+/// Whether the readings refute a fit.
+fn misfits(frame: &Frame, fit: &Fit) -> bool {
+    Residuals::new(frame, fit).is_none_or(|residuals| {
+        let blocks = residuals.blocks(frame);
+        super::verdict::Checks {
+            goodness: residuals.goodness(),
+            blocks: &blocks,
+            closure_low: None,
+        }
+        .refuted()
+    })
+}
+
+/// Whether the readings that took no part, or each mode from the others, are predicted better.
+fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
+    use super::withheld::WithheldErrors;
+    match (
+        WithheldErrors::new(frame, before),
+        WithheldErrors::new(frame, after),
+    ) {
+        (Some(before), Some(after)) => {
+            after.rms() < before.rms() || after.rms() < 1.5 * after.floor()
+        }
+        _ => {
+            let left_out =
+                |fit: &Fit| Residuals::new(frame, fit).and_then(|r| r.left_out_rms(frame));
+            match (left_out(before), left_out(after)) {
+                (Some(before), Some(after)) => after < before,
+                _ => false,
+            }
+        }
+    }
+}

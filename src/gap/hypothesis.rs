@@ -1,5 +1,6 @@
 //! Fits one hypothesis: starts, signs, places, and the sum over them.
 
+use super::branches::{keep, peaks};
 use super::catalogue::{Candidate, PlaceRange};
 use super::evidence::{
     Branch, covariance, evaluate, knowledge, linear_optimum, log_integral, log_likelihood,
@@ -248,7 +249,22 @@ impl Search<'_> {
                 keep(&mut found, branch, &[at, at + 1]);
             }
         }
-        found.sort_by(|a, b| a.optimum.objective.total_cmp(&b.optimum.objective));
+        let deepest = |a: &Branch, b: &Branch| a.optimum.objective.total_cmp(&b.optimum.objective);
+        found.sort_by(deepest);
+        // A search along a bent valley may stop short of its end: once more from either side of it.
+        if found
+            .first()
+            .is_some_and(|one| stands_out(one, at, spacing))
+        {
+            for aside in [-0.4 * spacing, 0.4 * spacing] {
+                let mut from = found[0].optimum.parameters.clone();
+                from[at + 1] += aside;
+                if let Some(branch) = evaluate(forward, known, &from, &self.settings.drift_stds) {
+                    keep(&mut found, branch, &[at, at + 1]);
+                }
+            }
+            found.sort_by(deepest);
+        }
         let best = found.first()?.clone();
         let of_maxima: Vec<f64> = found.iter().map(|branch| branch.log_evidence).collect();
         let total = if stands_out(&best, at, spacing) {
@@ -356,43 +372,4 @@ fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
         return f64::NEG_INFINITY;
     }
     y0 + (y1 - y0) * (t - t0) / (t1 - t0)
-}
-
-/// The nodes from which a search goes on: the local maxima, best first, at most three.
-fn peaks(evidence: &[f64]) -> Vec<usize> {
-    let value = |k: Option<usize>| {
-        k.and_then(|k| evidence.get(k))
-            .copied()
-            .unwrap_or(f64::NEG_INFINITY)
-    };
-    let mut peaks: Vec<usize> = (0..evidence.len())
-        .filter(|&k| evidence[k] >= value(k.checked_sub(1)) && evidence[k] >= value(Some(k + 1)))
-        .collect();
-    peaks.sort_by(|&a, &b| evidence[b].total_cmp(&evidence[a]));
-    // A peak 12 below the best has e^-12 of its probability. Where the nodes differ by far more than
-    // that, they lie too far apart to say which valley is the deepest.
-    let best = value(peaks.first().copied());
-    let worst = evidence.iter().copied().filter(|e| e.is_finite());
-    let depth = best - worst.fold(best, f64::min);
-    peaks.retain(|&k| evidence[k] > best - f64::max(12.0, 0.5 * depth));
-    peaks.truncate(3);
-    peaks
-}
-
-/// Adds a branch unless the same optimum is there already (in the parameters `which`).
-fn keep(found: &mut Vec<Branch>, branch: Branch, which: &[usize]) {
-    let spread = covariance(&branch.knowledge, &branch.optimum);
-    let same = |other: &Branch| {
-        which.iter().all(|&k| {
-            let std = spread.as_ref().map_or(0.0, |c| c[(k, k)].max(0.0).sqrt());
-            (other.optimum.parameters[k] - branch.optimum.parameters[k]).abs() < 2.0 * std
-        })
-    };
-    match found.iter().position(same) {
-        Some(index) if found[index].optimum.objective > branch.optimum.objective => {
-            found[index] = branch;
-        }
-        Some(_) => {}
-        None => found.push(branch),
-    }
 }

@@ -18,6 +18,7 @@
 
 mod along_decay;
 mod assemble;
+mod branches;
 mod catalogue;
 mod catch_all;
 mod checks;

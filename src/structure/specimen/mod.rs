@@ -6,7 +6,7 @@
 //!
 //! Finite elements on a banded matrix. What lies between two nodes is not moved to the nearest one:
 //! masses and springs act through the element's shape, a hinge changes the element's own static
-//! shape, and what the static shapes miss is added to second order ([`section`]). So frequencies
+//! shape, and what the static shapes miss is added to second order (`section.rs`). So frequencies
 //! are smooth in every position and good on a coarse mesh.
 
 mod band;

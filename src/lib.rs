@@ -32,6 +32,7 @@ pub mod structure;
 pub mod effects;
 pub mod gap;
 
+pub mod described;
 pub mod pipeline;
 pub mod report;
 pub mod simulate;

@@ -9,6 +9,7 @@ use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
 use tapjoint::report::blind_check::{render_confusion_png, score_json, tell_apart};
+use tapjoint::structure::JointStiffness;
 use tapjoint::study::blind_check::score;
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
@@ -66,7 +67,10 @@ pub(super) fn run(
         modes: arguments.modes,
         frequency_std: 0.01 * positive("--std", arguments.std)?,
         joint: match (arguments.kx, arguments.ky) {
-            (Some(kx), Some(ky)) => Some([positive("--kx", kx)?, positive("--ky", ky)?]),
+            (Some(kx), Some(ky)) => Some(JointStiffness::two_parameter(
+                positive("--kx", kx)?,
+                positive("--ky", ky)?,
+            )),
             _ => None,
         },
         seed,

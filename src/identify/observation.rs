@@ -156,6 +156,25 @@ pub struct ExtraPeak {
     pub label: String,
 }
 
+impl ObservedMode {
+    /// A frequency (Hz) read elsewhere, with the standard uncertainty (Hz) that was stated.
+    pub fn read_elsewhere(mode: usize, frequency: f64, std: Option<f64>) -> Self {
+        Self {
+            mode,
+            frequency,
+            std,
+            freedom: None,
+            repeats: 0,
+            damping: None,
+            shape: Vec::new(),
+            reference: None,
+            constant: None,
+            amplitude: None,
+            decay: None,
+        }
+    }
+}
+
 impl Configuration {
     /// Covariance of the frequencies with what they have in common (Hz^2), C + common^2 f f'; `None`
     /// where a frequency has no uncertainty.

@@ -1,9 +1,8 @@
 //! The consistent estimate of a described test: what the description says, in the estimator's terms.
 
 use super::model::TestedStructure;
-use crate::description::{
-    FitParameter, RightHalf, SensorDescription, SensorKind, TestDescription, Weights,
-};
+use crate::described::right_half;
+use crate::description::{FitParameter, SensorDescription, SensorKind, TestDescription, Weights};
 use crate::identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
     JointedStructure, LapLayout, Parameter, ResidualWeights,
@@ -53,17 +52,6 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
         },
         fit: test.analysis.fit.clone(),
         weights: test.analysis.weights,
-    }
-}
-
-fn right_half(right: &RightHalf, left: &Beam) -> Beam {
-    Beam {
-        length: left.length,
-        width: right.width.unwrap_or(left.width),
-        thickness: right.thickness.unwrap_or(left.thickness),
-        modulus: right.modulus.unwrap_or(left.modulus),
-        density: right.density.unwrap_or(left.density),
-        poisson: right.poisson.unwrap_or(left.poisson),
     }
 }
 

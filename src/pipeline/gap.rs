@@ -2,11 +2,12 @@
 //! diagnosis.
 
 use super::{Analysis, observations};
-use crate::description::{BeamTheory, JointKind, KnownStiffness, TestDescription};
+use crate::described::{described_beam, described_specimen, stiffness_of};
+use crate::description::{JointKind, JointModel, KnownStiffness, TestDescription};
 use crate::gap::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
-use crate::structure::Beam;
+use crate::structure::JointStiffness;
 use crate::structure::joint::StiffnessUnits;
-use crate::structure::specimen::{Body, LapOverlap, Specimen, SpecimenJoint};
+use crate::structure::specimen::SpecimenJoint;
 
 /// Where the search for the joint begins if the frequencies gave no estimate: Kx and Ky (1) of the
 /// bolted cantilever of Ingole & Chatterjee.
@@ -28,80 +29,44 @@ pub fn diagnose_test(
 
 /// The structure as described, with the joint as estimated: where the diagnosis begins.
 pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
-    let found = analysis.identification.as_ref().and_then(|found| {
-        let estimate = found.consistent.as_ref()?;
-        Some([estimate.joint.kx, estimate.joint.ky])
-    });
-    nominal_with(test, found)
+    let found = analysis.identification.as_ref();
+    let estimate = found.and_then(|found| found.consistent.as_ref());
+    nominal_with(test, estimate.map(|estimate| estimate.joint))
 }
 
-/// The structure as described; a joint whose stiffnesses are not described has these Kx and Ky (1).
-pub fn nominal_with(test: &TestDescription, found: Option<[f64; 2]>) -> Nominal {
-    let beam = described_beam(test);
-    let mut specimen = Specimen::new(body(test, beam), joint(test, found, &beam));
-    specimen.shear_rotary = match test.joint.beam {
-        BeamTheory::Euler => 0.0,
-        BeamTheory::Timoshenko => 1.0,
-    };
-    specimen.overlap = test.joint.overlap.map(|overlap| LapOverlap {
-        length: overlap.length,
-        mass: overlap.mass,
-    });
+/// The structure as described; what is not described of its joint is `found`, else usual.
+pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> Nominal {
     let sensors = test.sensors.iter().map(|sensor| NominalSensor {
         name: sensor.name.clone(),
         mass: sensor.mass.filter(|_| test.analysis.sensor_mass),
     });
     Nominal {
-        specimen,
+        specimen: described_specimen(test, joint(test, found)),
         sensors: sensors.collect(),
         scale_std: scale_std(test),
         reading_bias: reading_bias(test),
     }
 }
 
-fn described_beam(test: &TestDescription) -> Beam {
-    super::tested_structure(test).beam
-}
-
-fn body(test: &TestDescription, whole: Beam) -> Body {
-    if test.joint.kind != JointKind::Lap {
-        return Body::One(whole);
-    }
-    let left = test.joint.position.unwrap_or(0.5 * whole.length);
-    let other = test.joint.right.clone().unwrap_or_default();
-    let right = Beam {
-        length: whole.length - left,
-        width: other.width.unwrap_or(whole.width),
-        thickness: other.thickness.unwrap_or(whole.thickness),
-        modulus: other.modulus.unwrap_or(whole.modulus),
-        density: other.density.unwrap_or(whole.density),
-        poisson: other.poisson.unwrap_or(whole.poisson),
-    };
-    let left = Beam {
-        length: left,
-        ..whole
-    };
-    Body::Joined([left, right])
-}
-
-/// Known stiffnesses, else the estimate's, else usual ones.
-fn joint(test: &TestDescription, found: Option<[f64; 2]>, beam: &Beam) -> SpecimenJoint {
+/// Known stiffnesses, else those found, else usual ones. A coupling that the joint's model has is held as
+/// found: what the diagnosis then calls `cross-coupling` comes on top of it.
+fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
     if test.joint.kind == JointKind::Free {
         return SpecimenJoint::Free;
     }
-    let units = StiffnessUnits::of(beam);
-    let start = |known: Option<KnownStiffness>, index: usize, unit: f64| match known {
-        Some(KnownStiffness::Rigid) => f64::INFINITY,
-        Some(KnownStiffness::Value(value)) => value,
-        None => {
-            let found = found.map(|joint| joint[index]).filter(|k| *k > 0.0);
-            unit * found.unwrap_or(USUAL_JOINT[index]).min(STIFFEST_START)
-        }
+    let units = StiffnessUnits::of(&described_beam(test));
+    let start = |known: Option<KnownStiffness>, found: Option<f64>, (usual, unit): (f64, f64)| {
+        let begin = found.filter(|k| *k > 0.0).unwrap_or(usual);
+        known.map_or(unit * begin.min(STIFFEST_START), stiffness_of)
     };
+    let [kx, ky] = USUAL_JOINT;
+    let model = test.joint.model;
     SpecimenJoint::Springs {
-        kt: start(test.joint.kt, 0, units.kt),
-        kr: start(test.joint.kr, 1, units.kr),
-        coupling: 0.0,
+        kt: start(test.joint.kt, found.map(|joint| joint.kx), (kx, units.kt)),
+        kr: start(test.joint.kr, found.map(|joint| joint.ky), (ky, units.kr)),
+        coupling: found
+            .filter(|_| model == JointModel::ThreeParameter)
+            .map_or(0.0, |joint| joint.coupling()),
     }
 }
 

@@ -1,12 +1,10 @@
 //! From what the description says to what the theory takes.
 
+use crate::described::{described_beam, stiffness_of};
 use crate::description::{self, JointKind, KnownStiffness, TestDescription};
 use crate::identify::PairsModel;
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness};
-
-/// Poisson's ratio where the description is silent: that of most metals.
-const USUAL_POISSON: f64 = 0.3;
 
 /// The described structure in the theory's terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,14 +53,7 @@ impl KnownJoint {
 
 /// The structure that a test description describes.
 pub fn tested_structure(test: &TestDescription) -> TestedStructure {
-    let beam = Beam {
-        length: test.beam.length,
-        width: test.beam.width,
-        thickness: test.beam.thickness,
-        modulus: test.beam.modulus,
-        density: test.beam.density,
-        poisson: test.beam.poisson.unwrap_or(USUAL_POISSON),
-    };
+    let beam = described_beam(test);
     let (assembly, regression) = match (test.joint.kind, test.joint.model) {
         (JointKind::Free, _) => (Assembly::Free, None),
         (JointKind::Lap, _) => (Assembly::Lap, Some(PairsModel::Lap)),
@@ -87,12 +78,8 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
 
 fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
     let units = StiffnessUnits::of(beam);
-    let in_units = |known: Option<KnownStiffness>, unit: f64| {
-        known.map(|known| match known {
-            KnownStiffness::Value(value) => value / unit,
-            KnownStiffness::Rigid => f64::INFINITY,
-        })
-    };
+    let in_units =
+        |known: Option<KnownStiffness>, unit: f64| known.map(|known| stiffness_of(known) / unit);
     KnownJoint {
         kx: in_units(test.joint.kt, units.kt),
         ky: in_units(test.joint.kr, units.kr),

@@ -1,15 +1,11 @@
 //! From a test description to the specimen it describes.
 
 use super::error::SimulateError;
-use crate::description::{
-    BeamTheory, JointKind, KnownStiffness, RecordingDescription, SensorKind, TestDescription,
-};
+use crate::described::{described_beam, described_specimen, stiffness_of};
+use crate::description::{JointKind, RecordingDescription, SensorKind, TestDescription};
 use crate::effects::SensorPlace;
 use crate::structure::joint::StiffnessUnits;
-use crate::structure::specimen::{
-    Body, LapOverlap, PointInertia, PointMass, Specimen, SpecimenJoint,
-};
-use crate::structure::{Beam, beam::DEFAULT_POISSON};
+use crate::structure::specimen::{PointMass, Specimen, SpecimenJoint};
 
 /// Non-dimensional stiffnesses of a joint, in place of the description's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,17 +24,7 @@ pub(super) fn nominal_specimen(
     recording: &RecordingDescription,
     given: Option<GivenJoint>,
 ) -> Result<Specimen, SimulateError> {
-    let body = body(test);
-    let mut specimen = Specimen::new(body, joint(test, given)?);
-    specimen.shear_rotary = match test.joint.beam {
-        BeamTheory::Euler => 0.0,
-        BeamTheory::Timoshenko => 1.0,
-    };
-    specimen.overlap = test.joint.overlap.map(|overlap| LapOverlap {
-        length: overlap.length,
-        mass: overlap.mass,
-    });
-    specimen.joint_mass = PointInertia::default();
+    let mut specimen = described_specimen(test, joint(test, given)?);
     for place in sensor_places(test, recording)? {
         if place.mass > 0.0 {
             specimen.masses.push(PointMass {
@@ -51,40 +37,6 @@ pub(super) fn nominal_specimen(
     Ok(specimen)
 }
 
-/// The beam of the description; of a lap joint the left half's properties and the total length.
-pub(super) fn beam(test: &TestDescription) -> Beam {
-    Beam {
-        length: test.beam.length,
-        width: test.beam.width,
-        thickness: test.beam.thickness,
-        modulus: test.beam.modulus,
-        density: test.beam.density,
-        poisson: test.beam.poisson.unwrap_or(DEFAULT_POISSON),
-    }
-}
-
-fn body(test: &TestDescription) -> Body {
-    let whole = beam(test);
-    if test.joint.kind != JointKind::Lap {
-        return Body::One(whole);
-    }
-    let position = test.joint.position.unwrap_or(0.5 * whole.length);
-    let left = Beam {
-        length: position,
-        ..whole
-    };
-    let other = test.joint.right.clone().unwrap_or_default();
-    let right = Beam {
-        length: whole.length - position,
-        width: other.width.unwrap_or(whole.width),
-        thickness: other.thickness.unwrap_or(whole.thickness),
-        modulus: other.modulus.unwrap_or(whole.modulus),
-        density: other.density.unwrap_or(whole.density),
-        poisson: other.poisson.unwrap_or(whole.poisson),
-    };
-    Body::Joined([left, right])
-}
-
 fn joint(
     test: &TestDescription,
     given: Option<GivenJoint>,
@@ -92,7 +44,7 @@ fn joint(
     if test.joint.kind == JointKind::Free {
         return Ok(SpecimenJoint::Free);
     }
-    let units = StiffnessUnits::of(&beam(test));
+    let units = StiffnessUnits::of(&described_beam(test));
     if let Some(given) = given {
         return Ok(SpecimenJoint::Springs {
             kt: given.kx * units.kt,
@@ -102,8 +54,8 @@ fn joint(
     }
     let (missing, keys) = match (test.joint.kt, test.joint.kr) {
         (Some(kt), Some(kr)) => {
-            let (kt, kr) = (stiffness(kt), stiffness(kr));
-            let ktr = test.joint.ktr.map_or(f64::INFINITY, stiffness);
+            let (kt, kr) = (stiffness_of(kt), stiffness_of(kr));
+            let ktr = test.joint.ktr.map_or(f64::INFINITY, stiffness_of);
             return Ok(SpecimenJoint::Springs {
                 kt,
                 kr,
@@ -126,13 +78,6 @@ fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
         0.0
     } else {
         kt.sqrt() * kr.sqrt() * cross_compliance
-    }
-}
-
-fn stiffness(known: KnownStiffness) -> f64 {
-    match known {
-        KnownStiffness::Value(value) => value,
-        KnownStiffness::Rigid => f64::INFINITY,
     }
 }
 

@@ -108,7 +108,7 @@ pub struct ModeTruth {
 
 /// The truth about a virtual test.
 pub fn truth_of(plan: &TestPlan<'_>, test: &VirtualTest) -> Truth {
-    let units = StiffnessUnits::of(&super::nominal::beam(plan.description));
+    let units = StiffnessUnits::of(&crate::described::described_beam(plan.description));
     Truth {
         version: 1,
         name: plan.description.name.clone(),

@@ -15,6 +15,7 @@ use crate::gap::{
     GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, observe,
 };
 use crate::pipeline::nominal_with;
+use crate::structure::JointStiffness;
 use crate::structure::specimen::Body;
 
 /// How a plan is judged.
@@ -30,8 +31,8 @@ pub struct PlanSettings {
     pub taps: usize,
     /// Standard deviation of the joint's stiffnesses between recordings (1). 0.5 %.
     pub drift: f64,
-    /// Kx and Ky (1) of a joint that the description does not state.
-    pub joint: Option<[f64; 2]>,
+    /// A joint that the description does not state.
+    pub joint: Option<JointStiffness>,
     /// Seed of what is drawn.
     pub seed: u64,
 }

@@ -200,18 +200,8 @@ fn recover_a_deep_crack_by_itself() {
 
 /// Frequencies read elsewhere.
 fn read(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Observations {
-    let mode = |(index, frequency): (usize, &f64)| ObservedMode {
-        mode: index + 1,
-        frequency: *frequency,
-        std: std(*frequency),
-        freedom: None,
-        repeats: 0,
-        damping: None,
-        shape: Vec::new(),
-        reference: None,
-        constant: None,
-        amplitude: None,
-        decay: None,
+    let mode = |(index, frequency): (usize, &f64)| {
+        ObservedMode::read_elsewhere(index + 1, *frequency, std(*frequency))
     };
     Observations {
         configurations: vec![Configuration {

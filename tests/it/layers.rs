@@ -24,6 +24,7 @@ const TABLE: &[(&str, &[&str])] = &[
     ("structure", &["quantity"]),
     ("effects", &["structure", "quantity", "stats"]),
     ("identify", &["modal", "stats", "structure"]),
+    ("described", &["description", "structure"]),
     (
         "gap",
         &["identify", "modal", "stats", "structure", "effects"],
@@ -32,6 +33,7 @@ const TABLE: &[(&str, &[&str])] = &[
         "simulate",
         &[
             "quantity",
+            "described",
             "description",
             "recording",
             "structure",
@@ -43,6 +45,7 @@ const TABLE: &[(&str, &[&str])] = &[
         "pipeline",
         &[
             "quantity",
+            "described",
             "description",
             "recording",
             "taps",

@@ -7,32 +7,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-const TEST: &str = r#"
-name = "virtual"
-[beam]
-length = 0.423
-width = 0.05
-thickness = 0.005
-modulus = 207e9
-density = 7850
-[joint]
-kind = "cantilever"
-kt = 1.994e6
-kr = 1223.0
-beam = "euler"
-[hammer]
-channel = 1
-[[sensor]]
-name = "A"
-position = 0.338
-[[sensor]]
-name = "B"
-position = 0.205
-[[recording]]
-file = "taps.csv"
-tap = 0.385
-band = [0, 1000]
-"#;
+use crate::shared::VIRTUAL_CANTILEVER as TEST;
 
 fn folder(text: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();

@@ -63,19 +63,11 @@ pub fn observations(analysis: &Analysis) -> Observations {
 /// Frequencies read elsewhere: independent of each other, with the uncertainty that was stated.
 fn of_measured(modes: &[ModeResult]) -> Configuration {
     let mode = |mode: &ModeResult| {
-        Some(ObservedMode {
-            mode: mode.mode?,
-            frequency: mode.frequency,
-            std: mode.std,
-            freedom: None,
-            repeats: 0,
-            damping: None,
-            shape: Vec::new(),
-            reference: None,
-            constant: None,
-            amplitude: None,
-            decay: None,
-        })
+        Some(ObservedMode::read_elsewhere(
+            mode.mode?,
+            mode.frequency,
+            mode.std,
+        ))
     };
     let mut modes: Vec<ObservedMode> = modes.iter().filter_map(mode).collect();
     modes.sort_by_key(|mode| mode.mode);

@@ -1,8 +1,10 @@
 //! From the competition to the answer: every number that is shown.
 
 use super::catalogue::PlaceKind;
+use super::evidence::log_likelihood;
 use super::forward::Layout;
 use super::frame::Frame;
+use super::nominal::COUPLING;
 use super::place_map::place_map;
 use super::posterior::{APART, Entry, confounded, lead, places, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
@@ -34,6 +36,8 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let checks = Checks {
         goodness,
         blocks: &blocks,
+        withheld: WithheldErrors::new(frame, &entries[best].fit)
+            .and_then(|errors| errors.goodness()),
         closure_low: hypotheses[best].closure.map(|closure| closure.low),
     };
     let nominal = entries
@@ -46,6 +50,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let none = Checks {
         goodness: nominal.as_ref().and_then(Residuals::goodness),
         blocks: &nominal_blocks,
+        withheld: None,
         closure_low: None,
     };
     let verdict = verdict(entries, &checks, &none);
@@ -60,22 +65,26 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks,
         noise_floor: noise_floor(frame),
         goodness_of_fit: goodness,
+        misfit: after.as_ref().map(Residuals::misfit),
         joint_shift: hypotheses[best].joint_shift,
         hypotheses,
         map: place_map(frame, &competition.baseline),
-        decided_by: decided_by(entries),
+        decided_by: decided_by(frame, entries),
         fitted_modes: frame.fitted_modes,
     }
 }
 
-/// Likelihood ratio of the two best hypotheses of different groups at their optima.
-fn decided_by(entries: &[Entry]) -> DecidedBy {
-    let rival = entries.iter().skip(1).find(|entry| {
-        entry.groups() != entries[0].groups() || entry.hypothesis == Hypothesis::None
-    });
-    match rival {
-        // 2 ln 3
-        Some(rival) if lead(&entries[0].fit, &rival.fit) < 2.2 => DecidedBy::Priors,
+/// Likelihood ratio of the two best hypotheses at their optima. What is unknown has readings of another
+/// uncertainty; its likelihood cannot be held against the others'.
+fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
+    let mut named = entries
+        .iter()
+        .filter(|entry| entry.hypothesis != Hypothesis::Unknown);
+    let likelihood = |entry: &Entry| log_likelihood(&frame.readings, &entry.fit.branch.optimum);
+    match (named.next(), named.next()) {
+        (Some(first), Some(rival)) if likelihood(first) - likelihood(rival) < 3.0_f64.ln() => {
+            DecidedBy::Priors
+        }
         _ => DecidedBy::Readings,
     }
 }
@@ -164,7 +173,9 @@ impl<'a> Context<'a> {
             return None;
         }
         for (k, (direction, _)) in sought.iter().enumerate() {
-            joint[*direction] = entry.fit.branch.optimum.parameters[k].exp();
+            if *direction != COUPLING {
+                joint[*direction] = entry.fit.branch.optimum.parameters[k].exp();
+            }
         }
         Some(joint)
     }
@@ -175,7 +186,8 @@ impl<'a> Context<'a> {
         let after = &entry.fit.branch.optimum.parameters;
         for (k, (direction, _)) in self.frame().nominal.sought().iter().enumerate() {
             let percent = Some(100.0 * ((after[k] - before[k]).exp() - 1.0));
-            match direction {
+            match *direction {
+                COUPLING => {}
                 0 => shift.kx_percent = percent,
                 _ => shift.ky_percent = percent,
             }
@@ -200,7 +212,8 @@ impl<'a> Context<'a> {
                 (values[size], Some(spreads[size])),
             );
             // lambda = 14.9: 1 % level, 90 % power.
-            own.smallest_detectable = Some(14.9_f64.sqrt() * spreads[size]);
+            own.smallest_detectable =
+                Some(14.9_f64.sqrt() * spreads[size]).filter(|size| size.is_finite());
             own.smallest_isolable = self.isolable(index, values[size] - candidate.size.nothing);
             parameters.push(own);
             if let (Some(range), Some(place)) = (&candidate.place, layout.place(k)) {

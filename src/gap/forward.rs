@@ -4,6 +4,7 @@ use super::catalogue::{Candidate, PlaceKind};
 use super::frame::{Frame, Row, Small};
 use super::joint_energy::{joint_shares, stiffened_slope};
 use super::least_squares::{Knowledge, Linearised};
+use super::nominal::COUPLING;
 use super::setup::Setup;
 use crate::effects::{Circumstances, Effect, Seen, apply};
 use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
@@ -13,7 +14,7 @@ use std::sync::Arc;
 /// Parameters of a hypothesis in their order: joint, effects (size and place of each), small unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
-    /// Directions of the joint's stiffnesses that are sought.
+    /// What is sought of the joint: 0 translation, 1 rotation, 2 coupling.
     pub(super) joint: Vec<usize>,
     /// The effects.
     pub(super) effects: Vec<Candidate>,
@@ -62,9 +63,13 @@ impl Layout {
     /// The nominal structure with the joint that the parameters give it.
     fn with_joint(&self, specimen: &Specimen, parameters: &[f64]) -> Specimen {
         let mut specimen = specimen.clone();
-        if let SpecimenJoint::Springs { kt, kr, .. } = &mut specimen.joint {
+        if let SpecimenJoint::Springs { kt, kr, coupling } = &mut specimen.joint {
             for (direction, value) in self.joint.iter().zip(parameters) {
-                *(if *direction == 0 { &mut *kt } else { &mut *kr }) = value.exp();
+                match *direction {
+                    0 => *kt = value.exp(),
+                    COUPLING => *coupling = *value,
+                    _ => *kr = value.exp(),
+                }
             }
         }
         specimen
@@ -130,7 +135,7 @@ impl<'a> Forward<'a> {
         let solved = self.solve(parameters)?;
         let base = self.rows_of(&solved, parameters)?;
         let mut slopes = DMatrix::zeros(self.rows.len(), parameters.len());
-        self.joint_slopes(&solved, parameters, &mut slopes);
+        self.joint_slopes(&solved, &mut slopes);
         for index in 0..self.layout.effects.len() {
             let steps = self.steps(index, parameters);
             for (column, step) in steps.into_iter().filter(|(k, _)| !known[*k].is_held()) {
@@ -178,9 +183,8 @@ impl<'a> Forward<'a> {
         for setup in &self.frame.setups {
             let nominal = self.layout.with_joint(&setup.specimen, parameters);
             let circumstances = Circumstances {
-                sensors: &setup.sensors,
+                sensors: &setup.carried,
                 level: self.level(setup, parameters),
-                visit: setup.visit,
                 ..Circumstances::default()
             };
             let seen = apply(&effects, &nominal, &circumstances);
@@ -302,7 +306,7 @@ impl<'a> Forward<'a> {
 
     /// d ln f/d ln k = half the strain energy of that spring, as the mode has it, over that of the
     /// structure (Rayleigh's quotient is stationary in the shape).
-    fn joint_slopes(&self, solved: &[Solved], parameters: &[f64], slopes: &mut DMatrix<f64>) {
+    fn joint_slopes(&self, solved: &[Solved], slopes: &mut DMatrix<f64>) {
         for (row, kind) in self.rows.iter().enumerate() {
             let Row::Frequency {
                 configuration,
@@ -321,19 +325,15 @@ impl<'a> Forward<'a> {
                 continue;
             };
             for (column, &direction) in self.layout.joint.iter().enumerate() {
-                slopes[(row, column)] = self.joint_slope(one, (index, direction), parameters)
-                    * offset_factor(one, index);
+                slopes[(row, column)] =
+                    self.joint_slope(one, (index, direction)) * offset_factor(one, index);
             }
         }
     }
 
-    fn joint_slope(
-        &self,
-        one: &Solved,
-        (index, direction): (usize, usize),
-        _parameters: &[f64],
-    ) -> f64 {
-        if one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0) {
+    fn joint_slope(&self, one: &Solved, (index, direction): (usize, usize)) -> f64 {
+        let based = one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        if based || direction == COUPLING {
             // The base's spring is tied to the joint's by their ratio: both move.
             return stiffened_slope(one, index, direction);
         }

@@ -2,7 +2,7 @@
 //! (columns) that every hypothesis shares.
 
 use super::noise::{self, Reading};
-use super::nominal::Nominal;
+use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
 use super::setup::{Setup, setup, twin};
 use crate::identify::observation::{DecayVerdict, Observations};
@@ -45,12 +45,14 @@ pub(super) enum Small {
     SensorPlace { place: usize },
     /// Where the hammer struck in one visit (m).
     TapPlace { visit: usize },
-    /// Calibration of a sensor (1).
-    Gain { name: usize },
+    /// Calibration of a sensor as it was mounted for one visit (1).
+    Gain { visit: usize, name: usize },
     /// Common level of the nominal damping ratios (logarithm).
     Damping,
     /// Amplitude that counts over the one at the decay's begin (logarithm).
     Amplitude,
+    /// What the taps of one configuration scatter in common (standard deviations).
+    Scatter { configuration: usize },
     /// What no effect explains in one mode, the same in all configurations (logarithm).
     Discrepancy { mode: usize },
 }
@@ -73,8 +75,9 @@ pub(super) struct Frame {
     pub(super) fitted_modes: usize,
     /// Frequencies that take no part in the fit: row and reading.
     pub(super) withheld: Vec<(Row, Reading)>,
-    /// Number of distinct tap levels.
-    pub(super) levels: usize,
+    /// What the frequency of a configuration and mode moves by for one standard deviation of the taps' common
+    /// scatter (logarithm).
+    pub(super) scatter: Vec<((usize, usize), f64)>,
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
@@ -95,7 +98,7 @@ const SLOPE_FLOOR: f64 = 5e-6;
 pub(super) const SHARE: (f64, f64) = (0.45, 0.3);
 
 impl Frame {
-    /// From observations whose sensors all have places (see `with_places`).
+    /// From observations in which every sensor with a mass has a place.
     pub(super) fn new(
         observations: &Observations,
         nominal: &Nominal,
@@ -103,7 +106,7 @@ impl Frame {
     ) -> Self {
         let highest = highest_mode(observations);
         let fitted_modes = if highest >= settings.withhold_from {
-            highest - settings.withheld_modes
+            highest.saturating_sub(settings.withheld_modes)
         } else {
             highest
         };
@@ -126,23 +129,15 @@ impl Frame {
             modes: highest,
             fitted_modes,
             withheld: Vec::new(),
-            levels: 0,
+            scatter: Vec::new(),
             shape_slopes: None,
         };
-        frame.set_levels();
         frame.add_frequencies(observations, settings);
         frame.add_shapes(observations);
         frame.add_damping(observations, settings);
         frame.add_slopes(observations);
         frame.add_smalls(&names, &places, settings);
         frame
-    }
-
-    fn set_levels(&mut self) {
-        let mut levels: Vec<f64> = self.setups.iter().map(|setup| setup.level).collect();
-        levels.sort_by(f64::total_cmp);
-        levels.dedup_by(|a, b| (*a - *b).abs() < 1e-3);
-        self.levels = levels.len();
     }
 
     fn push(&mut self, row: Row, reading: Reading) {
@@ -181,6 +176,14 @@ impl Frame {
                 continue;
             };
             let common = observations.configurations[configuration].common;
+            let share = self.scattered(configuration, mode);
+            if share != 0.0 {
+                // The common part is an unknown of its own.
+                let moved = share * reading.std;
+                self.scatter.push(((configuration, mode), moved));
+                reading.std *= (1.0 - share * share).max(0.0).sqrt();
+            }
+            // What a recording has in common is far below the floor: as good as independent.
             reading.std = reading.std.hypot(settings.frequency_floor).hypot(common);
             if mode > self.fitted_modes {
                 self.withheld.push((row, reading));
@@ -188,6 +191,14 @@ impl Frame {
                 self.push(row, reading);
             }
         }
+    }
+
+    /// Share of a frequency's scatter that its configuration has in common; none of what is withheld.
+    fn scattered(&self, configuration: usize, mode: usize) -> f64 {
+        let shares = &self.setups[configuration].scatter;
+        let own = shares.iter().find(|share| share.0 == mode);
+        own.filter(|_| mode <= self.fitted_modes)
+            .map_or(0.0, |share| share.1)
     }
 
     fn add_shapes(&mut self, observations: &Observations) {
@@ -293,13 +304,19 @@ impl Frame {
         visits.dedup();
         if visits.len() > 1 {
             for &visit in &visits {
-                for (direction, _) in self.nominal.sought() {
+                let sought = self.nominal.sought();
+                for (direction, _) in sought.into_iter().filter(|one| one.0 != COUPLING) {
                     self.small(
                         Small::Drift { visit, direction },
                         0.0,
                         settings.drift_stds[0],
                     );
                 }
+            }
+        }
+        for configuration in 0..self.setups.len() {
+            if !self.setups[configuration].scatter.is_empty() {
+                self.small(Small::Scatter { configuration }, 0.0, 1.0);
             }
         }
         for (name, text) in names.iter().enumerate() {
@@ -312,8 +329,8 @@ impl Frame {
             .iter()
             .any(|row| matches!(row, Row::Constant { .. }));
         let ratios = self.rows.iter().any(|row| matches!(row, Row::Ratio { .. }));
-        if shapes || ratios {
-            for place in 0..places.len() {
+        for (place, (name, _)) in places.iter().enumerate() {
+            if shapes || ratios || self.nominal.mass_of(&names[*name]) > 0.0 {
                 self.small(Small::SensorPlace { place }, 0.0, settings.position_std);
             }
         }
@@ -323,8 +340,10 @@ impl Frame {
             }
         }
         if shapes || ratios {
-            for name in 0..names.len() {
-                self.small(Small::Gain { name }, 0.0, settings.gain_std);
+            for &visit in &visits {
+                for name in 0..names.len() {
+                    self.small(Small::Gain { visit, name }, 0.0, settings.gain_std);
+                }
             }
         }
         if self
@@ -350,6 +369,13 @@ impl Frame {
         self.smalls.push(small);
         self.small_centres.push(centre);
         self.small_stds.push(std);
+    }
+
+    /// What one standard deviation of the taps' common scatter moves a frequency by (logarithm).
+    pub(super) fn scatter_of(&self, configuration: usize, mode: usize) -> f64 {
+        let mut all = self.scatter.iter();
+        all.find(|one| one.0 == (configuration, mode))
+            .map_or(0.0, |one| one.1)
     }
 
     /// Place of a small unknown among all, if it is there.

@@ -9,6 +9,7 @@ use super::evidence::{
 use super::forward::{Forward, Layout};
 use super::frame::Frame;
 use super::least_squares::{Knowledge, Optimum, factor_of, maximise};
+use super::nominal::COUPLING;
 use super::settings::GapSettings;
 
 /// A hypothesis with its best fit.
@@ -31,7 +32,12 @@ pub(super) fn fit_nominal(frame: &Frame, settings: &GapSettings) -> Option<Fit> 
         settings.joint_std,
         settings.drift_stds[0],
     );
-    let start: Vec<f64> = known.iter().map(|known| known.centre).collect();
+    let mut start: Vec<f64> = known.iter().map(|known| known.centre).collect();
+    for (parameter, (direction, sought)) in start.iter_mut().zip(frame.nominal.sought()) {
+        if direction == COUPLING {
+            *parameter = sought;
+        }
+    }
     let branch = evaluate(&forward, &known, &start, &settings.drift_stds)?;
     Some(Fit {
         effects: Vec::new(),
@@ -61,6 +67,34 @@ impl Search<'_> {
             None => self.without_place(&forward),
             Some(range) => self.with_place(&forward, &range),
         }
+    }
+
+    /// The objective of the fit that lacks the effect, with the drift that the search begins with.
+    pub(super) fn objective_without(&self) -> Option<f64> {
+        let forward = Forward::new(self.frame, &self.without.effects);
+        let known = self.known(&forward);
+        let at = &self.without.branch.optimum;
+        Some(linear_optimum(&self.frame.readings, &known, at)?.objective)
+    }
+
+    /// The least objective that the model linearised without the effect promises, over its places.
+    pub(super) fn promise(&self, candidate: Candidate) -> Option<f64> {
+        let mut effects = self.without.effects.clone();
+        effects.push(candidate);
+        let forward = Forward::new(self.frame, &effects);
+        let known = self.known(&forward);
+        let at = forward.layout.size(effects.len() - 1);
+        let Some(range) = candidate.place else {
+            return Some(self.linear_fit(&forward, &known, None)?.objective);
+        };
+        let (low, high) = (range.inward(range.low), range.inward(range.high));
+        let nodes = (0..range.nodes).filter_map(|node| {
+            let place = low + (high - low) * (node as f64 + 0.5) / range.nodes as f64;
+            let mut held = known.clone();
+            held[at + 1] = Knowledge::held(place);
+            Some(self.linear_fit(&forward, &held, Some(place))?.objective)
+        });
+        nodes.min_by(f64::total_cmp)
     }
 
     /// The same from where the second effect has its own optimum and the first is next to nothing, if

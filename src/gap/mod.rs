@@ -47,13 +47,27 @@ mod withheld;
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{
-    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
-    PlaceMap, PlaceProbabilities, Pull, Verdict,
+    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, Misfit,
+    ParameterValue, PlaceMap, PlaceProbabilities, Pull, Verdict,
 };
 pub use settings::GapSettings;
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
 
 use crate::identify::observation::Observations;
+
+/// By how much chi square (priors included) the nominal model with its joint refitted misses what a test
+/// observed: what any effect could gain at most.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn nominal_chi_square(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<f64, GapError> {
+    checks::check(observations, nominal)?;
+    search::nominal_chi_square(observations, nominal, settings).ok_or(GapError::NoFit)
+}
 
 /// Diagnoses what a test observed against what it was described to be.
 ///
@@ -65,6 +79,7 @@ pub fn diagnose(
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
+    settings.check()?;
     checks::check(observations, nominal)?;
     let competition = search::compete(observations, nominal, settings)?;
     Ok(assemble::diagnosis(&competition, settings))

@@ -47,13 +47,14 @@ impl Entry {
 const NONE_SHARE: f64 = 4.0;
 
 /// Gives every group the same probability beforehand, split evenly inside; `unknown` is a group, `none`
-/// has [`NONE_SHARE`] of them. Pairs share one unit among themselves. Sorts the most probable first.
-pub(super) fn set_probabilities(entries: &mut [Entry]) {
+/// has [`NONE_SHARE`] of them. The pairs that were `tried` share one unit among themselves, the accepted
+/// and the others. Sorts the most probable first.
+pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
     let share = |entry: &Entry| -> f64 {
+        if entry.effects().len() > 1 {
+            return tried.max(1) as f64;
+        }
         let same = |other: &&Entry| match (&entry.hypothesis, &other.hypothesis) {
-            (Hypothesis::Effects(own), Hypothesis::Effects(others)) if own.len() > 1 => {
-                others.len() > 1
-            }
             (Hypothesis::Effects(_), Hypothesis::Effects(others)) => {
                 others.len() == 1 && other.groups() == entry.groups()
             }

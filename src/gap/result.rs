@@ -19,6 +19,8 @@ pub struct Diagnosis {
     pub noise_floor: f64,
     /// Goodness of fit of the best hypothesis that has a name or none.
     pub goodness_of_fit: Option<f64>,
+    /// What that rests on; `None` without a fit.
+    pub misfit: Option<Misfit>,
     /// What adding the best hypothesis does to the joint.
     pub joint_shift: JointShift,
     /// What the residual of the nominal model calls for along the beam; `None` where the readings are
@@ -196,6 +198,15 @@ pub struct Pull {
     pub error_percent_after: f64,
     /// That over the standard uncertainty (1).
     pub z_after: f64,
+}
+
+/// How far a fit misses the readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Sum of the squared residuals in standard deviations, priors of the small unknowns included (1).
+    pub chi_square: f64,
+    /// Readings less parameters on which the priors have no hold.
+    pub freedom: f64,
 }
 
 /// Readings that belong together.

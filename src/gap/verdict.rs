@@ -23,6 +23,8 @@ pub(super) struct Checks<'a> {
     pub(super) goodness: Option<f64>,
     /// The same of its blocks, the worst first.
     pub(super) blocks: &'a [Block],
+    /// Goodness of its prediction of withheld readings; `None` without any.
+    pub(super) withheld: Option<f64>,
     /// Lower end of its closure on withheld readings; `None` where that says nothing.
     pub(super) closure_low: Option<f64>,
 }
@@ -31,6 +33,7 @@ impl Checks<'_> {
     /// Whether the readings refute the hypothesis.
     pub(super) fn refuted(&self) -> bool {
         self.goodness.is_some_and(|p| p < MISFIT)
+            || self.withheld.is_some_and(|p| p < BLOCK_MISFIT)
             || self
                 .blocks
                 .first()
@@ -53,6 +56,14 @@ pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>, none: &Checks<'_>)
     // readings better than the nominal model, there is no gap.
     if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
+    }
+    // With as many unknowns as readings everything fits.
+    if checks.goodness.is_none() {
+        return Verdict::NotEnoughData(
+            "as many unknowns as readings: no explanation can be tested; observe more modes, or in \
+             another configuration"
+                .to_owned(),
+        );
     }
     let holds = checks.closure_low.is_none_or(|low| low > 0.0);
     if groups[0].1 >= NAMED && holds {
@@ -116,24 +127,29 @@ fn alias_group(entries: &[Entry]) -> Vec<usize> {
         .collect()
 }
 
-/// The shortest list of groups that holds 90 %.
+/// The shortest list of groups that holds 90 %, each with its likely members.
 fn set_of(entries: &[Entry], groups: &[(Vec<usize>, f64)]) -> Verdict {
     let mut held = 0.0;
     let mut set = Vec::new();
+    let mut counted = 0;
     for (members, probability) in groups {
-        set.push(entries[members[0]].hypothesis.clone());
+        // A group is one of its members, and which one the readings need not know.
+        let likely = members
+            .iter()
+            .filter(|&&k| entries[k].probability > 0.02 * probability);
+        set.extend(likely.map(|&k| entries[k].hypothesis.clone()));
         held += probability;
+        counted += 1;
         if held >= SET.0 {
             break;
         }
     }
-    if set.len() <= SET.1 {
+    if counted <= SET.1 {
         Verdict::Set(set)
     } else {
         Verdict::NotEnoughData(format!(
-            "{} explanations are needed to hold {:.0} % of the probability; more readings of another kind \
-             would separate them (see the next tests)",
-            set.len(),
+            "{counted} explanations are needed to hold {:.0} % of the probability; more readings of another kind \
+             would separate them",
             100.0 * SET.0
         ))
     }

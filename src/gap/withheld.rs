@@ -4,6 +4,7 @@ use super::evidence::covariance;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
+use super::noise;
 use super::result::Closure;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -46,6 +47,12 @@ impl WithheldErrors {
     /// Root mean square of the errors (%).
     pub(super) fn rms(&self) -> f64 {
         root_mean_square(&self.errors)
+    }
+
+    /// Probability of errors as large or larger if the hypothesis is true.
+    pub(super) fn goodness(&self) -> Option<f64> {
+        let solved = self.spread.clone().cholesky()?.solve(&self.errors);
+        noise::chi_square_tail(self.errors.dot(&solved), self.errors.len() as f64)
     }
 
     /// Root mean square that uncertainty alone would leave (%).

@@ -176,18 +176,6 @@ impl ObservedMode {
 }
 
 impl Configuration {
-    /// Covariance of the frequencies with what they have in common (Hz^2), C + common^2 f f'; `None`
-    /// where a frequency has no uncertainty.
-    pub fn frequency_covariance(&self) -> Option<Vec<Vec<f64>>> {
-        let mut covariance = self.covariance.clone()?;
-        for (row, a) in covariance.iter_mut().zip(&self.modes) {
-            for (value, b) in row.iter_mut().zip(&self.modes) {
-                *value += self.common.powi(2) * a.frequency * b.frequency;
-            }
-        }
-        Some(covariance)
-    }
-
     /// The mode of this number, where it was seen.
     pub fn mode(&self, number: usize) -> Option<&ObservedMode> {
         self.modes.iter().find(|mode| mode.mode == number)

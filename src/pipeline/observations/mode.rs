@@ -77,6 +77,11 @@ impl<'a> ModeSeen<'a> {
         }
     }
 
+    /// Whether its frequency is that of these taps, and not of the whole recording.
+    pub fn is_of_taps(&self) -> bool {
+        !self.frequency.taps.is_empty()
+    }
+
     /// Natural frequency (Hz).
     pub fn frequency(&self) -> Observed {
         self.frequency.observed()
@@ -94,7 +99,9 @@ impl<'a> ModeSeen<'a> {
             freedom: frequency.freedom,
             repeats: self.frequency.taps.len(),
             damping: self.damping(),
-            constant: reference.and_then(|sensor| self.constant(sensor)),
+            constant: reference
+                .filter(|_| hardest)
+                .and_then(|sensor| self.constant(sensor)),
             amplitude: reference.and_then(|sensor| self.amplitude(sensor)),
             decay: self
                 .fit()

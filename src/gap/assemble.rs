@@ -6,7 +6,7 @@ use super::forward::Layout;
 use super::frame::Frame;
 use super::nominal::COUPLING;
 use super::place_map::place_map;
-use super::posterior::{APART, Entry, confounded, lead, places, spreads};
+use super::posterior::{APART, Entry, confounded, lead, places, raise_unknown, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
     Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
@@ -17,17 +17,42 @@ use super::verdict::{Checks, verdict};
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
+/// What the readings say against the best explanation is evidence for something unknown, which shares the
+/// prior of one group: a misfit of probability p speaks against it with odds of 1 to -e p ln p at most
+/// (Sellke, Bayarri & Berger 2001).
+pub(super) fn doubt(competition: &mut Competition) {
+    let Competition { frame, entries, .. } = competition;
+    let Some(best) = best(entries) else { return };
+    let residuals = Residuals::new(frame, &entries[best].fit);
+    let blocks = residuals
+        .as_ref()
+        .map_or_else(Vec::new, |r| r.blocks(frame));
+    let checks = Checks {
+        goodness: residuals.as_ref().and_then(Residuals::goodness),
+        blocks: &blocks,
+        withheld: WithheldErrors::new(frame, &entries[best].fit)
+            .and_then(|errors| errors.goodness()),
+        closure: None,
+    };
+    if let Some(p) = checks.refuting() {
+        let bound = -std::f64::consts::E * p * p.max(f64::MIN_POSITIVE).ln();
+        raise_unknown(entries, 1.0 / (1.0 + bound.clamp(0.0, 1.0)));
+    }
+}
+
+/// The best explanation that can be shown: what is unknown has no residual.
+fn best(entries: &[Entry]) -> Option<usize> {
+    let known = |entry: &Entry| entry.hypothesis != Hypothesis::Unknown;
+    entries.iter().position(known)
+}
+
 /// The answer to a competition.
 pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Diagnosis {
     let frame = &competition.frame;
     let entries = &competition.entries;
     let context = Context::new(competition, settings);
     let hypotheses: Vec<HypothesisResult> = (0..entries.len()).map(|k| context.result(k)).collect();
-    // The best explanation that can be shown: what is unknown has no residual.
-    let best = entries
-        .iter()
-        .position(|entry| entry.hypothesis != Hypothesis::Unknown)
-        .unwrap_or(0);
+    let best = best(entries).unwrap_or(0);
     let after = Residuals::new(frame, &entries[best].fit);
     let blocks = after
         .as_ref()
@@ -38,7 +63,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks: &blocks,
         withheld: WithheldErrors::new(frame, &entries[best].fit)
             .and_then(|errors| errors.goodness()),
-        closure_low: hypotheses[best].closure.map(|closure| closure.low),
+        closure: hypotheses[best].closure,
     };
     let nominal = entries
         .iter()
@@ -51,7 +76,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         goodness: nominal.as_ref().and_then(Residuals::goodness),
         blocks: &nominal_blocks,
         withheld: None,
-        closure_low: None,
+        closure: None,
     };
     let verdict = verdict(entries, &checks, &none);
     let pulls = match (&context.before, &after) {

@@ -81,6 +81,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, GapError> {
     settings.check()?;
     checks::check(observations, nominal)?;
-    let competition = search::compete(observations, nominal, settings)?;
+    let mut competition = search::compete(observations, nominal, settings)?;
+    assemble::doubt(&mut competition);
     Ok(assemble::diagnosis(&competition, settings))
 }

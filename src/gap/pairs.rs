@@ -149,7 +149,7 @@ fn misfits(frame: &Frame, fit: &Fit) -> bool {
             goodness: residuals.goodness(),
             blocks: &blocks,
             withheld: None,
-            closure_low: None,
+            closure: None,
         }
         .refuted()
     })

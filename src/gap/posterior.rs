@@ -77,6 +77,26 @@ pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
     entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }
 
+/// Gives what is unknown this probability, if that is more than it has, at the cost of all others.
+pub(super) fn raise_unknown(entries: &mut [Entry], probability: f64) {
+    let is_unknown = |entry: &Entry| entry.hypothesis == Hypothesis::Unknown;
+    let has = entries.iter().find(|entry| is_unknown(entry));
+    let Some(has) = has.map(|entry| entry.probability) else {
+        return;
+    };
+    if has >= probability {
+        return;
+    }
+    for entry in entries.iter_mut() {
+        entry.probability = if is_unknown(entry) {
+            probability
+        } else {
+            entry.probability * (1.0 - probability) / (1.0 - has)
+        };
+    }
+    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
 /// Probability of each group, pairs apart, `none` and `unknown` among them; the most probable first.
 pub(super) fn by_group(entries: &[Entry]) -> Vec<(Vec<usize>, f64)> {
     let mut groups: Vec<(Vec<usize>, f64)> = Vec::new();

@@ -1,7 +1,7 @@
 //! From probabilities to an answer, or to none.
 
 use super::posterior::{APART, Entry, by_group, lead};
-use super::result::{Block, Hypothesis, Verdict};
+use super::result::{Block, Closure, Hypothesis, Verdict};
 use crate::effects::EffectId;
 
 /// Probability from which a name is given.
@@ -10,6 +10,8 @@ const NAMED: f64 = 0.8;
 const MISFIT: f64 = 0.01;
 /// The same for the worst of many blocks.
 const BLOCK_MISFIT: f64 = 0.001;
+/// Probability of an error of withheld readings from which the hypothesis counts as predicting them.
+const PREDICTED: f64 = 0.05;
 /// Probability that a set has to hold, and the longest one that is still short.
 const SET: (f64, usize) = (0.9, 4);
 
@@ -25,19 +27,35 @@ pub(super) struct Checks<'a> {
     pub(super) blocks: &'a [Block],
     /// Goodness of its prediction of withheld readings; `None` without any.
     pub(super) withheld: Option<f64>,
-    /// Lower end of its closure on withheld readings; `None` where that says nothing.
-    pub(super) closure_low: Option<f64>,
+    /// Its closure on withheld readings; `None` where that says nothing.
+    pub(super) closure: Option<Closure>,
 }
 
 impl Checks<'_> {
     /// Whether the readings refute the hypothesis.
     pub(super) fn refuted(&self) -> bool {
-        self.goodness.is_some_and(|p| p < MISFIT)
-            || self.withheld.is_some_and(|p| p < BLOCK_MISFIT)
-            || self
-                .blocks
-                .first()
-                .is_some_and(|block| block.goodness_of_fit < BLOCK_MISFIT)
+        self.refuting().is_some()
+    }
+
+    /// The probability of the misfit that refutes the hypothesis, the smallest where several do; of one
+    /// block among many that of any.
+    pub(super) fn refuting(&self) -> Option<f64> {
+        let block = self.blocks.first().map(|block| block.goodness_of_fit);
+        let overall = self.goodness.filter(|p| *p < MISFIT);
+        let withheld = self.withheld.filter(|p| *p < BLOCK_MISFIT);
+        let block = block
+            .filter(|p| *p < BLOCK_MISFIT)
+            .map(|p| (p * self.blocks.len() as f64).min(MISFIT));
+        let all = [overall, withheld, block].into_iter().flatten();
+        all.min_by(f64::total_cmp)
+    }
+
+    /// Whether withheld readings speak for the hypothesis: it closes some of the gap for certain, or predicts
+    /// them within what it leaves open.
+    fn holds(&self) -> bool {
+        let predicts = self.withheld.is_some_and(|p| p > PREDICTED);
+        self.closure
+            .is_none_or(|closure| closure.low > 0.0 || predicts && closure.value > 0.0)
     }
 }
 
@@ -65,7 +83,7 @@ pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>, none: &Checks<'_>)
                 .to_owned(),
         );
     }
-    let holds = checks.closure_low.is_none_or(|low| low > 0.0);
+    let holds = checks.holds();
     if groups[0].1 >= NAMED && holds {
         return name_of(entries, &groups[0].0);
     }

@@ -1,5 +1,6 @@
 //! From the competition to the answer: every number that is shown.
 
+use super::advisor::advise;
 use super::catalogue::PlaceKind;
 use super::forward::Layout;
 use super::frame::Frame;
@@ -54,6 +55,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         _ => Vec::new(),
     };
     Diagnosis {
+        next_tests: advise(competition, &verdict),
         verdict,
         places: places(entries),
         pulls,

@@ -8,6 +8,7 @@
 //!                          quality     misfit overall, by block, with each mode left out
 //!                          withheld    what it predicts of readings that took no part
 //!                          verdict     an answer, or the reason why there is none
+//!                          advisor     which test would tell more
 //! ```
 //!
 //! Every hypothesis is the nominal model, one effect of the catalogue added to it, or "something else";
@@ -16,6 +17,7 @@
 //! uncertainty of the readings comes from the measurement, never from a residual. This module cannot
 //! reach the simulator, so that its answers to virtual tests are answers.
 
+mod advisor;
 mod along_decay;
 mod assemble;
 mod branches;
@@ -44,6 +46,7 @@ mod synthetic;
 mod verdict;
 mod withheld;
 
+pub use advisor::{NextTest, Step};
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{

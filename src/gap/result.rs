@@ -1,5 +1,6 @@
 //! What the diagnosis says, as plain data.
 
+use super::advisor::NextTest;
 use crate::effects::{Effect, EffectId, Group};
 
 /// The answer.
@@ -28,6 +29,8 @@ pub struct Diagnosis {
     pub decided_by: DecidedBy,
     /// Modes above this number took no part in the fit.
     pub fitted_modes: usize,
+    /// Tests that would tell more, those first that tell most per cost.
+    pub next_tests: Vec<NextTest>,
 }
 
 /// The kind of answer.

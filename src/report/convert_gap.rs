@@ -2,11 +2,12 @@
 
 use super::document::{
     BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
-    HypothesisSection, JointShiftSection, ParameterSection, PlaceMapSection, PullSection,
+    HypothesisSection, JointShiftSection, NextTestSection, ParameterSection, PlaceMapSection,
+    PullSection,
 };
 use crate::effects::EffectId;
 use crate::gap::{
-    DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift, PlaceMap,
+    DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift, NextTest, PlaceMap,
     PlaceProbabilities, Pull, Verdict,
 };
 
@@ -46,7 +47,7 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         ),
         map: found.map.as_ref().map(map),
         baselines: baselines(&found.hypotheses),
-        next_test: Vec::new(),
+        next_test: found.next_tests.iter().map(next_test).collect(),
     }
 }
 
@@ -151,6 +152,16 @@ fn map(map: &PlaceMap) -> PlaceMapSection {
         mass: map.mass.clone(),
         mass_std: map.mass_std.clone(),
         resolution: map.resolution,
+    }
+}
+
+fn next_test(test: &NextTest) -> NextTestSection {
+    NextTestSection {
+        id: test.step.id().to_owned(),
+        action: test.action.clone(),
+        separates: test.separates.clone(),
+        bits: test.bits,
+        effort: test.step.effort(),
     }
 }
 

@@ -29,7 +29,7 @@ pub struct GapSection {
     pub map: Option<PlaceMapSection>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
     pub baselines: Vec<BaselineSection>,
-    /// Tests that would tell more, the most telling first.
+    /// Tests that would tell more, those first that tell most for their effort.
     pub next_test: Vec<NextTestSection>,
 }
 
@@ -173,10 +173,14 @@ pub struct BaselineSection {
 /// A test that would tell more.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct NextTestSection {
+    /// Its kind: "higher-modes", "move-sensor", "known-mass", ...
+    pub id: String,
     /// What to do.
     pub action: String,
-    /// Which effects it would tell apart.
+    /// Which hypotheses it would tell apart.
     pub separates: Vec<String>,
-    /// Information it is expected to bring (bit).
+    /// Information about which hypothesis is true that it is expected to bring at least (bit).
     pub bits: f64,
+    /// What it costs, in multiples of reading again what is recorded; tests are ranked by bits over this.
+    pub effort: f64,
 }

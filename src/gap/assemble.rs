@@ -4,11 +4,13 @@ use super::advisor::advise;
 use super::catalogue::PlaceKind;
 use super::forward::Layout;
 use super::frame::Frame;
+use super::left_out::LeftOutErrors;
 use super::place_map::place_map;
 use super::posterior::{APART, Entry, confounded, lead, places, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
-    Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
+    Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LeftOutRecordings,
+    ParameterValue,
 };
 use super::search::Competition;
 use super::settings::GapSettings;
@@ -82,12 +84,16 @@ fn decided_by(entries: &[Entry]) -> DecidedBy {
     }
 }
 
+/// Probability from which on recordings are left out to test a hypothesis.
+const LEFT_OUT: f64 = 0.02;
+
 /// What every hypothesis is held against.
 struct Context<'a> {
     competition: &'a Competition,
     settings: &'a GapSettings,
     before: Option<Residuals>,
     withheld_before: Option<WithheldErrors>,
+    left_out_before: Option<LeftOutErrors>,
 }
 
 impl<'a> Context<'a> {
@@ -97,6 +103,7 @@ impl<'a> Context<'a> {
             settings,
             before: Residuals::new(&competition.frame, &competition.baseline),
             withheld_before: WithheldErrors::new(&competition.frame, &competition.baseline),
+            left_out_before: LeftOutErrors::new(&competition.frame, &competition.baseline),
         }
     }
 
@@ -137,6 +144,7 @@ impl<'a> Context<'a> {
             withheld_after: withheld.as_ref().map(WithheldErrors::rms),
             withheld_floor: withheld.as_ref().map(WithheldErrors::floor),
             closure: self.closure(withheld.as_ref()),
+            left_out_recordings: self.left_out(entry),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
             joint_shift: if predicts {
                 self.joint_shift(entry)
@@ -150,6 +158,16 @@ impl<'a> Context<'a> {
 
     fn closure(&self, after: Option<&WithheldErrors>) -> Option<Closure> {
         closure(self.withheld_before.as_ref()?, after?, self.settings.seed)
+    }
+
+    /// Of hypotheses that are in the running, and of none.
+    fn left_out(&self, entry: &Entry) -> Option<LeftOutRecordings> {
+        let weighed = entry.probability > LEFT_OUT || entry.hypothesis == Hypothesis::None;
+        if !weighed || entry.hypothesis == Hypothesis::Unknown {
+            return None;
+        }
+        let after = LeftOutErrors::new(self.frame(), &entry.fit)?;
+        after.against(self.left_out_before.as_ref()?, self.settings.seed)
     }
 
     fn effects(&self, entry: &Entry) -> Vec<Effect> {

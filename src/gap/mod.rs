@@ -7,6 +7,7 @@
 //!                          posterior   probabilities, places, what cannot be told apart
 //!                          quality     misfit overall, by block, with each mode left out
 //!                          withheld    what it predicts of readings that took no part
+//!                          left_out    what it predicts of each recording from the others
 //!                          verdict     an answer, or the reason why there is none
 //!                          advisor     which test would tell more
 //! ```
@@ -31,6 +32,7 @@ mod frame;
 mod hypothesis;
 mod joint_energy;
 mod least_squares;
+mod left_out;
 mod noise;
 mod nominal;
 mod pairs;
@@ -50,8 +52,9 @@ pub use advisor::{NextTest, Step};
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{
-    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
-    PlaceMap, PlaceProbabilities, Pull, Verdict,
+    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
+    LeftOutRecording, LeftOutRecordings, ParameterValue, PlaceMap, PlaceProbabilities, Pull,
+    Verdict,
 };
 pub use settings::GapSettings;
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};

@@ -119,6 +119,9 @@ pub struct HypothesisResult {
     /// Share of the gap on withheld readings that the hypothesis closes; `None` where the gap is below
     /// two noise floors.
     pub closure: Option<Closure>,
+    /// Each recording predicted from the others; `None` with fewer than three, and of hypotheses that are
+    /// hardly probable.
+    pub left_out_recordings: Option<LeftOutRecordings>,
     /// Goodness of fit.
     pub goodness_of_fit: Option<f64>,
     /// What it does to the joint.
@@ -156,6 +159,34 @@ pub struct Closure {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+}
+
+/// Recordings predicted from all others, each in turn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutRecordings {
+    /// Each of them.
+    pub recordings: Vec<LeftOutRecording>,
+    /// Root mean square of all their frequencies' errors under the nominal model (%).
+    pub before: f64,
+    /// The same under the hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%).
+    pub floor: f64,
+    /// Share of the gap that is closed; `None` where the gap is below two floors.
+    pub closure: Option<Closure>,
+}
+
+/// A recording predicted from all others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutRecording {
+    /// Which.
+    pub recording: String,
+    /// Root mean square of its frequencies' errors under the nominal model (%).
+    pub before: f64,
+    /// The same under the hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%).
+    pub floor: f64,
 }
 
 /// Change of the joint's stiffnesses when the effect is added.

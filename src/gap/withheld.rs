@@ -43,6 +43,26 @@ impl WithheldErrors {
         Some(WithheldErrors { errors, spread })
     }
 
+    /// From errors (%) and their covariance (%^2).
+    pub(super) fn from_parts(errors: DVector<f64>, spread: DMatrix<f64>) -> Self {
+        WithheldErrors { errors, spread }
+    }
+
+    /// Several of them that have nothing in common; `None` of none.
+    pub(super) fn together<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+        let count: usize = parts.clone().map(|part| part.errors.len()).sum();
+        let mut all = Self::from_parts(DVector::zeros(count), DMatrix::zeros(count, count));
+        let mut at = 0;
+        for part in parts {
+            let own = part.errors.len();
+            all.errors.rows_mut(at, own).copy_from(&part.errors);
+            let mut block = all.spread.view_mut((at, at), (own, own));
+            block.copy_from(&part.spread);
+            at += own;
+        }
+        (count > 0).then_some(all)
+    }
+
     /// Root mean square of the errors (%).
     pub(super) fn rms(&self) -> f64 {
         root_mean_square(&self.errors)

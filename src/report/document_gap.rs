@@ -101,6 +101,9 @@ pub struct HypothesisSection {
     pub withheld_floor: Option<f64>,
     /// Share of the gap that is closed on withheld data.
     pub closure: Option<ClosureSection>,
+    /// Each recording predicted from the others; null with fewer than three, and where the hypothesis is
+    /// hardly probable.
+    pub left_out_recordings: Option<LeftOutSection>,
     /// Probability of a misfit as large or larger.
     pub goodness_of_fit: Option<f64>,
     /// How much the joint moves when this is added.
@@ -131,6 +134,34 @@ pub struct ClosureSection {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+}
+
+/// Recordings predicted from all others, each in turn; the refits are linearised at the optimum.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct LeftOutSection {
+    /// Errors of their frequencies with the nominal model (%, rms).
+    pub before: f64,
+    /// The same with this hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%, rms).
+    pub floor: f64,
+    /// Share of the gap that is closed on them.
+    pub closure: Option<ClosureSection>,
+    /// Each recording.
+    pub recordings: Vec<LeftOutRecordingSection>,
+}
+
+/// A recording predicted from all others.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct LeftOutRecordingSection {
+    /// Which.
+    pub recording: String,
+    /// Errors of its frequencies with the nominal model (%, rms).
+    pub before: f64,
+    /// The same with this hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%, rms).
+    pub floor: f64,
 }
 
 /// Change of the joint (%).

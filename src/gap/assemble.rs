@@ -3,7 +3,7 @@
 use super::advisor::advise;
 use super::catalogue::PlaceKind;
 use super::forward::Layout;
-use super::frame::Frame;
+use super::frame::{Frame, Small};
 use super::left_out::LeftOutErrors;
 use super::place_map::place_map;
 use super::posterior::{APART, Entry, confounded, lead, places, spreads};
@@ -153,6 +153,7 @@ impl<'a> Context<'a> {
             },
             effects: self.effects(entry),
             joint: self.joint(entry),
+            scale: self.scale(entry),
         }
     }
 
@@ -187,6 +188,12 @@ impl<'a> Context<'a> {
             joint[*direction] = entry.fit.branch.optimum.parameters[k].exp();
         }
         Some(joint)
+    }
+
+    fn scale(&self, entry: &Entry) -> f64 {
+        let smalls = Layout::new(self.frame(), &entry.fit.effects).smalls();
+        let index = self.frame().small_index(Small::Scale);
+        index.map_or(0.0, |k| entry.fit.branch.optimum.parameters[smalls + k])
     }
 
     fn joint_shift(&self, entry: &Entry) -> JointShift {

@@ -48,6 +48,7 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         map: found.map.as_ref().map(map),
         baselines: baselines(&found.hypotheses),
         next_test: found.next_tests.iter().map(next_test).collect(),
+        updated_model: None,
     }
 }
 

@@ -20,7 +20,7 @@ pub use super::document_frf::{FrfResonanceSection, FrfSection};
 pub use super::document_gap::{
     BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
     HypothesisSection, JointShiftSection, LeftOutRecordingSection, LeftOutSection, NextTestSection,
-    ParameterSection, PlaceMapSection, PullSection,
+    ParameterSection, PlaceMapSection, PullSection, UpdatedModelSection,
 };
 pub use super::document_perturbation::{
     AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,

@@ -31,6 +31,20 @@ pub struct GapSection {
     pub baselines: Vec<BaselineSection>,
     /// Tests that would tell more, those first that tell most for their effort.
     pub next_test: Vec<NextTestSection>,
+    /// The model with what was found, to predict with; null where nothing predicts.
+    pub updated_model: Option<UpdatedModelSection>,
+}
+
+/// A model brought up to date.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct UpdatedModelSection {
+    /// The hypothesis that it takes for true.
+    pub effect: String,
+    /// The file that holds it as a test description, beside this report.
+    pub file: String,
+    /// Its natural frequencies (Hz), sensors where the first recording has them; `tapjoint predict` of the
+    /// file gives the same.
+    pub frequencies: Vec<f64>,
 }
 
 /// The answer.

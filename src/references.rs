@@ -48,5 +48,11 @@
 //!   the pseudospectral method", Journal of Sound and Vibration 269, 609-621. Frequencies of thick beams.
 //! - **Iwan 1966**: "A distributed-element model for hysteresis and its steady-state dynamic response",
 //!   Journal of Applied Mechanics 33, 893-900. Sliders in parallel.
+//! - **Box & Hill 1967**: "Discrimination among mechanistic models", Technometrics 9, 57-71. The experiment
+//!   whose outcomes the rival models predict furthest apart.
+//! - **Kolchinsky & Tracey 2017**: "Estimating mixture entropy with pairwise distances", Entropy 19, 361. Bounds
+//!   on what a reading tells about which of several distributions it came from.
+//! - **Cook & Weisberg 1982**: "Residuals and Influence in Regression", Chapman and Hall. What a fit without some
+//!   readings would predict of them.
 //! - **Masing 1926**: "Eigenspannungen und Verfestigung beim Messing", Proceedings of the 2nd International
 //!   Congress of Applied Mechanics, 332-335. Branches of a hysteresis loop from the first loading.

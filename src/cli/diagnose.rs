@@ -2,7 +2,9 @@
 
 use super::Outcome;
 use super::identify::{FrequencyArguments, resolve};
+use super::output::OutputFile;
 use super::terminal::Terminal;
+use super::updated_model::add_model;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::gap::GapSettings;
@@ -15,13 +17,18 @@ use tapjoint::report::{document_of, gap_section, render_gap_text};
 /// Answers may also be that nothing is missing, that something unknown is, or that these data cannot
 /// tell.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  tapjoint diagnose test.toml")]
+#[command(
+    after_help = "Examples:\n  tapjoint diagnose test.toml\n  tapjoint diagnose test.toml --model updated-model.toml"
+)]
 pub(super) struct DiagnoseArguments {
     /// A test description (.toml)
     #[arg(value_name = "TEST")]
     test: PathBuf,
     #[command(flatten)]
     frequencies: FrequencyArguments,
+    /// Write the model with what was found, for `tapjoint predict`
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
 }
 
 pub(super) fn run(
@@ -30,6 +37,11 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
+    let output = arguments
+        .model
+        .as_deref()
+        .map(OutputFile::prepare)
+        .transpose()?;
     let analysis = file.analyse(&IdentifySettings::default())?;
     let settings = GapSettings {
         seed,
@@ -37,7 +49,12 @@ pub(super) fn run(
     };
     let diagnosis = diagnose_test(&file.test, &analysis, &settings);
     let mut document = document_of(&analysis);
-    document.gap = Some(gap_section(diagnosis.as_ref()));
+    let mut gap = gap_section(diagnosis.as_ref());
+    let text = add_model(&mut gap, &file, (&analysis, diagnosis.as_ref()));
+    document.gap = Some(gap);
+    if let (Some(output), Some(text)) = (output, text) {
+        output.write(text.as_bytes())?;
+    }
     terminal.say(&render_gap_text(&document))?;
     terminal.write_document(&document)?;
     Ok(if diagnosis.is_ok() {

@@ -1,7 +1,7 @@
 //! Reading test descriptions from files.
 
 use super::terminal::Terminal;
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tapjoint::description::TestDescription;
@@ -23,6 +23,23 @@ pub(super) struct TestFile {
 /// # Errors
 /// The file cannot be read, is no UTF-8 text, or is no valid description.
 pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
+    let file = read_model(path, terminal)?;
+    if let Some(effect) = file.test.effects.first() {
+        bail!(
+            "{}:{}: [[effect]] belongs to models that are predicted or simulated with; this command takes \
+             tests, whose effects are yet to be found; remove it",
+            file.name,
+            effect.line
+        );
+    }
+    Ok(file)
+}
+
+/// The same where effects may be described.
+///
+/// # Errors
+/// As [`read_test`].
+pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let name = path.display().to_string();
     let remedy = "give the path of a test description; `tapjoint init` prints one";
     let bytes =

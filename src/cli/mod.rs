@@ -11,6 +11,7 @@ mod input;
 mod output;
 mod progress;
 mod terminal;
+mod updated_model;
 mod wiring;
 
 mod blind_check;

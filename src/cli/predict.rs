@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::arguments::{CrossStiffness, Stiffness};
 use super::choices::KindArgument;
-use super::input::{TestFile, read_test};
+use super::input::{TestFile, read_model};
 use super::terminal::Terminal;
 use anyhow::{anyhow, bail};
 use clap::Args;
@@ -12,16 +12,19 @@ use std::path::PathBuf;
 use tapjoint::description::JointKind;
 use tapjoint::identify::{predict, predict_lambdas};
 use tapjoint::pipeline::{TestedStructure, tested_structure};
+use tapjoint::report::document::{Document, PredictionSection};
 use tapjoint::report::{lambdas_of, prediction_of, render_text};
 use tapjoint::structure::{Assembly, JointStiffness};
+use tapjoint::study::updated_model::{described_effects, frequencies_with};
 
 /// Predict the natural frequencies of a beam with a known joint, in Hz and as lambda.
 ///
 /// Kx = Kt L^3/(E I), Ky = Kr L/(E I), Kz = Ktr L^2/(E I) are non-dimensional. With --joint
-/// instead of TEST there is no beam, and lambda alone is printed.
+/// instead of TEST there is no beam, and lambda alone is printed. TEST may be a model with effects, as
+/// `run` and `diagnose --model` write it; sensors whose mass is stated are on the beam then.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  tapjoint predict --joint cantilever --kx 500 --ky 100 --modes 5\n  tapjoint predict test.toml --kx 970.5 --ky 1.251"
+    after_help = "Examples:\n  tapjoint predict --joint cantilever --kx 500 --ky 100 --modes 5\n  tapjoint predict test.toml --kx 970.5 --ky 1.251\n  tapjoint predict test-report/updated-model.toml"
 )]
 pub(super) struct PredictArguments {
     /// A test description (.toml)
@@ -76,7 +79,7 @@ struct Request {
 
 fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<Request> {
     let subject = match (&arguments.test, arguments.joint) {
-        (Some(test), _) => Subject::Test(Box::new(read_test(test, terminal)?)),
+        (Some(test), _) => Subject::Test(Box::new(read_model(test, terminal)?)),
         (None, Some(kind)) => Subject::Kind(kind.into()),
         (None, None) => bail!("nothing to predict; give a test description, or --joint"),
     };
@@ -143,6 +146,12 @@ pub(super) fn given_stiffness(
 pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, &terminal)?;
     let document = match &request.subject {
+        Subject::Test(file) if has_more_than_a_joint(&request, file) => {
+            let structure = tested_structure(&file.test);
+            described_joint(&structure, &file.name)?;
+            let document = prediction_of(&file.test.name, &structure, &[]);
+            with_effects((document, &structure), file, &request)?
+        }
         Subject::Test(file) => {
             let structure = tested_structure(&file.test);
             let joint = match request.stiffness {
@@ -169,6 +178,38 @@ pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::R
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;
     Ok(Outcome::Answered)
+}
+
+/// Whether there is something on the beam that its frequency equation does not know: effects, or heavy
+/// sensors beside a described joint. Stiffnesses on the command line are those of the bare beam.
+fn has_more_than_a_joint(request: &Request, file: &TestFile) -> bool {
+    let test = &file.test;
+    let heavy = test.analysis.sensor_mass && test.sensors.iter().any(|one| one.mass > Some(0.0));
+    !test.effects.is_empty() || (heavy && request.stiffness.is_none())
+}
+
+/// The frequencies of a described structure with its sensors and its effects.
+fn with_effects(
+    (mut document, structure): (Document, &TestedStructure),
+    file: &TestFile,
+    request: &Request,
+) -> anyhow::Result<Document> {
+    if request.stiffness.is_some() {
+        bail!("effects go with the joint they were found with; leave out --kx, --ky and --kz");
+    }
+    let effects = described_effects(&file.test).map_err(|e| anyhow!("{}: {e}", file.name))?;
+    let frequencies = frequencies_with(&file.test, &effects, None, request.modes)?;
+    let rows = frequencies
+        .iter()
+        .enumerate()
+        .map(|(index, frequency)| PredictionSection {
+            mode: index + 1,
+            predicted: Some(*frequency),
+            lambda: Some(structure.beam.lambda_of(*frequency)),
+            ..PredictionSection::default()
+        });
+    document.prediction = Some(rows.collect());
+    Ok(document)
 }
 
 impl GivenStiffness {

@@ -7,6 +7,7 @@ use super::choices::{MethodsArgument, ReadingArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFolder;
 use super::terminal::Terminal;
+use super::updated_model::{FILE, add_model};
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
@@ -16,8 +17,8 @@ use tapjoint::report::{document_of, figures_of, gap_section, render_run, render_
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
 ///
-/// Writes report.html, report.json, parameters.csv, modes.csv, perturbation.csv and pictures into a
-/// folder.
+/// Writes report.html, report.json, parameters.csv, modes.csv, perturbation.csv, the model with what the
+/// diagnosis found (updated-model.toml) and pictures into a folder.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
@@ -127,11 +128,17 @@ pub(super) fn run(
         }
     };
     let mut document = document_of(&analysis);
+    let mut model = None;
     if let Subject::Test(file) = &request.subject {
         let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
-        document.gap = Some(gap_section(diagnosis.as_ref()));
+        let mut gap = gap_section(diagnosis.as_ref());
+        model = add_model(&mut gap, file, (&analysis, diagnosis.as_ref()));
+        document.gap = Some(gap);
     }
     drop(progress);
+    if let Some(model) = model {
+        request.output.add(FILE, model.as_bytes())?;
+    }
     for file in render_run(&document, &figures_of(&analysis))? {
         request.output.add(&file.name, &file.bytes)?;
     }

@@ -21,6 +21,7 @@ pub(super) const TOP: KnownTable = KnownTable {
         "recording",
         "measured",
         "analysis",
+        "effect",
     ],
 };
 pub(super) const BEAM: KnownTable = KnownTable {
@@ -100,6 +101,29 @@ pub(super) const ANALYSIS: KnownTable = KnownTable {
         "weights",
         "sensor_mass",
         "fit",
+    ],
+};
+
+/// Not among [`ALL`]: half of its keys are those of other tables.
+pub(super) const EFFECT: KnownTable = KnownTable {
+    header: "[[effect]]",
+    keys: &[
+        "id",
+        "mass",
+        "inertia",
+        "position",
+        "stiffness",
+        "coupling",
+        "ratio",
+        "exponent",
+        "loss_factor",
+        "std",
+        "frequency",
+        "relative",
+        "compliance",
+        "force",
+        "factor",
+        "offset",
     ],
 };
 

@@ -6,6 +6,7 @@
 
 mod analysis;
 mod beam;
+mod effects;
 mod error;
 mod joint;
 mod keys;
@@ -43,8 +44,21 @@ pub struct TestDescription {
     pub measured: Option<MeasuredFrequencies>,
     /// How to analyse.
     pub analysis: AnalysisDescription,
+    /// What the model has besides: to predict and to simulate with.
+    pub effects: Vec<EffectDescription>,
     /// What is odd but usable, in the order of reading.
     pub warnings: Vec<DescriptionWarning>,
+}
+
+/// An effect of a model that was brought up to date.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectDescription {
+    /// Its name.
+    pub id: String,
+    /// Its parameters (SI) by name; the others are typical.
+    pub values: BTreeMap<String, f64>,
+    /// Line of its table.
+    pub line: usize,
 }
 
 /// A uniform beam of rectangular cross-section, bending in the direction of its thickness.

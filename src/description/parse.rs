@@ -2,6 +2,7 @@
 
 use super::analysis::read_analysis;
 use super::beam::read_beam;
+use super::effects::read_effect;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning};
 use super::joint::read_joint;
 use super::keys;
@@ -75,7 +76,12 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
     let measured = measured(top, &recordings, &mut warnings)?;
     let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;
     let analysis = read_analysis(analysis.as_ref(), &joint)?;
+    let effects = array_of_tables(top, "effect", "[[effect]]")?
+        .iter()
+        .map(read_effect)
+        .collect::<Result<Vec<_>, _>>()?;
     Ok(TestDescription {
+        effects,
         name: name.unwrap_or_else(|| name_from_file(file_name)),
         beam,
         joint,

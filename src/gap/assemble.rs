@@ -1,15 +1,18 @@
 //! From the competition to the answer: every number that is shown.
 
+use super::advisor::advise;
 use super::catalogue::PlaceKind;
 use super::evidence::log_likelihood;
 use super::forward::Layout;
-use super::frame::Frame;
+use super::frame::{Frame, Small};
+use super::left_out::LeftOutErrors;
 use super::nominal::COUPLING;
 use super::place_map::place_map;
 use super::posterior::{APART, Entry, confounded, lead, places, raise_unknown, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
-    Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, ParameterValue,
+    Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LeftOutRecordings,
+    ParameterValue,
 };
 use super::search::Competition;
 use super::settings::GapSettings;
@@ -63,7 +66,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks: &blocks,
         withheld: WithheldErrors::new(frame, &entries[best].fit)
             .and_then(|errors| errors.goodness()),
-        closure: hypotheses[best].closure,
+        closure: hypotheses[best].closure.filter(|_| context.decides(best)),
     };
     let nominal = entries
         .iter()
@@ -84,6 +87,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         _ => Vec::new(),
     };
     Diagnosis {
+        next_tests: advise(competition, &verdict),
         verdict,
         places: places(entries),
         pulls,
@@ -114,12 +118,16 @@ fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
     }
 }
 
+/// Probability from which on recordings are left out to test a hypothesis.
+const LEFT_OUT: f64 = 0.02;
+
 /// What every hypothesis is held against.
 struct Context<'a> {
     competition: &'a Competition,
     settings: &'a GapSettings,
     before: Option<Residuals>,
     withheld_before: Option<WithheldErrors>,
+    left_out_before: Option<LeftOutErrors>,
 }
 
 impl<'a> Context<'a> {
@@ -129,6 +137,7 @@ impl<'a> Context<'a> {
             settings,
             before: Residuals::new(&competition.frame, &competition.baseline),
             withheld_before: WithheldErrors::new(&competition.frame, &competition.baseline),
+            left_out_before: LeftOutErrors::new(&competition.frame, &competition.baseline),
         }
     }
 
@@ -169,6 +178,7 @@ impl<'a> Context<'a> {
             withheld_after: withheld.as_ref().map(WithheldErrors::rms),
             withheld_floor: withheld.as_ref().map(WithheldErrors::floor),
             closure: self.closure(withheld.as_ref()),
+            left_out_recordings: self.left_out(entry),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
             joint_shift: if predicts {
                 self.joint_shift(entry)
@@ -177,11 +187,31 @@ impl<'a> Context<'a> {
             },
             effects: self.effects(entry),
             joint: self.joint(entry),
+            scale: self.scale(entry),
         }
+    }
+
+    /// Whether the withheld readings could tell this hypothesis from the nominal model.
+    fn decides(&self, index: usize) -> bool {
+        let fit = &self.competition.entries[index].fit;
+        let after = WithheldErrors::new(self.frame(), fit);
+        after
+            .zip(self.withheld_before.as_ref())
+            .is_some_and(|(after, before)| after.decides(before))
     }
 
     fn closure(&self, after: Option<&WithheldErrors>) -> Option<Closure> {
         closure(self.withheld_before.as_ref()?, after?, self.settings.seed)
+    }
+
+    /// Of hypotheses that are in the running, and of none.
+    fn left_out(&self, entry: &Entry) -> Option<LeftOutRecordings> {
+        let weighed = entry.probability > LEFT_OUT || entry.hypothesis == Hypothesis::None;
+        if !weighed || entry.hypothesis == Hypothesis::Unknown {
+            return None;
+        }
+        let after = LeftOutErrors::new(self.frame(), &entry.fit)?;
+        after.against(self.left_out_before.as_ref()?, self.settings.seed)
     }
 
     fn effects(&self, entry: &Entry) -> Vec<Effect> {
@@ -203,6 +233,12 @@ impl<'a> Context<'a> {
             }
         }
         Some(joint)
+    }
+
+    fn scale(&self, entry: &Entry) -> f64 {
+        let smalls = Layout::new(self.frame(), &entry.fit.effects).smalls();
+        let index = self.frame().small_index(Small::Scale);
+        index.map_or(0.0, |k| entry.fit.branch.optimum.parameters[smalls + k])
     }
 
     fn joint_shift(&self, entry: &Entry) -> JointShift {

@@ -7,7 +7,9 @@
 //!                          posterior   probabilities, places, what cannot be told apart
 //!                          quality     misfit overall, by block, with each mode left out
 //!                          withheld    what it predicts of readings that took no part
+//!                          left_out    what it predicts of each recording from the others
 //!                          verdict     an answer, or the reason why there is none
+//!                          advisor     which test would tell more
 //! ```
 //!
 //! Every hypothesis is the nominal model, one effect of the catalogue added to it, or "something else";
@@ -16,6 +18,7 @@
 //! uncertainty of the readings comes from the measurement, never from a residual. This module cannot
 //! reach the simulator, so that its answers to virtual tests are answers.
 
+mod advisor;
 mod along_decay;
 mod assemble;
 mod branches;
@@ -29,6 +32,7 @@ mod frame;
 mod hypothesis;
 mod joint_energy;
 mod least_squares;
+mod left_out;
 mod noise;
 mod nominal;
 mod pairs;
@@ -44,11 +48,13 @@ mod synthetic;
 mod verdict;
 mod withheld;
 
+pub use advisor::{NextTest, Step};
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{
-    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, Misfit,
-    ParameterValue, PlaceMap, PlaceProbabilities, Pull, Verdict,
+    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
+    LeftOutRecording, LeftOutRecordings, Misfit, ParameterValue, PlaceMap, PlaceProbabilities,
+    Pull, Verdict,
 };
 pub use settings::GapSettings;
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};

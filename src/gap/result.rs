@@ -1,5 +1,6 @@
 //! What the diagnosis says, as plain data.
 
+use super::advisor::NextTest;
 use crate::effects::{Effect, EffectId, Group};
 
 /// The answer.
@@ -30,6 +31,8 @@ pub struct Diagnosis {
     pub decided_by: DecidedBy,
     /// Modes above this number took no part in the fit.
     pub fitted_modes: usize,
+    /// Tests that would tell more, those first that tell most per cost.
+    pub next_tests: Vec<NextTest>,
 }
 
 /// The kind of answer.
@@ -118,6 +121,9 @@ pub struct HypothesisResult {
     /// Share of the gap on withheld readings that the hypothesis closes; `None` where the gap is below
     /// two noise floors.
     pub closure: Option<Closure>,
+    /// Each recording predicted from the others; `None` with fewer than three, and of hypotheses that are
+    /// hardly probable.
+    pub left_out_recordings: Option<LeftOutRecordings>,
     /// Goodness of fit.
     pub goodness_of_fit: Option<f64>,
     /// What it does to the joint.
@@ -126,6 +132,9 @@ pub struct HypothesisResult {
     pub effects: Vec<Effect>,
     /// The joint's stiffnesses that go with them (N/m, N m/rad); `None` without a joint.
     pub joint: Option<[f64; 2]>,
+    /// Logarithm of the common factor on all frequencies that goes with them, within the tolerance of the
+    /// geometry (1).
+    pub scale: f64,
 }
 
 /// A parameter of an effect.
@@ -155,6 +164,34 @@ pub struct Closure {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+}
+
+/// Recordings predicted from all others, each in turn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutRecordings {
+    /// Each of them.
+    pub recordings: Vec<LeftOutRecording>,
+    /// Root mean square of all their frequencies' errors under the nominal model (%).
+    pub before: f64,
+    /// The same under the hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%).
+    pub floor: f64,
+    /// Share of the gap that is closed; `None` where the gap is below two floors.
+    pub closure: Option<Closure>,
+}
+
+/// A recording predicted from all others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOutRecording {
+    /// Which.
+    pub recording: String,
+    /// Root mean square of its frequencies' errors under the nominal model (%).
+    pub before: f64,
+    /// The same under the hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%).
+    pub floor: f64,
 }
 
 /// Change of the joint's stiffnesses when the effect is added.

@@ -2,12 +2,13 @@
 
 use super::document::{
     BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
-    HypothesisSection, JointShiftSection, ParameterSection, PlaceMapSection, PullSection,
+    HypothesisSection, JointShiftSection, LeftOutRecordingSection, LeftOutSection, NextTestSection,
+    ParameterSection, PlaceMapSection, PullSection,
 };
 use crate::effects::EffectId;
 use crate::gap::{
-    DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift, PlaceMap,
-    PlaceProbabilities, Pull, Verdict,
+    Closure, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
+    LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Verdict,
 };
 
 /// The section of a diagnosis, or of the reason why there is none.
@@ -46,7 +47,8 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         ),
         map: found.map.as_ref().map(map),
         baselines: baselines(&found.hypotheses),
-        next_test: Vec::new(),
+        next_test: found.next_tests.iter().map(next_test).collect(),
+        updated_model: None,
     }
 }
 
@@ -132,14 +134,37 @@ fn hypothesis(found: &HypothesisResult) -> HypothesisSection {
         withheld_before: found.withheld_before,
         withheld_after: found.withheld_after,
         withheld_floor: found.withheld_floor,
-        closure: found.closure.map(|closure| ClosureSection {
-            value: closure.value,
-            low: closure.low,
-            high: closure.high,
-        }),
+        closure: found.closure.as_ref().map(closure),
+        left_out_recordings: found.left_out_recordings.as_ref().map(left_out),
         goodness_of_fit: found.goodness_of_fit,
         joint_shift: shift(&found.joint_shift),
         joint: found.joint,
+    }
+}
+
+fn closure(closure: &Closure) -> ClosureSection {
+    ClosureSection {
+        value: closure.value,
+        low: closure.low,
+        high: closure.high,
+    }
+}
+
+fn left_out(found: &LeftOutRecordings) -> LeftOutSection {
+    let recordings = found.recordings.iter();
+    LeftOutSection {
+        before: found.before,
+        after: found.after,
+        floor: found.floor,
+        closure: found.closure.as_ref().map(closure),
+        recordings: recordings
+            .map(|one| LeftOutRecordingSection {
+                recording: one.recording.clone(),
+                before: one.before,
+                after: one.after,
+                floor: one.floor,
+            })
+            .collect(),
     }
 }
 
@@ -151,6 +176,16 @@ fn map(map: &PlaceMap) -> PlaceMapSection {
         mass: map.mass.clone(),
         mass_std: map.mass_std.clone(),
         resolution: map.resolution,
+    }
+}
+
+fn next_test(test: &NextTest) -> NextTestSection {
+    NextTestSection {
+        id: test.step.id().to_owned(),
+        action: test.action.clone(),
+        separates: test.separates.clone(),
+        bits: test.bits,
+        effort: test.step.effort(),
     }
 }
 

@@ -19,8 +19,8 @@ pub use super::document_fit::{
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
 pub use super::document_gap::{
     BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
-    HypothesisSection, JointShiftSection, NextTestSection, ParameterSection, PlaceMapSection,
-    PullSection,
+    HypothesisSection, JointShiftSection, LeftOutRecordingSection, LeftOutSection, NextTestSection,
+    ParameterSection, PlaceMapSection, PullSection, UpdatedModelSection,
 };
 pub use super::document_perturbation::{
     AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,

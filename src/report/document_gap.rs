@@ -29,8 +29,22 @@ pub struct GapSection {
     pub map: Option<PlaceMapSection>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
     pub baselines: Vec<BaselineSection>,
-    /// Tests that would tell more, the most telling first.
+    /// Tests that would tell more, those first that tell most for their effort.
     pub next_test: Vec<NextTestSection>,
+    /// The model with what was found, to predict with; null where nothing predicts.
+    pub updated_model: Option<UpdatedModelSection>,
+}
+
+/// A model brought up to date.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct UpdatedModelSection {
+    /// The hypothesis that it takes for true.
+    pub effect: String,
+    /// The file that holds it as a test description, beside this report.
+    pub file: String,
+    /// Its natural frequencies (Hz), sensors where the first recording has them; `tapjoint predict` of the
+    /// file gives the same.
+    pub frequencies: Vec<f64>,
 }
 
 /// The answer.
@@ -101,6 +115,9 @@ pub struct HypothesisSection {
     pub withheld_floor: Option<f64>,
     /// Share of the gap that is closed on withheld data.
     pub closure: Option<ClosureSection>,
+    /// Each recording predicted from the others; null with fewer than three, and where the hypothesis is
+    /// hardly probable.
+    pub left_out_recordings: Option<LeftOutSection>,
     /// Probability of a misfit as large or larger.
     pub goodness_of_fit: Option<f64>,
     /// How much the joint moves when this is added.
@@ -131,6 +148,34 @@ pub struct ClosureSection {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+}
+
+/// Recordings predicted from all others, each in turn; the refits are linearised at the optimum.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct LeftOutSection {
+    /// Errors of their frequencies with the nominal model (%, rms).
+    pub before: f64,
+    /// The same with this hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%, rms).
+    pub floor: f64,
+    /// Share of the gap that is closed on them.
+    pub closure: Option<ClosureSection>,
+    /// Each recording.
+    pub recordings: Vec<LeftOutRecordingSection>,
+}
+
+/// A recording predicted from all others.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct LeftOutRecordingSection {
+    /// Which.
+    pub recording: String,
+    /// Errors of its frequencies with the nominal model (%, rms).
+    pub before: f64,
+    /// The same with this hypothesis.
+    pub after: f64,
+    /// What uncertainty alone would leave (%, rms).
+    pub floor: f64,
 }
 
 /// Change of the joint (%).
@@ -173,10 +218,14 @@ pub struct BaselineSection {
 /// A test that would tell more.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct NextTestSection {
+    /// Its kind: "higher-modes", "move-sensor", "known-mass", ...
+    pub id: String,
     /// What to do.
     pub action: String,
-    /// Which effects it would tell apart.
+    /// Which hypotheses it would tell apart.
     pub separates: Vec<String>,
-    /// Information it is expected to bring (bit).
+    /// Information about which hypothesis is true that it is expected to bring at least (bit).
     pub bits: f64,
+    /// What it costs, in multiples of reading again what is recorded; tests are ranked by bits over this.
+    pub effort: f64,
 }

@@ -17,9 +17,15 @@ pub(super) fn gap(document: &Document) -> String {
         .iter()
         .map(|sentence| wrapped(sentence, 2) + "\n")
         .collect();
-    let table = table_or_nothing(tables::hypotheses(document));
-    if story.is_empty() || table.is_empty() {
-        return story + &table;
+    let tables = [tables::hypotheses(document), tables::next_tests(document)];
+    let tables: Vec<String> = tables
+        .into_iter()
+        .map(table_or_nothing)
+        .filter(|table| !table.is_empty())
+        .collect();
+    let tables = tables.join("\n");
+    if story.is_empty() || tables.is_empty() {
+        return story + &tables;
     }
-    format!("{story}\n{table}")
+    format!("{story}\n{tables}")
 }

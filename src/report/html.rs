@@ -244,7 +244,10 @@ fn gap_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Sect
         title: "What the model still misses",
         missing: String::new(),
         story: tables::gap_story(document),
-        tables: found(vec![tables::hypotheses(document)]),
+        tables: found(vec![
+            tables::hypotheses(document),
+            tables::next_tests(document),
+        ]),
         folded: Vec::new(),
         figures: &figures.gap,
     })

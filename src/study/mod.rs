@@ -6,3 +6,4 @@ pub mod blind_check;
 pub mod paper;
 pub mod plan;
 pub mod resolution;
+pub mod updated_model;

@@ -10,14 +10,13 @@ use rayon::prelude::*;
 
 use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
 use crate::description::{JointKind, TestDescription};
-use crate::effects::{Effect, EffectError};
+use crate::effects::{Effect, EffectError, EffectId};
 use crate::gap::{
     GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
     observe,
 };
 use crate::pipeline::nominal_with;
-use crate::structure::JointStiffness;
-use crate::structure::specimen::Body;
+use crate::structure::{Beam, JointStiffness};
 
 /// Non-centrality of a chi square of one degree of freedom that is noticed nine times out of ten at the
 /// 1 % level, (2.576 + 1.282)^2.
@@ -76,9 +75,6 @@ pub enum PlanError {
         /// Its name.
         name: String,
     },
-    /// A structure of which the catalogue's sizes say nothing.
-    #[error("only cantilevers can be planned yet: sizes of effects are known for those alone")]
-    NotACantilever,
     /// An effect out of its range.
     #[error("an effect of usual size is out of range on this beam: {0}")]
     Effect(#[from] EffectError),
@@ -98,12 +94,13 @@ pub fn judge_plan(
 ) -> Result<Vec<Case>, PlanError> {
     let nominal = nominal_with(test, settings.joint);
     let plan = plan_of(test, settings)?;
-    let total = (GROUPS.len() + 1) * settings.draws;
+    let groups = groups_of(test.joint.kind);
+    let total = (groups.len() + 1) * settings.draws;
     let done = std::sync::atomic::AtomicUsize::new(0);
     (0..total)
         .into_par_iter()
         .map(|number| {
-            let case = case(&plan, &nominal, number, settings)?;
+            let case = case(&plan, &nominal, (number, &groups), settings)?;
             let before = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             progress(before + 1, total);
             Ok(case)
@@ -116,9 +113,6 @@ pub(super) fn plan_of(
     test: &TestDescription,
     settings: &PlanSettings,
 ) -> Result<TestPlan, PlanError> {
-    if test.joint.kind != JointKind::Cantilever {
-        return Err(PlanError::NotACantilever);
-    }
     if test.recordings.is_empty() {
         return Err(PlanError::NoRecordings);
     }
@@ -162,16 +156,13 @@ pub(super) fn plan_of(
 fn case(
     plan: &TestPlan,
     nominal: &Nominal,
-    number: usize,
+    (number, groups): (usize, &[&[EffectId]]),
     settings: &PlanSettings,
 ) -> Result<Case, PlanError> {
     let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
     random.set_stream(number as u64 + 1);
-    let effects: Vec<Effect> = match GROUPS.get(number / settings.draws) {
-        Some(group) => {
-            let (Body::One(beam) | Body::Joined([beam, _])) = &nominal.specimen.body;
-            vec![draw_effect(beam, group, &mut random)?]
-        }
+    let effects: Vec<Effect> = match groups.get(number / settings.draws) {
+        Some(group) => vec![draw_effect(&whole(nominal), group, &mut random)?],
         None => Vec::new(),
     };
     let observed = observe(plan, nominal, &effects, random.random())?;
@@ -190,6 +181,35 @@ fn case(
             Err(_) => (truth, Answer::none()),
         },
     )
+}
+
+/// Groups of effects that a structure can have: a lap joint has no coupling and no fixture, a beam by itself
+/// no joint and nothing that pulls on it.
+fn groups_of(kind: JointKind) -> Vec<&'static [EffectId]> {
+    let cannot: &[EffectId] = match kind {
+        JointKind::Cantilever => &[],
+        JointKind::Lap => &[EffectId::CrossCoupling, EffectId::Fixture],
+        JointKind::Free => &[
+            EffectId::CrossCoupling,
+            EffectId::Fixture,
+            EffectId::JointMass,
+            EffectId::JointNonlinearity,
+            EffectId::JointDamping,
+            EffectId::AxialLoad,
+        ],
+    };
+    let mut groups = GROUPS.to_vec();
+    groups.retain(|group| !cannot.contains(&group[0]));
+    groups
+}
+
+/// The beam from which sizes are taken: of a lap joint the first one, as long as both.
+fn whole(nominal: &Nominal) -> Beam {
+    let body = &nominal.specimen.body;
+    Beam {
+        length: body.length(),
+        ..body.beams()[0]
+    }
 }
 
 fn truth(number: usize, effects: &[Effect]) -> Truth {

@@ -7,6 +7,7 @@ mod documents;
 mod export;
 mod first_steps;
 mod schema;
+mod updated_model;
 
 use std::path::{Path, PathBuf};
 

@@ -6,7 +6,7 @@ mod summary;
 
 use super::Outcome;
 use super::arguments::{CrossStiffness, Stiffness};
-use super::input::{TestFile, read_test};
+use super::input::{TestFile, read_model};
 use super::output::OutputFolder;
 use super::predict::given_stiffness;
 use super::terminal::Terminal;
@@ -23,6 +23,7 @@ use tapjoint::simulate::{
     GivenJoint, Laboratory, TestPlan, VirtualRecording, VirtualTest, believed_description,
     plan_test, truth_of,
 };
+use tapjoint::study::updated_model::described_effects;
 
 /// Make the recordings of a virtual test: what a laboratory would record of a described structure.
 ///
@@ -72,7 +73,7 @@ struct Request {
 }
 
 fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result<Request> {
-    let file = read_test(&arguments.test, terminal)?;
+    let file = read_model(&arguments.test, terminal)?;
     let text = fs::read_to_string(&arguments.test)
         .with_context(|| format!("{}: cannot be read", file.name))?;
     let written = arguments.out.join(DESCRIPTION);
@@ -87,10 +88,10 @@ fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result
     let laboratory = arguments.laboratory.resolve()?;
     Ok(Request {
         output: OutputFolder::prepare(&arguments.out)?,
-        effects: arguments
-            .effects
-            .iter()
-            .map(|planted| planted.0.clone())
+        effects: described_effects(&file.test)
+            .map_err(|error| anyhow!("{}: {error}", file.name))?
+            .into_iter()
+            .chain(arguments.effects.iter().map(|planted| planted.0.clone()))
             .collect(),
         format: match laboratory.recorder.bits {
             16 => WavFormat::Pcm16,

@@ -1,6 +1,8 @@
 //! The gap between model and measurement, in sentences and as a table.
 
-use super::super::document::{Document, GapSection, HypothesisSection, ParameterSection};
+use super::super::document::{
+    ClosureSection, Document, GapSection, HypothesisSection, NextTestSection, ParameterSection,
+};
 use super::super::format::{MISSING, significant};
 use super::{Table, number, words};
 
@@ -18,11 +20,7 @@ pub fn gap_story(document: &Document) -> Vec<String> {
     story.extend(place(gap));
     story.extend(how_far(gap));
     story.extend(price(gap));
-    story.extend(
-        gap.next_test
-            .first()
-            .map(|test| format!("Next test: {} ({:.2} bit).", test.action, test.bits)),
-    );
+    story.extend(next_test(gap));
     story
 }
 
@@ -50,11 +48,82 @@ fn verdict(gap: &GapSection) -> String {
                       trust the joint's stiffness beyond the misfit."
                 .to_owned()
         }
-        _ => format!(
-            "No diagnosis: {}.",
-            gap.verdict.reason.as_deref().unwrap_or("too few data")
-        ),
+        _ => undecided(gap),
     }
+}
+
+/// Probability of `none` below which a gap counts as there.
+const GAP: f64 = 0.1;
+
+/// That there is no answer, and what is known all the same.
+fn undecided(gap: &GapSection) -> String {
+    let reason = gap.verdict.reason.as_deref().unwrap_or("too few data");
+    let of = |name: &str| gap.hypotheses.iter().find(|found| found.effect == name);
+    let Some(none) = of("none") else {
+        return format!("No diagnosis: {reason}.");
+    };
+    let mut text = if none.probability < GAP {
+        format!(
+            "There is a gap ({}): the described model with its joint refitted misses the frequencies by \
+             {} % (rms), where their uncertainty is {} %. These data cannot say what causes it: {reason}.",
+            probability(1.0 - none.probability),
+            percent(none.gap_before),
+            percent(gap.noise_floor),
+        )
+    } else {
+        format!("These data do not decide whether there is a gap, nor what causes it: {reason}.")
+    };
+    if let Some(coupling) = of("cross-coupling") {
+        text.push_str(&format!(
+            " A cross-coupling of the joint is not established ({}).",
+            probability(coupling.probability)
+        ));
+    }
+    text
+}
+
+/// The test that tells most for its effort; what it is for depends on the answer.
+fn next_test(gap: &GapSection) -> Option<String> {
+    let test = gap.next_test.first()?;
+    let purpose = match gap.verdict.kind.as_str() {
+        "no-gap" | "named" => "To confirm it",
+        _ => "To decide",
+    };
+    Some(format!(
+        "{purpose}: {} (about {:.2} bit; it tells {} apart).",
+        test.action,
+        test.bits,
+        test.separates.join(", ")
+    ))
+}
+
+/// Tests that would tell more; `None` where none would.
+pub fn next_tests(document: &Document) -> Option<Table> {
+    let tests = &document.gap.as_ref()?.next_test;
+    if tests.is_empty() {
+        return None;
+    }
+    let row = |test: &NextTestSection| {
+        vec![
+            test.action.clone(),
+            format!("{:.2}", test.bits),
+            format!("{:.0}", test.effort),
+            test.separates.join(", "),
+        ]
+    };
+    Some(Table {
+        caption: "What to do next".to_owned(),
+        columns: vec![
+            words("Test"),
+            number("Information (bit)"),
+            number("Effort"),
+            words("Tells apart").on_page(),
+        ],
+        rows: tests.iter().map(row).collect(),
+        note: "Information about the cause that the test is expected to bring at least, by the hypotheses \
+               above; effort in multiples of reading again what is recorded. Ranked by one over the other."
+            .to_owned(),
+    })
 }
 
 /// The hypothesis that the verdict names.
@@ -114,17 +183,32 @@ fn how_far(gap: &GapSection) -> Option<String> {
         ));
     }
     if let Some(closure) = &found.closure {
+        text.push_str(&share(closure));
+    }
+    if let Some(left_out) = &found.left_out_recordings {
         text.push_str(&format!(
-            ", {:.0} % of the gap (95 %: {:.0} to {:.0})",
-            100.0 * closure.value,
-            100.0 * closure.low,
-            100.0 * closure.high
+            "; on recordings predicted from the others from {} to {} %",
+            percent(Some(left_out.before)),
+            percent(Some(left_out.after))
         ));
+        if let Some(closure) = &left_out.closure {
+            text.push_str(&share(closure));
+        }
     }
     Some(format!(
         "{text}; noise would leave {} %.",
         percent(gap.noise_floor)
     ))
+}
+
+/// ", 97 % of the gap (95 %: 93 to 99)".
+fn share(closure: &ClosureSection) -> String {
+    format!(
+        ", {:.0} % of the gap (95 %: {:.0} to {:.0})",
+        100.0 * closure.value,
+        100.0 * closure.low,
+        100.0 * closure.high
+    )
 }
 
 /// What ignoring the effect costs.

@@ -13,7 +13,7 @@ mod uncertainty;
 
 pub use datasets::datasets;
 pub use frfs::frfs;
-pub use gap::{gap_story, hypotheses};
+pub use gap::{gap_story, hypotheses, next_tests};
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters, prediction};
 pub use measured::{channels, conditions, recordings};
 pub use modes::{fitted_to, mode_details, modes, reading_details, readings};

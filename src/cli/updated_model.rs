@@ -1,0 +1,34 @@
+//! The model with what a diagnosis found, for the report and as a file.
+
+use super::input::TestFile;
+use tapjoint::description::TestDescription;
+use tapjoint::gap::{Diagnosis, GapError};
+use tapjoint::pipeline::Analysis;
+use tapjoint::report::document::{GapSection, UpdatedModelSection};
+use tapjoint::study::updated_model::{described_effects, frequencies_with, updated_model};
+
+/// Name of the file beside a report.
+pub(super) const FILE: &str = "updated-model.toml";
+
+/// Adds the model that a diagnosis makes of the described one to the report's section, and returns its
+/// file; `None` where there is no such model.
+pub(super) fn add_model(
+    gap: &mut GapSection,
+    file: &TestFile,
+    (analysis, diagnosis): (&Analysis, Result<&Diagnosis, &GapError>),
+) -> Option<String> {
+    let found = analysis.identification.as_ref();
+    let joint = found.and_then(|found| Some(found.consistent.as_ref()?.joint));
+    let model = updated_model(&file.test, diagnosis.ok()?, joint)?;
+    let highest = analysis.modes.iter().filter_map(|mode| mode.mode).max()?;
+    // Read back, so that the report shows what the file gives.
+    let written = TestDescription::parse(&model.text, FILE).ok()?;
+    let effects = described_effects(&written).ok()?;
+    let frequencies = frequencies_with(&written, &effects, None, highest).ok()?;
+    gap.updated_model = Some(UpdatedModelSection {
+        effect: model.hypothesis,
+        file: FILE.to_owned(),
+        frequencies,
+    });
+    Some(model.text)
+}

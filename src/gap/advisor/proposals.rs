@@ -1,0 +1,366 @@
+//! The tests that are weighed against each other, as configurations that the model can predict.
+
+use super::super::catalogue::Candidate;
+use super::super::frame::{Frame, Row, Small};
+use super::super::setup::Setup;
+use super::step::Step;
+use crate::effects::EffectId;
+use crate::structure::specimen::{Body, PointInertia, PointMass, SpecimenJoint};
+
+/// A test with the readings that it would bring.
+#[derive(Debug, Clone)]
+pub(super) struct Proposal {
+    pub(super) step: Step,
+    pub(super) readings: Readings,
+}
+
+/// What a test would read.
+#[derive(Debug, Clone)]
+pub(super) enum Readings {
+    /// Frequencies of modes (logarithms) with their standard uncertainties.
+    Frequencies(Structure, Vec<(Row, f64)>),
+    /// Something that is read without the beam's vibration.
+    Direct,
+}
+
+/// Of what frequencies are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Structure {
+    /// The tested structure.
+    Whole,
+    /// The same, its frequencies read without bias.
+    Unbiased,
+    /// The beam by itself.
+    Bare,
+}
+
+impl Structure {
+    /// Whether an effect shows there.
+    pub(super) fn shows(self, effect: &Candidate) -> bool {
+        match self {
+            Structure::Whole => true,
+            Structure::Unbiased => effect.effect != EffectId::Resolution,
+            Structure::Bare => matches!(
+                effect.effect,
+                EffectId::Modulus
+                    | EffectId::Length
+                    | EffectId::Timebase
+                    | EffectId::AddedMass
+                    | EffectId::LocalCrack
+                    | EffectId::ShearRotary
+            ),
+        }
+    }
+}
+
+/// All tests that could be made of this structure.
+pub(super) struct Proposals {
+    pub(super) all: Vec<Proposal>,
+    /// Configurations at hand and planned ones.
+    pub(super) whole: Frame,
+    /// Least standard deviation of the joint's drift of each small unknown that was added for a planned
+    /// visit.
+    pub(super) drifts: Vec<f64>,
+    /// The beam by itself.
+    pub(super) bare: Option<Frame>,
+    /// The configuration in which gravity is turned over.
+    pub(super) turned: Option<usize>,
+}
+
+/// Configurations at hand that are kept for reading them again.
+const KEPT: usize = 4;
+/// How many modes more might be read.
+const MORE_MODES: usize = 2;
+/// Places to which a sensor might be moved, over the length.
+const PLACES: [f64; 5] = [0.3, 0.45, 0.6, 0.75, 0.95];
+/// A sensor counts as moved from this share of the length on.
+const MOVED: f64 = 0.08;
+/// The known mass over the beam's: 2 % moves frequencies by up to 4 %, a hundred times what is read.
+const KNOWN_MASS: f64 = 0.02;
+/// Standard deviation of a joint that was tightened again (1).
+const RETIGHTENED: f64 = 0.02;
+/// Readings by a fit have this share of the bias that reading on lines may have.
+const FINER: f64 = 0.1;
+
+impl Proposals {
+    /// What could be done next, given the readings at hand.
+    pub(super) fn new(frame: &Frame) -> Self {
+        let mut whole = frame.clone();
+        whole.setups.truncate(KEPT);
+        whole.modes += MORE_MODES;
+        whole.rows.clear();
+        whole.readings.clear();
+        whole.shape_slopes = None;
+        let mut planned = Proposals {
+            all: Vec::new(),
+            whole,
+            drifts: Vec::new(),
+            bare: None,
+            turned: None,
+        };
+        planned.read_again(frame);
+        planned.tap_again(frame);
+        planned.change(frame);
+        planned.take_apart(frame);
+        for step in [Step::WeighSensor, Step::Calipers, Step::ReferenceTone] {
+            let readings = Readings::Direct;
+            planned.all.push(Proposal { step, readings });
+        }
+        planned
+    }
+
+    fn propose(&mut self, step: Step, structure: Structure, rows: Vec<(Row, f64)>) {
+        let readings = Readings::Frequencies(structure, rows);
+        self.all.push(Proposal { step, readings });
+    }
+
+    /// Higher modes, finer lines.
+    fn read_again(&mut self, frame: &Frame) {
+        let (first, last) = (frame.modes + 1, frame.modes + MORE_MODES);
+        let kept = self.whole.setups.len();
+        let higher = |configuration: usize| {
+            (first..=last).map(move |mode| {
+                let row = Row::Frequency {
+                    configuration,
+                    mode,
+                };
+                (row, std_of(frame, mode))
+            })
+        };
+        let rows = (0..kept).flat_map(higher).collect();
+        self.propose(Step::HigherModes { first, last }, Structure::Whole, rows);
+        if let Some(bias) = frame.nominal.reading_bias {
+            let rows = observed_modes(frame).map(|mode| {
+                let configuration = 0;
+                let row = Row::Frequency {
+                    configuration,
+                    mode,
+                };
+                (row, without_bias(frame, mode, bias))
+            });
+            let spacing = 2.0 * FINER * bias;
+            self.propose(
+                Step::FinerLines { spacing },
+                Structure::Unbiased,
+                rows.collect(),
+            );
+        }
+    }
+
+    /// The first recording once more: more taps, other levels, a joint that was opened.
+    fn tap_again(&mut self, frame: &Frame) {
+        let again = frame.setups[0].clone();
+        let more = Step::MoreTaps { factor: 4 };
+        let rows = self.visit(frame, again.clone(), 0.0);
+        let rows = rows.into_iter().map(|(row, std)| (row, 0.5 * std));
+        let rows = rows.collect();
+        self.propose(more, Structure::Whole, rows);
+        let sought = frame.nominal.sought();
+        if sought.iter().any(|(direction, _)| *direction == 1) {
+            for level in [0.25, 3.0] {
+                let mut other = again.clone();
+                other.level *= level;
+                let rows = self.visit(frame, other, 0.0);
+                self.propose(Step::TapLevel { level }, Structure::Whole, rows);
+            }
+        }
+        if !sought.is_empty() {
+            let rows = self.visit(frame, again, RETIGHTENED);
+            self.propose(Step::Retighten, Structure::Whole, rows);
+        }
+    }
+
+    /// Sensors moved, masses fastened, the set-up turned over.
+    fn change(&mut self, frame: &Frame) {
+        let length = frame.nominal.specimen.body.length();
+        let first = &frame.setups[0];
+        let sat = |place: f64| {
+            let sensors = frame.setups.iter().flat_map(|setup| &setup.sensors);
+            let mut near = sensors.map(|sensor| (sensor.position - place).abs());
+            near.any(|distance| distance < MOVED * length)
+        };
+        let places: Vec<f64> = PLACES.iter().map(|share| share * length).collect();
+        if !first.sensors.is_empty() {
+            for position in places.into_iter().filter(|place| !sat(*place)) {
+                let step = Step::MoveSensor {
+                    name: name_of(frame),
+                    position,
+                };
+                let rows = self.visit(frame, moved(frame, position), 0.0);
+                self.propose(step, Structure::Whole, rows);
+            }
+        }
+        let mass = round_mass(KNOWN_MASS * beam_mass(frame));
+        for position in [length, 0.5 * length] {
+            let mut heavier = first.clone();
+            heavier.specimen.masses.push(PointMass {
+                position,
+                mass,
+                inertia: 0.0,
+            });
+            let rows = self.visit(frame, heavier, 0.0);
+            self.propose(Step::KnownMass { mass, position }, Structure::Whole, rows);
+        }
+        if held_at_one_end(frame) {
+            self.turned = Some(self.whole.setups.len());
+            let rows = self.visit(frame, first.clone(), 0.0);
+            self.propose(Step::TurnOver, Structure::Whole, rows);
+        }
+    }
+
+    /// The beam by itself.
+    fn take_apart(&mut self, frame: &Frame) {
+        if !held_at_one_end(frame) {
+            return;
+        }
+        let mut bare = self.whole.clone();
+        let specimen = &mut bare.nominal.specimen;
+        specimen.joint = SpecimenJoint::Free;
+        specimen.joint_mass = PointInertia::default();
+        specimen.overlap = None;
+        let mut alone = frame.setups[0].clone();
+        alone.specimen = specimen.clone();
+        alone.sensors.clear();
+        alone.names.clear();
+        alone.places.clear();
+        bare.setups = vec![alone];
+        let configuration = 0;
+        let rows = observed_modes(frame).map(|mode| {
+            (
+                Row::Frequency {
+                    configuration,
+                    mode,
+                },
+                std_of(frame, mode),
+            )
+        });
+        self.propose(Step::BareBeam, Structure::Bare, rows.collect());
+        self.bare = Some(bare);
+    }
+
+    /// A new visit to the structure: its configuration, its own drift of the joint, its rows.
+    fn visit(&mut self, frame: &Frame, mut setup: Setup, drift: f64) -> Vec<(Row, f64)> {
+        let visits = self.whole.setups.iter().chain(&frame.setups);
+        let visit = 1 + visits.map(|setup| setup.visit).max().unwrap_or(0);
+        setup.visit = visit;
+        for (direction, _) in frame.nominal.sought() {
+            self.whole.smalls.push(Small::Drift { visit, direction });
+            self.whole.small_centres.push(0.0);
+            self.whole.small_stds.push(drift);
+            self.drifts.push(drift);
+        }
+        let configuration = self.whole.setups.len();
+        self.whole.setups.push(setup);
+        observed_modes(frame)
+            .map(|mode| {
+                (
+                    Row::Frequency {
+                        configuration,
+                        mode,
+                    },
+                    std_of(frame, mode),
+                )
+            })
+            .collect()
+    }
+}
+
+/// The first configuration with its first sensor elsewhere.
+fn moved(frame: &Frame, position: f64) -> Setup {
+    let mut other = frame.setups[0].clone();
+    let before = other.sensors[0];
+    other.sensors[0].position = position;
+    // What belongs to the sensor's place is another unknown now.
+    other.places[0] = usize::MAX;
+    let masses = &mut other.specimen.masses;
+    let own = |mass: &&mut PointMass| mass.position == before.position && mass.mass == before.mass;
+    if let Some(mass) = masses.iter_mut().find(own) {
+        mass.position = position;
+    }
+    other
+}
+
+fn name_of(frame: &Frame) -> String {
+    match &frame.nominal.sensors[..] {
+        [one] => format!("sensor {}", one.name),
+        _ => "one sensor".to_owned(),
+    }
+}
+
+/// Whether it is one beam on a joint.
+fn held_at_one_end(frame: &Frame) -> bool {
+    let specimen = &frame.nominal.specimen;
+    matches!(specimen.body, Body::One(_)) && !matches!(specimen.joint, SpecimenJoint::Free)
+}
+
+/// Mass of the beam or beams (kg).
+pub(super) fn beam_mass(frame: &Frame) -> f64 {
+    let beams = frame.nominal.specimen.body.beams();
+    beams.iter().map(crate::structure::Beam::mass).sum()
+}
+
+/// To 1, 1.5, 2, 3, 5 or 7 times a power of ten (kg).
+fn round_mass(mass: f64) -> f64 {
+    let decade = 10.0_f64.powf(mass.log10().floor());
+    let near = |a: &f64, b: &f64| {
+        let away = |step: f64| (step * decade / mass).ln().abs();
+        away(*a).total_cmp(&away(*b))
+    };
+    let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0];
+    steps.into_iter().min_by(near).unwrap_or(1.0) * decade
+}
+
+/// Numbers of the modes that take part in the fit.
+fn observed_modes(frame: &Frame) -> impl Iterator<Item = usize> + '_ {
+    (1..=frame.fitted_modes).filter(|mode| stds(frame, *mode).next().is_some())
+}
+
+fn stds(frame: &Frame, wanted: usize) -> impl Iterator<Item = f64> + '_ {
+    let fitted = frame.rows.iter().zip(&frame.readings);
+    let withheld = frame.withheld.iter().map(|(row, reading)| (row, reading));
+    fitted.chain(withheld).filter_map(move |(row, reading)| {
+        matches!(row, Row::Frequency { mode, .. } if *mode == wanted).then_some(reading.std)
+    })
+}
+
+/// How well a mode's frequency will be read (1): as well as so far, higher modes as well as the highest.
+fn std_of(frame: &Frame, mode: usize) -> f64 {
+    let below = (1..=mode).rev();
+    let mut known = below.map(|mode| median(stds(frame, mode).collect()));
+    known.find_map(|std| std).unwrap_or(1e-3)
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// The same without what reading on lines adds, b/sqrt 3.
+fn without_bias(frame: &Frame, mode: usize, bias: f64) -> f64 {
+    let std = std_of(frame, mode);
+    let rows = frame.rows.iter().zip(&frame.readings);
+    let mut own =
+        rows.filter(|(row, _)| matches!(row, Row::Frequency { mode: m, .. } if *m == mode));
+    let Some((_, reading)) = own.next() else {
+        return std;
+    };
+    let line = bias / 3.0_f64.sqrt() / reading.value.exp();
+    let rest = (std * std - line * line).max(0.0);
+    (rest + (FINER * line).powi(2)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_known_masses_are_such_as_a_laboratory_has() {
+        let rounded: Vec<f64> = [0.0166, 0.0012, 0.00044, 1.3]
+            .into_iter()
+            .map(|mass| 1e3 * round_mass(mass))
+            .collect();
+        for (found, expected) in rounded.iter().zip([15.0, 1.0, 0.5, 1500.0]) {
+            assert!((found / expected - 1.0_f64).abs() < 1e-12, "{rounded:?}");
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! The described model with what the diagnosis found: as a description that can be predicted with, and its
+//! natural frequencies.
+
+use crate::description::{JointKind, TestDescription};
+use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
+use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
+use crate::identify::observation::effective_share;
+use crate::pipeline::nominal_with;
+use crate::structure::specimen::{Mesh, PointMass, SpecimenJoint};
+use crate::structure::{JointStiffness, StructureError};
+use toml::Value;
+
+/// A model brought up to date.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UpdatedModel {
+    /// The hypothesis that it takes for true.
+    pub hypothesis: String,
+    /// A test description with the joint as found and `[[effect]]` tables.
+    pub text: String,
+}
+
+/// Why a described effect cannot be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("line {line}: {cause}")]
+pub struct DescribedEffectError {
+    /// Line of its table.
+    pub line: usize,
+    /// What is wrong with it.
+    pub cause: EffectError,
+}
+
+/// The model that a diagnosis makes of the described one: with what it names, else with the most probable
+/// hypothesis that predicts anything. `None` where nothing predicts.
+///
+/// `joint` is the estimate from which the diagnosis began.
+pub fn updated_model(
+    test: &TestDescription,
+    diagnosis: &Diagnosis,
+    joint: Option<JointStiffness>,
+) -> Option<UpdatedModel> {
+    let wanted = match &diagnosis.verdict {
+        Verdict::NoGap => Some(Hypothesis::None),
+        Verdict::Named(effects) => Some(Hypothesis::Effects(effects.clone())),
+        _ => None,
+    };
+    let mut all = diagnosis.hypotheses.iter();
+    let found = match wanted {
+        Some(wanted) => all.find(|one| one.hypothesis == wanted),
+        None => all.find(|one| one.hypothesis != Hypothesis::Unknown),
+    }?;
+    let mut effects = found.effects.clone();
+    let held = match nominal_with(test, joint).specimen.joint {
+        SpecimenJoint::Springs { coupling, .. } => coupling,
+        SpecimenJoint::Free => 0.0,
+    };
+    add_coupling(&mut effects, held)?;
+    let mut text = heading(diagnosis, found);
+    text.push_str(&described(test, found));
+    for effect in &effects {
+        text.push_str(&table_of(effect));
+    }
+    Some(UpdatedModel {
+        hypothesis: found.hypothesis.name(),
+        text,
+    })
+}
+
+/// A coupling that the joint's own model has stands among the effects: descriptions have none.
+fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
+    if held == 0.0 {
+        return Some(());
+    }
+    let own = effects
+        .iter_mut()
+        .find(|one| one.id == EffectId::CrossCoupling);
+    let total = held
+        + own
+            .as_ref()
+            .and_then(|one| one.value("coupling"))
+            .unwrap_or(0.0);
+    let whole = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", total)]).ok()?;
+    match own {
+        Some(own) => *own = whole,
+        None => effects.push(whole),
+    }
+    Some(())
+}
+
+fn heading(diagnosis: &Diagnosis, found: &HypothesisResult) -> String {
+    format!(
+        "# The model with what the diagnosis found (verdict: {}; hypothesis: {}, {:.1} %).\n\
+         # Natural frequencies: tapjoint predict updated-model.toml\n\n",
+        diagnosis.verdict.kind(),
+        found.hypothesis.name(),
+        100.0 * found.probability
+    )
+}
+
+fn quoted(text: &str) -> String {
+    Value::String(text.to_owned()).to_string()
+}
+
+fn line(key: &str, value: f64) -> String {
+    if value.is_infinite() {
+        format!("{key} = \"rigid\"\n")
+    } else {
+        // Debug's form is the shortest that reads back as the same number, and TOML's.
+        format!("{key} = {value:?}\n")
+    }
+}
+
+/// Beam, joint and sensors of the reference configuration.
+fn described(test: &TestDescription, found: &HypothesisResult) -> String {
+    let beam = &test.beam;
+    let mut text = format!("name = {}\n\n[beam]\n", quoted(&test.name));
+    text.push_str(&line("length", beam.length));
+    text.push_str(&line("width", beam.width));
+    text.push_str(&line("thickness", beam.thickness));
+    text.push_str(&line("modulus", beam.modulus));
+    // The common factor s on all frequencies that the geometry's tolerance left open: f ~ rho^-1/2.
+    text.push_str(&line("density", beam.density * (-2.0 * found.scale).exp()));
+    let poisson = beam.poisson.map(|poisson| line("poisson", poisson));
+    text.push_str(&poisson.unwrap_or_default());
+    text.push_str(&right_half(test, found.scale));
+    text.push_str(&joint(test, found));
+    text.push_str(&sensors(test));
+    if !test.analysis.sensor_mass {
+        text.push_str("\n[analysis]\nsensor_mass = false\n");
+    }
+    text
+}
+
+fn right_half(test: &TestDescription, scale: f64) -> String {
+    let Some(right) = &test.joint.right else {
+        return String::new();
+    };
+    let own = [
+        ("width", right.width),
+        ("thickness", right.thickness),
+        ("modulus", right.modulus),
+        (
+            "density",
+            right.density.map(|own| own * (-2.0 * scale).exp()),
+        ),
+        ("poisson", right.poisson),
+    ];
+    let lines = own
+        .iter()
+        .filter_map(|(key, value)| Some(line(key, (*value)?)));
+    format!("\n[beam.right]\n{}", lines.collect::<String>())
+}
+
+fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
+    use crate::description::BeamTheory;
+    let kind = match test.joint.kind {
+        JointKind::Cantilever => "cantilever",
+        JointKind::Lap => "lap",
+        JointKind::Free => "free",
+    };
+    let beam = match test.joint.beam {
+        BeamTheory::Euler => "euler",
+        BeamTheory::Timoshenko => "timoshenko",
+    };
+    let mut text = format!("\n[joint]\nkind = \"{kind}\"\nbeam = \"{beam}\"\n");
+    if let Some([kt, kr]) = found.joint {
+        text.push_str(&line("kt", kt));
+        text.push_str(&line("kr", kr));
+    }
+    if let Some(position) = test.joint.position {
+        text.push_str(&line("position", position));
+    }
+    if let Some(overlap) = &test.joint.overlap {
+        text.push_str(&format!(
+            "overlap = {{ length = {:?}, mass = {:?} }}\n",
+            overlap.length, overlap.mass
+        ));
+    }
+    text
+}
+
+/// Sensors where the first recording has them.
+fn sensors(test: &TestDescription) -> String {
+    let moves = test.recordings.first().map(|recording| &recording.at);
+    let tables = test.sensors.iter().filter_map(|sensor| {
+        let moved = moves.and_then(|at| at.get(&sensor.name)).copied();
+        let position = moved.or(sensor.position)?;
+        let mut text = format!("\n[[sensor]]\nname = {}\n", quoted(&sensor.name));
+        text.push_str(&line("position", position));
+        text.push_str(
+            &sensor
+                .mass
+                .map(|mass| line("mass", mass))
+                .unwrap_or_default(),
+        );
+        Some(text)
+    });
+    tables.collect()
+}
+
+fn table_of(effect: &Effect) -> String {
+    let values = effect.values().map(|(info, value)| line(info.name, value));
+    format!(
+        "\n[[effect]]\nid = \"{}\"\n{}",
+        effect.id.name(),
+        values.collect::<String>()
+    )
+}
+
+/// The effects that a description adds to its structure.
+///
+/// # Errors
+/// The first that there is not, with the line of its table.
+pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, DescribedEffectError> {
+    let read = |described: &crate::description::EffectDescription| {
+        let at = |cause| DescribedEffectError {
+            line: described.line,
+            cause,
+        };
+        let values = described.values.iter();
+        let pairs: Vec<(&str, f64)> = values
+            .map(|(name, value)| (name.as_str(), *value))
+            .collect();
+        let id = EffectId::parse(&described.id).map_err(at)?;
+        Effect::from_pairs(id, &pairs).map_err(at)
+    };
+    test.effects.iter().map(read).collect()
+}
+
+/// The lowest natural frequencies (Hz), as they would be read, of a described structure with these effects
+/// and with its sensors on it. A fixture's own mode does not count.
+///
+/// # Errors
+/// [`StructureError`] where there is no such structure.
+pub fn frequencies_with(
+    test: &TestDescription,
+    effects: &[Effect],
+    joint: Option<JointStiffness>,
+    count: usize,
+) -> Result<Vec<f64>, StructureError> {
+    let nominal = nominal_with(test, joint);
+    let mut specimen = nominal.specimen.clone();
+    let places: Vec<SensorPlace> = test
+        .sensors
+        .iter()
+        .zip(&nominal.sensors)
+        .filter_map(|(sensor, known)| {
+            Some(SensorPlace {
+                position: sensor.position?,
+                mass: known.mass.unwrap_or(0.0),
+            })
+        })
+        .collect();
+    let heavy = places.iter().filter(|sensor| sensor.mass > 0.0);
+    specimen.masses.extend(heavy.map(|sensor| PointMass {
+        position: sensor.position,
+        mass: sensor.mass,
+        inertia: 0.0,
+    }));
+    // A joint that changes with amplitude is seen at the amplitude that counts for a whole decay.
+    let power = effects.iter().find_map(|effect| effect.value("exponent"));
+    let circumstances = Circumstances {
+        sensors: &places,
+        level: effective_share(power.unwrap_or(1.0)),
+        ..Circumstances::default()
+    };
+    let seen = apply(effects, &specimen, &circumstances);
+    let based = seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+    let all = count + usize::from(based);
+    let modes = seen.specimen.modes(all, Mesh::SIMULATION)?;
+    let moving = |mode: &usize| modes.base_participation(*mode);
+    let fixture = (0..all)
+        .max_by(|a, b| moving(a).total_cmp(&moving(b)))
+        .filter(|_| based);
+    Ok((0..all)
+        .filter(|mode| Some(*mode) != fixture)
+        .map(|mode| seen.read(modes.frequencies()[mode]))
+        .collect())
+}

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Shape of one mode of the uniform Euler beam on the estimated joint.
+/// Shape of one mode of the structure that the prediction is of: the described beam, or the two halves of
+/// a lap joint, on the estimated joint with the sensors' masses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ModeShapeSection {
     /// The model's number.

@@ -16,7 +16,7 @@ use super::plot::shapes::draw_shapes;
 use super::plot::spectrum::draw_spectrum;
 use super::plot::stabilisation::draw_stabilisation;
 use super::plot::time::draw_taps;
-use super::plot::{Drawing, render_png, render_svg};
+use super::plot::{Drawing, PictureFormat, render_picture, render_svg};
 use super::{
     ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv,
     render_perturbation_csv,
@@ -43,9 +43,9 @@ struct Picture {
 }
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
-/// `perturbation.csv` where something was perturbed, and the pictures that apply: `spectrum-*.png`,
-/// `frf-*.png`, `stabilisation-*.png`, `amplitude-*.png`, `taps-*.png`, `frequencies.png`,
-/// `mode-shapes.png`, `cloud.png`, `gap.png`, `gap-place.png`.
+/// `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
+/// `spectrum-*`, `frf-*`, `stabilisation-*`, `amplitude-*`, `taps-*`, `frequencies`, `mode-shapes`, `cloud`,
+/// `gap`, `gap-place`.
 ///
 /// # Errors
 /// The first [`ReportError`] of any file.
@@ -54,14 +54,14 @@ pub fn render_run(
     figures: &[RecordingFigure],
 ) -> Result<Vec<ReportFile>, ReportError> {
     let pictures = pictures(document, figures);
-    let rendered: Vec<(ReportFile, InlineFigure)> = pictures
+    let rendered: Vec<([ReportFile; 2], InlineFigure)> = pictures
         .par_iter()
-        .map(render_picture)
+        .map(rendered)
         .collect::<Result<_, _>>()?;
     let mut page = PageFigures::default();
     let mut files = Vec::new();
-    for (picture, (file, inline)) in pictures.iter().zip(rendered) {
-        files.push(file);
+    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered) {
+        files.extend(of_picture);
         match picture.shelf {
             Shelf::Spectra => page.spectra.push(inline),
             Shelf::Taps => page.taps.push(inline),
@@ -86,35 +86,55 @@ pub fn render_run(
     Ok(files)
 }
 
-/// The averaged spectra of a recording as PNG; `None` when no tap was accepted.
+/// The averaged spectra of a recording as a picture; `None` when no tap was accepted.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_spectrum_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_spectrum(figure).as_ref().map(render_png).transpose()
+pub fn render_spectrum_picture(
+    figure: &RecordingFigure,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    optional(draw_spectrum(figure), format)
 }
 
-/// The frequency response functions of a recording as PNG; `None` without a hammer or an accepted
+/// The frequency response functions of a recording as a picture; `None` without a hammer or an accepted
 /// tap.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_frf_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_frf(figure).as_ref().map(render_png).transpose()
+pub fn render_frf_picture(
+    figure: &RecordingFigure,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    optional(draw_frf(figure), format)
 }
 
-/// The estimates under changed frequencies as PNG; `None` where there are none.
+/// The estimates under changed frequencies as a picture; `None` where there are none.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_cloud_png(document: &Document) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_cloud(document).as_ref().map(render_png).transpose()
+pub fn render_cloud_picture(
+    document: &Document,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    optional(draw_cloud(document), format)
 }
 
-fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), ReportError> {
-    let file = ReportFile {
-        name: format!("{}.png", picture.name),
-        bytes: render_png(&picture.drawing)?,
+fn optional(
+    drawing: Option<Drawing>,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    let picture = drawing.map(|drawing| render_picture(&drawing, format));
+    picture.transpose()
+}
+
+/// A picture as files for screens and for papers, and for the page.
+fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
+    let file = |ending: &str, format: PictureFormat| {
+        Ok::<_, ReportError>(ReportFile {
+            name: format!("{}.{ending}", picture.name),
+            bytes: render_picture(&picture.drawing, format)?,
+        })
     };
     let inline = InlineFigure {
         caption: picture.caption.clone(),
@@ -126,7 +146,11 @@ fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), Repor
             .transpose()
             .map_err(ReportError::Json)?,
     };
-    Ok((file, inline))
+    let files = [
+        file("png", PictureFormat::Png)?,
+        file("svg", PictureFormat::Svg)?,
+    ];
+    Ok((files, inline))
 }
 
 fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
@@ -150,8 +174,8 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
         Picture {
             shelf: Shelf::Comparison,
             name: "mode-shapes".to_owned(),
-            caption: "Shapes of the predicted modes, of the uniform Euler beam on the estimated joint. A sensor \
-                      or a tap near a node hardly sees the mode."
+            caption: "Shapes of the predicted modes, of the described beam on the estimated joint with what sits \
+                      on it. A sensor or a tap near a node hardly sees the mode."
                 .to_owned(),
             drawing,
             live: None,

@@ -214,9 +214,12 @@ fn draw_panel(
     panel.draw_x_ticks(drawing, &amplitude_ticks(&panel.x));
     panel.draw_y_ticks(drawing, &panel.y.ticks(34.0));
     panel.draw_curve(drawing, line, Stroke::new(INK, 1.4));
-    for point in &curve.points {
-        let color = color(curve, point.tap);
-        draw_point(drawing, &panel, (point, quantity), color);
+    // All bars, then all dots: neighbours of one style are one path in an SVG.
+    for draw in [draw_bar, draw_dot] {
+        for point in &curve.points {
+            let color = color(curve, point.tap);
+            draw(drawing, &panel, (point, quantity), color);
+        }
     }
     panel.draw_frame(drawing);
     if !x_title.is_empty() {
@@ -299,19 +302,29 @@ fn draw_band(
     line
 }
 
-fn draw_point(
+fn draw_bar(
     drawing: &mut Drawing,
     panel: &Panel,
     (point, quantity): (&AmplitudePoint, &Quantity),
     color: Color,
 ) {
     let (value, std) = (quantity.value)(point);
-    if !panel.y.holds(value) {
-        return;
+    if panel.y.holds(value) {
+        let x = panel.x.place(point.amplitude);
+        let low = panel.y.place(value - BAR * std);
+        let high = panel.y.place(value + BAR * std);
+        drawing.line(vec![(x, low), (x, high)], Stroke::new(color, 1.3));
     }
-    let (x, y) = panel.place(point.amplitude, value);
-    let low = panel.y.place(value - BAR * std);
-    let high = panel.y.place(value + BAR * std);
-    drawing.line(vec![(x, low), (x, high)], Stroke::new(color, 1.3));
-    drawing.dot((x, y), 3.4, color);
+}
+
+fn draw_dot(
+    drawing: &mut Drawing,
+    panel: &Panel,
+    (point, quantity): (&AmplitudePoint, &Quantity),
+    color: Color,
+) {
+    let (value, _) = (quantity.value)(point);
+    if panel.y.holds(value) {
+        drawing.dot(panel.place(point.amplitude, value), 3.4, color);
+    }
 }

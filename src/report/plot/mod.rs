@@ -20,13 +20,17 @@ pub mod time;
 
 mod closeup;
 mod font;
+mod format;
+mod letters;
 mod marks;
 pub(super) mod panel;
+mod paths;
 mod raster;
 mod vector;
 
 pub use drawing::Drawing;
 pub use font::Weight;
 pub(super) use marks::frequency as frequency_words;
+pub use format::{PictureFormat, render_picture};
 pub use raster::render_png;
-pub use vector::render_svg;
+pub use vector::{render_svg, render_svg_file};

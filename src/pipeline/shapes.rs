@@ -18,7 +18,8 @@ pub struct SampledShape {
     pub mode: usize,
     /// Frequency of this shape (Hz).
     pub frequency: f64,
-    /// Positions (m) from the joint; of a lap joint or a free beam from the left end.
+    /// Positions (m) from the joint; of a lap joint or a free beam from the left end. The place of a lap
+    /// joint stands twice, for either half's end.
     pub positions: Vec<f64>,
     /// Displacement relative to the largest (1).
     pub displacements: Vec<f64>,
@@ -37,20 +38,37 @@ pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
     let Ok(modes) = specimen.modes(found.prediction.len(), Mesh::DIAGNOSIS) else {
         return Vec::new();
     };
-    let step = specimen.body.length() / (POINTS - 1) as f64;
-    let positions: Vec<f64> = (0..POINTS).map(|point| step * point as f64).collect();
+    let positions = positions(&specimen.body);
     let shape = |mode: usize| {
-        let raw = positions.iter().map(|x| modes.displacement(mode, *x));
+        let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
         let raw: Vec<f64> = raw.collect();
         let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs()));
         SampledShape {
             mode: mode + 1,
             frequency: modes.frequencies()[mode],
-            positions: positions.clone(),
+            positions: positions.iter().map(|(x, _)| *x).collect(),
             displacements: raw.iter().map(|value| value / largest).collect(),
         }
     };
     (0..modes.len()).map(shape).collect()
+}
+
+/// Places along all beams (m), and where the model is asked for each: a hair inside the beam that is
+/// meant, since two beams meet at a lap joint.
+fn positions(body: &Body) -> Vec<(f64, f64)> {
+    let beams = body.beams();
+    let points = POINTS.div_ceil(beams.len());
+    let hair = 1e-9 * body.length();
+    let mut start = 0.0;
+    let mut all = Vec::new();
+    for beam in beams {
+        let end = start + beam.length;
+        let share = |point: usize| point as f64 / (points - 1) as f64;
+        let places = (0..points).map(|point| start + share(point) * beam.length);
+        all.extend(places.map(|x| (x, x.clamp(start + hair, end - hair))));
+        start = end;
+    }
+    all
 }
 
 /// The structure of a prediction with this beam on this joint; `details` as for the prediction.

@@ -11,7 +11,8 @@ pub struct ModeShapeSection {
     pub mode: usize,
     /// Frequency of this shape (Hz).
     pub frequency: f64,
-    /// Positions (m) from the joint; of a lap joint or a free beam from the left end.
+    /// Positions (m) from the joint; of a lap joint or a free beam from the left end. The place of a lap
+    /// joint stands twice, for either half's end.
     pub positions: Vec<f64>,
     /// Displacement relative to the largest (1).
     pub displacements: Vec<f64>,

@@ -27,6 +27,8 @@ pub mod format;
 mod gap_text;
 pub mod html;
 pub mod live;
+pub mod live_amplitude;
+pub mod live_points;
 pub mod plot;
 pub mod summary;
 pub mod tables;

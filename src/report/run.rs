@@ -1,11 +1,14 @@
 //! All files of one run.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::document::Document;
 use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
 use super::live::{LivePlot, live_frf, live_spectrum, live_taps, script_json};
+use super::live_amplitude::live_amplitude;
+use super::live_points::{LivePoints, live_cloud, live_stabilisation};
 use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
 use super::plot::comparison::draw_frequencies;
@@ -39,7 +42,15 @@ struct Picture {
     caption: String,
     drawing: Drawing,
     /// The same curves for the page's script.
-    live: Option<LivePlot>,
+    live: Option<Live>,
+}
+
+/// What the page's script draws in the picture's place.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Live {
+    Curves(LivePlot),
+    Points(LivePoints),
 }
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
@@ -189,7 +200,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
             caption: "Estimates when the frequencies are changed within what their readings allow."
                 .to_owned(),
             drawing,
-            live: None,
+            live: live_cloud(document).map(Live::Points),
         }
     }));
     pictures
@@ -223,26 +234,27 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
 
 fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
     let file = &figure.file;
+    let amplitude = figure.amplitude.as_ref();
     let kinds = [
         (
             Shelf::Spectra,
             "spectrum",
             draw_spectrum(figure),
-            live_spectrum(figure),
+            live_spectrum(figure).map(Live::Curves),
             format!("Averaged spectra of {file} with the resonances found."),
         ),
         (
             Shelf::Spectra,
             "frf",
             draw_frf(figure),
-            live_frf(figure),
+            live_frf(figure).map(Live::Curves),
             format!("Response per force (H1) of {file}, magnitude, phase and coherence."),
         ),
         (
             Shelf::Spectra,
             "stabilisation",
             draw_stabilisation(figure),
-            None,
+            live_stabilisation(figure).map(Live::Points),
             format!(
                 "Stabilisation diagram of {file}: poles that the fit finds at each order, marked by \
                  what of them the order before had."
@@ -252,14 +264,14 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
             Shelf::Spectra,
             "amplitude",
             figure.amplitude.as_ref().and_then(draw_amplitude),
-            None,
+            amplitude.and_then(live_amplitude).map(Live::Points),
             format!("Frequency and damping of the modes of {file} against amplitude."),
         ),
         (
             Shelf::Taps,
             "taps",
             draw_taps(figure),
-            live_taps(figure),
+            live_taps(figure).map(Live::Curves),
             format!("{file} over time; numbers count the taps."),
         ),
     ];

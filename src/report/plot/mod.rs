@@ -3,7 +3,7 @@
 pub mod amplitude;
 pub mod axis;
 pub mod cloud;
-mod cloud_points;
+pub(super) mod cloud_points;
 pub mod comparison;
 pub mod decimate;
 pub mod drawing;

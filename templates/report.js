@@ -14,6 +14,11 @@ function digits(value) {
   return text.replace(/-/g, "−");
 }
 
+function tickWords(value) {
+  var size = Math.abs(value);
+  return (size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential() : String(+value.toPrecision(8))).replace(/-/g, "−");
+}
+
 function element(name, className, text) {
   var made = document.createElement(name);
   if (className) made.className = className;
@@ -90,14 +95,11 @@ function axes(plot, panel, last) {
     Object.assign({}, common, { label: last ? plot.x.label + " (" + plot.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
       values: function (u, splits) { return last ? splits.map(digits) : []; } }),
     Object.assign({}, common, {
-      label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 48 : 62, space: 28,
-      values: function (u, splits) {
-        var scale = u.scales.y, whole = panel.scale === "logarithmic" && scale.max / scale.min > 30;
-        return splits.map(function (v) {
-          var decade = Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-6;
-          return v == null || whole && !decade ? "" : digits(v);
-        });
-      }
+      label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 56 : 62, space: 28,
+      values: function (u, splits) { return splits.map(tickWords); }
+    }, panel.scale !== "logarithmic" ? {} : {
+      splits: function (u, index, low, high) { return ticks(low, high, true); },
+      filter: function (u, splits) { return splits; }
     })
   ];
 }

@@ -26,7 +26,6 @@ function ticks(low, high, log) {
   return found;
 }
 
-function written(value) { return String(+value.toPrecision(8)).replace(/-/g, "−"); }
 
 function within(axis, value) { return value >= axis[0] && value <= axis[1]; }
 
@@ -68,20 +67,23 @@ function drawSet(u, panel, set, lit) {
 }
 
 function drawRules(u, panel) {
-  var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, free = -Infinity;
+  var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, taken = [];
   c.font = 12 * ratio + "px system-ui, sans-serif";
   c.textAlign = "center";
-  panel.rules.forEach(function (rule) {
+  // Modes first: where names have no room for each other, those of modes stay.
+  var rules = panel.rules.slice().sort(function (a, b) { return b.mode - a.mode; });
+  rules.forEach(function (rule) {
     if (!within(panel.view.x, rule.at)) return;
     var x = u.valToPos(rule.at, "x", true), half = c.measureText(rule.name).width / 2 + 4 * ratio;
+    var middle = Math.min(x, c.canvas.width - half);
     c.strokeStyle = c.fillStyle = color(rule.mode ? "--mode" : "--other");
     c.lineWidth = ratio;
     c.setLineDash(rule.mode ? [6 * ratio, 4 * ratio] : [2 * ratio, 4 * ratio]);
     c.beginPath(); c.moveTo(x, box.top); c.lineTo(x, box.top + box.height); c.stroke();
     c.setLineDash([]);
-    if (x - half > free) {
-      c.fillText(rule.name, x, box.top - 6 * ratio);
-      free = x + half;
+    if (taken.every(function (other) { return middle - half > other[1] || middle + half < other[0]; })) {
+      c.fillText(rule.name, middle, box.top - 6 * ratio);
+      taken.push([middle - half, middle + half]);
     }
   });
 }
@@ -113,10 +115,10 @@ function nearest(u, panel, left, top) {
 
 function saying(panel, point) {
   var set = point.set, i = point.index;
-  function one(label, value, of) { return label + " " + written(value) + unit(of); }
+  function one(label, value, of) { return label + " " + tickWords(value) + unit(of); }
   var parts = [set.words ? set.name + ", " + set.words[i] : set.name, one(panel.x.label, set.x[i], panel.x.unit)];
   var bar = set.high ? " ± " + digits(0.5 * (set.high[i] - set.low[i])) : "";
-  parts.push(panel.y.label + " " + written(set.y[i]) + bar + unit(panel.y.unit));
+  parts.push(panel.y.label + " " + tickWords(set.y[i]) + bar + unit(panel.y.unit));
   if (set.extra) parts.push(one(panel.extra[0], set.extra[i], panel.extra[1]));
   return parts.join(" · ");
 }
@@ -158,7 +160,7 @@ function pointOptions(figure, panel, holder) {
       grid: { stroke: color("--rule"), width: 1 }, ticks: { stroke: color("--rule"), width: 1 },
       splits: function (u, index, low, high) { return ticks(low, high, logarithmic(panel[key])); },
       filter: function (u, splits) { return splits; },
-      values: function (u, splits) { return splits.map(written); }
+      values: function (u, splits) { return splits.map(tickWords); }
     };
   }
   return {

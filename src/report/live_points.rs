@@ -178,7 +178,7 @@ pub fn live_stabilisation(figure: &RecordingFigure) -> Option<LivePoints> {
 fn pole_panel(spectra: &SpectraFigure, band: &StabilisationBand) -> PointPanel {
     let top = band.order as f64 + 1.0;
     let behind = thinned(level(spectra, band.core, top));
-    let mut sets = vec![PointSet::new("level (log)", "rule", ("line", 1.5), behind)];
+    let mut sets = vec![PointSet::new("level (log)", "data", ("line", 1.0), behind)];
     let classes = CLASSES.iter().rev();
     sets.extend(classes.filter_map(|(class, words)| pole_set(band, *class, words)));
     let on_axis = |at: f64| (band.core.0..=band.core.1).contains(&at);

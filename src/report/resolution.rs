@@ -1,8 +1,8 @@
 //! The study of resolution as text, table of values and picture.
 
 use super::ReportError;
-use super::plot::{PictureFormat, render_picture};
 use super::plot::resolution::draw_resolution;
+use super::plot::{PictureFormat, render_picture};
 use super::tables::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 use super::text::{render_table, wrapped};
 use crate::study::resolution::{EstimateMethod, ResolutionStudy, WindowName};

@@ -279,7 +279,10 @@ fn points_answer(points: &Value, case: &str) {
         .iter()
         .partition(|figure| words(figure, "met").contains("Kx"));
     assert_eq!(cloud.len(), 1, "{case}: {points:?}");
-    assert!(words(cloud[0], "zoomed").starts_with("shown: Kx "), "{case}");
+    assert!(
+        words(cloud[0], "zoomed").starts_with("shown: Kx "),
+        "{case}"
+    );
     for diagram in diagrams {
         for key in ["met", "again"] {
             let said = words(diagram, key);

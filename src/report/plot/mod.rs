@@ -30,7 +30,7 @@ mod vector;
 
 pub use drawing::Drawing;
 pub use font::Weight;
-pub(super) use marks::frequency as frequency_words;
 pub use format::{PictureFormat, render_picture};
+pub(super) use marks::frequency as frequency_words;
 pub use raster::render_png;
 pub use vector::{render_svg, render_svg_file};

@@ -240,13 +240,13 @@ pub(in crate::report) fn level(
     };
     let level = composite(&curves);
     let visible: Vec<(f64, f64)> = over_lines(spectra, &level)
-        .filter(|(frequency, value)| {
-            (band.0..=band.1).contains(frequency) && value.is_finite()
-        })
+        .filter(|(frequency, value)| (band.0..=band.1).contains(frequency) && value.is_finite())
         .collect();
     let values: Vec<f64> = visible.iter().map(|(_, value)| *value).collect();
     let scale = magnitude_axis([values.as_slice()], (0.0, LEVEL_SHARE * top));
-    let placed = visible.into_iter().map(|(x, value)| (x, scale.place(value)));
+    let placed = visible
+        .into_iter()
+        .map(|(x, value)| (x, scale.place(value)));
     placed.collect()
 }
 

@@ -9,8 +9,8 @@ use super::super::ReportError;
 use super::drawing::{Align, Direction, Drawing, Point, Shape, Text, ring_hole};
 use super::font::{self, Weight};
 use super::letters::Letters;
-use super::paths::{merged, same_style};
 use super::palette::{Color, WHITE};
+use super::paths::{merged, same_style};
 
 /// Units of the SVG per pixel: the backend knows whole numbers only, a quarter of a pixel is fine
 /// enough for smooth curves.
@@ -87,7 +87,9 @@ fn element(drawing: &Drawing, shape: &Shape) -> Result<String, ReportError> {
             .map_err(|error| failed(error.to_string()))?;
     }
     let inner = text.split_once(">\n").map_or("", |(_, inner)| inner);
-    let inner = inner.rsplit_once("</svg>").map_or(inner, |(inner, _)| inner);
+    let inner = inner
+        .rsplit_once("</svg>")
+        .map_or(inner, |(inner, _)| inner);
     // Full opacity is what SVG assumes.
     Ok(inner.replace(" opacity=\"1\"", ""))
 }

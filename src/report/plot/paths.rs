@@ -5,6 +5,14 @@ use super::palette::Color;
 use super::vector::UNITS;
 use std::fmt::Write;
 
+/// From so many points on a path in steps is shorter than the backend's list of places.
+const MANY: usize = 6;
+
+/// Whether a line is a curve, which a path says in less than half the letters.
+pub(super) fn is_long(shape: &Shape) -> bool {
+    matches!(shape, Shape::Line { points, .. } if points.len() > MANY)
+}
+
 /// Whether two shapes can stand in one path. Neighbours only are merged, so that what covers what stays.
 pub(super) fn same_style(one: &Shape, other: &Shape) -> bool {
     match (one, other) {
@@ -109,16 +117,18 @@ fn trace(path: &mut String, shape: &Shape) {
     debug_assert!(written.is_ok());
 }
 
-/// From the first point on in steps, which are short numbers.
+/// From the first point on in steps, which are short numbers; a minus sign parts numbers by itself.
 fn polyline(path: &mut String, points: &[Point]) {
     let mut last = None;
-    for point in points {
+    for (index, point) in points.iter().enumerate() {
         let (x, y) = place(*point);
-        let (letter, (dx, dy)) = match last {
-            None => ('M', (x, y)),
-            Some((x0, y0)) => ('l', (x - x0, y - y0)),
+        let (before, dx, dy) = match last {
+            None => ("M", x, y),
+            Some((x0, y0)) if index == 1 => ("l", x - x0, y - y0),
+            Some((x0, y0)) => (if x < x0 { "" } else { " " }, x - x0, y - y0),
         };
-        path.push_str(&format!("{letter}{dx} {dy}"));
+        let between = if dy < 0 { "" } else { " " };
+        path.push_str(&format!("{before}{dx}{between}{dy}"));
         last = Some((x, y));
     }
 }

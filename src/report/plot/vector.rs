@@ -10,7 +10,7 @@ use super::drawing::{Align, Direction, Drawing, Point, Shape, Text, ring_hole};
 use super::font::{self, Weight};
 use super::letters::Letters;
 use super::palette::{Color, WHITE};
-use super::paths::{merged, same_style};
+use super::paths::{is_long, merged, same_style};
 
 /// Units of the SVG per pixel: the backend knows whole numbers only, a quarter of a pixel is fine
 /// enough for smooth curves.
@@ -65,7 +65,7 @@ fn elements(drawing: &Drawing, letters: &mut Option<Letters>) -> Result<String, 
     for group in drawing.shapes.chunk_by(same_style) {
         match (group, letters.as_mut()) {
             ([Shape::Text(text)], Some(letters)) => all.push_str(&letters.element(text)),
-            ([one], _) => all.push_str(&element(drawing, one)?),
+            ([one], _) if !is_long(one) => all.push_str(&element(drawing, one)?),
             _ => all.push_str(&merged(group)),
         }
     }

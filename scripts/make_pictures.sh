@@ -23,4 +23,12 @@ cp "$made/lap/spectrum-taps.png" docs/pictures/spectrum.png
 "$browser" --headless=new --no-sandbox --disable-gpu --hide-scrollbars --window-size=900,860 \
     --blink-settings=preferredColorScheme=1 --virtual-time-budget=4000 \
     --screenshot="$PWD/docs/pictures/report.png" "file://$made/lap/report.html" 2>/dev/null
+# A page of few colours: a palette is a third of the size. Without Pillow it stays as it is.
+python3 - docs/pictures/*.png <<'END' || true
+import sys
+from PIL import Image
+
+for name in sys.argv[1:]:
+    Image.open(name).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(name, optimize=True)
+END
 ls -l docs/pictures

@@ -171,7 +171,10 @@ fn prop_rejected_taps_carry_their_reason() {
 }
 
 fn dots(drawing: &Drawing, wanted: Color) -> usize {
-    let is_dot = |shape: &&Shape| matches!(shape, Shape::Dot { color, .. } if *color == wanted);
+    let is_dot = |shape: &&Shape| match shape {
+        Shape::Dot { color, .. } | Shape::Ring { color, .. } => *color == wanted,
+        _ => false,
+    };
     drawing.shapes.iter().filter(is_dot).count()
 }
 

@@ -23,6 +23,7 @@ mod observations;
 mod pairing;
 mod pipeline;
 mod pipeline_fits;
+mod predicted_shapes;
 mod quality;
 mod real_data;
 mod recording;

@@ -28,6 +28,7 @@ mod forward;
 mod frame;
 mod hypothesis;
 mod joint_energy;
+mod joint_path;
 mod least_squares;
 mod noise;
 mod nominal;

@@ -1,9 +1,40 @@
-//! Damping, and how frequencies change along a decay.
+//! Damping, and what a joint whose stiffness depends on the amplitude does to frequencies.
 
 use super::forward::{Forward, Solved};
-use super::frame::Small;
+use super::frame::{Frame, Small};
+use super::hypothesis::Fit;
 use super::joint_energy::joint_shares;
-use crate::effects::EffectId;
+use super::joint_path::{JointPath, SLIP_LOSS, slips};
+use crate::effects::{EffectId, JointLaw};
+use crate::identify::observation::{Observations, effective_share};
+
+/// Least stiffness that is left of a joint that softens (1).
+const LEAST_STIFFNESS: f64 = 0.05;
+
+impl Frame {
+    /// Sets how the joint moves in each configuration, over the largest rotation of all. Only where the
+    /// amplitudes of all of them are known.
+    pub(super) fn set_paths(&mut self, observations: &Observations, nominal: &Fit) {
+        let forward = Forward::new(self, &[]);
+        let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
+            return;
+        };
+        let paths: Option<Vec<JointPath>> = observations
+            .configurations
+            .iter()
+            .zip(&self.setups)
+            .zip(&solved)
+            .map(|((observed, setup), one)| JointPath::new(observed, setup, one))
+            .collect();
+        let Some(paths) = paths else { return };
+        let most = paths.iter().map(JointPath::peak).fold(0.0, f64::max);
+        if most > 0.0 {
+            for (setup, path) in self.setups.iter_mut().zip(paths) {
+                setup.path = Some(path.over(most));
+            }
+        }
+    }
+}
 
 impl Forward<'_> {
     /// Damping ratio: the nominal level and eta/2 times the joint's share of the strain energy; and the
@@ -17,44 +48,100 @@ impl Forward<'_> {
         let level = self.frame.small_index(Small::Damping)?;
         let nominal = parameters[self.layout.smalls() + level].exp();
         let shares = joint_shares(solved, solved.index(mode)?);
-        Some((
-            nominal + 0.5 * solved.seen.joint_loss_factor * (shares[0] + shares[1]).max(0.0),
-            nominal,
-        ))
+        let slip = self.slip_loss(mode, parameters) * shares[1];
+        let lost = solved.seen.joint_loss_factor * (shares[0] + shares[1]) + slip;
+        Some((nominal + 0.5 * lost.max(0.0), nominal))
     }
 
-    /// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr and
-    /// kr(a) = kr0 (1 + ratio a^p), averaged over the followed part of the decay.
+    /// Loss factor of a joint that slips, as one mode feels it on average over the configurations.
+    fn slip_loss(&self, mode: usize, parameters: &[f64]) -> f64 {
+        let Some(law) = self.law(parameters).filter(slips) else {
+            return 0.0;
+        };
+        let paths = self.frame.setups.iter().filter_map(|s| s.path.as_ref());
+        let changes: Vec<f64> = paths.filter_map(|path| path.whole(mode, &law)).collect();
+        -SLIP_LOSS * changes.iter().sum::<f64>() / changes.len().max(1) as f64
+    }
+
+    /// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr, averaged
+    /// over the followed part of the decay.
     pub(super) fn slope_along_decay(
         &self,
         (configuration, mode): (usize, usize),
         solved: &Solved,
         parameters: &[f64],
     ) -> f64 {
-        let Some((ratio, power)) = self.softening(parameters) else {
-            return 0.0;
-        };
-        let Some(index) = solved.index(mode) else {
+        let (Some(law), Some(index)) = (self.law(parameters), solved.index(mode)) else {
             return 0.0;
         };
         let setup = &self.frame.setups[configuration];
         let sensitivity = 0.5 * joint_shares(solved, index)[1];
-        let spans = setup.spans.iter().find(|span| span.0 == mode);
-        let stiffness = |amplitude: f64| {
-            (1.0 + ratio * (setup.level * amplitude).powf(power))
-                .max(0.05)
-                .ln()
-        };
-        match spans {
-            Some(&(_, early, late)) => {
-                sensitivity * (stiffness(early) - stiffness(late)) / (early / late).ln()
-            }
-            None => {
-                let a = self.share(parameters);
-                // A factor of 1 % either way: the derivative at the effective amplitude.
-                sensitivity * (stiffness(a * 1.01) - stiffness(a / 1.01)) / (2.0 * 1.01_f64.ln())
-            }
+        let span = setup.spans.iter().find(|span| span.0 == mode);
+        if let (Some(&(_, early, late)), Some(path)) = (span, &setup.path)
+            && let Some((first, last)) = path.between(mode, (early, late), &law)
+        {
+            return sensitivity * (stiffness(first) - stiffness(last)) / (early / late).ln();
         }
+        // Without amplitudes: the derivative at the effective one, 1 % to either side.
+        let a = setup.level * effective_share(law.exponent);
+        let at = |a: f64| stiffness(law.secant(a) - 1.0);
+        sensitivity * (at(a * 1.01) - at(a / 1.01)) / (2.0 * 1.01_f64.ln())
+    }
+
+    /// The joint's law at the amplitudes that the parameters give it, where that is a hypothesis.
+    pub(super) fn law(&self, parameters: &[f64]) -> Option<JointLaw> {
+        let (ratio, exponent) = self.softening(parameters)?;
+        // The amplitude is known but for a factor, which all recordings share.
+        let ratio = ratio * self.amplitude_factor(parameters).powf(exponent);
+        Some(JointLaw { ratio, exponent })
+    }
+
+    /// Relative amplitude at which the structure of a configuration is solved: the joint then has the mean
+    /// stiffness that its modes feel.
+    pub(super) fn level(&self, configuration: usize, parameters: &[f64]) -> f64 {
+        let Some((ratio, exponent)) = self.softening(parameters) else {
+            return 1.0;
+        };
+        let factor = self.amplitude_factor(parameters);
+        let setup = &self.frame.setups[configuration];
+        match &setup.path {
+            // ratio level^p = mean change; the sign cancels.
+            Some(path) => {
+                let unit = JointLaw {
+                    ratio: sign(ratio),
+                    exponent,
+                };
+                factor * path.mean(&unit).abs().powf(exponent.recip())
+            }
+            None => factor * setup.level * effective_share(exponent),
+        }
+    }
+
+    /// What a mode's frequency differs by from that of the structure as it was solved (logarithm): it
+    /// feels another stiffness than the mean of all modes.
+    pub(super) fn own_change(
+        &self,
+        (configuration, mode): (usize, usize),
+        solved: &Solved,
+        parameters: &[f64],
+    ) -> f64 {
+        let Some((law, path)) = self
+            .law(parameters)
+            .zip(self.frame.setups[configuration].path.as_ref())
+        else {
+            return 0.0;
+        };
+        let (Some(own), Some(index)) = (path.whole(mode, &law), solved.index(mode)) else {
+            return 0.0;
+        };
+        let sensitivity = 0.5 * joint_shares(solved, index)[1];
+        sensitivity * (stiffness(own) - stiffness(path.mean(&law)))
+    }
+
+    fn amplitude_factor(&self, parameters: &[f64]) -> f64 {
+        self.frame
+            .small_index(Small::Amplitude)
+            .map_or(1.0, |index| parameters[self.layout.smalls() + index].exp())
     }
 
     /// Relative stiffness change at the hardest tap and its exponent, where that is a hypothesis.
@@ -69,4 +156,14 @@ impl Forward<'_> {
             parameters[self.layout.place(index)?],
         ))
     }
+}
+
+/// Logarithm of a stiffness that has changed by this much.
+fn stiffness(change: f64) -> f64 {
+    (1.0 + change).max(LEAST_STIFFNESS).ln()
+}
+
+/// -1 or 1.
+fn sign(value: f64) -> f64 {
+    if value < 0.0 { -1.0 } else { 1.0 }
 }

@@ -1,11 +1,10 @@
 //! What a hypothesis predicts: all readings, with their slopes.
 
 use super::catalogue::{Candidate, PlaceKind};
-use super::frame::{Frame, Row, Small};
+use super::frame::{Frame, Row};
 use super::joint_energy::{joint_shares, stiffened_slope};
 use super::least_squares::{Knowledge, Linearised};
 use super::nominal::COUPLING;
-use super::setup::Setup;
 use crate::effects::{Circumstances, Effect, Seen, apply};
 use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
 use nalgebra::DMatrix;
@@ -180,11 +179,11 @@ impl<'a> Forward<'a> {
     pub(super) fn solve(&self, parameters: &[f64]) -> Option<Vec<Solved>> {
         let effects = self.layout.effects_at(parameters)?;
         let mut all: Vec<Solved> = Vec::with_capacity(self.frame.setups.len());
-        for setup in &self.frame.setups {
+        for (configuration, setup) in self.frame.setups.iter().enumerate() {
             let nominal = self.layout.with_joint(&setup.specimen, parameters);
             let circumstances = Circumstances {
                 sensors: &setup.carried,
-                level: self.level(setup, parameters),
+                level: self.level(configuration, parameters),
                 ..Circumstances::default()
             };
             let seen = apply(&effects, &nominal, &circumstances);
@@ -202,18 +201,6 @@ impl<'a> Forward<'a> {
             });
         }
         Some(all)
-    }
-
-    /// Amplitude that counts for the frequency of a whole decay.
-    fn level(&self, setup: &Setup, parameters: &[f64]) -> f64 {
-        setup.level * self.share(parameters)
-    }
-
-    /// Effective amplitude over the first one.
-    pub(super) fn share(&self, parameters: &[f64]) -> f64 {
-        self.frame
-            .small_index(Small::Amplitude)
-            .map_or(1.0, |index| parameters[self.layout.smalls() + index].exp())
     }
 
     fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
@@ -263,8 +250,10 @@ impl<'a> Forward<'a> {
                 configuration,
                 mode,
             } => {
-                let frequency = solved[configuration].frequency(mode)?;
-                (frequency > 0.0).then(|| frequency.ln())
+                let one = &solved[configuration];
+                let frequency = one.frequency(mode)?;
+                let own = self.own_change((configuration, mode), one, parameters);
+                (frequency > 0.0).then(|| frequency.ln() + own)
             }
             Row::Constant {
                 configuration,

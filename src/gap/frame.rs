@@ -5,7 +5,7 @@ use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
 use super::setup::{Setup, setup, twin};
-use crate::identify::observation::{DecayVerdict, Observations};
+use crate::identify::observation::{DecayVerdict, Observations, ObservedMode};
 use nalgebra::DMatrix;
 
 /// What a reading is of.
@@ -49,7 +49,7 @@ pub(super) enum Small {
     Gain { visit: usize, name: usize },
     /// Common level of the nominal damping ratios (logarithm).
     Damping,
-    /// Amplitude that counts over the one at the decay's begin (logarithm).
+    /// Amplitude of the joint over what the sensors' amplitudes and the shapes make of it (logarithm).
     Amplitude,
     /// What the taps of one configuration scatter in common (standard deviations).
     Scatter { configuration: usize },
@@ -91,11 +91,13 @@ const SHAPE_FLOOR: f64 = 0.01;
 /// relative frequency per e-fold.
 const SLOPE_FLOOR: f64 = 5e-6;
 
-/// The amplitude that counts for a frequency fitted to a whole decay, over its first one, and the
-/// scatter of its logarithm: 0.41 to 0.5 for all powers of the amplitude
-/// ([`effective_share`](crate::identify::observation::effective_share)), less certain because other
-/// modes move the joint too.
-pub(super) const SHARE: (f64, f64) = (0.45, 0.3);
+/// The joint's amplitude over what the sensors' amplitudes and the shapes make of it, and the scatter
+/// of its logarithm: the largest rotation under the hammer is not seen, nor all modes that share in it.
+pub(super) const AMPLITUDE: (f64, f64) = (1.0, 0.15);
+
+/// How well the change along a decay is predicted of the joint's motion, relative to the change: a fifth,
+/// since several motions at once are reduced to one amplitude.
+const CHANGE_MODEL: f64 = 0.2;
 
 impl Frame {
     /// From observations in which every sensor with a mass has a place.
@@ -279,19 +281,18 @@ impl Frame {
         let fitted = self.fitted_modes;
         for (configuration, one) in observations.configurations.iter().enumerate() {
             for mode in one.modes.iter().filter(|m| m.mode <= fitted) {
-                let Some(decay) = mode.decay else { continue };
-                let slope = decay.frequency_slope;
-                if decay.verdict == DecayVerdict::Doubtful || slope.std.is_nan() || slope.std <= 0.0
-                {
+                let Some(mut reading) = slope_of(mode) else {
                     continue;
-                }
+                };
+                reading.std = reading
+                    .std
+                    .hypot(SLOPE_FLOOR)
+                    .hypot(CHANGE_MODEL * reading.value);
                 let row = Row::Slope {
                     configuration,
                     mode: mode.mode,
                 };
-                let std = (slope.std / mode.frequency).hypot(SLOPE_FLOOR);
-                let freedom = slope.freedom.unwrap_or(f64::INFINITY).max(3.0);
-                self.push(row, reading_of(slope.value / mode.frequency, std, freedom));
+                self.push(row, reading);
             }
         }
     }
@@ -362,7 +363,7 @@ impl Frame {
             // Wide: nobody knows the damping of a beam beforehand.
             self.small(Small::Damping, sum / count, 2.0);
         }
-        self.small(Small::Amplitude, SHARE.0.ln(), SHARE.1);
+        self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
     }
 
     fn small(&mut self, small: Small, centre: f64, std: f64) {
@@ -382,6 +383,27 @@ impl Frame {
     pub(super) fn small_index(&self, small: Small) -> Option<usize> {
         self.smalls.iter().position(|&one| one == small)
     }
+}
+
+/// Change of the logarithm of a frequency per e-fold of the amplitude, between the ends of the followed
+/// decay where their amplitudes are known.
+fn slope_of(mode: &ObservedMode) -> Option<Reading> {
+    let decay = mode.decay?;
+    if decay.verdict == DecayVerdict::Doubtful {
+        return None;
+    }
+    let slope = decay.frequency_slope;
+    let freedom = slope.freedom.unwrap_or(f64::INFINITY).max(3.0);
+    let (value, std) = match (decay.early.amplitude, decay.late.amplitude) {
+        (Some(early), Some(late)) if early > 1.05 * late && late > 0.0 => {
+            let (first, last) = (decay.early.frequency, decay.late.frequency);
+            let folds = (early / late).ln();
+            let std = first.std.hypot(last.std) / mode.frequency;
+            ((first.value / last.value).ln() / folds, std / folds)
+        }
+        _ => (slope.value / mode.frequency, slope.std / mode.frequency),
+    };
+    (std.is_finite() && std > 0.0).then(|| reading_of(value, std, freedom))
 }
 
 fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {

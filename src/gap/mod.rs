@@ -31,6 +31,7 @@ mod forward;
 mod frame;
 mod hypothesis;
 mod joint_energy;
+mod joint_path;
 mod least_squares;
 mod left_out;
 mod noise;

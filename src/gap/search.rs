@@ -165,6 +165,7 @@ fn nominal_of(
     let mut frame = Frame::new(observations, nominal, settings);
     let first = fit_nominal(&frame, settings)?;
     set_amplitudes(&mut frame, &first);
+    frame.set_paths(observations, &first);
     let forward = Forward::new(&frame, &[]);
     let shapes = forward.joint_differences(&first.branch.optimum.parameters)?;
     frame.shape_slopes = Some(shapes);

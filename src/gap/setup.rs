@@ -1,5 +1,6 @@
 //! One configuration of the test as the model needs it.
 
+use super::joint_path::JointPath;
 use super::nominal::Nominal;
 use crate::effects::SensorPlace;
 use crate::identify::observation::{Configuration, ExtraPeak, ObservedMode};
@@ -28,6 +29,8 @@ pub(super) struct Setup {
     pub(super) level: f64,
     /// Amplitude at the begin and end of the followed decay over that of its first instant, by mode.
     pub(super) spans: Vec<(usize, f64, f64)>,
+    /// How the joint moves; `None` where no amplitude is known.
+    pub(super) path: Option<JointPath>,
     /// Which visit to the structure.
     pub(super) visit: usize,
     /// What the taps' scatter has in common: share of each mode's standard deviation, with its sign.
@@ -89,6 +92,7 @@ pub(super) fn setup(
         tap: configuration.tap,
         level: configuration.level.unwrap_or(1.0),
         spans: configuration.modes.iter().filter_map(span).collect(),
+        path: None,
         visit: configuration.recording.unwrap_or(index),
         scatter: common_scatter(configuration),
     }

@@ -181,6 +181,7 @@ impl Scene<'_> {
             peak_force: Some(planned.level),
             level: Some(planned.level),
             taps: self.plan.taps,
+            decay_seconds: None,
             modes: seen_modes,
             covariance: None,
             common: 0.0,

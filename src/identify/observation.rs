@@ -29,6 +29,8 @@ pub struct Configuration {
     pub level: Option<f64>,
     /// Taps that entered; 0 of frequencies read elsewhere and of functions from a file.
     pub taps: usize,
+    /// Length of the decays that were fitted (s); `None` where nothing was recorded.
+    pub decay_seconds: Option<f64>,
     /// The modes with a number, ascending.
     pub modes: Vec<ObservedMode>,
     /// Covariance of the frequencies (Hz^2), row by row in the order of `modes`, without `common`;

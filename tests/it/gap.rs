@@ -214,6 +214,7 @@ fn read(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Observations {
             peak_force: None,
             level: None,
             taps: 0,
+            decay_seconds: None,
             modes: frequencies.iter().enumerate().map(mode).collect(),
             covariance: None,
             common: 0.0,

@@ -80,6 +80,7 @@ fn of_measured(modes: &[ModeResult]) -> Configuration {
         peak_force: None,
         level: None,
         taps: 0,
+        decay_seconds: None,
         covariance: covariance::independent(&modes),
         modes,
         // What was stated is meant to be all.
@@ -125,6 +126,8 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
                 Format::FrequencyResponses => 0,
                 _ => taps.len(),
             },
+            decay_seconds: Some(spectra.averages.lines.duration)
+                .filter(|_| recording.format != Format::FrequencyResponses),
             covariance: covariance::of_taps(&seen),
             // Changes along the decays belong to all taps; they stand with the hardest.
             modes: seen.iter().map(|seen| seen.observed(place == 0)).collect(),

@@ -4,6 +4,7 @@
 
 mod amplitude;
 mod blind_check;
+mod blind_check_draw;
 mod cli;
 mod cli_frf;
 mod description;

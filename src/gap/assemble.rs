@@ -1,6 +1,7 @@
 //! From the competition to the answer: every number that is shown.
 
 use super::catalogue::PlaceKind;
+use super::decay_finding::decay_finding;
 use super::forward::Layout;
 use super::frame::Frame;
 use super::place_map::place_map;
@@ -64,6 +65,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         hypotheses,
         map: place_map(frame, &competition.baseline),
         decided_by: decided_by(entries),
+        along_decays: decay_finding(frame, &competition.baseline),
         fitted_modes: frame.fitted_modes,
     }
 }

@@ -22,6 +22,8 @@ mod branches;
 mod catalogue;
 mod catch_all;
 mod checks;
+mod decay_finding;
+mod decay_readings;
 mod error;
 mod evidence;
 mod forward;
@@ -45,6 +47,7 @@ mod synthetic;
 mod verdict;
 mod withheld;
 
+pub use decay_finding::{DecayChange, DecayFinding};
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{

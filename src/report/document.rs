@@ -18,9 +18,9 @@ pub use super::document_fit::{
 };
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
 pub use super::document_gap::{
-    BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
-    HypothesisSection, JointShiftSection, NextTestSection, ParameterSection, PlaceMapSection,
-    PullSection,
+    AlongDecaysSection, BaselineSection, ClosureSection, DecayChangeSection, GapPlaceSection,
+    GapSection, GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection,
+    ParameterSection, PlaceMapSection, PullSection,
 };
 pub use super::document_perturbation::{
     AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,

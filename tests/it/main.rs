@@ -10,6 +10,7 @@ mod description;
 mod effects;
 mod errors;
 mod gap;
+mod gap_decay;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;

@@ -4,7 +4,8 @@ use super::forward::{Forward, Solved};
 use super::frame::{Frame, Small};
 use super::hypothesis::Fit;
 use super::joint_energy::joint_shares;
-use super::joint_path::{JointPath, SLIP_LOSS, slips};
+use super::joint_path::{Changes, JointPath, SLIP_LOSS, slips};
+use super::setup::Setup;
 use crate::effects::{EffectId, JointLaw};
 use crate::identify::observation::{Observations, effective_share};
 
@@ -19,6 +20,7 @@ impl Frame {
         let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
             return;
         };
+        self.widen_changes(&solved);
         let paths: Option<Vec<JointPath>> = observations
             .configurations
             .iter()
@@ -42,50 +44,38 @@ impl Forward<'_> {
     pub(super) fn damping(
         &self,
         mode: usize,
-        solved: &Solved,
+        all: &[Solved],
         parameters: &[f64],
     ) -> Option<(f64, f64)> {
         let level = self.frame.small_index(Small::Damping)?;
         let nominal = parameters[self.layout.smalls() + level].exp();
+        let solved = all.first()?;
         let shares = joint_shares(solved, solved.index(mode)?);
-        let slip = self.slip_loss(mode, parameters) * shares[1];
+        let slip = self.slip_loss(mode, all, parameters) * shares[1];
         let lost = solved.seen.joint_loss_factor * (shares[0] + shares[1]) + slip;
         Some((nominal + 0.5 * lost.max(0.0), nominal))
     }
 
     /// Loss factor of a joint that slips, as one mode feels it on average over the configurations.
-    fn slip_loss(&self, mode: usize, parameters: &[f64]) -> f64 {
-        let Some(law) = self.law(parameters).filter(slips) else {
+    fn slip_loss(&self, mode: usize, all: &[Solved], parameters: &[f64]) -> f64 {
+        if !self.law(parameters).is_some_and(|law| slips(&law)) {
             return 0.0;
-        };
-        let paths = self.frame.setups.iter().filter_map(|s| s.path.as_ref());
-        let changes: Vec<f64> = paths.filter_map(|path| path.whole(mode, &law)).collect();
-        -SLIP_LOSS * changes.iter().sum::<f64>() / changes.len().max(1) as f64
+        }
+        let changes = all.iter().filter_map(|one| one.changes.as_ref()?.of(mode));
+        let (sum, count) = changes.fold((0.0, 0), |(sum, n), one| (sum + one, n + 1));
+        -SLIP_LOSS * sum / f64::from(count.max(1))
     }
 
-    /// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr, averaged
-    /// over the followed part of the decay.
+    /// Change of the logarithm of a frequency per e-fold of its amplitude, along the followed decay.
     pub(super) fn slope_along_decay(
         &self,
         (configuration, mode): (usize, usize),
         solved: &Solved,
         parameters: &[f64],
     ) -> f64 {
-        let (Some(law), Some(index)) = (self.law(parameters), solved.index(mode)) else {
-            return 0.0;
-        };
         let setup = &self.frame.setups[configuration];
-        let sensitivity = 0.5 * joint_shares(solved, index)[1];
-        let span = setup.spans.iter().find(|span| span.0 == mode);
-        if let (Some(&(_, early, late)), Some(path)) = (span, &setup.path)
-            && let Some((first, last)) = path.between(mode, (early, late), &law)
-        {
-            return sensitivity * (stiffness(first) - stiffness(last)) / (early / late).ln();
-        }
-        // Without amplitudes: the derivative at the effective one, 1 % to either side.
-        let a = setup.level * effective_share(law.exponent);
-        let at = |a: f64| stiffness(law.secant(a) - 1.0);
-        sensitivity * (at(a * 1.01) - at(a / 1.01)) / (2.0 * 1.01_f64.ln())
+        self.law(parameters)
+            .map_or(0.0, |law| lawful_change(setup, mode, solved, &law))
     }
 
     /// The joint's law at the amplitudes that the parameters give it, where that is a hypothesis.
@@ -96,46 +86,43 @@ impl Forward<'_> {
         Some(JointLaw { ratio, exponent })
     }
 
+    /// What the modes of a configuration feel of the joint's law.
+    pub(super) fn changes(&self, configuration: usize, parameters: &[f64]) -> Option<Changes> {
+        let path = self.frame.setups[configuration].path.as_ref()?;
+        Some(path.changes(&self.law(parameters)?))
+    }
+
     /// Relative amplitude at which the structure of a configuration is solved: the joint then has the mean
     /// stiffness that its modes feel.
-    pub(super) fn level(&self, configuration: usize, parameters: &[f64]) -> f64 {
+    pub(super) fn level(
+        &self,
+        setup: &Setup,
+        changes: Option<&Changes>,
+        parameters: &[f64],
+    ) -> f64 {
         let Some((ratio, exponent)) = self.softening(parameters) else {
             return 1.0;
         };
-        let factor = self.amplitude_factor(parameters);
-        let setup = &self.frame.setups[configuration];
-        match &setup.path {
-            // ratio level^p = mean change; the sign cancels.
-            Some(path) => {
-                let unit = JointLaw {
-                    ratio: sign(ratio),
-                    exponent,
-                };
-                factor * path.mean(&unit).abs().powf(exponent.recip())
+        match changes {
+            // ratio level^p = mean change, of the same sign.
+            Some(changes) if ratio != 0.0 => (changes.mean / ratio).powf(exponent.recip()),
+            Some(_) => 0.0,
+            None => {
+                let factor = self.amplitude_factor(parameters);
+                factor * setup.level * effective_share(exponent)
             }
-            None => factor * setup.level * effective_share(exponent),
         }
     }
 
     /// What a mode's frequency differs by from that of the structure as it was solved (logarithm): it
     /// feels another stiffness than the mean of all modes.
-    pub(super) fn own_change(
-        &self,
-        (configuration, mode): (usize, usize),
-        solved: &Solved,
-        parameters: &[f64],
-    ) -> f64 {
-        let Some((law, path)) = self
-            .law(parameters)
-            .zip(self.frame.setups[configuration].path.as_ref())
-        else {
+    pub(super) fn own_change(mode: usize, solved: &Solved) -> f64 {
+        let changes = solved.changes.as_ref();
+        let of = changes.and_then(|changes| Some((changes.of(mode)?, changes.mean)));
+        let (Some((own, mean)), Some(index)) = (of, solved.index(mode)) else {
             return 0.0;
         };
-        let (Some(own), Some(index)) = (path.whole(mode, &law), solved.index(mode)) else {
-            return 0.0;
-        };
-        let sensitivity = 0.5 * joint_shares(solved, index)[1];
-        sensitivity * (stiffness(own) - stiffness(path.mean(&law)))
+        0.5 * joint_shares(solved, index)[1] * (stiffness(own) - stiffness(mean))
     }
 
     fn amplitude_factor(&self, parameters: &[f64]) -> f64 {
@@ -158,12 +145,26 @@ impl Forward<'_> {
     }
 }
 
+/// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr, averaged over the
+/// followed part of the decay.
+pub(super) fn lawful_change(setup: &Setup, mode: usize, solved: &Solved, law: &JointLaw) -> f64 {
+    let Some(index) = solved.index(mode) else {
+        return 0.0;
+    };
+    let sensitivity = 0.5 * joint_shares(solved, index)[1];
+    let span = setup.spans.iter().find(|span| span.0 == mode);
+    if let (Some(&(_, early, late)), Some(path)) = (span, &setup.path)
+        && let Some((first, last)) = path.between(mode, (early, late), law)
+    {
+        return sensitivity * (stiffness(first) - stiffness(last)) / (early / late).ln();
+    }
+    // Without amplitudes: the derivative at the effective one, 1 % to either side.
+    let a = setup.level * effective_share(law.exponent);
+    let at = |a: f64| stiffness(law.secant(a) - 1.0);
+    sensitivity * (at(a * 1.01) - at(a / 1.01)) / (2.0 * 1.01_f64.ln())
+}
+
 /// Logarithm of a stiffness that has changed by this much.
 fn stiffness(change: f64) -> f64 {
     (1.0 + change).max(LEAST_STIFFNESS).ln()
-}
-
-/// -1 or 1.
-fn sign(value: f64) -> f64 {
-    if value < 0.0 { -1.0 } else { 1.0 }
 }

@@ -2,6 +2,7 @@
 
 use super::advisor::advise;
 use super::catalogue::PlaceKind;
+use super::decay_finding::decay_finding;
 use super::evidence::log_likelihood;
 use super::forward::Layout;
 use super::frame::{Frame, Small};
@@ -99,6 +100,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         hypotheses,
         map: place_map(frame, &competition.baseline),
         decided_by: decided_by(frame, entries),
+        along_decays: decay_finding(frame, &competition.baseline),
         fitted_modes: frame.fitted_modes,
     }
 }

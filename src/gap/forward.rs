@@ -3,6 +3,7 @@
 use super::catalogue::{Candidate, PlaceKind};
 use super::frame::{Frame, Row};
 use super::joint_energy::{joint_shares, stiffened_slope};
+use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised};
 use super::nominal::COUPLING;
 use crate::effects::{Circumstances, Effect, Seen, apply};
@@ -97,6 +98,8 @@ pub(super) struct Solved {
     pub(super) modes: Arc<SpecimenModes>,
     /// Which of the modes is the model's mode 1, 2, ...: that of a fixture is left out.
     numbers: Vec<usize>,
+    /// What its modes feel of a joint whose stiffness depends on the amplitude.
+    pub(super) changes: Option<Changes>,
 }
 
 impl Solved {
@@ -181,9 +184,10 @@ impl<'a> Forward<'a> {
         let mut all: Vec<Solved> = Vec::with_capacity(self.frame.setups.len());
         for (configuration, setup) in self.frame.setups.iter().enumerate() {
             let nominal = self.layout.with_joint(&setup.specimen, parameters);
+            let changes = self.changes(configuration, parameters);
             let circumstances = Circumstances {
                 sensors: &setup.carried,
-                level: self.level(configuration, parameters),
+                level: self.level(setup, changes.as_ref(), parameters),
                 ..Circumstances::default()
             };
             let seen = apply(&effects, &nominal, &circumstances);
@@ -198,6 +202,7 @@ impl<'a> Forward<'a> {
                 seen,
                 modes,
                 numbers,
+                changes,
             });
         }
         Some(all)
@@ -252,7 +257,7 @@ impl<'a> Forward<'a> {
             } => {
                 let one = &solved[configuration];
                 let frequency = one.frequency(mode)?;
-                let own = self.own_change((configuration, mode), one, parameters);
+                let own = Self::own_change(mode, one);
                 (frequency > 0.0).then(|| frequency.ln() + own)
             }
             Row::Constant {
@@ -281,7 +286,7 @@ impl<'a> Forward<'a> {
                 };
                 Some(at(sensor) / at(reference))
             }
-            Row::Damping { mode } => Some(self.damping(mode, &solved[0], parameters)?.0.ln()),
+            Row::Damping { mode } => Some(self.damping(mode, solved, parameters)?.0.ln()),
             Row::Slope {
                 configuration,
                 mode,

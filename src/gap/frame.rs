@@ -1,11 +1,12 @@
 //! What was observed, in the order in which it is compared: readings (rows) and small unknowns
 //! (columns) that every hypothesis shares.
 
+use super::decay_readings::{average_std, bent_std, widen};
 use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
 use super::setup::{Setup, setup, twin};
-use crate::identify::observation::{DecayVerdict, Observations, ObservedMode};
+use crate::identify::observation::Observations;
 use nalgebra::DMatrix;
 
 /// What a reading is of.
@@ -87,17 +88,9 @@ pub(super) struct Frame {
 /// modes beyond the model and real beams leave.
 const SHAPE_FLOOR: f64 = 0.01;
 
-/// A slope along the decay that is smaller cannot be told from what the fits' own bias leaves, in
-/// relative frequency per e-fold.
-const SLOPE_FLOOR: f64 = 5e-6;
-
 /// The joint's amplitude over what the sensors' amplitudes and the shapes make of it, and the scatter
 /// of its logarithm: the largest rotation under the hammer is not seen, nor all modes that share in it.
-pub(super) const AMPLITUDE: (f64, f64) = (1.0, 0.15);
-
-/// How well the change along a decay is predicted of the joint's motion, relative to the change: a fifth,
-/// since several motions at once are reduced to one amplitude.
-const CHANGE_MODEL: f64 = 0.2;
+pub(super) const AMPLITUDE: (f64, f64) = (1.0, 0.25);
 
 impl Frame {
     /// From observations in which every sensor with a mass has a place.
@@ -142,7 +135,7 @@ impl Frame {
         frame
     }
 
-    fn push(&mut self, row: Row, reading: Reading) {
+    pub(super) fn push(&mut self, row: Row, reading: Reading) {
         self.rows.push(row);
         self.readings.push(reading);
     }
@@ -187,6 +180,9 @@ impl Frame {
             }
             // What a recording has in common is far below the floor: as good as independent.
             reading.std = reading.std.hypot(settings.frequency_floor).hypot(common);
+            if let Some(observed) = observations.configurations[configuration].mode(mode) {
+                widen(&mut reading, average_std(observed));
+            }
             if mode > self.fitted_modes {
                 self.withheld.push((row, reading));
             } else {
@@ -226,7 +222,9 @@ impl Frame {
                         sensor: reference,
                     };
                     let freedom = constant.freedom.unwrap_or(f64::INFINITY);
-                    constants.push((row, reading_of(constant.value, constant.std, freedom)));
+                    let bent = constant.value * bent_std(mode);
+                    let std = constant.std.hypot(bent);
+                    constants.push((row, reading_of(constant.value, std, freedom)));
                 }
                 let others = mode
                     .shape
@@ -273,26 +271,6 @@ impl Frame {
                 let std = weights.powf(-0.5).hypot(settings.damping_scatter);
                 let reading = reading_of(sum / weights, std, f64::INFINITY);
                 self.push(Row::Damping { mode }, reading);
-            }
-        }
-    }
-
-    fn add_slopes(&mut self, observations: &Observations) {
-        let fitted = self.fitted_modes;
-        for (configuration, one) in observations.configurations.iter().enumerate() {
-            for mode in one.modes.iter().filter(|m| m.mode <= fitted) {
-                let Some(mut reading) = slope_of(mode) else {
-                    continue;
-                };
-                reading.std = reading
-                    .std
-                    .hypot(SLOPE_FLOOR)
-                    .hypot(CHANGE_MODEL * reading.value);
-                let row = Row::Slope {
-                    configuration,
-                    mode: mode.mode,
-                };
-                self.push(row, reading);
             }
         }
     }
@@ -385,28 +363,7 @@ impl Frame {
     }
 }
 
-/// Change of the logarithm of a frequency per e-fold of the amplitude, between the ends of the followed
-/// decay where their amplitudes are known.
-fn slope_of(mode: &ObservedMode) -> Option<Reading> {
-    let decay = mode.decay?;
-    if decay.verdict == DecayVerdict::Doubtful {
-        return None;
-    }
-    let slope = decay.frequency_slope;
-    let freedom = slope.freedom.unwrap_or(f64::INFINITY).max(3.0);
-    let (value, std) = match (decay.early.amplitude, decay.late.amplitude) {
-        (Some(early), Some(late)) if early > 1.05 * late && late > 0.0 => {
-            let (first, last) = (decay.early.frequency, decay.late.frequency);
-            let folds = (early / late).ln();
-            let std = first.std.hypot(last.std) / mode.frequency;
-            ((first.value / last.value).ln() / folds, std / folds)
-        }
-        _ => (slope.value / mode.frequency, slope.std / mode.frequency),
-    };
-    (std.is_finite() && std > 0.0).then(|| reading_of(value, std, freedom))
-}
-
-fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {
+pub(super) fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {
     Reading {
         value,
         std,

@@ -1,7 +1,8 @@
 //! Fits one hypothesis: starts, signs, places, and the sum over them.
 
 use super::branches::{keep, peaks};
-use super::catalogue::{Candidate, PlaceRange};
+use super::catalogue::{Candidate, PlaceKind, PlaceRange};
+use super::decay_finding::best_law;
 use super::evidence::{
     Branch, covariance, evaluate, knowledge, linear_optimum, log_integral, log_likelihood,
     log_mean, log_sum, over_drifts,
@@ -283,6 +284,11 @@ impl Search<'_> {
                 keep(&mut found, branch, &[at, at + 1]);
             }
         }
+        if let Some(from) = self.from_decays(forward, nodes)
+            && let Some(branch) = evaluate(forward, known, &from, &self.settings.drift_stds)
+        {
+            keep(&mut found, branch, &[at, at + 1]);
+        }
         let deepest = |a: &Branch, b: &Branch| a.optimum.objective.total_cmp(&b.optimum.objective);
         found.sort_by(deepest);
         // A search along a bent valley may stop short of its end: once more from either side of it.
@@ -307,6 +313,24 @@ impl Search<'_> {
             log_mean(&evidence)
         };
         Some(self.fit(forward, best, total))
+    }
+
+    /// The best node with the size and the exponent that the changes along the decays call for, of a
+    /// joint whose stiffness depends on the amplitude.
+    fn from_decays(&self, forward: &Forward<'_>, nodes: &[Branch]) -> Option<Vec<f64>> {
+        let index = forward.layout.effects.len() - 1;
+        forward.layout.effects[index]
+            .place
+            .filter(|range| range.kind == PlaceKind::Exponent)?;
+        let law = best_law(self.frame, self.without)?.law;
+        let best = nodes
+            .iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let mut start = best.optimum.parameters.clone();
+        let at = forward.layout.size(index);
+        start[at] = law.ratio;
+        start[at + 1] = law.exponent;
+        Some(start)
     }
 
     /// What the profile of the likelihood over the size adds to the evidence of its parabola. Only

@@ -5,13 +5,12 @@
 //! set by its own amplitude and by those of all others; what is read of it is an average over its decay,
 //! or its frequency at two times.
 
+use super::decay_readings::beginning;
 use super::forward::Solved;
 use super::setup::Setup;
 use crate::effects::{JointLaw, JointLawKind, ModeMotion};
 use crate::identify::observation::Configuration;
 
-/// Damping ratio of a mode whose own was not read (1): the middle of what beams have, in logarithms.
-const USUAL_DAMPING: f64 = 0.003;
 /// Times at which an average over a decay is taken; they lie denser where the decay begins. 16 leave
 /// 0.5 % of the average.
 const TIMES: usize = 16;
@@ -42,6 +41,23 @@ pub(super) struct JointPath {
     seconds: f64,
 }
 
+/// Relative changes of the stiffness that the modes of one configuration feel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Changes {
+    /// Number of the mode and its change.
+    modes: Vec<(usize, f64)>,
+    /// Mean of all modes: what the structure is solved with.
+    pub(super) mean: f64,
+}
+
+impl Changes {
+    /// Of one mode, where its amplitude is known.
+    pub(super) fn of(&self, mode: usize) -> Option<f64> {
+        let found = self.modes.iter().find(|one| one.0 == mode);
+        found.map(|one| one.1)
+    }
+}
+
 impl JointPath {
     /// From the amplitudes that were observed at the sensors and the shapes of a fitted model; `None`
     /// where no amplitude is known.
@@ -52,7 +68,8 @@ impl JointPath {
     ) -> Option<JointPath> {
         let mut modes = Vec::new();
         for mode in &configuration.modes {
-            let (Some(amplitude), Some(reference)) = (mode.amplitude, mode.reference) else {
+            let (Some((amplitude, damping)), Some(reference)) = (beginning(mode), mode.reference)
+            else {
                 continue;
             };
             let Some(index) = solved.index(mode.mode) else {
@@ -66,14 +83,13 @@ impl JointPath {
                 .tap
                 .map_or(1.0, |tap| solved.modes.displacement(index, tap));
             let omega = std::f64::consts::TAU * mode.frequency;
-            let damping = mode.damping.map_or(USUAL_DAMPING, |damping| damping.value);
             let size = (amplitude * rotation / at_sensor).abs();
             if size.is_finite() {
                 modes.push(ModePath {
                     mode: mode.mode,
                     amplitude: size.copysign(rotation * at_tap),
                     omega,
-                    rate: damping.max(1e-5) * omega,
+                    rate: damping * omega,
                 });
             }
         }
@@ -122,13 +138,13 @@ impl JointPath {
         law.change_among(own, others)
     }
 
-    /// The change that the frequency fitted to a whole decay stands for, and the part of it that is
-    /// dissipation (as a loss factor). `None` of a mode whose amplitude is not known.
+    /// The change that the frequency fitted to a whole decay stands for; `None` of a mode whose
+    /// amplitude is not known.
     ///
     /// Least squares weigh the phase with e^{-bt}, b = 2 rate; a change g(t) of the angular frequency then
     /// fits as cov(t, integral of g)/var(t), which is the integral of K g with
     /// K(t) ~ integral of e^{-bs} (s - mean) from t to T.
-    pub(super) fn whole(&self, mode: usize, law: &JointLaw) -> Option<f64> {
+    fn whole(&self, mode: usize, law: &JointLaw) -> Option<f64> {
         let place = self.place(mode)?;
         let b = 2.0 * self.modes[place].rate;
         let last = self.seconds.min(2.0 * RUNG_DOWN / b);
@@ -162,10 +178,12 @@ impl JointPath {
         Some((at(shares.0), at(shares.1)))
     }
 
-    /// The mean change of all modes, which the structure is solved with.
-    pub(super) fn mean(&self, law: &JointLaw) -> f64 {
-        let changes = self.modes.iter().filter_map(|m| self.whole(m.mode, law));
-        changes.sum::<f64>() / self.modes.len() as f64
+    /// The change that each mode's frequency stands for, and their mean.
+    pub(super) fn changes(&self, law: &JointLaw) -> Changes {
+        let whole = |m: &ModePath| Some((m.mode, self.whole(m.mode, law)?));
+        let modes: Vec<(usize, f64)> = self.modes.iter().filter_map(whole).collect();
+        let mean = modes.iter().map(|mode| mode.1).sum::<f64>() / modes.len().max(1) as f64;
+        Changes { modes, mean }
     }
 }
 

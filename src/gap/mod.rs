@@ -25,6 +25,8 @@ mod branches;
 mod catalogue;
 mod catch_all;
 mod checks;
+mod decay_finding;
+mod decay_readings;
 mod error;
 mod evidence;
 mod forward;
@@ -50,6 +52,7 @@ mod verdict;
 mod withheld;
 
 pub use advisor::{NextTest, Step};
+pub use decay_finding::{DecayChange, DecayFinding};
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{

@@ -1,6 +1,7 @@
 //! What the diagnosis says, as plain data.
 
 use super::advisor::NextTest;
+use super::decay_finding::DecayFinding;
 use crate::effects::{Effect, EffectId, Group};
 
 /// The answer.
@@ -29,6 +30,9 @@ pub struct Diagnosis {
     pub map: Option<PlaceMap>,
     /// How certain it is that this was decided by the readings and not by the priors.
     pub decided_by: DecidedBy,
+    /// What the decays by themselves say of a joint whose stiffness depends on the amplitude; `None` where
+    /// no frequency changes along them.
+    pub along_decays: Option<DecayFinding>,
     /// Modes above this number took no part in the fit.
     pub fitted_modes: usize,
     /// Tests that would tell more, those first that tell most per cost.

@@ -1,5 +1,6 @@
 //! One configuration of the test as the model needs it.
 
+use super::decay_readings::beginning;
 use super::joint_path::JointPath;
 use super::nominal::Nominal;
 use crate::effects::SensorPlace;
@@ -145,7 +146,7 @@ pub(super) fn twin(configuration: &Configuration, mode: &ObservedMode) -> Option
 
 fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {
     let decay = mode.decay?;
-    let first = mode.amplitude?;
+    let first = beginning(mode)?.0;
     let share = |amplitude: Option<f64>| Some(amplitude? / first);
     let (early, late) = (share(decay.early.amplitude)?, share(decay.late.amplitude)?);
     (late > 0.0 && early > 1.05 * late).then_some((mode.mode, early, late))

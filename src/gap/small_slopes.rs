@@ -91,9 +91,7 @@ impl Forward<'_> {
                 predicted * (towards - away)
             }
             Row::Damping { mode } if *small == Small::Damping => {
-                let (all, nominal) = self
-                    .damping(mode, &solved[0], parameters)
-                    .unwrap_or((1.0, 1.0));
+                let (all, nominal) = self.damping(mode, solved, parameters).unwrap_or((1.0, 1.0));
                 nominal / all
             }
             Row::Damping { .. } | Row::Slope { .. } => 0.0,

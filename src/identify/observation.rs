@@ -116,7 +116,7 @@ pub struct AlongDecay {
     pub damping_slope: Observed,
     /// At the largest amplitude.
     pub early: DecayEnd,
-    /// At the smallest amplitude.
+    /// At the smallest amplitude, or at a tenth of the largest.
     pub late: DecayEnd,
     /// Whether the change is one of the mode itself.
     pub verdict: DecayVerdict,

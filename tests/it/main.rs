@@ -12,6 +12,7 @@ mod effects;
 mod errors;
 mod gap;
 mod gap_advice;
+mod gap_decay;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;

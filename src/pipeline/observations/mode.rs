@@ -21,6 +21,11 @@ use crate::stats::{median, root_mean_square};
 /// A 95 % bound over the standard uncertainty of a normal distribution.
 const BOUND: f64 = 1.96;
 
+/// Amplitude at which a decay's late end is read, over the largest (1), where it was followed further: a
+/// change with any power of the amplitude from 1/2 on is over there by two thirds, and beyond it
+/// noise and neighbours bend the curve.
+const LATE_SHARE: f64 = 0.1;
+
 /// A mode, and the taps that count.
 pub(super) struct ModeSeen<'a> {
     number: usize,
@@ -237,11 +242,13 @@ impl<'a> ModeSeen<'a> {
         };
         let amplitudes = || curve.points.iter().map(|point| point.amplitude);
         let end = |amplitude: f64| self.decay_end(curve, amplitude, shape);
+        let most = amplitudes().fold(0.0, f64::max);
+        let least = amplitudes().fold(f64::INFINITY, f64::min);
         Some(AlongDecay {
             frequency_slope: slope(frequency),
             damping_slope: slope(damping),
-            early: end(amplitudes().fold(0.0, f64::max))?,
-            late: end(amplitudes().fold(f64::INFINITY, f64::min))?,
+            early: end(most)?,
+            late: end(least.max(most * LATE_SHARE))?,
             verdict: match curve.verdict {
                 AmplitudeVerdict::Changes => DecayVerdict::Changes,
                 AmplitudeVerdict::Steady => DecayVerdict::Steady,

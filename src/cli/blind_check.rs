@@ -164,8 +164,7 @@ fn drawn(campaign: &Campaign, terminal: &Terminal) -> anyhow::Result<Vec<Case>> 
     Ok(diagnosed)
 }
 
-/// The truths as the file that is written at the end; a number that nobody knows before keeps the
-/// digest from being guessed.
+/// The truths as the file that is written at the end.
 fn sealed_text(tests: &[DrawnTest]) -> anyhow::Result<String> {
     let truths: Vec<Truth> = tests.iter().map(|test| test.truth.clone()).collect();
     Ok(tapjoint::report::blind_check::truths_json(&truths)?)

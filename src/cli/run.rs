@@ -128,7 +128,14 @@ pub(super) fn run(
     };
     let mut document = document_of(&analysis);
     if let Subject::Test(file) = &request.subject {
-        let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
+        let diagnosis = diagnose_test(
+            &file.test,
+            &analysis,
+            &GapSettings {
+                seed,
+                ..GapSettings::default()
+            },
+        );
         document.gap = Some(gap_section(diagnosis.as_ref()));
     }
     drop(progress);

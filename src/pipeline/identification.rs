@@ -10,7 +10,6 @@ use crate::identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodn
 use crate::identify::{
     Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
 };
-use crate::structure::{Beam, JointStiffness};
 
 /// Which estimate is the main one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -89,34 +88,30 @@ pub fn identify(
         };
         warnings.extend(joint.doubts.iter().filter(told).map(of_doubt));
     }
+    let reason = match (&consistent, &estimate) {
+        (Some(_), _) => None,
+        (None, Some(_)) => refused,
+        (None, None) => refused.or(missing),
+    };
+    let mut found = Identification {
+        consistent,
+        estimate,
+        reason,
+        prediction: Vec::new(),
+        perturbations: perturbations(structure, estimator.as_ref(), (modes, &used), settings),
+    };
     // An estimate that no joint can have has its warning already; it predicts nothing.
-    let found = (consistent.as_deref(), estimate.as_ref());
-    let prediction = match prediction(structure, found, (&measured, &used), settings) {
-        Ok(prediction) => prediction,
+    match prediction(structure, &found, (&measured, &used), settings) {
+        Ok(prediction) => found.prediction = prediction,
         Err(error) => {
-            warnings.extend(consistent.as_ref().map(|_| Warning::Estimate {
+            warnings.extend(found.consistent.as_ref().map(|_| Warning::Estimate {
                 code: "no-prediction",
                 text: format!("the estimated joint cannot be predicted with: {error}"),
             }));
-            Vec::new()
         }
-    };
-    warnings.extend(misfit(&prediction, &measured));
-    let perturbations = perturbations(structure, estimator.as_ref(), (modes, &used), settings);
-    (
-        Identification {
-            reason: match (&consistent, &estimate) {
-                (Some(_), _) => None,
-                (None, Some(_)) => refused,
-                (None, None) => refused.or(missing),
-            },
-            consistent,
-            estimate,
-            prediction,
-            perturbations,
-        },
-        warnings,
-    )
+    }
+    warnings.extend(misfit(&found.prediction, &measured));
+    (found, warnings)
 }
 
 /// The modes with a number, ascending.
@@ -163,36 +158,19 @@ fn split<T>(result: Result<T, IdentifyError>) -> (Option<T>, Option<String>) {
 /// beside the measured ones; of a free beam with the estimated modulus.
 fn prediction(
     structure: &TestedStructure,
-    (consistent, estimate): (Option<&ConsistentEstimate>, Option<&Estimate>),
+    found: &Identification,
     (measured, used): (&[MeasuredMode], &[MeasuredMode]),
     settings: &IdentifySettings,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
-    let (beam, joint) = match (consistent, estimate) {
-        (Some(found), _) => (found.beam, Some(found.joint)),
-        (None, Some(Estimate::FreeBeam(found))) => {
-            let beam = Beam {
-                modulus: found.modulus.value,
-                ..structure.beam
-            };
-            (beam, Some(JointStiffness::FREE))
-        }
-        (None, Some(Estimate::Joint(found))) => {
-            (structure.beam, structure.known.over(found.pairs.joint()))
-        }
-        (None, None) => (structure.beam, structure.known.over(None)),
-    };
-    let Some(joint) = joint else {
+    let Some((beam, joint)) = found.beam_and_joint(structure) else {
         return Ok(Vec::new());
     };
-    let estimated = consistent.is_some() || estimate.is_some();
-    let used = if estimated { used } else { &[] };
+    let used = if found.is_answered() { used } else { &[] };
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
     let beside = (measured, &numbers[..]);
-    // A fallback estimated without sensors' masses predicts without them: it has taken them in.
-    let attached = consistent.is_some() || structure.known.over(None).is_some();
     match settings.method {
-        EstimateMethod::Consistent if attached => {
+        EstimateMethod::Consistent if found.predicts_with_details(structure) => {
             let held = (&beam, &joint);
             consistent::predict(structure, &settings.details, held, beside, count)
         }
@@ -203,26 +181,24 @@ fn prediction(
     }
 }
 
-/// The worst misfit, if it is notable and beyond three standard deviations of its reading.
+/// The largest notable misfit of those beyond three standard deviations of their reading. A coarse
+/// reading may miss by more than a sharp one and mean less.
 fn misfit(prediction: &[PredictedMode], measured: &[MeasuredMode]) -> Option<Warning> {
-    let error = |mode: &PredictedMode| mode.error_percent.map_or(0.0, f64::abs);
-    let worst = prediction
-        .iter()
-        .max_by(|a, b| error(a).total_cmp(&error(b)))?;
-    let error_percent = worst
-        .error_percent
-        .filter(|error| error.abs() > NOTABLE_MISFIT)?;
-    let reading = measured.iter().find(|mode| mode.mode == worst.mode)?;
-    let deviations = reading
-        .std
-        .map(|std| (worst.predicted - reading.frequency) / std);
-    deviations
-        .is_none_or(|deviations| deviations.abs() > 3.0)
-        .then_some(Warning::Misfit {
-            mode: worst.mode,
-            error_percent,
-            deviations,
-        })
+    let notable = prediction.iter().filter_map(|mode| {
+        let error_percent = mode.error_percent.filter(|e| e.abs() > NOTABLE_MISFIT)?;
+        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
+        let deviations = reading
+            .std
+            .map(|std| (mode.predicted - reading.frequency) / std);
+        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
+        beyond.then_some((mode.mode, error_percent, deviations))
+    });
+    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    worst.map(|(mode, error_percent, deviations)| Warning::Misfit {
+        mode,
+        error_percent,
+        deviations,
+    })
 }
 
 fn of_doubt(doubt: &Doubt) -> Warning {

@@ -6,6 +6,7 @@ mod amplitude;
 mod blind_check;
 mod cli;
 mod cli_frf;
+mod deck;
 mod description;
 mod effects;
 mod errors;

@@ -454,11 +454,12 @@ fn regress_a_coarse_reading_does_not_hide_the_misfit_of_a_sharp_one() {
     assert_eq!(misfits, [3], "{:?}", analysis.warnings);
 }
 
-/// What is said of mode 1 (Hz) where only modes 2 to 4 were in the band of a cantilever's recording.
-fn missing_mode_1(
+/// The numbers of the peaks, and what is said of mode 1 (Hz), where only modes 2 to 4 were in the band of
+/// a cantilever's recording.
+fn without_mode_1(
     joint: &JointStiffness,
     known: [(PairsModel, KnownJoint, Option<Vec<FitParameter>>); 2],
-) -> [f64; 2] {
+) -> [(Vec<usize>, Option<f64>); 2] {
     let beam = steel_strip();
     let shapes = mode_shapes(&beam, Assembly::Cantilever, joint, 5).unwrap();
     let settings = TapTestSettings {
@@ -494,13 +495,12 @@ fn missing_mode_1(
         };
         let (modes, warnings) = modes_of_recordings(&mut found, &[0], (&structure, &details));
         let numbers: Vec<usize> = modes.iter().filter_map(|mode| mode.mode).collect();
-        assert_eq!(numbers, [2, 3, 4], "{warnings:?}");
         let about = |warning: &Warning| {
             let text = warning.to_string();
             let rest = text.split_once("mode 1 (about ")?.1;
             rest.split_once(" Hz")?.0.parse().ok()
         };
-        warnings.iter().find_map(about).unwrap()
+        (numbers, warnings.iter().find_map(about))
     })
 }
 
@@ -524,28 +524,21 @@ fn regress_modes_are_numbered_with_the_joint_that_is_estimated() {
     };
     let three = PairsModel::ThreeParameter;
     let without = (PairsModel::TwoParameter, KnownJoint::default(), None);
-    let [held, ignored] = missing_mode_1(&coupled, [(three, known, None), without.clone()]);
-    eprintln!(
-        "{held} {ignored} {} {}",
-        error(held, &coupled),
-        error(ignored, &coupled)
+    let [held, ignored] = without_mode_1(&coupled, [(three, known, None), without.clone()]);
+    assert_eq!(
+        (&held.0[..], &ignored.0[..]),
+        (&[2, 3, 4][..], &[2, 3, 4][..])
     );
-    // The frequency is said to a tenth of a hertz.
-    assert!(error(held, &coupled) < 0.01, "{held}");
-    assert!(error(ignored, &coupled) > 0.02, "{ignored}");
-    // What is neither fitted nor stated is rigid: the same peaks then ask for a softer rotation.
+    let [held, ignored] = [held, ignored].map(|found| error(found.1.unwrap(), &coupled));
+    // The frequency is said to a tenth of a hertz, 0.2 % of it.
+    assert!(held < 0.003, "{held}");
+    assert!(ignored > 0.006, "{ignored}");
+    // What is neither fitted nor stated is rigid, and no rotation alone has these frequencies.
     let soft = JointStiffness::two_parameter(150.0, 20.0);
-    let only = (
-        PairsModel::TwoParameter,
-        KnownJoint::default(),
-        Some(vec![FitParameter::Kr]),
-    );
-    let [rigid, both] = missing_mode_1(&soft, [only, without]);
-    eprintln!(
-        "{rigid} {both} {} {}",
-        error(rigid, &soft),
-        error(both, &soft)
-    );
-    assert!(error(both, &soft) < 0.01, "{both}");
-    assert!(error(rigid, &soft) > 0.02, "{rigid}");
+    let only = vec![FitParameter::Kr];
+    let only = (PairsModel::TwoParameter, KnownJoint::default(), Some(only));
+    let [rigid, both] = without_mode_1(&soft, [only, without]);
+    assert_eq!(both.0, [2, 3, 4]);
+    assert!(error(both.1.unwrap(), &soft) < 0.01, "{both:?}");
+    assert_ne!(rigid.0, both.0);
 }

@@ -25,12 +25,17 @@ pub(super) struct CommonArguments {
     /// Threads to work with; default: one for each processor
     #[arg(long, global = true, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     pub(super) threads: Option<usize>,
-    /// Tell more about what was done; twice: still more
+    /// Tell on standard error what was used and how long it took; twice: every tap and peak too
     #[arg(long, short, global = true, action = clap::ArgAction::Count)]
     pub(super) verbose: u8,
 }
 
 impl CommonArguments {
+    /// Whether times are to be told.
+    pub(super) fn tells_more(&self) -> bool {
+        self.verbose > 0 && !self.quiet
+    }
+
     /// Sets the number of threads for the whole program.
     ///
     /// # Errors

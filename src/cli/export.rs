@@ -1,17 +1,24 @@
 //! `tapjoint export`: the beam with its identified joint for a finite-element program.
 
 use super::Outcome;
-use super::input::read_test;
+use super::input::{TestFile, read_test};
 use super::output::OutputFile;
 use super::terminal::Terminal;
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use tapjoint::pipeline::{IdentifySettings, TestedStructure, tested_structure};
-use tapjoint::report::deck::{deck_of, render_abaqus, render_nastran};
-use tapjoint::structure::JointStiffness;
+use tapjoint::description::TestDescription;
+use tapjoint::identify::consistent::JointedStructure;
+use tapjoint::pipeline::{
+    IdentifySettings, TestedStructure, frequencies_of, jointed_structure, structure_details,
+    tested_structure,
+};
+use tapjoint::report::deck::{
+    DeckError, DeckSource, deck_of, render_abaqus, render_nastran, source_of,
+};
 use tapjoint::structure::joint::StiffnessUnits;
+use tapjoint::structure::{Assembly, Beam, JointStiffness};
 
 /// Write the updated beam with its joint for a finite-element program.
 ///
@@ -28,13 +35,17 @@ pub(super) struct ExportArguments {
     /// Format
     #[arg(long, value_enum, default_value_t)]
     format: DeckFormat,
-    /// Take the joint from this report.json instead of estimating it
+    /// Take joint and beam from this report.json instead of estimating them; recordings are then not
+    /// read
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
     /// Write into this file; default: print
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
+
+/// Predicted frequencies at the head of a deck where the report predicts none.
+const USUAL_MODES: usize = 6;
 
 /// Formats of finite-element input.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -48,23 +59,16 @@ enum DeckFormat {
 
 pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let file = read_test(&arguments.test, &terminal)?;
-    file.test.check_has_data(&file.name)?;
-    file.check_recordings()?;
     let output = arguments
         .out
         .as_deref()
         .map(OutputFile::prepare)
         .transpose()?;
-    let structure = tested_structure(&file.test);
-    let joint = arguments
-        .report
-        .as_deref()
-        .map(|path| reported_joint(path, &structure))
-        .transpose()?;
-    let progress = terminal.progress("estimating the joint");
-    let analysis = file.analyse(&IdentifySettings::default())?;
-    drop(progress);
-    let deck = match deck_of(&file.test, &analysis, joint) {
+    let source = match &arguments.report {
+        Some(path) => Ok(reported(path, &file.test)?),
+        None => estimated(&file, &terminal)?,
+    };
+    let deck = match source.and_then(|source| deck_of(&file.test.name, &source)) {
         Ok(deck) => deck,
         Err(problem) => {
             terminal.warn(&problem.to_string());
@@ -83,34 +87,92 @@ pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Re
     Ok(Outcome::Answered)
 }
 
-/// The joint of a report, non-dimensional by the described beam, and where it is from.
-fn reported_joint(
-    path: &Path,
-    structure: &TestedStructure,
-) -> anyhow::Result<(JointStiffness, String)> {
-    let name = path.display();
+/// The joint of the test's own data.
+fn estimated(
+    file: &TestFile,
+    terminal: &Terminal,
+) -> anyhow::Result<Result<DeckSource, DeckError>> {
+    file.test.check_has_data(&file.name)?;
+    file.check_recordings()?;
+    let progress = terminal.progress("estimating the joint");
+    let analysis = file.analyse(&IdentifySettings::default())?;
+    drop(progress);
+    Ok(source_of(&file.test, &analysis))
+}
+
+/// The joint of a report with the beam that belongs to it.
+fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
+    let name = path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
     let report: Value = serde_json::from_str(&text)
         .with_context(|| format!("{name}: is no report; give a report.json of `tapjoint run`"))?;
-    let units = StiffnessUnits::of(&structure.beam);
+    let estimate = &report["estimate"];
+    let structure = tested_structure(test);
+    let beam = reported_beam(estimate, &structure.beam);
+    let joint = reported_joint(estimate, (&structure, &beam)).with_context(|| {
+        format!(
+            "{name}: has no estimate of the joint; give a report with one, or leave --report out"
+        )
+    })?;
+    // A closed form has been estimated without masses and unequal halves, and holds their effect.
+    let whole = estimate["method"] == "consistent" || structure.known.over(None).is_some();
+    let details = structure_details(test, &structure.beam);
+    let structure = match whole {
+        true => jointed_structure(&structure, &details).with_beam(&beam),
+        false => JointedStructure::new(structure.theory, beam, structure.assembly),
+    };
+    let count = report["prediction"]
+        .as_array()
+        .map_or(USUAL_MODES, Vec::len);
+    Ok(DeckSource {
+        frequencies: frequencies_of(&structure, &joint, count)?,
+        structure,
+        joint,
+        origin: format!("from {name}"),
+    })
+}
+
+/// The described beam with what the report estimates of it.
+fn reported_beam(estimate: &Value, described: &Beam) -> Beam {
+    let own = |key: &str| estimate["beam"][key].as_f64();
+    let asked = |key: &str| estimate[key]["value"].as_f64();
+    // A free beam's closed form gives either its modulus or, instead, its density.
+    let closed = estimate["method"] == "free-beam";
+    let density = own("density").or(asked("density").filter(|_| !closed));
+    Beam {
+        length: own("length").unwrap_or(described.length),
+        width: own("width").unwrap_or(described.width),
+        thickness: own("thickness").unwrap_or(described.thickness),
+        modulus: own("modulus")
+            .or(asked("modulus"))
+            .unwrap_or(described.modulus),
+        density: density.unwrap_or(described.density),
+        ..*described
+    }
+}
+
+/// The joint of a report, non-dimensional by its beam.
+fn reported_joint(
+    estimate: &Value,
+    (structure, beam): (&TestedStructure, &Beam),
+) -> Option<JointStiffness> {
+    if structure.assembly == Assembly::Free {
+        return Some(JointStiffness::FREE);
+    }
+    let (units, described) = (
+        StiffnessUnits::of(beam),
+        StiffnessUnits::of(&structure.beam),
+    );
     // Null instead of a value is a rigid joint, null instead of the quantity an unknown one.
-    let stiffness = |key: &str| match &report["estimate"][key] {
+    let stiffness = |key: &str| match &estimate[key] {
         Value::Object(found) => Some(found.get("value")?.as_f64().unwrap_or(f64::INFINITY)),
         _ => None,
     };
     let known = &structure.known;
-    let of = |key: &str, unit: f64, known: Option<f64>| {
-        stiffness(key).map(|value| value / unit).or(known).ok_or_else(|| {
-            anyhow!("{name}: has no estimate.{key}; give a report with an estimate, or leave --report out")
-        })
-    };
-    let cross = stiffness("ktr")
-        .map(|ktr| units.ktr / ktr)
-        .or(known.cross_compliance);
-    let joint = JointStiffness {
-        kx: of("kt", units.kt, known.kx)?,
-        ky: of("kr", units.kr, known.ky)?,
-        cross_compliance: cross.unwrap_or(0.0),
-    };
-    Ok((joint, format!("from {name}")))
+    let cross = stiffness("ktr").or(known.cross_compliance.map(|c| described.ktr / c));
+    Some(JointStiffness {
+        kx: stiffness("kt").or(known.kx.map(|kx| kx * described.kt))? / units.kt,
+        ky: stiffness("kr").or(known.ky.map(|ky| ky * described.kr))? / units.kr,
+        cross_compliance: cross.map_or(0.0, |ktr| units.ktr / ktr),
+    })
 }

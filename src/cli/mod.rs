@@ -10,6 +10,7 @@ mod help;
 mod input;
 mod output;
 mod progress;
+mod stiffness;
 mod terminal;
 mod updated_model;
 mod wiring;
@@ -34,7 +35,9 @@ mod spectrum;
 
 use arguments::CommonArguments;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::io::{self, Write};
 use std::process::ExitCode;
+use std::time::Instant;
 use terminal::Terminal;
 
 /// From hammer taps to joint stiffness.
@@ -100,7 +103,18 @@ pub(super) fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
         }
     };
-    match run_command(&line) {
+    let start = Instant::now();
+    let outcome = run_command(&line);
+    if line.common.tells_more() {
+        let seconds = start.elapsed().as_secs_f64();
+        let threads = rayon::current_num_threads();
+        let _ = writeln!(
+            io::stderr(),
+            "time: {seconds:.1} s, up to {threads} threads; seed {}",
+            line.common.seed
+        );
+    }
+    match outcome {
         Ok(Outcome::Answered) => ExitCode::SUCCESS,
         Ok(Outcome::NoAnswer) => ExitCode::from(1),
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,

@@ -3,11 +3,13 @@
 use super::Outcome;
 use super::input::read_test;
 use super::output::OutputFile;
+use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
+use tapjoint::description::{JointModel, TestDescription};
 use tapjoint::report::blind_check::{render_confusion_picture, score_json, tell_apart};
 use tapjoint::structure::JointStiffness;
 use tapjoint::study::blind_check::score;
@@ -33,12 +35,8 @@ pub(super) struct PlanArguments {
     /// Standard uncertainty of a frequency (%)
     #[arg(long, value_name = "P", default_value_t = 0.03)]
     std: f64,
-    /// Kx of a joint that the description does not state
-    #[arg(long, value_name = "K", requires = "ky")]
-    kx: Option<f64>,
-    /// Ky likewise
-    #[arg(long, value_name = "K", requires = "kx")]
-    ky: Option<f64>,
+    #[command(flatten)]
+    stiffness: StiffnessArguments,
     /// Picture of the table; SVG where the name ends in .svg
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
@@ -50,13 +48,11 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let file = read_test(&arguments.test, &terminal)?;
-    let positive = |name: &str, value: f64| {
-        anyhow::ensure!(
-            value > 0.0 && value.is_finite(),
-            "{name} {value}: give a positive number"
-        );
-        Ok(value)
-    };
+    let std = arguments.std;
+    ensure!(
+        std > 0.0 && std.is_finite(),
+        "--std {std}: give a positive number"
+    );
     let png = arguments
         .png
         .as_deref()
@@ -65,14 +61,8 @@ pub(super) fn run(
     let settings = PlanSettings {
         draws: arguments.draws,
         modes: arguments.modes,
-        frequency_std: 0.01 * positive("--std", arguments.std)?,
-        joint: match (arguments.kx, arguments.ky) {
-            (Some(kx), Some(ky)) => Some(JointStiffness::two_parameter(
-                positive("--kx", kx)?,
-                positive("--ky", ky)?,
-            )),
-            _ => None,
-        },
+        frequency_std: 0.01 * std,
+        joint: planned_joint(&arguments.stiffness, &file.test)?,
         seed,
         ..PlanSettings::default()
     };
@@ -85,4 +75,24 @@ pub(super) fn run(
     }
     terminal.write_json(&score_json(&score(&cases)))?;
     Ok(Outcome::Answered)
+}
+
+/// The joint of --kx, --ky and --kz. A test observes a joint that gives way.
+fn planned_joint(
+    arguments: &StiffnessArguments,
+    test: &TestDescription,
+) -> anyhow::Result<Option<JointStiffness>> {
+    let joint = arguments.given(test.joint.kind)?;
+    for (name, value) in joint.iter().flat_map(|j| [("--kx", j.kx), ("--ky", j.ky)]) {
+        ensure!(
+            value > 0.0 && value.is_finite(),
+            "{name} {value}: give a positive number"
+        );
+    }
+    let coupled = joint.is_some_and(|joint| joint.cross_compliance != 0.0);
+    ensure!(
+        !coupled || test.joint.model == JointModel::ThreeParameter,
+        "--kz is of a joint of three stiffnesses; write model = \"3p\" into [joint], or leave it out"
+    );
+    Ok(joint)
 }

@@ -1,20 +1,18 @@
 //! `tapjoint resolution`: what block size, window and reading do to frequencies and stiffness.
 
 use super::Outcome;
-use super::arguments::{Band, CrossStiffness, Stiffness, block_size};
+use super::arguments::{Band, block_size};
 use super::choices::{ReadingArgument, WindowArgument};
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
-use super::predict::given_stiffness;
+use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use anyhow::anyhow;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::description::{ReadingMethod, WindowKind};
-use tapjoint::pipeline::{Estimate, IdentifySettings, TestedStructure, tested_structure};
+use tapjoint::pipeline::{IdentifySettings, TestedStructure, tested_structure};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::report::{
     prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
@@ -64,15 +62,8 @@ pub(super) struct ResolutionArguments {
     /// Peak of a response over the rms of its noise (dB)
     #[arg(long, value_name = "DB", default_value_t = 60.0, value_parser = decibels)]
     noise: f64,
-    /// Translational stiffness (non-dimensional), instead of TEST's
-    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true)]
-    kx: Option<Stiffness>,
-    /// Rotational stiffness (non-dimensional), instead of TEST's
-    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
-    ky: Option<Stiffness>,
-    /// Cross-coupling stiffness (non-dimensional); default: no coupling
-    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
-    kz: Option<CrossStiffness>,
+    #[command(flatten)]
+    stiffness: StiffnessArguments,
     /// Draw errors over block size into this file; SVG where its name ends in .svg
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
@@ -134,12 +125,11 @@ fn resolve(
 ) -> anyhow::Result<Request> {
     let file = read_test(&arguments.test, terminal)?;
     let structure = tested_structure(&file.test);
-    let stiffness = (arguments.kx, arguments.ky, arguments.kz);
-    let given = given_stiffness(stiffness, file.test.joint.kind)?;
+    let given = arguments.stiffness.given(file.test.joint.kind)?;
     let prepare = |path: &Option<PathBuf>| path.as_deref().map(OutputFile::prepare).transpose();
     let (png, csv) = (prepare(&arguments.png)?, prepare(&arguments.csv)?);
     let joint = match given {
-        Some(given) => given.joint(),
+        Some(given) => given,
         None => described_joint(&file, &structure)?,
     };
     let bands: Vec<(f64, f64)> = arguments
@@ -211,11 +201,7 @@ fn described_joint(file: &TestFile, structure: &TestedStructure) -> anyhow::Resu
     }
     let found = file.analyse(&IdentifySettings::default())?.identification;
     let found = found.ok_or_else(|| missing(""))?;
-    let joint = match (&found.consistent, &found.estimate) {
-        (Some(consistent), _) => Some(consistent.joint),
-        (None, Some(Estimate::Joint(joint))) => structure.known.over(joint.pairs.joint()),
-        (None, _) => None,
-    };
+    let joint = found.beam_and_joint(structure).map(|(_, joint)| joint);
     joint.ok_or_else(|| {
         let reason = found.reason.as_deref().unwrap_or("no estimate");
         missing(&format!(" and cannot be estimated ({reason})"))
@@ -228,13 +214,9 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, seed, &terminal)?;
-    let shown = terminal.shows_progress().then(Progress::default);
-    let study = study_resolution(&request.test, &request.settings, &|done, total| {
-        if let Some(shown) = &shown {
-            shown.tell(done, total);
-        }
+    let study = study_resolution(&request.test, &request.settings, &|done, of| {
+        terminal.count("virtual tests", done, of);
     })?;
-    drop(shown);
     if let Some(file) = request.png {
         let picture = render_resolution_picture(&study, file.picture_format())?;
         file.write(&picture)?;
@@ -259,34 +241,4 @@ pub(super) fn run(
         "warnings": warnings,
     }))?;
     Ok(Outcome::Answered)
-}
-
-/// How far the study is, on standard error.
-#[derive(Debug, Default)]
-struct Progress {
-    percent: AtomicUsize,
-}
-
-impl Progress {
-    /// Tells each percent once.
-    fn tell(&self, done: usize, total: usize) {
-        let percent = 100 * done / total.max(1);
-        if self.percent.fetch_max(percent, Ordering::Relaxed) < percent {
-            let _ = write!(std::io::stderr(), "\r{percent:3} % of the virtual tests");
-        }
-    }
-}
-
-impl Drop for Progress {
-    /// The line is left empty, whatever happened.
-    fn drop(&mut self) {
-        let _ = write!(std::io::stderr(), "\r{:40}\r", "");
-    }
-}
-
-impl Terminal {
-    /// Whether somebody watches standard error.
-    fn shows_progress(&self) -> bool {
-        !self.is_quiet() && std::io::stderr().is_terminal()
-    }
 }

@@ -130,7 +130,11 @@ pub(super) fn run(
     let mut document = document_of(&analysis);
     let mut model = None;
     if let Subject::Test(file) = &request.subject {
-        let diagnosis = diagnose_test(&file.test, &analysis, &GapSettings::default());
+        let settings = GapSettings {
+            seed,
+            ..GapSettings::default()
+        };
+        let diagnosis = diagnose_test(&file.test, &analysis, &settings);
         let mut gap = gap_section(diagnosis.as_ref());
         model = add_model(&mut gap, file, (&analysis, diagnosis.as_ref()));
         document.gap = Some(gap);

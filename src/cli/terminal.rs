@@ -4,13 +4,14 @@ use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
 use super::progress::Progress;
 use std::io::{self, IsTerminal, Write};
-use tapjoint::report::{document::Document, render_json};
+use tapjoint::report::{document::Document, render_json, render_readings, render_stages};
 
 /// Where a command's words go.
 #[derive(Debug)]
 pub(super) struct Terminal {
     json: Option<Json>,
     quiet: bool,
+    verbose: u8,
 }
 
 /// Where the JSON document goes; a file is opened before any work.
@@ -32,12 +33,8 @@ impl Terminal {
         Ok(Self {
             json,
             quiet: common.quiet,
+            verbose: common.verbose,
         })
-    }
-
-    /// Whether it was asked to print nothing but errors.
-    pub(super) fn is_quiet(&self) -> bool {
-        self.quiet
     }
 
     /// Prints an answer, unless it was asked to be quiet or standard output belongs to JSON.
@@ -64,18 +61,35 @@ impl Terminal {
         }
     }
 
-    /// Shows how far a long task is, on a terminal only.
+    /// Shows how far a long task is, on a terminal only; of a thousand steps every tenth.
     pub(super) fn count(&self, doing: &str, done: usize, of: usize) {
         let mut error = io::stderr();
-        if self.quiet || !error.is_terminal() {
+        let percent = |done: usize| 100 * done / of.max(1);
+        let same = percent(done) == percent(done.saturating_sub(1));
+        if self.quiet || same || !error.is_terminal() {
             return;
         }
         let end = if done == of { "\n" } else { "" };
         let _ = write!(error, "\r{done} of {of} {doing}{end}");
     }
 
+    /// Tells on standard error what each stage used, and twice asked also every tap and peak.
+    fn tell(&self, document: &Document) {
+        if self.quiet {
+            return;
+        }
+        let mut error = io::stderr();
+        if self.verbose > 0 {
+            let _ = write!(error, "{}", render_stages(document));
+        }
+        if self.verbose > 1 {
+            let _ = write!(error, "{}", render_readings(document));
+        }
+    }
+
     /// Writes a report's document to where `--json` says, if it says anything. Call it last.
     pub(super) fn write_document(self, document: &Document) -> anyhow::Result<()> {
+        self.tell(document);
         if self.json.is_none() {
             return Ok(());
         }

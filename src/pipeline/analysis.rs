@@ -12,6 +12,7 @@ use crate::modal::ModeReading;
 use crate::quality::Verdict;
 use crate::recording::{ChannelInfo, Format};
 use crate::structure::specimen::Specimen;
+use crate::structure::{Beam, JointStiffness};
 
 /// A finished analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +129,34 @@ impl Identification {
     /// Whether there is an estimate by any method.
     pub fn is_answered(&self) -> bool {
         self.consistent.is_some() || self.estimate.is_some()
+    }
+
+    /// The beam and the joint (non-dimensional by that beam) that predictions are made with: those of
+    /// the main estimate, else of the closed form with known stiffnesses in the place of its own, else
+    /// the known ones; `None` where no joint is known.
+    pub fn beam_and_joint(&self, structure: &TestedStructure) -> Option<(Beam, JointStiffness)> {
+        match (&self.consistent, &self.estimate) {
+            (Some(found), _) => Some((found.beam, found.joint)),
+            (None, Some(Estimate::FreeBeam(found))) => {
+                let modulus = found.modulus.value;
+                let beam = Beam {
+                    modulus,
+                    ..structure.beam
+                };
+                Some((beam, JointStiffness::FREE))
+            }
+            (None, Some(Estimate::Joint(found))) => {
+                let joint = structure.known.over(found.pairs.joint())?;
+                Some((structure.beam, joint))
+            }
+            (None, None) => Some((structure.beam, structure.known.over(None)?)),
+        }
+    }
+
+    /// Whether predictions take in what is fastened to the beam and a lap joint's unequal halves: a
+    /// closed form that was estimated without them has their effect in its stiffnesses already.
+    pub fn predicts_with_details(&self, structure: &TestedStructure) -> bool {
+        self.consistent.is_some() || structure.known.over(None).is_some()
     }
 }
 

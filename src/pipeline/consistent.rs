@@ -81,7 +81,7 @@ pub(super) fn reference_place(test: &TestDescription, sensor: &SensorDescription
 }
 
 /// The structure that the estimator takes.
-pub(super) fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedStructure {
+pub fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedStructure {
     let mut jointed = JointedStructure::new(structure.theory, structure.beam, structure.assembly);
     if structure.assembly == Assembly::Lap {
         jointed.lap = details.lap;
@@ -91,7 +91,7 @@ pub(super) fn jointed(structure: &TestedStructure, details: &StructureDetails) -
 }
 
 /// What of the joint is estimated where the description names nothing: all that is not known.
-pub(super) fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
+fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
     let known = &structure.known;
     let joint = match structure.regression {
         None => return vec![Parameter::Modulus],
@@ -110,11 +110,8 @@ pub(super) fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
     .collect()
 }
 
-fn settings(
-    structure: &TestedStructure,
-    details: &StructureDetails,
-    used: &[MeasuredMode],
-) -> ConsistentSettings {
+/// What is estimated: what the description names, else all of the joint that is not known.
+pub(super) fn fitted(structure: &TestedStructure, details: &StructureDetails) -> Vec<Parameter> {
     let parameter = |fit: &FitParameter| match fit {
         FitParameter::Kt => Parameter::Kt,
         FitParameter::Kr => Parameter::Kr,
@@ -122,10 +119,18 @@ fn settings(
         FitParameter::Modulus => Parameter::Modulus,
         FitParameter::Density => Parameter::Density,
     };
-    let fit = match &details.fit {
+    match &details.fit {
         Some(fit) => fit.iter().map(parameter).collect(),
         None => usual_fit(structure),
-    };
+    }
+}
+
+fn settings(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+) -> ConsistentSettings {
+    let fit = fitted(structure, details);
     let units = StiffnessUnits::of(&structure.beam);
     let known = &structure.known;
     let all_known = used
@@ -209,18 +214,46 @@ pub(super) fn predict(
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
     let there = jointed(structure, details).with_beam(beam);
-    let model = FrequencyModel::new(&there, count)?;
-    let units = StiffnessUnits::of(beam);
+    let frequencies = frequencies_of(&there, joint, count)?;
+    Ok(compare(beam, &frequencies, measured))
+}
+
+/// Frequencies of the described structure on this joint (non-dimensional), with everything that is
+/// fastened to it.
+///
+/// # Errors
+/// [`IdentifyError::Structure`] where structure or joint cannot exist.
+pub fn predict_described(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    joint: &JointStiffness,
+    count: usize,
+) -> Result<Vec<PredictedMode>, IdentifyError> {
+    joint.check()?;
+    let held = (&structure.beam, joint);
+    predict(structure, details, held, (&[], &[]), count)
+}
+
+/// The first natural frequencies (Hz) of a structure on this joint, non-dimensional by its beam.
+///
+/// # Errors
+/// [`IdentifyError::Structure`] where the structure cannot exist.
+pub fn frequencies_of(
+    there: &JointedStructure,
+    joint: &JointStiffness,
+    count: usize,
+) -> Result<Vec<f64>, IdentifyError> {
+    let model = FrequencyModel::new(there, count)?;
+    let units = StiffnessUnits::of(&there.beam);
     let mut point = model.nominal();
-    if structure.assembly != Assembly::Free {
+    if there.assembly != Assembly::Free {
         point[Parameter::Kt as usize] = (joint.kx.max(NO_SPRING) * units.kt).ln();
         point[Parameter::Kr as usize] = (joint.ky.max(NO_SPRING) * units.kr).ln();
         let coupling = joint.coupling();
         let coupling = if coupling.is_finite() { coupling } else { 0.0 };
         point[Parameter::Coupling as usize] = coupling.atanh();
     }
-    let frequencies: Vec<f64> = (1..=count)
+    Ok((1..=count)
         .map(|mode| model.response(&point, mode, mode as f64).frequency)
-        .collect();
-    Ok(compare(beam, &frequencies, measured))
+        .collect())
 }

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::force::{pulse_window, remove_offset};
-use super::stage::Stage;
+use super::stage::{MOST_KEPT, Stage};
 use crate::modal::amplitude::Decay;
 use crate::modal::fit::{Column, FitError, FreeDecayCollector, ModalData, TapForce};
 use crate::recording::RecordingError;
@@ -14,9 +14,6 @@ use crate::taps::Tap;
 const AFTER_TRIGGER: f64 = 5e-3;
 /// Fewest samples of a decay that is worth a fit: some 16 lines for a mode and what surrounds it.
 const LEAST_SAMPLES: u64 = 64;
-/// Bound on the samples and on the lines kept (values; 8 and 16 bytes each). Taps beyond it are left out
-/// of the fits.
-const MOST_KEPT: usize = 1 << 24;
 
 /// Decays of all taps, and what of them is fitted.
 pub(super) struct FreeDecays {

@@ -12,7 +12,6 @@ use crate::identify::{
     Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
 };
 use crate::structure::specimen::Specimen;
-use crate::structure::{Beam, JointStiffness};
 
 /// Which estimate is the main one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -91,28 +90,34 @@ pub fn identify(
         };
         warnings.extend(joint.doubts.iter().filter(told).map(of_doubt));
     }
+    let reason = match (&consistent, &estimate) {
+        (Some(_), _) => None,
+        (None, Some(_)) => refused,
+        (None, None) => refused.or(missing),
+    };
+    let mut found = Identification {
+        consistent,
+        estimate,
+        reason,
+        prediction: Vec::new(),
+        predicted: None,
+        perturbations: perturbations(structure, estimator.as_ref(), (modes, &used), settings),
+    };
     // An estimate that no joint can have has its warning already; it predicts nothing.
-    let found = (consistent.as_deref(), estimate.as_ref());
-    let (prediction, predicted, failed) =
-        predict_with(structure, found, (&measured, &used), settings);
-    warnings.extend(failed);
-    warnings.extend(misfit(&prediction, &measured));
-    let perturbations = perturbations(structure, estimator.as_ref(), (modes, &used), settings);
-    (
-        Identification {
-            reason: match (&consistent, &estimate) {
-                (Some(_), _) => None,
-                (None, Some(_)) => refused,
-                (None, None) => refused.or(missing),
-            },
-            consistent,
-            estimate,
-            prediction,
-            predicted,
-            perturbations,
-        },
-        warnings,
-    )
+    match prediction(structure, &found, (&measured, &used), settings) {
+        Ok((prediction, predicted)) => {
+            found.prediction = prediction;
+            found.predicted = predicted;
+        }
+        Err(error) => {
+            warnings.extend(found.consistent.as_ref().map(|_| Warning::Estimate {
+                code: "no-prediction",
+                text: format!("the estimated joint cannot be predicted with: {error}"),
+            }));
+        }
+    }
+    warnings.extend(misfit(&found.prediction, &measured));
+    (found, warnings)
 }
 
 /// The modes with a number, ascending.
@@ -155,110 +160,53 @@ fn split<T>(result: Result<T, IdentifyError>) -> (Option<T>, Option<String>) {
     }
 }
 
-/// Beam and joint of the main estimate, or of the closed form with known stiffnesses in their place; of
-/// a free beam with the estimated modulus.
-fn estimated(
-    structure: &TestedStructure,
-    (consistent, estimate): (Option<&ConsistentEstimate>, Option<&Estimate>),
-) -> Option<(Beam, JointStiffness)> {
-    let with = |beam: Beam| move |joint: JointStiffness| (beam, joint);
-    match (consistent, estimate) {
-        (Some(found), _) => Some((found.beam, found.joint)),
-        (None, Some(Estimate::FreeBeam(found))) => {
-            let beam = Beam {
-                modulus: found.modulus.value,
-                ..structure.beam
-            };
-            Some((beam, JointStiffness::FREE))
-        }
-        (None, Some(Estimate::Joint(found))) => {
-            let joint = structure.known.over(found.pairs.joint());
-            joint.map(with(structure.beam))
-        }
-        (None, None) => structure.known.over(None).map(with(structure.beam)),
-    }
-}
-
-/// The prediction, the structure it is of, and why there is none although there is an estimate.
-fn predict_with(
-    structure: &TestedStructure,
-    found: (Option<&ConsistentEstimate>, Option<&Estimate>),
-    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
-    settings: &IdentifySettings,
-) -> (Vec<PredictedMode>, Option<Specimen>, Option<Warning>) {
-    let Some((beam, joint)) = estimated(structure, found) else {
-        return (Vec::new(), None, None);
-    };
-    let any = found.0.is_some() || found.1.is_some();
-    let used = if any { used } else { &[] };
-    let details = predicting(structure, found.0, settings);
-    match prediction(structure, details, (&beam, &joint), (measured, used)) {
-        Ok(prediction) => {
-            let plain = StructureDetails::default();
-            let details = details.unwrap_or(&plain);
-            let predicted = predicted_specimen(structure, details, (&beam, &joint));
-            (prediction, Some(predicted), None)
-        }
-        Err(error) => {
-            let warning = found.0.map(|_| Warning::Estimate {
-                code: "no-prediction",
-                text: format!("the estimated joint cannot be predicted with: {error}"),
-            });
-            (Vec::new(), None, warning)
-        }
-    }
-}
-
-/// What the prediction knows beyond beam and joint; `None` = a plain beam. A fallback estimated without
-/// sensors' masses predicts without them: it has taken them in.
-fn predicting<'a>(
-    structure: &TestedStructure,
-    consistent: Option<&ConsistentEstimate>,
-    settings: &'a IdentifySettings,
-) -> Option<&'a StructureDetails> {
-    let attached = consistent.is_some() || structure.known.over(None).is_some();
-    (settings.method == EstimateMethod::Consistent && attached).then_some(&settings.details)
-}
-
-/// Frequencies of the estimated beam and joint beside the measured ones.
+/// Frequencies of the estimated beam and joint beside the measured ones, and the structure that has them;
+/// nothing where no joint is known.
 fn prediction(
     structure: &TestedStructure,
-    details: Option<&StructureDetails>,
-    (beam, joint): (&Beam, &JointStiffness),
+    found: &Identification,
     (measured, used): (&[MeasuredMode], &[MeasuredMode]),
-) -> Result<Vec<PredictedMode>, IdentifyError> {
+    settings: &IdentifySettings,
+) -> Result<(Vec<PredictedMode>, Option<Specimen>), IdentifyError> {
+    let Some((beam, joint)) = found.beam_and_joint(structure) else {
+        return Ok((Vec::new(), None));
+    };
+    let used = if found.is_answered() { used } else { &[] };
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
     let beside = (measured, &numbers[..]);
-    match details {
-        Some(details) => consistent::predict(structure, details, (beam, joint), beside, count),
-        None => {
-            let held = (structure.assembly, joint);
-            predict(structure.theory, beam, held, beside, count)
-        }
-    }
+    let detailed =
+        settings.method == EstimateMethod::Consistent && found.predicts_with_details(structure);
+    let plain = StructureDetails::default();
+    let details = if detailed { &settings.details } else { &plain };
+    let held = (&beam, &joint);
+    let rows = if detailed {
+        consistent::predict(structure, details, held, beside, count)?
+    } else {
+        let held = (structure.assembly, &joint);
+        predict(structure.theory, &beam, held, beside, count)?
+    };
+    Ok((rows, Some(predicted_specimen(structure, details, held))))
 }
 
-/// The worst misfit, if it is notable and beyond three standard deviations of its reading.
+/// The largest notable misfit of those beyond three standard deviations of their reading. A coarse
+/// reading may miss by more than a sharp one and mean less.
 fn misfit(prediction: &[PredictedMode], measured: &[MeasuredMode]) -> Option<Warning> {
-    let error = |mode: &PredictedMode| mode.error_percent.map_or(0.0, f64::abs);
-    let worst = prediction
-        .iter()
-        .max_by(|a, b| error(a).total_cmp(&error(b)))?;
-    let error_percent = worst
-        .error_percent
-        .filter(|error| error.abs() > NOTABLE_MISFIT)?;
-    let reading = measured.iter().find(|mode| mode.mode == worst.mode)?;
-    let deviations = reading
-        .std
-        .map(|std| (worst.predicted - reading.frequency) / std);
-    deviations
-        .is_none_or(|deviations| deviations.abs() > 3.0)
-        .then_some(Warning::Misfit {
-            mode: worst.mode,
-            error_percent,
-            deviations,
-        })
+    let notable = prediction.iter().filter_map(|mode| {
+        let error_percent = mode.error_percent.filter(|e| e.abs() > NOTABLE_MISFIT)?;
+        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
+        let deviations = reading
+            .std
+            .map(|std| (mode.predicted - reading.frequency) / std);
+        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
+        beyond.then_some((mode.mode, error_percent, deviations))
+    });
+    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    worst.map(|(mode, error_percent, deviations)| Warning::Misfit {
+        mode,
+        error_percent,
+        deviations,
+    })
 }
 
 fn of_doubt(doubt: &Doubt) -> Warning {

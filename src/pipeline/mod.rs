@@ -42,7 +42,10 @@ pub use analysis::{
     Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
     Perturbation, RecordingResult, Response,
 };
-pub use consistent::{StructureDetails, structure_details};
+pub use consistent::{
+    StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
+    structure_details,
+};
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use functions::{FunctionSettings, run_functions};
 pub use gap::{diagnose_test, nominal, nominal_with};
@@ -74,6 +77,7 @@ pub fn run_test(
     settings: &IdentifySettings,
 ) -> Result<Analysis, PipelineError> {
     let structure = tested_structure(test);
+    let details = structure_details(test, &structure.beam);
     // In parallel, but collected in the description's order, so that of several errors the first is told.
     let mut recordings = test
         .recordings
@@ -98,7 +102,6 @@ pub fn run_test(
         Some(measured) => modes_of_measured(measured, &structure),
         None => {
             let reference = modes::reference_configuration(test, &recordings);
-            let details = structure_details(test, &structure.beam);
             let known = (&structure, &details);
             let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
@@ -108,7 +111,7 @@ pub fn run_test(
     warnings.extend(warning::of_amplitude(&recordings));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
-        details: structure_details(test, &structure.beam),
+        details,
         ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);

@@ -38,7 +38,7 @@ pub(super) fn number_jointed(
         return Vec::new();
     }
     let jointed = consistent::jointed(known.0, known.1);
-    let found = pair_modes(&jointed, &peaks, &settings(known.0, recordings));
+    let found = pair_modes(&jointed, &peaks, &settings(known, recordings));
     let Some(pairing) = found.ok().filter(|_| !peaks.is_empty()) else {
         number_in_order(modes);
         return Vec::new();
@@ -60,11 +60,14 @@ fn fits_the_beam(details: &StructureDetails) -> bool {
 }
 
 /// What is estimated and what is held, as the estimate has it.
-fn settings(structure: &TestedStructure, recordings: &[&RecordingResult]) -> PairingSettings {
+fn settings(
+    (structure, details): (&TestedStructure, &StructureDetails),
+    recordings: &[&RecordingResult],
+) -> PairingSettings {
     let units = StiffnessUnits::of(&structure.beam);
     let held = |known: Option<f64>, unit: f64| known.map(|value| value.max(NO_SPRING) * unit);
     let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
-    let mut fit = consistent::usual_fit(structure);
+    let mut fit = consistent::fitted(structure, details);
     fit.retain(|parameter| joint.contains(parameter));
     let band = |recording: &&RecordingResult| {
         let lines = recording.measurement.spectra.as_ref()?.averages.lines;
@@ -75,6 +78,7 @@ fn settings(structure: &TestedStructure, recordings: &[&RecordingResult]) -> Pai
         held: [
             held(structure.known.kx, units.kt),
             held(structure.known.ky, units.kr),
+            structure.known.cross_compliance.map(|c| units.ktr / c),
         ],
         bands: recordings.iter().filter_map(band).collect(),
         ..PairingSettings::default()

@@ -84,12 +84,12 @@ fn of_consistent(
     if !estimator.estimates_a_spring() {
         return None;
     }
+    let near = estimator.neighbourhood();
     // Without the uncertainties of all modes there is nothing to draw from.
     let random = settings.monte_carlo.and_then(|(samples, seed)| {
-        let found = estimator.monte_carlo(samples, seed).ok()?;
+        let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
         Some(found.joint)
     });
-    let near = estimator.neighbourhood();
     perturbation(
         (EstimateMethod::Consistent, random),
         frequencies,

@@ -146,13 +146,7 @@ impl<'a> Stage<'a> {
             .iter()
             .map(|x| root_mean_square(&band_limited(x, rate, band)))
             .collect();
-        let mut checks = vec![
-            DecayCheck {
-                remaining: 0.0,
-                noise: 1.0
-            };
-            noise.len()
-        ];
+        let mut checks = vec![DecayCheck::NOTHING; noise.len()];
         for tap in self.taps.accepted() {
             let responses = self.record(tap)?.split_off(usize::from(self.has_force));
             for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
@@ -264,10 +258,6 @@ impl<'a> Stage<'a> {
 
 /// The slowest of the decays that stand above their noise; of none, the slowest of all.
 fn slowest_decay(checks: &[DecayCheck]) -> DecayCheck {
-    let nothing = DecayCheck {
-        remaining: 0.0,
-        noise: 1.0,
-    };
     let above = |check: &DecayCheck| check.remaining > check.noise;
     checks
         .iter()
@@ -277,11 +267,12 @@ fn slowest_decay(checks: &[DecayCheck]) -> DecayCheck {
                 .cmp(&above(b))
                 .then(a.remaining.total_cmp(&b.remaining))
         })
-        .unwrap_or(nothing)
+        .unwrap_or(DecayCheck::NOTHING)
 }
 
-/// Bound on the transforms kept for a test without hammer (values; 16 bytes each).
-const MOST_KEPT: usize = 1 << 24;
+/// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
+/// each). Taps beyond it are left out of them.
+pub(super) const MOST_KEPT: usize = 1 << 24;
 
 /// Whether a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
 /// resonates, so the quotient's peak is the force's doing. The force on the peak is compared with that

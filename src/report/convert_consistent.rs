@@ -1,10 +1,12 @@
 //! The consistent estimate in the document.
 
 use super::document::{
-    CorrelationSection, EstimateSection, IdentifiabilitySection, MisfitSection, ValueSection,
+    BeamSection, CorrelationSection, EstimateSection, IdentifiabilitySection, MisfitSection,
+    ValueSection,
 };
 use super::format::significant;
 use crate::identify::consistent::{ConsistentEstimate, EstimatedQuantity, Limit, Quantity};
+use crate::structure::Beam;
 
 /// The main estimate; what stands beside it is added by the caller.
 pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
@@ -40,6 +42,7 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
                 value: correlation.value,
             })
             .collect(),
+        beam: Some(beam_section(&found.beam)),
         log_covariance: found.stiffness_covariance,
         goodness_of_fit: goodness.probability,
         misfit: Some(MisfitSection {
@@ -50,6 +53,16 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
         }),
         identifiability: Some(identifiability(found)),
         ..EstimateSection::default()
+    }
+}
+
+fn beam_section(beam: &Beam) -> BeamSection {
+    BeamSection {
+        length: beam.length,
+        width: beam.width,
+        thickness: beam.thickness,
+        modulus: beam.modulus,
+        density: beam.density,
     }
 }
 

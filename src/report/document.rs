@@ -10,7 +10,7 @@ use serde::Serialize;
 
 pub use super::document_contents::{ChannelSection, DatasetSection};
 pub use super::document_estimate::{
-    CorrelationSection, FreeBeamSection, IdentifiabilitySection, MisfitSection,
+    BeamSection, CorrelationSection, FreeBeamSection, IdentifiabilitySection, MisfitSection,
 };
 pub use super::document_fit::{
     AmplitudeEndsSection, AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection,
@@ -276,6 +276,9 @@ pub struct EstimateSection {
     pub modulus: Option<ValueSection>,
     /// Density (kg/m3).
     pub density: Option<ValueSection>,
+    /// The beam that belongs to the joint: as described but for what was estimated of it; null of a closed
+    /// form.
+    pub beam: Option<BeamSection>,
     /// Covariance of ln Kx and ln Ky, of a consistent estimate with both; scaled by the misfit where no
     /// uncertainty is stated.
     pub log_covariance: Option<[[f64; 2]; 2]>,

@@ -47,3 +47,18 @@ pub struct FreeBeamSection {
     /// Density (kg/m3) at the described modulus instead.
     pub density: f64,
 }
+
+/// The beam that belongs to a joint.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
+pub struct BeamSection {
+    /// Length (m); of a lap joint both halves together.
+    pub length: f64,
+    /// Width (m).
+    pub width: f64,
+    /// Thickness (m).
+    pub thickness: f64,
+    /// Young's modulus (Pa).
+    pub modulus: f64,
+    /// Density (kg/m3).
+    pub density: f64,
+}

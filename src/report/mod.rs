@@ -43,6 +43,7 @@ mod json;
 mod resolution;
 mod run;
 mod schema;
+mod stages;
 
 pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
@@ -61,6 +62,7 @@ pub use json::render_json;
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{render_cloud_picture, render_frf_picture, render_run, render_spectrum_picture};
 pub use schema::render_schema;
+pub use stages::{render_readings, render_stages};
 pub use text::render_text;
 
 /// A finished file.

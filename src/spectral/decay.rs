@@ -15,6 +15,14 @@ pub struct DecayCheck {
     pub noise: f64,
 }
 
+impl DecayCheck {
+    /// Of a record that never rises above its noise.
+    pub const NOTHING: Self = Self {
+        remaining: 0.0,
+        noise: 1.0,
+    };
+}
+
 /// Measures how far `samples` (a tap record without window, its mean taken out) rings down.
 ///
 /// `noise_rms` is the rms of the noise before the taps (same unit as the samples).
@@ -27,10 +35,7 @@ pub fn measure_decay(samples: &[f64], noise_rms: f64) -> DecayCheck {
     let noise_power = noise_rms * noise_rms;
     let largest = powers.iter().copied().fold(0.0, f64::max) - noise_power;
     if largest <= 0.0 {
-        return DecayCheck {
-            remaining: 0.0,
-            noise: 1.0,
-        };
+        return DecayCheck::NOTHING;
     }
     let last = (powers.last().copied().unwrap_or(0.0) - noise_power).max(0.0);
     DecayCheck {

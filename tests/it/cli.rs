@@ -1191,3 +1191,133 @@ fn regress_a_band_that_does_not_fit_names_the_line_of_its_recording() {
         ));
     assert!(!folder.path().join("test-report").exists());
 }
+
+/// Answers of two commands on one description.
+fn document(description: &str, arguments: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("test.toml"), description).unwrap();
+    let output = tapjoint(folder.path()).args(arguments).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{arguments:?}: {error}"))
+}
+
+#[test]
+fn regress_predict_and_identify_agree_on_a_known_joint_with_everything_fastened_to_it() {
+    let lap = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9
+        density = 7850\n[beam.right]\nthickness = 0.007\n[joint]\nkind = \"lap\"\nposition = 0.17
+        kt = 5e5\nkr = 900\noverlap = { length = 0.04, mass = 0.05 }\n[[sensor]]\nname = \"A\"
+        channel = 2\nposition = 0.4\nmass = \"24 g\"\n[measured]\nfrequencies = [100, 200, 400]\n";
+    let predicted = document(
+        lap,
+        &["predict", "test.toml", "--modes", "3", "--json", "-"],
+    );
+    let compared = document(lap, &["identify", "test.toml", "--json", "-"]);
+    for mode in 0..3 {
+        let of = |document: &Value| document["prediction"][mode]["predicted"].as_f64().unwrap();
+        let (a, b) = (of(&predicted), of(&compared));
+        // As fine elements for one mode more or less: 1e-6.
+        assert!(
+            (a / b - 1.0).abs() < 1e-5,
+            "mode {}: {a} and {b} Hz",
+            mode + 1
+        );
+    }
+}
+
+#[test]
+fn regress_run_diagnoses_with_the_seed_that_diagnose_takes() {
+    // Six modes of the strip on a joint of 2e6 N/m and 1230 N m/rad, 1 % high: the last is withheld.
+    let text = format!(
+        "{TEST}[measured]\nfrequencies = [24.0, 149.5, 417.1, 812.0, 1330.0, 1965.0]\nstd = 0.05\n"
+    );
+    let closures = |command: &[&str]| {
+        let gap = &document(&text, command)["gap"];
+        let all = gap["hypotheses"].as_array().unwrap().iter();
+        let low = |one: &Value| one["closure"]["low"].as_f64();
+        all.filter_map(low).collect::<Vec<f64>>()
+    };
+    let run = closures(&["run", "test.toml", "--seed", "7", "--json", "-"]);
+    let seven = closures(&["diagnose", "test.toml", "--seed", "7", "--json", "-"]);
+    let one = closures(&["diagnose", "test.toml", "--json", "-"]);
+    assert_eq!(run, seven);
+    assert_ne!(seven, one, "the seed must matter, or nothing is tested");
+}
+
+#[test]
+fn prop_verbose_tells_more_on_standard_error_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!("{TEST}beam = \"euler\"\n[measured]\nfrequencies = [17, 118, 335.6]\n");
+    fs::write(folder.path().join("test.toml"), text).unwrap();
+    let run = |more: &[&str]| {
+        let mut command = tapjoint(folder.path());
+        let output = command.args(["identify", "test.toml"]).args(more).output();
+        let output = output.unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (text(output.stdout), text(output.stderr))
+    };
+    let (plain, silent) = run(&[]);
+    let (told, said) = run(&["-v"]);
+    assert_eq!((silent.as_str(), plain), ("", told));
+    for part in [
+        "modes: 3 peaks, 3 with a number\n",
+        "estimate: consistent from modes 1, 2, 3",
+        "time: ",
+    ] {
+        assert!(said.contains(part), "{part:?} in {said:?}");
+    }
+    assert_eq!(run(&["-v", "-q"]), (String::new(), String::new()));
+    // Every tap and peak, of a recording.
+    let peaks: Vec<Vec<f64>> = vec![
+        (0..8000)
+            .map(|n| {
+                let t = f64::from(n % 4000) / 2000.0;
+                (-4.0 * t).exp() * (std::f64::consts::TAU * 100.0 * t).sin() * 0.5
+            })
+            .collect(),
+    ];
+    write_wav(
+        &folder.path().join("a.wav"),
+        2000,
+        &peaks,
+        WavFormat::Float32,
+    )
+    .unwrap();
+    let inspected = |more: &str| {
+        let output = tapjoint(folder.path())
+            .args(["inspect", "a.wav", more])
+            .output();
+        String::from_utf8(output.unwrap().stderr).unwrap()
+    };
+    assert!(!inspected("-v").contains("a.wav: tap at"));
+    assert!(
+        inspected("-vv").contains("a.wav: tap at"),
+        "{}",
+        inspected("-vv")
+    );
+}
+
+#[test]
+fn regress_plan_checks_its_joint_as_every_command_does() {
+    let plan = |text: &str, more: &[&str], says: &str| {
+        let arguments = [&["plan", "test.toml"], more].concat();
+        refused(text, &arguments, &[says]);
+    };
+    let free = TEST.replace("cantilever", "free");
+    plan(
+        &free,
+        &["--kx", "5", "--ky", "1"],
+        "a free beam has no joint",
+    );
+    plan(
+        TEST,
+        &["--kx", "0", "--ky", "1"],
+        "--kx 0: give a positive number",
+    );
+    let coupled = ["--kx", "5", "--ky", "1", "--kz", "9"];
+    plan(TEST, &coupled, "write model = \"3p\"");
+    plan(
+        TEST,
+        &["--kx", "500", "--ky", "1", "--kz", "9"],
+        "a source of energy",
+    );
+}

@@ -149,3 +149,39 @@ fn limit_a_rigid_direction_is_held_and_no_joint_is_no_answer() {
     std::fs::write(folder.path().join("few.toml"), few).unwrap();
     assert_eq!(tapjoint(folder.path(), &["export", "few.toml"], 1), "");
 }
+
+#[test]
+fn prop_a_report_gives_the_same_deck_where_the_beam_was_estimated_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "name = \"uneven\"\n[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9
+        density = 7850\ntolerance = { length = \"1 mm\" }\n[beam.right]\nthickness = 0.007\n[joint]
+        kind = \"lap\"\nposition = 0.17\noverlap = { length = 0.04, mass = 0.05 }\n[[sensor]]
+        name = \"A\"\nchannel = 2\nposition = 0.4\nmass = \"24 g\"\n[measured]\nscatter = \"0.1 %\"
+        frequencies = [124, 367, 838, 1354, 2400]\n[analysis]\nfit = [\"kt\", \"kr\", \"modulus\"]\n";
+    std::fs::write(folder.path().join("test.toml"), text).unwrap();
+    tapjoint(folder.path(), &["run", "test.toml", "--out", "report"], 0);
+    let fresh = tapjoint(folder.path(), &["export", "test.toml"], 0);
+    // With a report nothing is estimated: data are not even asked for.
+    let bare = text.split("[measured]").next().unwrap();
+    std::fs::write(folder.path().join("bare.toml"), bare).unwrap();
+    let arguments = ["export", "bare.toml", "--report", "report/report.json"];
+    let reported = tapjoint(folder.path(), &arguments, 0);
+    let numbers = |text: &str| -> Vec<f64> {
+        let kept = text.lines().filter(|line| !line.contains("joint: "));
+        let words = kept.flat_map(|line| line.split([',', ' ', '=']));
+        words.filter_map(|word| word.trim().parse().ok()).collect()
+    };
+    let (a, b) = (numbers(&fresh), numbers(&reported));
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(&b) {
+        assert!((a - b).abs() <= DIGITS * a.abs(), "{a} {b}");
+    }
+    let modulus = fresh
+        .lines()
+        .find_map(|line| line.strip_prefix("MAT1*,1,"))
+        .and_then(|rest| rest.split(',').next()?.trim().parse::<f64>().ok());
+    assert!(
+        modulus.is_some_and(|e| (e / 207e9 - 1.0).abs() > 1e-3),
+        "{modulus:?}"
+    );
+}

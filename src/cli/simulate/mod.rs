@@ -5,10 +5,9 @@ mod planted;
 mod summary;
 
 use super::Outcome;
-use super::arguments::{CrossStiffness, Stiffness};
 use super::input::{TestFile, read_model};
 use super::output::OutputFolder;
-use super::predict::given_stiffness;
+use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
@@ -48,15 +47,8 @@ pub(super) struct SimulateArguments {
     /// Write no truth.json: a folder for whoever diagnoses
     #[arg(long)]
     no_truth: bool,
-    /// Translational stiffness (non-dimensional), instead of kt of TEST
-    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true)]
-    kx: Option<Stiffness>,
-    /// Rotational stiffness (non-dimensional), instead of kr of TEST
-    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
-    ky: Option<Stiffness>,
-    /// Cross-coupling stiffness (non-dimensional), with --kx and --ky
-    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
-    kz: Option<CrossStiffness>,
+    #[command(flatten)]
+    stiffness: StiffnessArguments,
     #[command(flatten)]
     laboratory: LaboratoryArguments,
 }
@@ -83,8 +75,7 @@ fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result
             written.display()
         );
     }
-    let stiffness = (arguments.kx, arguments.ky, arguments.kz);
-    let given = given_stiffness(stiffness, file.test.joint.kind)?;
+    let given = arguments.stiffness.given(file.test.joint.kind)?;
     let laboratory = arguments.laboratory.resolve()?;
     Ok(Request {
         output: OutputFolder::prepare(&arguments.out)?,

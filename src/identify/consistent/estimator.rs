@@ -39,8 +39,6 @@ pub struct PointFit {
     pub frequencies: Vec<f64>,
     /// Why it stopped.
     pub stop: StopReason,
-    /// Other valleys: misfit and place.
-    pub others: Vec<(f64, Point)>,
 }
 
 /// Where repetitions of an estimate start: the valleys of a first one, and the body as it belongs to
@@ -261,9 +259,8 @@ impl ConsistentEstimator {
         }
     }
 
-    fn summary(&self, problem: &Problem<'_>, mut minima: Vec<Minimum>) -> PointFit {
-        let rest = minima.split_off(1.min(minima.len()));
-        let Some(best) = minima.pop() else {
+    fn summary(&self, problem: &Problem<'_>, minima: Vec<Minimum>) -> PointFit {
+        let Some(best) = minima.into_iter().next() else {
             return self.nothing(problem);
         };
         let directions = self.directions();
@@ -278,10 +275,6 @@ impl ConsistentEstimator {
                 .collect(),
             frequencies: best.at.frequencies,
             stop: best.stop,
-            others: rest
-                .iter()
-                .map(|other| (other.at.cost, other.at.point))
-                .collect(),
         }
     }
 
@@ -294,7 +287,6 @@ impl ConsistentEstimator {
             stds: Vec::new(),
             frequencies: at.frequencies,
             stop: StopReason::NothingFree,
-            others: Vec::new(),
         }
     }
 }

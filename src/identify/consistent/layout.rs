@@ -86,7 +86,10 @@ impl JointedStructure {
     }
 
     /// The beams between which the joint sits, or the one beam.
-    pub(super) fn pieces(&self) -> Result<Vec<Beam>, StructureError> {
+    ///
+    /// # Errors
+    /// [`StructureError`] of a beam that cannot exist, or a joint off the beam.
+    pub fn pieces(&self) -> Result<Vec<Beam>, StructureError> {
         self.beam.check()?;
         if self.assembly != Assembly::Lap {
             return Ok(vec![self.beam]);
@@ -112,7 +115,7 @@ impl JointedStructure {
 
     /// Masses on the beam, the overlap's included: two points in either half, where Gauss's rule
     /// puts them, carry a uniform mass as a cubic shape feels it.
-    pub(super) fn all_masses(&self) -> Vec<PointAttachment> {
+    pub fn all_masses(&self) -> Vec<PointAttachment> {
         let mut masses = self.masses.clone();
         if let Some((length, mass)) = self.lap.overlap.filter(|_| self.assembly == Assembly::Lap) {
             let joint = self.lap.position.unwrap_or(0.5 * self.beam.length);

@@ -55,18 +55,30 @@ impl ConsistentEstimator {
         samples: usize,
         seed: u64,
     ) -> Result<ConsistentMonteCarlo, IdentifyError> {
+        self.monte_carlo_near(&self.neighbourhood(), samples, seed)
+    }
+
+    /// The same from a [`ConsistentEstimator::neighbourhood`] that is known already.
+    ///
+    /// # Errors
+    /// As [`ConsistentEstimator::monte_carlo`].
+    pub fn monte_carlo_near(
+        &self,
+        near: &Neighbourhood,
+        samples: usize,
+        seed: u64,
+    ) -> Result<ConsistentMonteCarlo, IdentifyError> {
         let mut errors = Vec::with_capacity(self.modes.len());
         for mode in &self.modes {
             let std = mode.std.filter(|std| std.is_finite());
             let std = std.ok_or(IdentifyError::NoUncertainty { mode: mode.mode })?;
             errors.push((mode.frequency, std));
         }
-        let near = self.neighbourhood();
         let chunks: Vec<Vec<Option<Point>>> = (0..samples.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let count = CHUNK.min(samples - chunk * CHUNK);
-                self.repeat((seed, chunk as u64), count, (&errors, &near))
+                self.repeat((seed, chunk as u64), count, (&errors, near))
             })
             .collect();
         let found: Vec<Point> = chunks.into_iter().flatten().flatten().collect();

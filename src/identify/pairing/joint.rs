@@ -16,12 +16,17 @@ const DENSITY: f64 = 0.375;
 /// Prior means of ln Kx, ln Ky and atanh of the coupling, and their standard deviations: joints of
 /// built structures lie within some decades of the beam's own stiffness, couplings within 0.3.
 const PRIOR: [(f64, f64); 3] = [(3.0 * LN_10, 3.0), (LN_10, 3.0), (0.0, 0.3)];
-/// Decades of the grid, Kx and Ky, and its step: it moves a frequency by 10 % at most.
+/// Decades of the grid, Kx and Ky, and its step. A frequency rises at most with the root of both
+/// stiffnesses together, so that the nearest place of the grid, half a step off in both, misses it by
+/// 10^(0.3/4) - 1 = 19 % at most, where all stiffness is in soft springs. The candidates allow for that,
+/// and the search for the joint goes on from there.
 const DECADES: [(f64, f64); 2] = [(-1.0, 6.0), (-2.0, 4.5)];
 const STEP: f64 = 0.3;
 /// Steps of the search, and its largest step (1).
 const STEPS: usize = 40;
 const LARGEST: f64 = 2.0;
+/// Largest coupling (1) that a held Ktr is taken to have.
+const STRONGEST: f64 = 0.999;
 
 /// Peaks and the model they are compared with.
 pub(super) struct JointSearch<'a> {
@@ -29,6 +34,8 @@ pub(super) struct JointSearch<'a> {
     pub(super) peaks: &'a [MeasuredPeak],
     settings: &'a PairingSettings,
     units: StiffnessUnits,
+    /// 1/Kz (1) of a coupling that is held; 0 without one.
+    cross: f64,
     highest: usize,
 }
 
@@ -46,11 +53,16 @@ impl<'a> JointSearch<'a> {
         peaks: &'a [MeasuredPeak],
         settings: &'a PairingSettings,
     ) -> Self {
+        let units = StiffnessUnits::of(&model.structure().beam);
+        let [kt, kr, ktr] = settings.held;
+        let rigid = [kt, kr].contains(&Some(f64::INFINITY));
+        let coupled = !settings.fit.contains(&Parameter::Coupling) && !rigid;
         JointSearch {
             model,
             peaks,
             settings,
-            units: StiffnessUnits::of(&model.structure().beam),
+            units,
+            cross: ktr.filter(|_| coupled).map_or(0.0, |ktr| units.ktr / ktr),
             highest: peaks.len() + super::candidates::MOST_MISSING,
         }
     }
@@ -76,23 +88,31 @@ impl<'a> JointSearch<'a> {
         self.settings.fit.contains(&parameters[index])
     }
 
+    /// The place with the coupling that a held Ktr has there: sqrt(Kx Ky)/Kz, and no joint's is 1.
+    fn coupled(&self, [kx, ky, coupling]: [f64; 3]) -> [f64; 3] {
+        if self.cross == 0.0 {
+            return [kx, ky, coupling];
+        }
+        let held = self.cross * (0.5 * (kx + ky)).exp();
+        [kx, ky, held.clamp(-STRONGEST, STRONGEST).atanh()]
+    }
+
     /// Places (ln Kx, ln Ky, atanh of the coupling) over all joints; a held stiffness has one.
     pub fn grid(&self) -> Vec<[f64; 3]> {
         let axis = |index: usize| -> Vec<f64> {
             let (low, high) = DECADES[index];
-            let held = self.settings.held[index];
-            match held.filter(|_| !self.is_free(index)) {
-                Some(held) => vec![(held / [self.units.kt, self.units.kr][index]).ln()],
-                None => {
-                    let steps = ((high - low) / STEP) as usize;
-                    let at = |step| (low + STEP * f64::from(step)) * LN_10;
-                    (0..=steps as u32).map(at).collect()
-                }
+            if !self.is_free(index) {
+                let held = self.settings.held[index].unwrap_or(f64::INFINITY);
+                return vec![(held / [self.units.kt, self.units.kr][index]).ln()];
             }
+            let steps = ((high - low) / STEP) as usize;
+            let at = |step| (low + STEP * f64::from(step)) * LN_10;
+            (0..=steps as u32).map(at).collect()
         };
         let (translation, rotation) = (axis(0), axis(1));
         let rows = translation.iter();
         rows.flat_map(|&kx| rotation.iter().map(move |&ky| [kx, ky, 0.0]))
+            .map(|place| self.coupled(place))
             .collect()
     }
 
@@ -124,7 +144,17 @@ impl<'a> JointSearch<'a> {
                 0.0
             }
         };
-        let slopes = [Parameter::Kt, Parameter::Kr, Parameter::Coupling].map(|p| slope(p as usize));
+        let mut slopes =
+            [Parameter::Kt, Parameter::Kr, Parameter::Coupling].map(|p| slope(p as usize));
+        let coupling = place[2].tanh();
+        if self.cross != 0.0 && coupling.abs() < STRONGEST {
+            // The coupling follows: d atanh(c)/d ln Kx = c/(2 (1 - c^2)), and so for Ky.
+            let follows = 0.5 * coupling / (1.0 - coupling * coupling);
+            let by_coupling = response.sensitivity[Parameter::Coupling as usize];
+            for index in [0, 1].into_iter().filter(|&index| self.is_free(index)) {
+                slopes[index] += follows * by_coupling;
+            }
+        }
         (response.frequency.ln(), Vector3::from(slopes))
     }
 
@@ -197,6 +227,7 @@ impl<'a> JointSearch<'a> {
                 break;
             };
             let next = [0, 1, 2].map(|i| place[i] - step[i].clamp(-LARGEST, LARGEST));
+            let next = self.coupled(next);
             let there = self.cost(pairs, next);
             if there.0 < now.0 {
                 let gain = now.0 - there.0;

@@ -58,8 +58,9 @@ pub struct ShapeAt {
 pub struct PairingSettings {
     /// Stiffnesses of the joint that are estimated: two by default; those not named are held.
     pub fit: Vec<Parameter>,
-    /// Held stiffnesses Kt (N/m) and Kr (N m/rad), infinite for rigid: none.
-    pub held: [Option<f64>; 2],
+    /// Held stiffnesses Kt (N/m), Kr (N m/rad) and Ktr (N/rad). What is neither estimated nor held is
+    /// infinite: rigid, or without coupling. None.
+    pub held: [Option<f64>; 3],
     /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
     pub bands: Vec<(f64, f64)>,
     /// What the model misses of a frequency, relative: 1.5 %, what a beam's stated dimensions, its
@@ -74,7 +75,7 @@ impl Default for PairingSettings {
     fn default() -> Self {
         PairingSettings {
             fit: vec![Parameter::Kt, Parameter::Kr],
-            held: [None; 2],
+            held: [None; 3],
             bands: Vec::new(),
             discrepancy: 0.015,
             odds: 20.0,

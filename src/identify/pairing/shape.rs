@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 
 use super::joint::{JointFit, JointSearch};
 use super::{MeasuredPeak, MissingCause, MissingMode, ShapeAt};
-use crate::identify::consistent::LapLayout;
 use crate::structure::{ModeShape, mode_shapes};
 
 /// Standard deviation of the angle between a measured shape and its model (rad): positions, axes and
@@ -16,7 +15,8 @@ const UNLIKE: f64 = 0.1;
 const WRONG_SIGN: f64 = 0.05;
 /// A mode is at its node where it moves less than this share of what the modes usually do there.
 const AT_NODE: f64 = 0.12;
-/// A value that is no more than this many of its standard deviations has no sign.
+/// Values that together are no more than this many of their standard deviations have neither sign nor
+/// direction.
 const CLEAR: f64 = 3.0;
 
 /// Predicted shapes of one joint, where they can be had.
@@ -38,7 +38,6 @@ impl View {
         let structure = search.model().structure();
         // The closed form has equal halves only.
         let known = structure.lap.position.is_none() && structure.lap.right.is_none();
-        let known = known || structure.lap == LapLayout::default();
         let count = search.peaks.len() + super::candidates::MOST_MISSING;
         let joint = search.joint(fit.place);
         let shapes = match known && !places.is_empty() {
@@ -149,7 +148,7 @@ fn likeness(seen: &[&ShapeAt], predicted: &[f64]) -> f64 {
     let measured: f64 = seen.iter().map(|at| at.value.powi(2)).sum();
     let model: f64 = predicted.iter().map(|p| p * p).sum();
     let noise: f64 = seen.iter().map(|at| at.std.powi(2)).sum();
-    if !(measured > CLEAR * noise && model > 0.0) {
+    if !(measured > CLEAR.powi(2) * noise && model > 0.0) {
         return 0.0;
     }
     let width = ANGLE.hypot((noise / measured).sqrt());

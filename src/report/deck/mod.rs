@@ -8,9 +8,11 @@ mod abaqus;
 mod nastran;
 
 use crate::description::TestDescription;
-use crate::pipeline::{Analysis, structure_details, tested_structure};
+use crate::identify::consistent::JointedStructure;
+use crate::pipeline::{Analysis, jointed_structure, structure_details, tested_structure};
+use crate::structure::finite_elements::PointAttachment;
 use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness};
+use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 
 pub use abaqus::render_abaqus;
 pub use nastran::render_nastran;
@@ -37,7 +39,7 @@ pub struct Deck {
     pub masses: Vec<(usize, f64)>,
     /// The joint; `None` for a free beam.
     pub joint: Option<DeckJoint>,
-    /// Frequencies (Hz) that the report predicts.
+    /// Frequencies (Hz) that are predicted with what the deck says.
     pub frequencies: Vec<f64>,
 }
 
@@ -48,7 +50,7 @@ pub struct DeckPiece {
     pub first: usize,
     /// Last node's index.
     pub last: usize,
-    /// Section and material.
+    /// Its length, section and material.
     pub beam: Beam,
 }
 
@@ -81,82 +83,83 @@ pub enum DeckError {
         "a joint with cross coupling that is rigid in one direction is no spring; give finite kt and kr"
     )]
     RigidAndCoupled,
+    /// A beam or a lap joint that cannot exist.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
 }
 
-/// The deck of an analysed test; `joint` (non-dimensional by the described beam) takes the place of
-/// the analysis's.
+/// What a deck is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeckSource {
+    /// The structure without its joint, of the beam that belongs to the joint.
+    pub structure: JointedStructure,
+    /// The joint, non-dimensional by that beam.
+    pub joint: JointStiffness,
+    /// Where it is from.
+    pub origin: String,
+    /// Frequencies (Hz) that both together predict.
+    pub frequencies: Vec<f64>,
+}
+
+/// The structure and joint that an analysed test predicts with.
 ///
 /// # Errors
-/// [`DeckError`] where no joint is known.
-pub fn deck_of(
-    test: &TestDescription,
-    analysis: &Analysis,
-    joint: Option<(JointStiffness, String)>,
-) -> Result<Deck, DeckError> {
+/// [`DeckError::NoJoint`] where no joint is known.
+pub fn source_of(test: &TestDescription, analysis: &Analysis) -> Result<DeckSource, DeckError> {
     let structure = tested_structure(test);
     let found = analysis.identification.as_ref();
-    let consistent = found.and_then(|found| found.consistent.as_deref());
-    let (beam, joint, origin) = match (joint, consistent) {
-        (Some((joint, origin)), _) => (structure.beam, joint, origin),
-        (None, Some(estimate)) => (
-            estimate.beam,
-            estimate.joint,
-            "least squares on the frequencies".to_owned(),
-        ),
-        (None, None) => {
-            let known = structure.known.over(None);
-            let reason = found.and_then(|found| found.reason.clone());
-            let joint = known.ok_or_else(|| DeckError::NoJoint {
-                reason: reason.unwrap_or_else(|| "nothing was estimated".to_owned()),
-            })?;
-            (
-                structure.beam,
-                joint,
-                "stated in the description".to_owned(),
-            )
-        }
+    let missing = || DeckError::NoJoint {
+        reason: found
+            .and_then(|found| found.reason.clone())
+            .unwrap_or_else(|| "nothing was estimated".to_owned()),
+    };
+    let found = found.ok_or_else(missing)?;
+    let (beam, joint) = found.beam_and_joint(&structure).ok_or_else(missing)?;
+    let origin = match (&found.consistent, &found.estimate) {
+        (Some(_), _) => "least squares on the frequencies",
+        (None, _) if structure.known.over(None).is_some() => "stated in the description",
+        (None, Some(_)) => "estimated in closed form",
+        (None, None) => "stated in the description",
     };
     let details = structure_details(test, &structure.beam);
-    let prediction = found.map_or(&[][..], |found| &found.prediction);
-    let masses = details.masses.iter().map(|mass| (mass.position, mass.size));
+    Ok(DeckSource {
+        structure: match found.predicts_with_details(&structure) {
+            true => jointed_structure(&structure, &details).with_beam(&beam),
+            false => JointedStructure::new(structure.theory, beam, structure.assembly),
+        },
+        joint,
+        origin: origin.to_owned(),
+        frequencies: found.prediction.iter().map(|mode| mode.predicted).collect(),
+    })
+}
+
+/// The deck of a test of this name.
+///
+/// # Errors
+/// [`DeckError`] where structure or joint cannot be written.
+pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
+    let structure = &source.structure;
     let mut deck = Deck {
-        name: analysis.name.clone(),
-        origin,
+        name: name.to_owned(),
+        origin: source.origin.clone(),
         theory: structure.theory,
         pieces: Vec::new(),
         nodes: Vec::new(),
         masses: Vec::new(),
         joint: None,
-        frequencies: prediction.iter().map(|mode| mode.predicted).collect(),
+        frequencies: source.frequencies.clone(),
     };
-    let mut masses: Vec<(f64, f64)> = masses.collect();
-    let beams = match structure.assembly {
-        Assembly::Lap => {
-            let place = details.lap.position.unwrap_or(0.5 * beam.length);
-            masses.extend(overlap_masses(place, details.lap.overlap));
-            let right = details.lap.right.unwrap_or(beam);
-            vec![(0.0, place, beam), (place, beam.length, right)]
-        }
-        _ => vec![(0.0, beam.length, beam)],
-    };
-    deck.mesh(&beams, &masses);
+    deck.mesh(&structure.pieces()?, &structure.all_masses());
+    let (beam, joint) = (&structure.beam, &source.joint);
     deck.joint = match structure.assembly {
         Assembly::Free => None,
-        Assembly::Cantilever => Some(springs(&beam, &joint, (0, None))?),
+        Assembly::Cantilever => Some(springs(beam, joint, (0, None))?),
         Assembly::Lap => {
             let first = deck.pieces.last().map_or(0, |piece| piece.first);
-            Some(springs(&beam, &joint, (first, first.checked_sub(1)))?)
+            Some(springs(beam, joint, (first, first.checked_sub(1)))?)
         }
     };
     Ok(deck)
-}
-
-/// An overlap's mass as the estimate takes it: spread over its length, by two Gauss points a side.
-fn overlap_masses(joint: f64, overlap: Option<(f64, f64)>) -> Vec<(f64, f64)> {
-    let gauss = 0.25 / 3f64.sqrt();
-    let points = [-0.25 - gauss, -0.25 + gauss, 0.25 - gauss, 0.25 + gauss];
-    let of = |(length, mass): (f64, f64)| points.map(|point| (joint + point * length, 0.25 * mass));
-    overlap.map(of).into_iter().flatten().collect()
 }
 
 /// The joint's scalar springs: with the stiffness matrix K, the inverse of the compliance
@@ -195,14 +198,16 @@ fn springs(
 
 impl Deck {
     /// Nodes at equal distances and at every mass; elements of each beam between its own nodes.
-    fn mesh(&mut self, beams: &[(f64, f64, Beam)], masses: &[(f64, f64)]) {
-        let length = beams.last().map_or(1.0, |beam| beam.1);
-        for &(from, to, beam) in beams {
-            let count = ((to - from) / length * ELEMENTS as f64).ceil().max(1.0) as usize;
+    fn mesh(&mut self, beams: &[Beam], masses: &[PointAttachment]) {
+        let length: f64 = beams.iter().map(|beam| beam.length).sum();
+        let mut from = 0.0;
+        for beam in beams {
+            let to = from + beam.length;
+            let count = (beam.length / length * ELEMENTS as f64).ceil().max(1.0) as usize;
             let mut places: Vec<f64> = (0..=count)
-                .map(|index| from + (to - from) * index as f64 / count as f64)
+                .map(|index| from + beam.length * index as f64 / count as f64)
                 .collect();
-            let inside = masses.iter().map(|mass| mass.0);
+            let inside = masses.iter().map(|mass| mass.position);
             places.extend(inside.filter(|place| (from..=to).contains(place)));
             places.sort_by(f64::total_cmp);
             places.dedup_by(|a, b| (*a - *b).abs() < SAME * length);
@@ -211,14 +216,16 @@ impl Deck {
             self.pieces.push(DeckPiece {
                 first,
                 last: self.nodes.len() - 1,
-                beam,
+                beam: *beam,
             });
+            from = to;
         }
-        for (place, mass) in masses {
-            let distance = |node: &(usize, &f64)| (node.1 - place).abs();
+        for mass in masses {
+            let distance = |node: &(usize, &f64)| (node.1 - mass.position).abs();
             let nodes = self.nodes.iter().enumerate();
             let nearest = nodes.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            self.masses.extend(nearest.map(|(node, _)| (node, *mass)));
+            self.masses
+                .extend(nearest.map(|(node, _)| (node, mass.size)));
         }
     }
 

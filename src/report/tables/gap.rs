@@ -26,10 +26,7 @@ pub fn gap_story(document: &Document) -> Vec<String> {
 }
 
 fn verdict(gap: &GapSection) -> String {
-    let first = gap.hypotheses.first();
-    let odds = first.map_or_else(String::new, |first| {
-        format!(" ({})", probability(first.probability))
-    });
+    let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));
     let effects = gap.verdict.effects.join(", ");
     match gap.verdict.kind.as_str() {
         "no-gap" => {
@@ -125,6 +122,20 @@ pub fn next_tests(document: &Document) -> Option<Table> {
                above; effort in multiples of reading again what is recorded. Ranked by one over the other."
             .to_owned(),
     })
+}
+
+/// How probable the verdict is: of a group its members together, be they single effects or pairs.
+fn odds(gap: &GapSection) -> Option<f64> {
+    if gap.verdict.kind != "group" {
+        return named(gap).map(|found| found.probability);
+    }
+    let effects = &gap.verdict.effects;
+    let total = |is_member: &dyn Fn(&str) -> bool| {
+        let members = gap.hypotheses.iter().filter(|one| is_member(&one.effect));
+        members.map(|one| one.probability).reduce(|a, b| a + b)
+    };
+    let is_in = |part: &str| effects.iter().any(|effect| effect == part);
+    total(&is_in).or_else(|| total(&|pair| pair.split('+').all(is_in)))
 }
 
 /// The hypothesis that the verdict names.

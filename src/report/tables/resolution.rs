@@ -87,17 +87,13 @@ pub fn resolution_frequencies(
             .map(|&reading| find(block, reading))
             .collect();
         let any = rows.iter().copied().flatten().next();
-        let mut cells = vec![
-            block.to_string(),
-            optional(any.map(|row| row.half_line), 3),
-            optional(any.map(|row| row.spacing / 12f64.sqrt()), 3),
+        let bounds = [
+            any.map(|row| row.half_line),
+            any.map(|row| row.spacing / 12f64.sqrt()),
         ];
-        cells.extend(
-            rows.iter()
-                .map(|row| optional(row.and_then(|row| row.rms), 3)),
-        );
-        cells.push(share(any.map(|row| (row.found, row.draws))));
-        cells
+        let errors = rows.iter().map(|row| row.and_then(|row| row.rms));
+        let counts = any.map(|row| (row.found, row.draws));
+        cells(block, bounds.into_iter().chain(errors), counts)
     };
     Table {
         caption: format!(
@@ -144,17 +140,13 @@ pub fn resolution_stiffnesses(
             .map(|&reading| find(block, reading))
             .collect();
         let any = rows.iter().copied().flatten().next();
-        let mut cells = vec![
-            block.to_string(),
-            optional(any.and_then(|row| row.half_line_bound_percent), 3),
-            optional(any.and_then(|row| row.line_rms_percent), 3),
+        let bounds = [
+            any.and_then(|row| row.half_line_bound_percent),
+            any.and_then(|row| row.line_rms_percent),
         ];
-        cells.extend(
-            rows.iter()
-                .map(|row| optional(row.and_then(|row| row.rms_percent), 3)),
-        );
-        cells.push(share(any.map(|row| (row.found, row.draws))));
-        cells
+        let errors = rows.iter().map(|row| row.and_then(|row| row.rms_percent));
+        let counts = any.map(|row| (row.found, row.draws));
+        cells(block, bounds.into_iter().chain(errors), counts)
     };
     let bias = match (method, stiffness.pairs_bias_percent) {
         (EstimateMethod::Pairs, Some(bias)) if bias.abs() >= 0.05 => format!(
@@ -173,6 +165,19 @@ pub fn resolution_stiffnesses(
         rows: study.blocks.iter().map(|block| row(block.block)).collect(),
         note: String::new(),
     }
+}
+
+/// A row of errors: the block, numbers, and how many of the draws were read.
+fn cells(
+    block: usize,
+    numbers: impl Iterator<Item = Option<f64>>,
+    counts: Option<(usize, usize)>,
+) -> Vec<String> {
+    let numbers = numbers.map(|value| optional(value, 3));
+    std::iter::once(block.to_string())
+        .chain(numbers)
+        .chain([share(counts)])
+        .collect()
 }
 
 /// "Kx".

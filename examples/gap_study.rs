@@ -250,6 +250,7 @@ fn nominal(random: &mut ChaCha8Rng) -> Nominal {
         sensors: vec![NominalSensor {
             name: "A".to_string(),
             mass: None,
+            position: None,
         }],
         scale_std: None,
         reading_bias: None,
@@ -284,6 +285,7 @@ fn plan(five: bool, drift: f64, noise: f64) -> TestPlan {
         slope_std: five.then_some(1e-4),
         drift: if five { drift } else { 0.0 },
         damping: 0.003,
+        scatter: 1.0,
     }
 }
 

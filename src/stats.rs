@@ -2,6 +2,8 @@
 
 pub mod student;
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 /// Median (the upper one of an even count), in the unit of the values; 0 of nothing. Reorders them.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
@@ -14,6 +16,13 @@ pub fn median(values: &mut [f64]) -> f64 {
 /// Root of the mean square, sqrt(sum x^2/n), in the unit of the values; 0 of nothing.
 pub fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Value that chi square of `freedom` degrees of freedom stays below with this probability; `None` without
+/// a degree of freedom.
+pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
+    let chi_square = ChiSquared::new(freedom).ok()?;
+    Some(chi_square.inverse_cdf(probability))
 }
 
 #[cfg(test)]

@@ -1,236 +1,247 @@
 // Makes the page's pictures live: the same curves, drawn by uPlot, with zoom and hover. Without this
 // script, and in print, the pictures themselves are shown.
-(function () {
-  "use strict";
-  var all = [];
 
-  function color(name) {
-    return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  }
+var all = [];
 
-  function digits(value) {
-    if (value == null) return "–";
-    var size = Math.abs(value);
-    var text = size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential(3) : String(+value.toPrecision(4));
-    return text.replace(/-/g, "−");
-  }
+function color(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
 
-  function element(name, className, text) {
-    var made = document.createElement(name);
-    if (className) made.className = className;
-    if (text) made.textContent = text;
-    return made;
-  }
+function digits(value) {
+  if (value == null) return "–";
+  var size = Math.abs(value);
+  var text = size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential(3) : String(+value.toPrecision(4));
+  return text.replace(/-/g, "−");
+}
 
-  function unit(words) { return words && words !== "1" ? " " + words : ""; }
+function tickWords(value) {
+  var size = Math.abs(value);
+  return (size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential() : String(+value.toPrecision(8))).replace(/-/g, "−");
+}
 
-  // Half-line bands and lines of the resonances; names above the topmost panel only.
-  function drawMarks(plot, top) {
-    return function (u) {
-      var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, free = -Infinity;
-      c.save();
-      c.font = 12 * ratio + "px system-ui, sans-serif";
-      c.textAlign = "center";
-      plot.marks.forEach(function (mark) {
-        var x = u.valToPos(mark.at, "x", true);
-        if (x < box.left || x > box.left + box.width) return;
-        c.strokeStyle = c.fillStyle = color(mark.mode ? "--mode" : "--other");
-        var from = Math.max(u.valToPos(mark.line - mark.half, "x", true), box.left);
-        var to = Math.min(u.valToPos(mark.line + mark.half, "x", true), box.left + box.width);
-        c.globalAlpha = 0.18;
-        c.fillRect(from, box.top, Math.max(to - from, 1), box.height);
-        c.globalAlpha = 0.9;
-        c.setLineDash(mark.mode ? [6 * ratio, 4 * ratio] : [2 * ratio, 4 * ratio]);
-        c.lineWidth = ratio;
-        c.beginPath();
-        c.moveTo(x, box.top);
-        c.lineTo(x, box.top + box.height);
+function element(name, className, text) {
+  var made = document.createElement(name);
+  if (className) made.className = className;
+  if (text) made.textContent = text;
+  return made;
+}
+
+function unit(words) { return words && words !== "1" ? " " + words : ""; }
+
+// Half-line bands and lines of the resonances; names above the topmost panel only.
+function drawMarks(plot, top) {
+  return function (u) {
+    var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, free = -Infinity;
+    c.save();
+    c.font = 12 * ratio + "px system-ui, sans-serif";
+    c.textAlign = "center";
+    plot.marks.forEach(function (mark) {
+      var x = u.valToPos(mark.at, "x", true);
+      if (x < box.left || x > box.left + box.width) return;
+      c.strokeStyle = c.fillStyle = color(mark.mode ? "--mode" : "--other");
+      var from = Math.max(u.valToPos(mark.line - mark.half, "x", true), box.left);
+      var to = Math.min(u.valToPos(mark.line + mark.half, "x", true), box.left + box.width);
+      c.globalAlpha = 0.18;
+      c.fillRect(from, box.top, Math.max(to - from, 1), box.height);
+      c.globalAlpha = 0.9;
+      c.setLineDash(mark.mode ? [6 * ratio, 4 * ratio] : [2 * ratio, 4 * ratio]);
+      c.lineWidth = ratio;
+      c.beginPath();
+      c.moveTo(x, box.top);
+      c.lineTo(x, box.top + box.height);
+      c.stroke();
+      var half = c.measureText(mark.name).width / 2 + 4 * ratio;
+      if (top && x - half > free) {
+        c.globalAlpha = 1;
+        c.fillText(mark.name, x, box.top - 6 * ratio);
+        free = x + half;
+      }
+    });
+    c.restore();
+  };
+}
+
+// Taps: dots for used ones, crosses for rejected ones.
+function drawTaps(plot, state) {
+  return function (u) {
+    var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1;
+    c.save();
+    plot.taps.forEach(function (tap, index) {
+      var x = u.valToPos(tap.at, "x", true);
+      if (tap.peak == null || x < box.left || x > box.left + box.width) return;
+      var y = Math.min(Math.max(u.valToPos(tap.peak, "y", true), box.top + 6 * ratio), box.top + box.height - 6 * ratio);
+      var size = (index === state.tap ? 8 : 5) * ratio;
+      c.strokeStyle = c.fillStyle = color(tap.used ? "--mode" : "--bad");
+      c.lineWidth = 2.5 * ratio;
+      c.beginPath();
+      if (tap.used) {
+        c.arc(x, y, size, 0, 2 * Math.PI);
+        c.fill();
+      } else {
+        c.moveTo(x - size, y - size); c.lineTo(x + size, y + size);
+        c.moveTo(x - size, y + size); c.lineTo(x + size, y - size);
         c.stroke();
-        var half = c.measureText(mark.name).width / 2 + 4 * ratio;
-        if (top && x - half > free) {
-          c.globalAlpha = 1;
-          c.fillText(mark.name, x, box.top - 6 * ratio);
-          free = x + half;
-        }
-      });
-      c.restore();
-    };
-  }
-
-  // Taps: dots for used ones, crosses for rejected ones.
-  function drawTaps(plot, state) {
-    return function (u) {
-      var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1;
-      c.save();
-      plot.taps.forEach(function (tap, index) {
-        var x = u.valToPos(tap.at, "x", true);
-        if (tap.peak == null || x < box.left || x > box.left + box.width) return;
-        var y = Math.min(Math.max(u.valToPos(tap.peak, "y", true), box.top + 6 * ratio), box.top + box.height - 6 * ratio);
-        var size = (index === state.tap ? 8 : 5) * ratio;
-        c.strokeStyle = c.fillStyle = color(tap.used ? "--mode" : "--bad");
-        c.lineWidth = 2.5 * ratio;
-        c.beginPath();
-        if (tap.used) {
-          c.arc(x, y, size, 0, 2 * Math.PI);
-          c.fill();
-        } else {
-          c.moveTo(x - size, y - size); c.lineTo(x + size, y + size);
-          c.moveTo(x - size, y + size); c.lineTo(x + size, y - size);
-          c.stroke();
-        }
-      });
-      c.restore();
-    };
-  }
-
-  function axes(plot, panel, last) {
-    var ink = color("--ink"), rule = color("--rule");
-    var common = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { stroke: rule, width: 1 } };
-    var narrow = innerWidth < 600;
-    return [
-      Object.assign({}, common, { label: last ? plot.x.label + " (" + plot.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
-        values: function (u, splits) { return last ? splits.map(digits) : []; } }),
-      Object.assign({}, common, {
-        label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 48 : 62, space: 28,
-        values: function (u, splits) {
-          var scale = u.scales.y, whole = panel.scale === "logarithmic" && scale.max / scale.min > 30;
-          return splits.map(function (v) {
-            var decade = Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-6;
-            return v == null || whole && !decade ? "" : digits(v);
-          });
-        }
-      })
-    ];
-  }
-
-  function vertical(panel) {
-    if (panel.range) return { range: panel.range };
-    if (panel.scale !== "logarithmic") return { range: { min: { pad: 0.08 }, max: { pad: 0.14 } } };
-    return {
-      distr: 3,
-      // As in the pictures, 140 dB below the largest are shown at most.
-      range: function (u, low, high) { return high > 0 ? [Math.max(low, high * 1e-7) / 1.4, high * 1.6] : [0.1, 1]; }
-    };
-  }
-
-  function options(figure, index) {
-    var plot = figure.plot, panel = plot.panels[index], last = index === plot.panels.length - 1;
-    var log = panel.scale === "logarithmic", taps = plot.kind === "taps";
-    var series = [{ label: plot.x.label, value: function (u, v) { return v == null ? "–" : +v.toPrecision(7) + " " + plot.x.unit; } }];
-    panel.series.forEach(function (curve) {
-      series.push({
-        label: curve.name, stroke: taps ? color("--data") : color("--c" + curve.color % 6), width: 1.5, spanGaps: false,
-        points: { show: taps ? false : undefined },
-        value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.unit)); }
-      });
+      }
     });
-    var draw = [taps ? drawTaps(plot, figure) : drawMarks(plot, index === 0)];
-    return {
-      width: Math.max(figure.host.clientWidth, 240),
-      height: (log ? 280 : panel.label === "coherence" ? 130 : taps ? 260 : 150) + (last ? 36 : 0),
-      series: series, axes: axes(plot, panel, last),
-      scales: { x: { time: false }, y: vertical(panel) },
-      bands: taps ? [{ series: [2, 1], fill: color("--data") + "55" }] : [],
-      padding: [index === 0 ? 22 : 8, 30, 0, 0],
-      cursor: { sync: { key: figure.key, scales: ["x", null] }, drag: { x: true, y: false } },
-      hooks: { draw: draw }
-    };
-  }
+    c.restore();
+  };
+}
 
-  function zoom(figure, low, high) {
-    var x = figure.x, end = x[x.length - 1];
-    figure.panels.forEach(function (u) {
-      u.setScale("x", { min: Math.max(low, x[0]), max: Math.min(high, end) });
-    });
-  }
+function axes(plot, panel, last) {
+  var ink = color("--ink"), rule = color("--rule");
+  var common = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { stroke: rule, width: 1 } };
+  var narrow = innerWidth < 600;
+  return [
+    Object.assign({}, common, { label: last ? plot.x.label + " (" + plot.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
+      values: function (u, splits) { return last ? splits.map(digits) : []; } }),
+    Object.assign({}, common, {
+      label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 56 : 62, space: 28,
+      values: function (u, splits) { return splits.map(tickWords); }
+    }, panel.scale !== "logarithmic" ? {} : {
+      splits: function (u, index, low, high) { return ticks(low, high, true); },
+      filter: function (u, splits) { return splits; }
+    })
+  ];
+}
 
-  function whole(figure) { zoom(figure, -Infinity, Infinity); }
+function vertical(panel) {
+  if (panel.range) return { range: panel.range };
+  if (panel.scale !== "logarithmic") return { range: { min: { pad: 0.08 }, max: { pad: 0.14 } } };
+  return {
+    distr: 3,
+    // As in the pictures, 140 dB below the largest are shown at most.
+    range: function (u, low, high) { return high > 0 ? [Math.max(low, high * 1e-7) / 1.4, high * 1.6] : [0.1, 1]; }
+  };
+}
 
-  function build(figure) {
-    figure.panels.forEach(function (u) { u.destroy(); });
-    figure.panels = figure.plot.panels.map(function (panel, index) {
-      var data = [figure.x].concat(panel.series.map(function (curve) {
-        var values = curve.values;
-        if (panel.scale === "logarithmic") return values.map(function (v) { return v > 0 ? v : null; });
-        // No line across the wrap of a phase.
-        return panel.label !== "phase" ? values : values.map(function (v, i) {
-          return i > 0 && v != null && values[i - 1] != null && Math.abs(v - values[i - 1]) > 180 ? null : v;
-        });
-      }));
-      return new uPlot(options(figure, index), data, figure.host);
-    });
-  }
-
-  function chosen(figure, index) {
-    var tap = figure.plot.taps[index], x = figure.x, reach = Math.max(20 * figure.plot.x.step, 0.02 * x[x.length - 1]);
-    figure.tap = index;
-    figure.said.textContent = tap.name + ": " + tap.words;
-    zoom(figure, tap.at - 0.25 * reach, tap.at + reach);
-  }
-
-  function chips(figure) {
-    var bar = element("div", "chips");
-    function chip(words, className, action) {
-      var button = element("button", className, words);
-      button.type = "button";
-      button.addEventListener("click", action);
-      bar.appendChild(button);
-    }
-    chip("whole range", "reset", function () { figure.tap = -1; figure.said.textContent = ""; whole(figure); });
-    figure.plot.marks.forEach(function (mark) {
-      chip(mark.name + ", " + mark.words, mark.mode ? "mode" : "other", function () {
-        var reach = Math.max(40 * mark.half, 10 * figure.plot.x.step);
-        zoom(figure, mark.at - reach, mark.at + reach);
-      });
-    });
-    figure.plot.taps.forEach(function (tap, index) {
-      chip((tap.used ? "● " : "✕ ") + tap.name, tap.used ? "mode" : "bad", function () { chosen(figure, index); });
-    });
-    chip("picture", "reset", function () { figure.element.classList.toggle("still"); });
-    return bar;
-  }
-
-  // A click without a drag takes the nearest tap.
-  function clicks(figure) {
-    if (figure.plot.kind !== "taps") return;
-    figure.host.addEventListener("click", function (event) {
-      var over = event.target.closest(".u-over"), u = figure.panels[0];
-      if (!over || !u) return;
-      var at = event.clientX - over.getBoundingClientRect().left, best = -1, near = 14;
-      figure.plot.taps.forEach(function (tap, index) {
-        var distance = Math.abs(u.valToPos(tap.at, "x") - at);
-        if (distance < near) { near = distance; best = index; }
-      });
-      if (best >= 0) chosen(figure, best);
-    });
-  }
-
-  function start(node, index) {
-    var figure = { element: node, key: "figure" + index, panels: [], tap: -1, x: [] };
-    figure.plot = JSON.parse(node.querySelector("script").textContent);
-    for (var i = 0; i < figure.plot.x.count; i++) figure.x.push(figure.plot.x.start + i * figure.plot.x.step);
-    var live = element("div", "plot");
-    figure.host = element("div", "host");
-    figure.said = element("p", "said");
-    figure.said.setAttribute("aria-live", "polite");
-    live.appendChild(chips(figure));
-    live.appendChild(figure.host);
-    live.appendChild(figure.said);
-    live.appendChild(element("p", "note", "Drag over a range to zoom, double click for the whole range. " + figure.plot.note));
-    node.insertBefore(live, node.firstChild);
-    node.classList.add("live");
-    build(figure);
-    clicks(figure);
-    all.push(figure);
-  }
-
-  document.querySelectorAll("figure.curves").forEach(start);
-  addEventListener("resize", function () {
-    all.forEach(function (figure) {
-      var width = Math.max(figure.host.clientWidth, 240);
-      figure.panels.forEach(function (u) { if (u.width !== width) u.setSize({ width: width, height: u.height }); });
+function options(figure, index) {
+  var plot = figure.plot, panel = plot.panels[index], last = index === plot.panels.length - 1;
+  var log = panel.scale === "logarithmic", taps = plot.kind === "taps";
+  var series = [{ label: plot.x.label, value: function (u, v) { return v == null ? "–" : +v.toPrecision(7) + " " + plot.x.unit; } }];
+  panel.series.forEach(function (curve) {
+    series.push({
+      label: curve.name, stroke: taps ? color("--data") : color("--c" + curve.color % 6), width: 1.5, spanGaps: false,
+      points: { show: taps ? false : undefined },
+      value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.unit)); }
     });
   });
-  // Canvases do not follow the page's colours by themselves.
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { all.forEach(build); });
-})();
+  var draw = [taps ? drawTaps(plot, figure) : drawMarks(plot, index === 0)];
+  return {
+    width: Math.max(figure.host.clientWidth, 240),
+    height: (log ? 280 : panel.label === "coherence" ? 130 : taps ? 260 : 150) + (last ? 36 : 0),
+    series: series, axes: axes(plot, panel, last),
+    scales: { x: { time: false }, y: vertical(panel) },
+    bands: taps ? [{ series: [2, 1], fill: color("--data") + "55" }] : [],
+    padding: [index === 0 ? 22 : 8, 30, 0, 0],
+    cursor: { sync: { key: figure.key, scales: ["x", null] }, drag: { x: true, y: false } },
+    hooks: { draw: draw }
+  };
+}
+
+function zoom(figure, low, high) {
+  var x = figure.x, end = x[x.length - 1];
+  figure.panels.forEach(function (u) {
+    u.setScale("x", { min: Math.max(low, x[0]), max: Math.min(high, end) });
+  });
+}
+
+function whole(figure) { zoom(figure, -Infinity, Infinity); }
+
+function build(figure) {
+  if (figure.plot.kind === "points") return buildPoints(figure);
+  figure.panels.forEach(function (u) { u.destroy(); });
+  figure.panels = figure.plot.panels.map(function (panel, index) {
+    var data = [figure.x].concat(panel.series.map(function (curve) {
+      var values = curve.values;
+      if (panel.scale === "logarithmic") return values.map(function (v) { return v > 0 ? v : null; });
+      // No line across the wrap of a phase.
+      return panel.label !== "phase" ? values : values.map(function (v, i) {
+        return i > 0 && v != null && values[i - 1] != null && Math.abs(v - values[i - 1]) > 180 ? null : v;
+      });
+    }));
+    var u = new uPlot(options(figure, index), data, figure.host);
+    fingers(u, { x: [figure.x[0], figure.x[figure.x.length - 1]] }, function (x) { zoom(figure, x[0], x[1]); });
+    return u;
+  });
+}
+
+function chosen(figure, index) {
+  var tap = figure.plot.taps[index], x = figure.x, reach = Math.max(20 * figure.plot.x.step, 0.02 * x[x.length - 1]);
+  figure.tap = index;
+  figure.said.textContent = tap.name + ": " + tap.words;
+  zoom(figure, tap.at - 0.25 * reach, tap.at + reach);
+}
+
+function chips(figure) {
+  var bar = element("div", "chips");
+  function chip(words, className, action) {
+    var button = element("button", className, words);
+    button.type = "button";
+    button.addEventListener("click", function () { action(button); });
+    bar.appendChild(button);
+  }
+  if (figure.plot.kind === "points") pointChips(figure, chip);
+  else curveChips(figure, chip);
+  chip("picture", "reset", function () { figure.element.classList.toggle("still"); });
+  return bar;
+}
+
+function curveChips(figure, chip) {
+  chip("whole range", "reset", function () { figure.tap = -1; figure.said.textContent = ""; whole(figure); });
+  figure.plot.marks.forEach(function (mark) {
+    chip(mark.name + ", " + mark.words, mark.mode ? "mode" : "other", function () {
+      var reach = Math.max(40 * mark.half, 10 * figure.plot.x.step);
+      zoom(figure, mark.at - reach, mark.at + reach);
+    });
+  });
+  figure.plot.taps.forEach(function (tap, index) {
+    chip((tap.used ? "● " : "✕ ") + tap.name, tap.used ? "mode" : "bad", function () { chosen(figure, index); });
+  });
+}
+
+// A click without a drag takes the nearest tap.
+function clicks(figure) {
+  if (figure.plot.kind !== "taps") return;
+  figure.host.addEventListener("click", function (event) {
+    var over = event.target.closest(".u-over"), u = figure.panels[0];
+    if (!over || !u) return;
+    var at = event.clientX - over.getBoundingClientRect().left, best = -1, near = 14;
+    figure.plot.taps.forEach(function (tap, index) {
+      var distance = Math.abs(u.valToPos(tap.at, "x") - at);
+      if (distance < near) { near = distance; best = index; }
+    });
+    if (best >= 0) chosen(figure, best);
+  });
+}
+
+function start(node, index) {
+  var figure = { element: node, key: "figure" + index, panels: [], tap: -1, shown: 0, x: [] };
+  figure.plot = JSON.parse(node.querySelector("script").textContent);
+  var points = figure.plot.kind === "points", axis = figure.plot.x;
+  for (var i = 0; !points && i < axis.count; i++) figure.x.push(axis.start + i * axis.step);
+  var live = element("div", "plot");
+  figure.host = element("div", "host");
+  figure.said = element("p", "said");
+  figure.said.setAttribute("aria-live", "polite");
+  live.appendChild(chips(figure));
+  live.appendChild(figure.host);
+  live.appendChild(figure.said);
+  live.appendChild(element("p", "note", "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + (figure.plot.note || "")));
+  node.insertBefore(live, node.firstChild);
+  node.classList.add("live");
+  build(figure);
+  clicks(figure);
+  all.push(figure);
+}
+
+document.querySelectorAll("figure.curves").forEach(start);
+addEventListener("resize", function () {
+  all.forEach(function (figure) {
+    figure.panels.forEach(function (u) {
+      var width = Math.max(u.root.parentNode.clientWidth, 240);
+      if (u.width !== width) u.setSize({ width: width, height: u.height });
+    });
+  });
+});
+// Canvases do not follow the page's colours by themselves.
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", function () { all.forEach(build); });

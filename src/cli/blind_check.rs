@@ -67,6 +67,10 @@ pub(super) struct BlindCheckArguments {
     /// What was planted in them: JSON list of {"name", "effects", "params"}
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,
+    /// Keep the drawn tests in this folder, each with its recordings and its description, and beside
+    /// them their truth.json: to look at, or for --folder
+    #[arg(long, value_name = "DIR", conflicts_with = "folder")]
+    keep: Option<PathBuf>,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "blind-check")]
     out: PathBuf,
@@ -111,7 +115,11 @@ pub(super) fn run(
     let output = OutputFolder::prepare(&arguments.out)?;
     let cases = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
-        _ => drawn(&arguments.campaign(seed)?, &terminal)?,
+        _ => drawn(
+            &arguments.campaign(seed)?,
+            arguments.keep.as_deref(),
+            &terminal,
+        )?,
     };
     let scores = score(&cases);
     terminal.say(&render_rows(&rows(&scores)))?;
@@ -135,7 +143,11 @@ pub(super) fn run(
 }
 
 /// Draws, seals, records, diagnoses, opens.
-fn drawn(campaign: &Campaign, terminal: &Terminal) -> anyhow::Result<Vec<Case>> {
+fn drawn(
+    campaign: &Campaign,
+    keep: Option<&Path>,
+    terminal: &Terminal,
+) -> anyhow::Result<Vec<Case>> {
     let tests = (0..campaign.len())
         .into_par_iter()
         .map(|index| campaign.draw(index))
@@ -151,7 +163,13 @@ fn drawn(campaign: &Campaign, terminal: &Terminal) -> anyhow::Result<Vec<Case>> 
         .par_iter()
         .map(|test| {
             let recorded = test.record()?;
-            let case = diagnose_recorded(&recorded, &test.truth)?;
+            let truth = test.with_limits()?;
+            let case = match keep {
+                Some(folder) => {
+                    diagnose_recorded(&recorded, &truth, &folder.join(&test.truth.name))?
+                }
+                None => diagnose_in_passing(&recorded, &truth)?,
+            };
             terminal.count(
                 "tests diagnosed",
                 done.fetch_add(1, Ordering::Relaxed) + 1,
@@ -161,11 +179,15 @@ fn drawn(campaign: &Campaign, terminal: &Terminal) -> anyhow::Result<Vec<Case>> 
         })
         .collect::<anyhow::Result<Vec<Case>>>()?;
     check_names(&tests, &diagnosed)?;
+    if let Some(folder) = keep {
+        let path = folder.join("truth.json");
+        fs::write(&path, sealed)
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
     Ok(diagnosed)
 }
 
-/// The truths as the file that is written at the end; a number that nobody knows before keeps the
-/// digest from being guessed.
+/// The truths as the file that is written at the end.
 fn sealed_text(tests: &[DrawnTest]) -> anyhow::Result<String> {
     let truths: Vec<Truth> = tests.iter().map(|test| test.truth.clone()).collect();
     Ok(tapjoint::report::blind_check::truths_json(&truths)?)
@@ -185,7 +207,7 @@ fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<()> {
             recording.file = name;
         }
         recorded.description = recorded.description.replace(&test.truth.name, "another");
-        let (_, again) = diagnose_recorded(&recorded, &test.truth)?;
+        let (_, again) = diagnose_in_passing(&recorded, &test.truth)?;
         if again != *answer {
             bail!(
                 "the answer to {} depends on the names of its files",
@@ -196,11 +218,23 @@ fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes a test into a folder of its own, and diagnoses what stands there.
-fn diagnose_recorded(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
+fn diagnose_in_passing(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
+    diagnose_recorded(recorded, truth, folder.path())
+}
+
+/// Writes a test into a folder of its own, and diagnoses what stands there.
+fn diagnose_recorded(
+    recorded: &RecordedTest,
+    truth: &Truth,
+    folder: &Path,
+) -> anyhow::Result<Case> {
+    let written = |path: &Path| format!("{}: cannot be written", path.display());
+    fs::create_dir_all(folder).with_context(|| written(folder))?;
+    let path = folder.join("test.toml");
+    fs::write(&path, &recorded.description).with_context(|| written(&path))?;
     for recording in &recorded.recordings {
-        let path = folder.path().join(&recording.file);
+        let path = folder.join(&recording.file);
         write_wav(
             &path,
             recording.sample_rate,
@@ -209,16 +243,13 @@ fn diagnose_recorded(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<C
         )?;
     }
     let test = TestDescription::parse(&recorded.description, "test.toml")?;
-    Ok(case_of(&test, folder.path(), truth))
+    Ok(case_of(&test, folder, truth))
 }
 
-/// A test that cannot be analysed or diagnosed is one without an answer.
+/// A test that cannot be analysed or diagnosed has no answer, which is counted apart.
 fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
     match diagnosis_of(test, folder) {
-        Some(diagnosis) => (
-            truth.clone().with_limits(&diagnosis),
-            Answer::of(&diagnosis),
-        ),
+        Some(diagnosis) => (truth.clone(), Answer::of(&diagnosis)),
         None => (truth.clone(), Answer::none()),
     }
 }

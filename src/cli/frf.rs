@@ -14,7 +14,7 @@ use tapjoint::description::{ChannelRef, WindowKind};
 use tapjoint::pipeline::{Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_wired};
 use tapjoint::recording::UffFormat;
 use tapjoint::report::{
-    frf_document, frf_figure, render_frf_csv, render_frf_png, render_frf_uff, render_text,
+    frf_document, frf_figure, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
 };
 
 /// Frequency response functions (H1, H2, Hv) with coherence and random error.
@@ -65,7 +65,7 @@ pub(super) struct FrfArguments {
     /// The form of the functions; default: as measured
     #[arg(long, value_enum, value_name = "FORM")]
     form: Option<FormArgument>,
-    /// Draw magnitude, phase and coherence into this file; of several recordings one file each,
+    /// Draw magnitude, phase and coherence into this file, SVG where its name ends in .svg; of several recordings one file each,
     /// named NAME-RECORDING.png
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
@@ -264,7 +264,7 @@ fn write_pictures(
     terminal: &Terminal,
 ) -> anyhow::Result<()> {
     for (file, (recording, frfs)) in files.into_iter().zip(analysis.recordings.iter().zip(frfs)) {
-        match render_frf_png(&frf_figure(recording, frfs))? {
+        match render_frf_picture(&frf_figure(recording, frfs), file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
                 "{}: no tap was accepted, so there is no function to draw",

@@ -10,6 +10,7 @@
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use tapjoint::report::plot::PictureFormat;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Beginning of the names of everything temporary.
@@ -104,6 +105,11 @@ impl OutputFile {
             ),
         };
         Ok(Self { path, target })
+    }
+
+    /// What a picture in this file should be, by its name.
+    pub(super) fn picture_format(&self) -> PictureFormat {
+        PictureFormat::of(&self.path)
     }
 
     /// Writes the whole file and puts it in its place.

@@ -10,7 +10,7 @@ use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
 use tapjoint::pipeline::IdentifySettings;
-use tapjoint::report::{document_of, render_cloud_png, render_perturbation_csv, render_text};
+use tapjoint::report::{document_of, render_cloud_picture, render_perturbation_csv, render_text};
 
 /// Enough for 95 % limits that are good to a tenth of their distance.
 const SAMPLES: usize = 2000;
@@ -39,7 +39,8 @@ pub(super) struct PerturbArguments {
     /// Monte Carlo samples
     #[arg(long, value_name = "N", default_value_t = SAMPLES, value_parser = RangedU64ValueParser::<usize>::new().range(10..=1_000_000))]
     samples: usize,
-    /// Draw the estimates, Kx against Ky, into this file
+    /// Draw the estimates, Kx against Ky, into this file; SVG where its name ends in
+    /// .svg
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
     /// Write all numbers as comma separated values into this file
@@ -63,7 +64,7 @@ pub(super) fn run(
     let analysis = file.analyse(&settings)?;
     let document = document_of(&analysis);
     if let Some(file) = png {
-        match render_cloud_png(&document)? {
+        match render_cloud_picture(&document, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn("there are no estimates of Kx and Ky to draw"),
         }

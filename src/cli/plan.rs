@@ -8,7 +8,7 @@ use anyhow::Context;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::report::blind_check::{render_confusion_png, score_json, tell_apart};
+use tapjoint::report::blind_check::{render_confusion_picture, score_json, tell_apart};
 use tapjoint::structure::JointStiffness;
 use tapjoint::study::blind_check::score;
 use tapjoint::study::plan::{PlanSettings, judge_plan};
@@ -39,7 +39,7 @@ pub(super) struct PlanArguments {
     /// Ky likewise
     #[arg(long, value_name = "K", requires = "kx")]
     ky: Option<f64>,
-    /// Picture of the table
+    /// Picture of the table; SVG where the name ends in .svg
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 }
@@ -80,7 +80,8 @@ pub(super) fn run(
     let cases = judge_plan(&file.test, &settings, &progress).with_context(|| file.name.clone())?;
     terminal.say(&tell_apart(&cases))?;
     if let Some(png) = png {
-        png.write(&render_confusion_png(&cases)?)?;
+        let picture = render_confusion_picture(&cases, png.picture_format())?;
+        png.write(&picture)?;
     }
     terminal.write_json(&score_json(&score(&cases)))?;
     Ok(Outcome::Answered)

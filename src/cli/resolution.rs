@@ -17,7 +17,7 @@ use tapjoint::description::{ReadingMethod, WindowKind};
 use tapjoint::pipeline::{Estimate, IdentifySettings, TestedStructure, tested_structure};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::report::{
-    prediction_of, render_resolution, render_resolution_csv, render_resolution_png,
+    prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
 };
 use tapjoint::structure::{Assembly, JointStiffness};
 use tapjoint::study::resolution::{
@@ -73,7 +73,7 @@ pub(super) struct ResolutionArguments {
     /// Cross-coupling stiffness (non-dimensional); default: no coupling
     #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
     kz: Option<CrossStiffness>,
-    /// Draw errors over block size into this file
+    /// Draw errors over block size into this file; SVG where its name ends in .svg
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
     /// Write every number into this file
@@ -236,7 +236,8 @@ pub(super) fn run(
     })?;
     drop(shown);
     if let Some(file) = request.png {
-        file.write(&render_resolution_png(&study)?)?;
+        let picture = render_resolution_picture(&study, file.picture_format())?;
+        file.write(&picture)?;
     }
     if let Some(file) = request.csv {
         file.write(render_resolution_csv(&study)?.as_bytes())?;

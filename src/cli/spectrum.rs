@@ -11,7 +11,7 @@ use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::WindowKind;
-use tapjoint::report::{document_of, figures_of, render_spectrum_png, render_text};
+use tapjoint::report::{document_of, figures_of, render_spectrum_picture, render_text};
 
 /// Show the averaged spectrum of a recording and its peaks with their resolution bounds.
 ///
@@ -37,7 +37,7 @@ pub(super) struct SpectrumArguments {
     /// How frequencies are read
     #[arg(long, value_enum, value_name = "R", default_value_t)]
     reading: ReadingArgument,
-    /// Draw the spectrum into this file
+    /// Draw the spectrum into this file; SVG where its name ends in .svg
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
     #[command(flatten)]
@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &SpectrumArguments, terminal: Terminal) -> anyhow::
     if let Some(file) = request.png {
         let picture = figures_of(&analysis)
             .first()
-            .map(render_spectrum_png)
+            .map(|figure| render_spectrum_picture(figure, file.picture_format()))
             .transpose()?
             .flatten();
         match picture {

@@ -19,8 +19,6 @@ pub struct Circumstances<'a> {
     pub sensors: &'a [SensorPlace],
     /// Amplitude relative to the hardest tap's (1), from 0 to 1.
     pub level: f64,
-    /// Which visit it is, from 0. The joint does not drift within one.
-    pub visit: usize,
     /// Draws for this visit's drift of Kt and Kr (1), in standard deviations.
     pub drift: [f64; 2],
 }
@@ -31,7 +29,6 @@ impl Default for Circumstances<'_> {
         Self {
             sensors: &[],
             level: 1.0,
-            visit: 0,
             drift: [0.0; 2],
         }
     }

@@ -15,7 +15,7 @@ mod parameters;
 pub use apply::{Circumstances, Seen, SensorPlace, apply};
 pub use catalogue::{EffectId, Group, Place};
 pub use effect::Effect;
-pub use joint_law::{JointLaw, JointLawKind};
+pub use joint_law::{JointLaw, JointLawKind, ModeMotion};
 pub use parameters::{Dimension, ParameterInfo, ParameterScale};
 
 /// Why an effect cannot be had.

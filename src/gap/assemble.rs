@@ -2,11 +2,14 @@
 
 use super::advisor::advise;
 use super::catalogue::PlaceKind;
+use super::decay_finding::decay_finding;
+use super::evidence::log_likelihood;
 use super::forward::Layout;
 use super::frame::{Frame, Small};
 use super::left_out::LeftOutErrors;
+use super::nominal::COUPLING;
 use super::place_map::place_map;
-use super::posterior::{APART, Entry, confounded, lead, places, spreads};
+use super::posterior::{APART, Entry, confounded, lead, places, raise_unknown, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
     Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LeftOutRecordings,
@@ -18,17 +21,42 @@ use super::verdict::{Checks, verdict};
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
+/// What the readings say against the best explanation is evidence for something unknown, which shares the
+/// prior of one group: a misfit of probability p speaks against it with odds of 1 to -e p ln p at most
+/// (Sellke, Bayarri & Berger 2001).
+pub(super) fn doubt(competition: &mut Competition) {
+    let Competition { frame, entries, .. } = competition;
+    let Some(best) = best(entries) else { return };
+    let residuals = Residuals::new(frame, &entries[best].fit);
+    let blocks = residuals
+        .as_ref()
+        .map_or_else(Vec::new, |r| r.blocks(frame));
+    let checks = Checks {
+        goodness: residuals.as_ref().and_then(Residuals::goodness),
+        blocks: &blocks,
+        withheld: WithheldErrors::new(frame, &entries[best].fit)
+            .and_then(|errors| errors.goodness()),
+        closure: None,
+    };
+    if let Some(p) = checks.refuting() {
+        let bound = -std::f64::consts::E * p * p.max(f64::MIN_POSITIVE).ln();
+        raise_unknown(entries, 1.0 / (1.0 + bound.clamp(0.0, 1.0)));
+    }
+}
+
+/// The best explanation that can be shown: what is unknown has no residual.
+fn best(entries: &[Entry]) -> Option<usize> {
+    let known = |entry: &Entry| entry.hypothesis != Hypothesis::Unknown;
+    entries.iter().position(known)
+}
+
 /// The answer to a competition.
 pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Diagnosis {
     let frame = &competition.frame;
     let entries = &competition.entries;
     let context = Context::new(competition, settings);
     let hypotheses: Vec<HypothesisResult> = (0..entries.len()).map(|k| context.result(k)).collect();
-    // The best explanation that can be shown: what is unknown has no residual.
-    let best = entries
-        .iter()
-        .position(|entry| entry.hypothesis != Hypothesis::Unknown)
-        .unwrap_or(0);
+    let best = best(entries).unwrap_or(0);
     let after = Residuals::new(frame, &entries[best].fit);
     let blocks = after
         .as_ref()
@@ -37,7 +65,9 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let checks = Checks {
         goodness,
         blocks: &blocks,
-        closure_low: hypotheses[best].closure.map(|closure| closure.low),
+        withheld: WithheldErrors::new(frame, &entries[best].fit)
+            .and_then(|errors| errors.goodness()),
+        closure: hypotheses[best].closure.filter(|_| context.decides(best)),
     };
     let nominal = entries
         .iter()
@@ -49,7 +79,8 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let none = Checks {
         goodness: nominal.as_ref().and_then(Residuals::goodness),
         blocks: &nominal_blocks,
-        closure_low: None,
+        withheld: None,
+        closure: None,
     };
     let verdict = verdict(entries, &checks, &none);
     let pulls = match (&context.before, &after) {
@@ -64,22 +95,27 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks,
         noise_floor: noise_floor(frame),
         goodness_of_fit: goodness,
+        misfit: after.as_ref().map(Residuals::misfit),
         joint_shift: hypotheses[best].joint_shift,
         hypotheses,
         map: place_map(frame, &competition.baseline),
-        decided_by: decided_by(entries),
+        decided_by: decided_by(frame, entries),
+        along_decays: decay_finding(frame, &competition.baseline),
         fitted_modes: frame.fitted_modes,
     }
 }
 
-/// Likelihood ratio of the two best hypotheses of different groups at their optima.
-fn decided_by(entries: &[Entry]) -> DecidedBy {
-    let rival = entries.iter().skip(1).find(|entry| {
-        entry.groups() != entries[0].groups() || entry.hypothesis == Hypothesis::None
-    });
-    match rival {
-        // 2 ln 3
-        Some(rival) if lead(&entries[0].fit, &rival.fit) < 2.2 => DecidedBy::Priors,
+/// Likelihood ratio of the two best hypotheses at their optima. What is unknown has readings of another
+/// uncertainty; its likelihood cannot be held against the others'.
+fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
+    let mut named = entries
+        .iter()
+        .filter(|entry| entry.hypothesis != Hypothesis::Unknown);
+    let likelihood = |entry: &Entry| log_likelihood(&frame.readings, &entry.fit.branch.optimum);
+    match (named.next(), named.next()) {
+        (Some(first), Some(rival)) if likelihood(first) - likelihood(rival) < 3.0_f64.ln() => {
+            DecidedBy::Priors
+        }
         _ => DecidedBy::Readings,
     }
 }
@@ -157,6 +193,15 @@ impl<'a> Context<'a> {
         }
     }
 
+    /// Whether the withheld readings could tell this hypothesis from the nominal model.
+    fn decides(&self, index: usize) -> bool {
+        let fit = &self.competition.entries[index].fit;
+        let after = WithheldErrors::new(self.frame(), fit);
+        after
+            .zip(self.withheld_before.as_ref())
+            .is_some_and(|(after, before)| after.decides(before))
+    }
+
     fn closure(&self, after: Option<&WithheldErrors>) -> Option<Closure> {
         closure(self.withheld_before.as_ref()?, after?, self.settings.seed)
     }
@@ -185,7 +230,9 @@ impl<'a> Context<'a> {
             return None;
         }
         for (k, (direction, _)) in sought.iter().enumerate() {
-            joint[*direction] = entry.fit.branch.optimum.parameters[k].exp();
+            if *direction != COUPLING {
+                joint[*direction] = entry.fit.branch.optimum.parameters[k].exp();
+            }
         }
         Some(joint)
     }
@@ -202,7 +249,8 @@ impl<'a> Context<'a> {
         let after = &entry.fit.branch.optimum.parameters;
         for (k, (direction, _)) in self.frame().nominal.sought().iter().enumerate() {
             let percent = Some(100.0 * ((after[k] - before[k]).exp() - 1.0));
-            match direction {
+            match *direction {
+                COUPLING => {}
                 0 => shift.kx_percent = percent,
                 _ => shift.ky_percent = percent,
             }
@@ -227,7 +275,8 @@ impl<'a> Context<'a> {
                 (values[size], Some(spreads[size])),
             );
             // lambda = 14.9: 1 % level, 90 % power.
-            own.smallest_detectable = Some(14.9_f64.sqrt() * spreads[size]);
+            own.smallest_detectable =
+                Some(14.9_f64.sqrt() * spreads[size]).filter(|size| size.is_finite());
             own.smallest_isolable = self.isolable(index, values[size] - candidate.size.nothing);
             parameters.push(own);
             if let (Some(range), Some(place)) = (&candidate.place, layout.place(k)) {

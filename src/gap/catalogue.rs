@@ -1,9 +1,9 @@
 //! The hypotheses: which size each effect may have before anything is measured.
 //!
 //! Every prior reaches zero, so that "a little of it" is never excluded by definition. Sizes are
-//! mixtures of three normal distributions, half of them where the sign is fixed: the widest has the
-//! standard deviation `scale`, whose double is the catalogue's largest size, the others a quarter and
-//! a sixteenth of it. One width alone would call a third of the range implausibly small.
+//! mixtures of two normal distributions, half of them where the sign is fixed: the wider has the
+//! standard deviation `scale`, whose double is the catalogue's largest size, the other two fifths of it.
+//! One width alone would call a third of the range implausibly small.
 //!
 //! Sizes that belong to the structure are fractions of its own: masses of the beam's mass, springs of
 //! E I/L^3, axial forces of E I/L^2. Those of sensors and clocks are absolute.

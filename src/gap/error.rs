@@ -53,6 +53,12 @@ pub enum GapError {
     /// The nominal model has no modes.
     #[error("the nominal model cannot be solved: {0}")]
     Structure(#[from] crate::structure::StructureError),
+    /// Settings with which nothing can be compared.
+    #[error("{setting}")]
+    Setting {
+        /// Which, and what is allowed.
+        setting: &'static str,
+    },
     /// No start led to a fit of the nominal model.
     #[error(
         "the nominal model could not be fitted to the frequencies; check the beam's description"

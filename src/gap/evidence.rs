@@ -6,6 +6,7 @@ use super::forward::{Forward, Layout};
 use super::frame::{Frame, Small};
 use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear, optimum_at};
 use super::noise::{self, Reading};
+use super::nominal::COUPLING;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -20,6 +21,19 @@ pub(super) struct Branch {
     pub(super) log_evidence: f64,
 }
 
+/// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
+const COUPLING_STD: f64 = 0.5;
+
+/// What is known of a stiffness before the data.
+fn stiffness_knowledge(start: f64, joint_std: f64) -> Knowledge {
+    Knowledge {
+        // Beyond these a beam's frequencies no longer feel the joint.
+        low: start.ln() - 8.0 * joint_std,
+        high: start.ln() + 8.0 * joint_std,
+        ..Knowledge::normal(start.ln(), joint_std)
+    }
+}
+
 /// What is known of all parameters of a hypothesis before the data.
 pub(super) fn knowledge(
     frame: &Frame,
@@ -31,11 +45,13 @@ pub(super) fn knowledge(
         .nominal
         .sought()
         .into_iter()
-        .map(|(_, start)| Knowledge {
-            // Beyond these a beam's frequencies no longer feel the joint.
-            low: start.ln() - 8.0 * joint_std,
-            high: start.ln() + 8.0 * joint_std,
-            ..Knowledge::normal(start.ln(), joint_std)
+        .map(|(direction, start)| match direction {
+            COUPLING => Knowledge {
+                low: -0.95,
+                high: 0.95,
+                ..Knowledge::normal(0.0, COUPLING_STD)
+            },
+            _ => stiffness_knowledge(start, joint_std),
         })
         .collect();
     for effect in &layout.effects {
@@ -340,7 +356,7 @@ pub(super) fn log_integral(
     if from >= to {
         return f64::NEG_INFINITY;
     }
-    // The prior bends within a sixteenth of its scale; cut there, both pieces are smooth.
+    // The prior bends within two fifths of its scale; cut inside, the pieces are smooth.
     let near = 0.2 * size.scale;
     let mut cuts = vec![from];
     for cut in [size.nothing - near, size.nothing, size.nothing + near] {

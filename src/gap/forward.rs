@@ -1,10 +1,11 @@
 //! What a hypothesis predicts: all readings, with their slopes.
 
 use super::catalogue::{Candidate, PlaceKind};
-use super::frame::{Frame, Row, Small};
+use super::frame::{Frame, Row};
 use super::joint_energy::{joint_shares, stiffened_slope};
+use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised};
-use super::setup::Setup;
+use super::nominal::COUPLING;
 use crate::effects::{Circumstances, Effect, Seen, apply};
 use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
 use nalgebra::DMatrix;
@@ -13,7 +14,7 @@ use std::sync::Arc;
 /// Parameters of a hypothesis in their order: joint, effects (size and place of each), small unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
-    /// Directions of the joint's stiffnesses that are sought.
+    /// What is sought of the joint: 0 translation, 1 rotation, 2 coupling.
     pub(super) joint: Vec<usize>,
     /// The effects.
     pub(super) effects: Vec<Candidate>,
@@ -62,9 +63,13 @@ impl Layout {
     /// The nominal structure with the joint that the parameters give it.
     fn with_joint(&self, specimen: &Specimen, parameters: &[f64]) -> Specimen {
         let mut specimen = specimen.clone();
-        if let SpecimenJoint::Springs { kt, kr, .. } = &mut specimen.joint {
+        if let SpecimenJoint::Springs { kt, kr, coupling } = &mut specimen.joint {
             for (direction, value) in self.joint.iter().zip(parameters) {
-                *(if *direction == 0 { &mut *kt } else { &mut *kr }) = value.exp();
+                match *direction {
+                    0 => *kt = value.exp(),
+                    COUPLING => *coupling = *value,
+                    _ => *kr = value.exp(),
+                }
             }
         }
         specimen
@@ -93,6 +98,8 @@ pub(super) struct Solved {
     pub(super) modes: Arc<SpecimenModes>,
     /// Which of the modes is the model's mode 1, 2, ...: that of a fixture is left out.
     numbers: Vec<usize>,
+    /// What its modes feel of a joint whose stiffness depends on the amplitude.
+    pub(super) changes: Option<Changes>,
 }
 
 impl Solved {
@@ -130,7 +137,7 @@ impl<'a> Forward<'a> {
         let solved = self.solve(parameters)?;
         let base = self.rows_of(&solved, parameters)?;
         let mut slopes = DMatrix::zeros(self.rows.len(), parameters.len());
-        self.joint_slopes(&solved, parameters, &mut slopes);
+        self.joint_slopes(&solved, &mut slopes);
         for index in 0..self.layout.effects.len() {
             let steps = self.steps(index, parameters);
             for (column, step) in steps.into_iter().filter(|(k, _)| !known[*k].is_held()) {
@@ -175,12 +182,12 @@ impl<'a> Forward<'a> {
     pub(super) fn solve(&self, parameters: &[f64]) -> Option<Vec<Solved>> {
         let effects = self.layout.effects_at(parameters)?;
         let mut all: Vec<Solved> = Vec::with_capacity(self.frame.setups.len());
-        for setup in &self.frame.setups {
+        for (configuration, setup) in self.frame.setups.iter().enumerate() {
             let nominal = self.layout.with_joint(&setup.specimen, parameters);
+            let changes = self.changes(configuration, parameters);
             let circumstances = Circumstances {
-                sensors: &setup.sensors,
-                level: self.level(setup, parameters),
-                visit: setup.visit,
+                sensors: &setup.carried,
+                level: self.level(setup, changes.as_ref(), parameters),
                 ..Circumstances::default()
             };
             let seen = apply(&effects, &nominal, &circumstances);
@@ -195,21 +202,10 @@ impl<'a> Forward<'a> {
                 seen,
                 modes,
                 numbers,
+                changes,
             });
         }
         Some(all)
-    }
-
-    /// Amplitude that counts for the frequency of a whole decay.
-    fn level(&self, setup: &Setup, parameters: &[f64]) -> f64 {
-        setup.level * self.share(parameters)
-    }
-
-    /// Effective amplitude over the first one.
-    pub(super) fn share(&self, parameters: &[f64]) -> f64 {
-        self.frame
-            .small_index(Small::Amplitude)
-            .map_or(1.0, |index| parameters[self.layout.smalls() + index].exp())
     }
 
     fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
@@ -259,8 +255,10 @@ impl<'a> Forward<'a> {
                 configuration,
                 mode,
             } => {
-                let frequency = solved[configuration].frequency(mode)?;
-                (frequency > 0.0).then(|| frequency.ln())
+                let one = &solved[configuration];
+                let frequency = one.frequency(mode)?;
+                let own = Self::own_change(mode, one);
+                (frequency > 0.0).then(|| frequency.ln() + own)
             }
             Row::Constant {
                 configuration,
@@ -288,7 +286,7 @@ impl<'a> Forward<'a> {
                 };
                 Some(at(sensor) / at(reference))
             }
-            Row::Damping { mode } => Some(self.damping(mode, &solved[0], parameters)?.0.ln()),
+            Row::Damping { mode } => Some(self.damping(mode, solved, parameters)?.0.ln()),
             Row::Slope {
                 configuration,
                 mode,
@@ -302,7 +300,7 @@ impl<'a> Forward<'a> {
 
     /// d ln f/d ln k = half the strain energy of that spring, as the mode has it, over that of the
     /// structure (Rayleigh's quotient is stationary in the shape).
-    fn joint_slopes(&self, solved: &[Solved], parameters: &[f64], slopes: &mut DMatrix<f64>) {
+    fn joint_slopes(&self, solved: &[Solved], slopes: &mut DMatrix<f64>) {
         for (row, kind) in self.rows.iter().enumerate() {
             let Row::Frequency {
                 configuration,
@@ -321,19 +319,15 @@ impl<'a> Forward<'a> {
                 continue;
             };
             for (column, &direction) in self.layout.joint.iter().enumerate() {
-                slopes[(row, column)] = self.joint_slope(one, (index, direction), parameters)
-                    * offset_factor(one, index);
+                slopes[(row, column)] =
+                    self.joint_slope(one, (index, direction)) * offset_factor(one, index);
             }
         }
     }
 
-    fn joint_slope(
-        &self,
-        one: &Solved,
-        (index, direction): (usize, usize),
-        _parameters: &[f64],
-    ) -> f64 {
-        if one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0) {
+    fn joint_slope(&self, one: &Solved, (index, direction): (usize, usize)) -> f64 {
+        let based = one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        if based || direction == COUPLING {
             // The base's spring is tied to the joint's by their ratio: both move.
             return stiffened_slope(one, index, direction);
         }

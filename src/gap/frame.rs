@@ -1,11 +1,12 @@
 //! What was observed, in the order in which it is compared: readings (rows) and small unknowns
 //! (columns) that every hypothesis shares.
 
+use super::decay_readings::{average_std, bent_std, widen};
 use super::noise::{self, Reading};
-use super::nominal::Nominal;
+use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
 use super::setup::{Setup, setup, twin};
-use crate::identify::observation::{DecayVerdict, Observations};
+use crate::identify::observation::Observations;
 use nalgebra::DMatrix;
 
 /// What a reading is of.
@@ -45,12 +46,14 @@ pub(super) enum Small {
     SensorPlace { place: usize },
     /// Where the hammer struck in one visit (m).
     TapPlace { visit: usize },
-    /// Calibration of a sensor (1).
-    Gain { name: usize },
+    /// Calibration of a sensor as it was mounted for one visit (1).
+    Gain { visit: usize, name: usize },
     /// Common level of the nominal damping ratios (logarithm).
     Damping,
-    /// Amplitude that counts over the one at the decay's begin (logarithm).
+    /// Amplitude of the joint over what the sensors' amplitudes and the shapes make of it (logarithm).
     Amplitude,
+    /// What the taps of one configuration scatter in common (standard deviations).
+    Scatter { configuration: usize },
     /// What no effect explains in one mode, the same in all configurations (logarithm).
     Discrepancy { mode: usize },
 }
@@ -73,8 +76,9 @@ pub(super) struct Frame {
     pub(super) fitted_modes: usize,
     /// Frequencies that take no part in the fit: row and reading.
     pub(super) withheld: Vec<(Row, Reading)>,
-    /// Number of distinct tap levels.
-    pub(super) levels: usize,
+    /// What the frequency of a configuration and mode moves by for one standard deviation of the taps' common
+    /// scatter (logarithm).
+    pub(super) scatter: Vec<((usize, usize), f64)>,
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
@@ -84,18 +88,12 @@ pub(super) struct Frame {
 /// modes beyond the model and real beams leave.
 const SHAPE_FLOOR: f64 = 0.01;
 
-/// A slope along the decay that is smaller cannot be told from what the fits' own bias leaves, in
-/// relative frequency per e-fold.
-const SLOPE_FLOOR: f64 = 5e-6;
-
-/// The amplitude that counts for a frequency fitted to a whole decay, over its first one, and the
-/// scatter of its logarithm: 0.41 to 0.5 for all powers of the amplitude
-/// ([`effective_share`](crate::identify::observation::effective_share)), less certain because other
-/// modes move the joint too.
-pub(super) const SHARE: (f64, f64) = (0.45, 0.3);
+/// The joint's amplitude over what the sensors' amplitudes and the shapes make of it, and the scatter
+/// of its logarithm: the largest rotation under the hammer is not seen, nor all modes that share in it.
+pub(super) const AMPLITUDE: (f64, f64) = (1.0, 0.25);
 
 impl Frame {
-    /// From observations whose sensors all have places (see `with_places`).
+    /// From observations in which every sensor with a mass has a place.
     pub(super) fn new(
         observations: &Observations,
         nominal: &Nominal,
@@ -103,7 +101,7 @@ impl Frame {
     ) -> Self {
         let highest = highest_mode(observations);
         let fitted_modes = if highest >= settings.withhold_from {
-            highest - settings.withheld_modes
+            highest.saturating_sub(settings.withheld_modes)
         } else {
             highest
         };
@@ -126,10 +124,9 @@ impl Frame {
             modes: highest,
             fitted_modes,
             withheld: Vec::new(),
-            levels: 0,
+            scatter: Vec::new(),
             shape_slopes: None,
         };
-        frame.set_levels();
         frame.add_frequencies(observations, settings);
         frame.add_shapes(observations);
         frame.add_damping(observations, settings);
@@ -138,14 +135,7 @@ impl Frame {
         frame
     }
 
-    fn set_levels(&mut self) {
-        let mut levels: Vec<f64> = self.setups.iter().map(|setup| setup.level).collect();
-        levels.sort_by(f64::total_cmp);
-        levels.dedup_by(|a, b| (*a - *b).abs() < 1e-3);
-        self.levels = levels.len();
-    }
-
-    fn push(&mut self, row: Row, reading: Reading) {
+    pub(super) fn push(&mut self, row: Row, reading: Reading) {
         self.rows.push(row);
         self.readings.push(reading);
     }
@@ -181,13 +171,32 @@ impl Frame {
                 continue;
             };
             let common = observations.configurations[configuration].common;
+            let share = self.scattered(configuration, mode);
+            if share != 0.0 {
+                // The common part is an unknown of its own.
+                let moved = share * reading.std;
+                self.scatter.push(((configuration, mode), moved));
+                reading.std *= (1.0 - share * share).max(0.0).sqrt();
+            }
+            // What a recording has in common is far below the floor: as good as independent.
             reading.std = reading.std.hypot(settings.frequency_floor).hypot(common);
+            if let Some(observed) = observations.configurations[configuration].mode(mode) {
+                widen(&mut reading, average_std(observed));
+            }
             if mode > self.fitted_modes {
                 self.withheld.push((row, reading));
             } else {
                 self.push(row, reading);
             }
         }
+    }
+
+    /// Share of a frequency's scatter that its configuration has in common; none of what is withheld.
+    fn scattered(&self, configuration: usize, mode: usize) -> f64 {
+        let shares = &self.setups[configuration].scatter;
+        let own = shares.iter().find(|share| share.0 == mode);
+        own.filter(|_| mode <= self.fitted_modes)
+            .map_or(0.0, |share| share.1)
     }
 
     fn add_shapes(&mut self, observations: &Observations) {
@@ -213,7 +222,9 @@ impl Frame {
                         sensor: reference,
                     };
                     let freedom = constant.freedom.unwrap_or(f64::INFINITY);
-                    constants.push((row, reading_of(constant.value, constant.std, freedom)));
+                    let bent = constant.value * bent_std(mode);
+                    let std = constant.std.hypot(bent);
+                    constants.push((row, reading_of(constant.value, std, freedom)));
                 }
                 let others = mode
                     .shape
@@ -264,27 +275,6 @@ impl Frame {
         }
     }
 
-    fn add_slopes(&mut self, observations: &Observations) {
-        let fitted = self.fitted_modes;
-        for (configuration, one) in observations.configurations.iter().enumerate() {
-            for mode in one.modes.iter().filter(|m| m.mode <= fitted) {
-                let Some(decay) = mode.decay else { continue };
-                let slope = decay.frequency_slope;
-                if decay.verdict == DecayVerdict::Doubtful || slope.std.is_nan() || slope.std <= 0.0
-                {
-                    continue;
-                }
-                let row = Row::Slope {
-                    configuration,
-                    mode: mode.mode,
-                };
-                let std = (slope.std / mode.frequency).hypot(SLOPE_FLOOR);
-                let freedom = slope.freedom.unwrap_or(f64::INFINITY).max(3.0);
-                self.push(row, reading_of(slope.value / mode.frequency, std, freedom));
-            }
-        }
-    }
-
     fn add_smalls(&mut self, names: &[String], places: &[(usize, f64)], settings: &GapSettings) {
         let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
         self.small(Small::Scale, 0.0, scale);
@@ -293,13 +283,19 @@ impl Frame {
         visits.dedup();
         if visits.len() > 1 {
             for &visit in &visits {
-                for (direction, _) in self.nominal.sought() {
+                let sought = self.nominal.sought();
+                for (direction, _) in sought.into_iter().filter(|one| one.0 != COUPLING) {
                     self.small(
                         Small::Drift { visit, direction },
                         0.0,
                         settings.drift_stds[0],
                     );
                 }
+            }
+        }
+        for configuration in 0..self.setups.len() {
+            if !self.setups[configuration].scatter.is_empty() {
+                self.small(Small::Scatter { configuration }, 0.0, 1.0);
             }
         }
         for (name, text) in names.iter().enumerate() {
@@ -312,8 +308,8 @@ impl Frame {
             .iter()
             .any(|row| matches!(row, Row::Constant { .. }));
         let ratios = self.rows.iter().any(|row| matches!(row, Row::Ratio { .. }));
-        if shapes || ratios {
-            for place in 0..places.len() {
+        for (place, (name, _)) in places.iter().enumerate() {
+            if shapes || ratios || self.nominal.mass_of(&names[*name]) > 0.0 {
                 self.small(Small::SensorPlace { place }, 0.0, settings.position_std);
             }
         }
@@ -323,8 +319,10 @@ impl Frame {
             }
         }
         if shapes || ratios {
-            for name in 0..names.len() {
-                self.small(Small::Gain { name }, 0.0, settings.gain_std);
+            for &visit in &visits {
+                for name in 0..names.len() {
+                    self.small(Small::Gain { visit, name }, 0.0, settings.gain_std);
+                }
             }
         }
         if self
@@ -343,7 +341,7 @@ impl Frame {
             // Wide: nobody knows the damping of a beam beforehand.
             self.small(Small::Damping, sum / count, 2.0);
         }
-        self.small(Small::Amplitude, SHARE.0.ln(), SHARE.1);
+        self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
     }
 
     fn small(&mut self, small: Small, centre: f64, std: f64) {
@@ -352,13 +350,20 @@ impl Frame {
         self.small_stds.push(std);
     }
 
+    /// What one standard deviation of the taps' common scatter moves a frequency by (logarithm).
+    pub(super) fn scatter_of(&self, configuration: usize, mode: usize) -> f64 {
+        let mut all = self.scatter.iter();
+        all.find(|one| one.0 == (configuration, mode))
+            .map_or(0.0, |one| one.1)
+    }
+
     /// Place of a small unknown among all, if it is there.
     pub(super) fn small_index(&self, small: Small) -> Option<usize> {
         self.smalls.iter().position(|&one| one == small)
     }
 }
 
-fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {
+pub(super) fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {
     Reading {
         value,
         std,

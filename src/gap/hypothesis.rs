@@ -1,7 +1,8 @@
 //! Fits one hypothesis: starts, signs, places, and the sum over them.
 
 use super::branches::{keep, peaks};
-use super::catalogue::{Candidate, PlaceRange};
+use super::catalogue::{Candidate, PlaceKind, PlaceRange};
+use super::decay_finding::best_law;
 use super::evidence::{
     Branch, covariance, evaluate, knowledge, linear_optimum, log_integral, log_likelihood,
     log_mean, log_sum, over_drifts,
@@ -9,6 +10,7 @@ use super::evidence::{
 use super::forward::{Forward, Layout};
 use super::frame::Frame;
 use super::least_squares::{Knowledge, Optimum, factor_of, maximise};
+use super::nominal::COUPLING;
 use super::settings::GapSettings;
 
 /// A hypothesis with its best fit.
@@ -31,7 +33,12 @@ pub(super) fn fit_nominal(frame: &Frame, settings: &GapSettings) -> Option<Fit> 
         settings.joint_std,
         settings.drift_stds[0],
     );
-    let start: Vec<f64> = known.iter().map(|known| known.centre).collect();
+    let mut start: Vec<f64> = known.iter().map(|known| known.centre).collect();
+    for (parameter, (direction, sought)) in start.iter_mut().zip(frame.nominal.sought()) {
+        if direction == COUPLING {
+            *parameter = sought;
+        }
+    }
     let branch = evaluate(&forward, &known, &start, &settings.drift_stds)?;
     Some(Fit {
         effects: Vec::new(),
@@ -61,6 +68,34 @@ impl Search<'_> {
             None => self.without_place(&forward),
             Some(range) => self.with_place(&forward, &range),
         }
+    }
+
+    /// The objective of the fit that lacks the effect, with the drift that the search begins with.
+    pub(super) fn objective_without(&self) -> Option<f64> {
+        let forward = Forward::new(self.frame, &self.without.effects);
+        let known = self.known(&forward);
+        let at = &self.without.branch.optimum;
+        Some(linear_optimum(&self.frame.readings, &known, at)?.objective)
+    }
+
+    /// The least objective that the model linearised without the effect promises, over its places.
+    pub(super) fn promise(&self, candidate: Candidate) -> Option<f64> {
+        let mut effects = self.without.effects.clone();
+        effects.push(candidate);
+        let forward = Forward::new(self.frame, &effects);
+        let known = self.known(&forward);
+        let at = forward.layout.size(effects.len() - 1);
+        let Some(range) = candidate.place else {
+            return Some(self.linear_fit(&forward, &known, None)?.objective);
+        };
+        let (low, high) = (range.inward(range.low), range.inward(range.high));
+        let nodes = (0..range.nodes).filter_map(|node| {
+            let place = low + (high - low) * (node as f64 + 0.5) / range.nodes as f64;
+            let mut held = known.clone();
+            held[at + 1] = Knowledge::held(place);
+            Some(self.linear_fit(&forward, &held, Some(place))?.objective)
+        });
+        nodes.min_by(f64::total_cmp)
     }
 
     /// The same from where the second effect has its own optimum and the first is next to nothing, if
@@ -249,6 +284,11 @@ impl Search<'_> {
                 keep(&mut found, branch, &[at, at + 1]);
             }
         }
+        if let Some(from) = self.from_decays(forward, nodes)
+            && let Some(branch) = evaluate(forward, known, &from, &self.settings.drift_stds)
+        {
+            keep(&mut found, branch, &[at, at + 1]);
+        }
         let deepest = |a: &Branch, b: &Branch| a.optimum.objective.total_cmp(&b.optimum.objective);
         found.sort_by(deepest);
         // A search along a bent valley may stop short of its end: once more from either side of it.
@@ -273,6 +313,24 @@ impl Search<'_> {
             log_mean(&evidence)
         };
         Some(self.fit(forward, best, total))
+    }
+
+    /// The best node with the size and the exponent that the changes along the decays call for, of a
+    /// joint whose stiffness depends on the amplitude.
+    fn from_decays(&self, forward: &Forward<'_>, nodes: &[Branch]) -> Option<Vec<f64>> {
+        let index = forward.layout.effects.len() - 1;
+        forward.layout.effects[index]
+            .place
+            .filter(|range| range.kind == PlaceKind::Exponent)?;
+        let law = best_law(self.frame, self.without)?.law;
+        let best = nodes
+            .iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let mut start = best.optimum.parameters.clone();
+        let at = forward.layout.size(index);
+        start[at] = law.ratio;
+        start[at + 1] = law.exponent;
+        Some(start)
     }
 
     /// What the profile of the likelihood over the size adds to the evidence of its parabola. Only

@@ -1,6 +1,7 @@
 //! How much of a mode's energy sits in the joint's springs, and what that does to its frequency.
 
 use super::forward::Solved;
+use super::nominal::COUPLING;
 use crate::structure::specimen::SpecimenJoint;
 
 /// Share of each spring of the joint in the strain energy of a mode, q_t F_t/omega^2 for a shape of
@@ -28,12 +29,17 @@ pub(super) fn joint_shares(one: &Solved, index: usize) -> [f64; 2] {
     [part(q[0], q[1], kt, kr), part(q[1], q[0], kr, kt)]
 }
 
-/// d ln f/d ln k of a spring of the joint by Rayleigh's quotient of the stiffened structure.
+/// d ln f/d ln k of a spring of the joint, or d ln f/d coupling, by Rayleigh's quotient of the changed
+/// structure.
 pub(super) fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f64 {
     const STEP: f64 = 1e-4;
     let mut other = one.seen.specimen.clone();
-    if let SpecimenJoint::Springs { kt, kr, .. } = &mut other.joint {
-        *(if direction == 0 { kt } else { kr }) *= STEP.exp();
+    if let SpecimenJoint::Springs { kt, kr, coupling } = &mut other.joint {
+        match direction {
+            0 => *kt *= STEP.exp(),
+            COUPLING => *coupling += STEP,
+            _ => *kr *= STEP.exp(),
+        }
     }
     match one.modes.rayleigh_frequency(index, &other) {
         Ok(frequency) => (frequency / one.modes.frequencies()[index]).ln() / STEP,

@@ -95,10 +95,10 @@ fn without(frame: &Frame, residuals: &Residuals, visit: usize) -> Option<Withhel
     let (predicted, spread) = (factor.solve(&own), factor.inverse());
     let percent = |k: usize| 100.0 * frame.readings[rows[frequencies[k]]].std;
     let count = frequencies.len();
-    Some(WithheldErrors::from_parts(
-        DVector::from_fn(count, |k, _| percent(k) * predicted[frequencies[k]]),
-        DMatrix::from_fn(count, count, |i, j| {
-            percent(i) * percent(j) * spread[(frequencies[i], frequencies[j])]
-        }),
-    ))
+    let errors = DVector::from_fn(count, |k, _| percent(k) * predicted[frequencies[k]]);
+    let covariance = DMatrix::from_fn(count, count, |i, j| {
+        percent(i) * percent(j) * spread[(frequencies[i], frequencies[j])]
+    });
+    let stds = DVector::from_fn(count, |k, _| percent(k));
+    Some(WithheldErrors::from_parts(errors, covariance, stds))
 }

@@ -25,12 +25,15 @@ mod branches;
 mod catalogue;
 mod catch_all;
 mod checks;
+mod decay_finding;
+mod decay_readings;
 mod error;
 mod evidence;
 mod forward;
 mod frame;
 mod hypothesis;
 mod joint_energy;
+mod joint_path;
 mod least_squares;
 mod left_out;
 mod noise;
@@ -49,17 +52,32 @@ mod verdict;
 mod withheld;
 
 pub use advisor::{NextTest, Step};
+pub use decay_finding::{DecayChange, DecayFinding};
 pub use error::GapError;
 pub use nominal::{Nominal, NominalSensor};
 pub use result::{
     Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
-    LeftOutRecording, LeftOutRecordings, ParameterValue, PlaceMap, PlaceProbabilities, Pull,
-    Verdict,
+    LeftOutRecording, LeftOutRecordings, Misfit, ParameterValue, PlaceMap, PlaceProbabilities,
+    Pull, Verdict,
 };
 pub use settings::GapSettings;
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
 
 use crate::identify::observation::Observations;
+
+/// By how much chi square (priors included) the nominal model with its joint refitted misses what a test
+/// observed: what any effect could gain at most.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn nominal_chi_square(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<f64, GapError> {
+    checks::check(observations, nominal)?;
+    search::nominal_chi_square(observations, nominal, settings).ok_or(GapError::NoFit)
+}
 
 /// Diagnoses what a test observed against what it was described to be.
 ///
@@ -71,7 +89,9 @@ pub fn diagnose(
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
+    settings.check()?;
     checks::check(observations, nominal)?;
-    let competition = search::compete(observations, nominal, settings)?;
+    let mut competition = search::compete(observations, nominal, settings)?;
+    assemble::doubt(&mut competition);
     Ok(assemble::diagnosis(&competition, settings))
 }

@@ -3,11 +3,15 @@
 use crate::identify::observation::ObservedSensor;
 use crate::structure::specimen::{PointMass, Specimen, SpecimenJoint};
 
+/// Index of the coupling among what is sought of a joint, after translation and rotation.
+pub(super) const COUPLING: usize = 2;
+
 /// The tested structure as it was described.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Nominal {
     /// Beam, joint and what is fastened to them for good, without sensors. The joint's stiffnesses are
-    /// where the search for them begins; those that are 0 or infinite stay so.
+    /// where the search for them begins, stated ones too; those that are 0 or infinite stay so. A coupling
+    /// other than 0 is sought with them.
     pub specimen: Specimen,
     /// The sensors by name.
     pub sensors: Vec<NominalSensor>,
@@ -24,11 +28,21 @@ pub struct Nominal {
 pub struct NominalSensor {
     /// Its name.
     pub name: String,
-    /// Its mass (kg); `None` where nobody said.
+    /// Its mass (kg); `None` where nobody said, 0 of one that does not touch the structure.
     pub mass: Option<f64>,
+    /// Where it sits in the reference configuration (m); `None` where nobody said.
+    pub position: Option<f64>,
 }
 
 impl Nominal {
+    /// Whether a sensor is known not to touch the structure.
+    pub(super) fn is_apart(&self, name: &str) -> bool {
+        let touches_nothing = |sensor: &NominalSensor| sensor.mass == Some(0.0);
+        self.sensors
+            .iter()
+            .any(|sensor| sensor.name == name && touches_nothing(sensor))
+    }
+
     /// Mass of a sensor (kg), 0 where it is unknown.
     pub(super) fn mass_of(&self, name: &str) -> f64 {
         self.sensors
@@ -51,28 +65,29 @@ impl Nominal {
         specimen
     }
 
-    /// The joint's stiffnesses that are to be found: index (0 translation, 1 rotation) and start.
+    /// What is to be found of the joint: index (0 translation, 1 rotation, 2 the coupling of a joint that
+    /// has one) and start.
     pub(super) fn sought(&self) -> Vec<(usize, f64)> {
-        match self.specimen.joint {
-            SpecimenJoint::Free => Vec::new(),
-            SpecimenJoint::Springs { .. } => self
-                .specimen
-                .joint
-                .stiffnesses()
-                .into_iter()
-                .enumerate()
-                .filter(|(_, stiffness)| *stiffness > 0.0 && stiffness.is_finite())
-                .collect(),
+        let SpecimenJoint::Springs { coupling, .. } = self.specimen.joint else {
+            return Vec::new();
+        };
+        let stiffnesses = self.specimen.joint.stiffnesses().into_iter().enumerate();
+        let mut sought: Vec<(usize, f64)> = stiffnesses
+            .filter(|(_, stiffness)| *stiffness > 0.0 && stiffness.is_finite())
+            .collect();
+        if coupling != 0.0 {
+            sought.push((COUPLING, coupling));
         }
+        sought
     }
 }
 
 impl NominalSensor {
-    /// The sensor as a configuration sees it when nobody said where it sat.
-    pub(super) fn unplaced(&self) -> ObservedSensor {
+    /// The sensor as a configuration sees it that was read elsewhere.
+    pub(super) fn observed(&self) -> ObservedSensor {
         ObservedSensor {
             name: self.name.clone(),
-            position: None,
+            position: self.position,
         }
     }
 }

@@ -14,7 +14,12 @@ const FIRSTS: usize = 2;
 /// Logarithm of the Bayes factor from which a second effect is believed.
 const SECOND: f64 = 5.0;
 
-/// Where no single effect suffices: a second one beside each of the best.
+/// How much further a second effect must promise to lower the objective where a single one suffices: what is
+/// believed, and as much again for the place and size that it may choose.
+const PROMISED: f64 = 2.0 * SECOND;
+
+/// A second effect beside each of the best single ones, where none of these suffices or the second promises
+/// much.
 pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
     let frame = &competition.frame;
     let suffices = |entry: &Entry| {
@@ -22,9 +27,15 @@ pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
             && entry.drift.is_none()
             && !misfits(frame, &entry.fit)
     };
-    if frame.rows.len() < 6 || competition.entries.iter().any(suffices) {
+    let seen = |entry: &Entry| entry.hypothesis != Hypothesis::None;
+    if frame.rows.len() < 6 || !competition.entries.first().is_some_and(seen) {
         return;
     }
+    let needed = if competition.entries.iter().any(suffices) {
+        PROMISED
+    } else {
+        f64::NEG_INFINITY
+    };
     let singles: Vec<&Entry> = competition
         .entries
         .iter()
@@ -40,13 +51,45 @@ pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
                 .map(|second| (*first, *second))
         })
         .collect();
-    let found: Vec<Option<Entry>> = tasks
+    let found: Vec<Option<Entry>> = promising((frame, settings), &tasks, needed)
         .par_iter()
         .map(|(first, second)| pair(frame, settings, (first, second)))
         .collect();
     let pairs = distinct(found.into_iter().flatten().collect());
+    let tried = tasks.len();
     competition.entries.extend(pairs);
-    set_probabilities(&mut competition.entries);
+    set_probabilities(&mut competition.entries, tried);
+}
+
+/// How many pairs are fitted in earnest.
+const EARNEST: usize = 6;
+
+/// The pairs whose linearised models explain the readings best, and better than the best single one by what
+/// is needed.
+fn promising<'a>(
+    (frame, settings): (&Frame, &GapSettings),
+    tasks: &[(&'a Entry, &'a Entry)],
+    needed: f64,
+) -> Vec<(&'a Entry, &'a Entry)> {
+    let promise = |(first, second): &(&Entry, &Entry)| {
+        let search = Search {
+            frame,
+            settings,
+            without: &first.fit,
+        };
+        let candidate = *second.fit.effects.first()?;
+        Some((search.objective_without()?, search.promise(candidate)?))
+    };
+    let promises: Vec<Option<(f64, f64)>> = tasks.par_iter().map(promise).collect();
+    let alone = promises.iter().flatten().map(|promise| promise.0);
+    let alone = alone.fold(f64::INFINITY, f64::min);
+    let of = |k: usize| promises[k].map_or(f64::INFINITY, |promise| promise.1);
+    let mut order: Vec<usize> = (0..tasks.len())
+        .filter(|&k| of(k) < alone - needed)
+        .collect();
+    order.sort_by(|&a, &b| of(a).total_cmp(&of(b)));
+    order.truncate(EARNEST);
+    order.into_iter().map(|k| tasks[k]).collect()
 }
 
 /// A second effect beside a first one, if it is believed: it has to beat the better of the two by
@@ -105,7 +148,8 @@ fn misfits(frame: &Frame, fit: &Fit) -> bool {
         super::verdict::Checks {
             goodness: residuals.goodness(),
             blocks: &blocks,
-            closure_low: None,
+            withheld: None,
+            closure: None,
         }
         .refuted()
     })

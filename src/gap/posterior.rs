@@ -47,13 +47,14 @@ impl Entry {
 const NONE_SHARE: f64 = 4.0;
 
 /// Gives every group the same probability beforehand, split evenly inside; `unknown` is a group, `none`
-/// has [`NONE_SHARE`] of them. Pairs share one unit among themselves. Sorts the most probable first.
-pub(super) fn set_probabilities(entries: &mut [Entry]) {
+/// has [`NONE_SHARE`] of them. The pairs that were `tried` share one unit among themselves, the accepted
+/// and the others. Sorts the most probable first.
+pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
     let share = |entry: &Entry| -> f64 {
+        if entry.effects().len() > 1 {
+            return tried.max(1) as f64;
+        }
         let same = |other: &&Entry| match (&entry.hypothesis, &other.hypothesis) {
-            (Hypothesis::Effects(own), Hypothesis::Effects(others)) if own.len() > 1 => {
-                others.len() > 1
-            }
             (Hypothesis::Effects(_), Hypothesis::Effects(others)) => {
                 others.len() == 1 && other.groups() == entry.groups()
             }
@@ -72,6 +73,26 @@ pub(super) fn set_probabilities(entries: &mut [Entry]) {
     let total = log_sum(&logs);
     for (entry, log) in entries.iter_mut().zip(&logs) {
         entry.probability = (log - total).exp();
+    }
+    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
+/// Gives what is unknown this probability, if that is more than it has, at the cost of all others.
+pub(super) fn raise_unknown(entries: &mut [Entry], probability: f64) {
+    let is_unknown = |entry: &Entry| entry.hypothesis == Hypothesis::Unknown;
+    let has = entries.iter().find(|entry| is_unknown(entry));
+    let Some(has) = has.map(|entry| entry.probability) else {
+        return;
+    };
+    if has >= probability {
+        return;
+    }
+    for entry in entries.iter_mut() {
+        entry.probability = if is_unknown(entry) {
+            probability
+        } else {
+            entry.probability * (1.0 - probability) / (1.0 - has)
+        };
     }
     entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }

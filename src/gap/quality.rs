@@ -4,7 +4,7 @@ use super::evidence::covariance;
 use super::frame::{Frame, Row, Small};
 use super::hypothesis::Fit;
 use super::noise;
-use super::result::{Block, Pull};
+use super::result::{Block, Misfit, Pull};
 use nalgebra::{DMatrix, DVector};
 
 /// Residuals of a fit and how they hang together.
@@ -67,8 +67,15 @@ impl Residuals {
 
     /// Probability of a chi square as large or larger, all readings and priors together.
     pub(super) fn goodness(&self) -> Option<f64> {
-        let freedom = self.unit.len() as f64 - self.wide as f64;
-        noise::chi_square_tail(self.unit.norm_squared() + self.prior, freedom)
+        let misfit = self.misfit();
+        noise::chi_square_tail(misfit.chi_square, misfit.freedom)
+    }
+
+    pub(super) fn misfit(&self) -> Misfit {
+        Misfit {
+            chi_square: self.unit.norm_squared() + self.prior,
+            freedom: self.unit.len() as f64 - self.wide as f64,
+        }
     }
 
     /// The same of some rows alone. Their sum of squares is taken as g chi2_n with the mean tr B and the

@@ -1,6 +1,7 @@
 //! What the diagnosis says, as plain data.
 
 use super::advisor::NextTest;
+use super::decay_finding::DecayFinding;
 use crate::effects::{Effect, EffectId, Group};
 
 /// The answer.
@@ -20,6 +21,8 @@ pub struct Diagnosis {
     pub noise_floor: f64,
     /// Goodness of fit of the best hypothesis that has a name or none.
     pub goodness_of_fit: Option<f64>,
+    /// What that rests on; `None` without a fit.
+    pub misfit: Option<Misfit>,
     /// What adding the best hypothesis does to the joint.
     pub joint_shift: JointShift,
     /// What the residual of the nominal model calls for along the beam; `None` where the readings are
@@ -27,6 +30,9 @@ pub struct Diagnosis {
     pub map: Option<PlaceMap>,
     /// How certain it is that this was decided by the readings and not by the priors.
     pub decided_by: DecidedBy,
+    /// What the decays by themselves say of a joint whose stiffness depends on the amplitude; `None` where
+    /// no frequency changes along them.
+    pub along_decays: Option<DecayFinding>,
     /// Modes above this number took no part in the fit.
     pub fitted_modes: usize,
     /// Tests that would tell more, those first that tell most per cost.
@@ -233,6 +239,15 @@ pub struct Pull {
     pub error_percent_after: f64,
     /// That over the standard uncertainty (1).
     pub z_after: f64,
+}
+
+/// How far a fit misses the readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Sum of the squared residuals in standard deviations, priors of the small unknowns included (1).
+    pub chi_square: f64,
+    /// Readings less parameters on which the priors have no hold.
+    pub freedom: f64,
 }
 
 /// Readings that belong together.

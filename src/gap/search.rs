@@ -7,7 +7,7 @@ use super::evidence::log_mean;
 use super::forward::Forward;
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search, fit_nominal};
-use super::nominal::Nominal;
+use super::nominal::{COUPLING, Nominal};
 use super::pairs::add_pairs;
 use super::posterior::{Entry, set_probabilities};
 use super::result::Hypothesis;
@@ -45,7 +45,7 @@ pub(super) fn compete(
     } else {
         over_placements(first, rest)
     };
-    set_probabilities(&mut competition.entries);
+    set_probabilities(&mut competition.entries, 0);
     add_pairs(&mut competition, settings);
     Ok(competition)
 }
@@ -66,7 +66,7 @@ fn placements(
             configuration.sensors = nominal
                 .sensors
                 .iter()
-                .map(super::nominal::NominalSensor::unplaced)
+                .map(super::nominal::NominalSensor::observed)
                 .collect();
         }
         // A sensor without a place and without a mass says nothing and weighs nothing.
@@ -96,14 +96,14 @@ fn placements(
         .collect()
 }
 
-/// Evidence averaged over the places; every hypothesis keeps the place that suits it best.
+/// Evidence averaged over the places; fits and residuals are those of the place that explains most.
 fn over_placements(mut first: Competition, rest: Vec<Competition>) -> Competition {
     let best_frame = |entries: &[Entry]| {
-        entries
-            .iter()
-            .map(|entry| entry.fit.log_evidence)
-            .fold(f64::NEG_INFINITY, f64::max)
+        let evidences = entries.iter().map(|entry| entry.fit.log_evidence);
+        evidences.fold(f64::NEG_INFINITY, f64::max)
     };
+    let mut most = best_frame(&first.entries);
+    let places = rest.len() + 1;
     for index in 0..first.entries.len() {
         let name = first.entries[index].hypothesis.clone();
         let same = |other: &Competition| -> Option<f64> {
@@ -112,6 +112,8 @@ fn over_placements(mut first: Competition, rest: Vec<Competition>) -> Competitio
         };
         let mut all = vec![first.entries[index].fit.log_evidence];
         all.extend(rest.iter().filter_map(same));
+        // Where a fit failed there is no evidence.
+        all.resize(places, f64::NEG_INFINITY);
         first.entries[index].fit.log_evidence = log_mean(&all);
     }
     // Residuals are shown where the readings are explained best.
@@ -126,7 +128,6 @@ fn over_placements(mut first: Competition, rest: Vec<Competition>) -> Competitio
         .map(|entry| entry.hypothesis.clone())
         .collect();
     let mut best = first;
-    let mut most = f64::NEG_INFINITY;
     for other in rest {
         let own = best_frame(&other.entries);
         if own > most {
@@ -142,18 +143,42 @@ fn over_placements(mut first: Competition, rest: Vec<Competition>) -> Competitio
     best
 }
 
+/// The least chi square of the nominal model over the places that nobody said.
+pub(super) fn nominal_chi_square(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<f64> {
+    placements(observations, nominal, settings)
+        .iter()
+        .filter_map(|placed| Some(nominal_of(placed, nominal, settings)?.1))
+        .map(|none| 2.0 * none.branch.optimum.objective)
+        .min_by(f64::total_cmp)
+}
+
+/// The readings, with amplitudes and slopes as the nominal model has them, and its fit.
+fn nominal_of(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<(Frame, Fit)> {
+    let mut frame = Frame::new(observations, nominal, settings);
+    let first = fit_nominal(&frame, settings)?;
+    set_amplitudes(&mut frame, &first);
+    frame.set_paths(observations, &first);
+    let forward = Forward::new(&frame, &[]);
+    let shapes = forward.joint_differences(&first.branch.optimum.parameters)?;
+    frame.shape_slopes = Some(shapes);
+    let none = fit_nominal(&frame, settings)?;
+    Some((frame, none))
+}
+
 fn compete_once(
     observations: &Observations,
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Option<Competition> {
-    let mut frame = Frame::new(observations, nominal, settings);
-    let first = fit_nominal(&frame, settings)?;
-    set_amplitudes(&mut frame, &first);
-    let forward = Forward::new(&frame, &[]);
-    let shapes = forward.joint_differences(&first.branch.optimum.parameters)?;
-    frame.shape_slopes = Some(shapes);
-    let none = fit_nominal(&frame, settings)?;
+    let (frame, none) = nominal_of(observations, nominal, settings)?;
     let candidates = candidates(&frame);
     let search = Search {
         frame: &frame,
@@ -217,17 +242,19 @@ fn candidates(frame: &Frame) -> Vec<Candidate> {
 
 /// Whether the test has what the effect acts on.
 fn possible(frame: &Frame, effect: EffectId) -> bool {
-    let sensors = || frame.setups.iter().flat_map(|setup| &setup.sensors);
+    let sensors = || frame.setups.iter().flat_map(|setup| &setup.carried);
     let sought = frame.nominal.sought();
     let joint = !matches!(
         frame.nominal.specimen.joint,
         crate::structure::specimen::SpecimenJoint::Free
     );
+    let coupled = sought.iter().any(|(direction, _)| *direction == COUPLING);
     let one_beam = frame.nominal.specimen.body.beams().len() == 1;
     match effect {
         EffectId::SensorMass => sensors().any(|sensor| sensor.mass == 0.0),
         EffectId::SensorCable => sensors().count() > 0,
-        EffectId::CrossCoupling | EffectId::Fixture => joint && one_beam,
+        EffectId::CrossCoupling => joint && one_beam && !coupled,
+        EffectId::Fixture => joint && one_beam,
         EffectId::JointMass | EffectId::JointDamping => joint,
         EffectId::JointNonlinearity => sought.iter().any(|(direction, _)| *direction == 1),
         EffectId::Resolution => frame.nominal.reading_bias.is_some(),

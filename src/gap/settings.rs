@@ -1,5 +1,7 @@
 //! What the diagnosis takes for granted where nobody says otherwise.
 
+use super::error::GapError;
+
 /// Settings of the diagnosis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GapSettings {
@@ -17,7 +19,8 @@ pub struct GapSettings {
     pub sensor_mass_std: f64,
     /// Standard uncertainty of the places of sensors and taps (m): 1 mm.
     pub position_std: f64,
-    /// Standard uncertainty of the calibration of hammer and sensor together (1): 3 %.
+    /// Standard uncertainty of the calibration of hammer and sensor together (1), anew in every visit: 3 %,
+    /// since a sensor that is mounted again is not aligned as before.
     pub gain_std: f64,
     /// Scatter of the nominal damping ratios about their common value (natural logarithm): 0.4.
     pub damping_scatter: f64,
@@ -32,6 +35,24 @@ pub struct GapSettings {
     pub unknown_positions: usize,
     /// Seed of what is sampled.
     pub seed: u64,
+}
+
+impl GapSettings {
+    /// Refuses settings with which nothing can be compared.
+    pub(super) fn check(&self) -> Result<(), GapError> {
+        let refused = |setting| Err(GapError::Setting { setting });
+        let positive = |std: &f64| *std > 0.0 && std.is_finite();
+        match self {
+            s if s.drift_stds.is_empty() || !s.drift_stds.iter().all(positive) => {
+                refused("drift_stds must hold at least one standard deviation above 0")
+            }
+            s if s.withheld_modes >= s.withhold_from => {
+                refused("withheld_modes must be less than withhold_from")
+            }
+            s if s.unknown_positions == 0 => refused("unknown_positions must be at least 1"),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Default for GapSettings {

@@ -1,9 +1,12 @@
 //! One configuration of the test as the model needs it.
 
+use super::decay_readings::beginning;
+use super::joint_path::JointPath;
 use super::nominal::Nominal;
 use crate::effects::SensorPlace;
 use crate::identify::observation::{Configuration, ExtraPeak, ObservedMode};
 use crate::structure::specimen::Specimen;
+use nalgebra::DMatrix;
 
 /// One configuration as the model needs it.
 #[derive(Debug, Clone)]
@@ -12,8 +15,11 @@ pub(super) struct Setup {
     pub(super) label: String,
     /// The structure with all masses that are known.
     pub(super) specimen: Specimen,
-    /// Places and masses of the sensors.
+    /// Places and masses of the sensors, in the order of the observations. One without a place has no
+    /// mass, and its shape is not compared.
     pub(super) sensors: Vec<SensorPlace>,
+    /// Those that sit on the structure at a known place.
+    pub(super) carried: Vec<SensorPlace>,
     /// Names of the sensors, as indices.
     pub(super) names: Vec<usize>,
     /// Distinct stated places of the sensors, as indices.
@@ -24,8 +30,12 @@ pub(super) struct Setup {
     pub(super) level: f64,
     /// Amplitude at the begin and end of the followed decay over that of its first instant, by mode.
     pub(super) spans: Vec<(usize, f64, f64)>,
+    /// How the joint moves; `None` where no amplitude is known.
+    pub(super) path: Option<JointPath>,
     /// Which visit to the structure.
     pub(super) visit: usize,
+    /// What the taps' scatter has in common: share of each mode's standard deviation, with its sign.
+    pub(super) scatter: Vec<(usize, f64)>,
 }
 
 /// Index of a value in a list, which grows where it is new.
@@ -49,12 +59,18 @@ pub(super) fn setup(
         .sensors
         .iter()
         .map(|sensor| SensorPlace {
-            // Without a place it stays where it does nothing; its shape is not compared.
             position: sensor.position.unwrap_or(0.0),
             mass: sensor
                 .position
                 .map_or(0.0, |_| nominal.mass_of(&sensor.name)),
         })
+        .collect();
+    let carried = configuration
+        .sensors
+        .iter()
+        .zip(&sensors)
+        .filter(|(sensor, _)| sensor.position.is_some() && !nominal.is_apart(&sensor.name))
+        .map(|(_, place)| *place)
         .collect();
     let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
     let name_indices: Vec<usize> = configuration
@@ -71,13 +87,45 @@ pub(super) fn setup(
         label: label(index, configuration),
         specimen: nominal.with_masses(&masses),
         sensors,
+        carried,
         names: name_indices,
         places: place_indices,
         tap: configuration.tap,
         level: configuration.level.unwrap_or(1.0),
         spans: configuration.modes.iter().filter_map(span).collect(),
+        path: None,
         visit: configuration.recording.unwrap_or(index),
+        scatter: common_scatter(configuration),
     }
+}
+
+/// Largest eigenvalue of a correlation matrix above which the modes have something in common: unrelated
+/// ones are shrunk towards 1.
+const RELATED: f64 = 1.3;
+
+/// The one factor that explains most of the correlation of the taps' scatter: with the largest eigenvalue l
+/// of the correlation matrix and its vector v, the shares sqrt(l - 1) v leave the diagonal as it is and
+/// most of the rest explained (exactly all of it where all correlations are equal and many).
+fn common_scatter(configuration: &Configuration) -> Vec<(usize, f64)> {
+    let Some(covariance) = &configuration.covariance else {
+        return Vec::new();
+    };
+    let size = configuration.modes.len();
+    let correlation = DMatrix::from_fn(size, size, |i, j| {
+        covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt()
+    });
+    if size < 2 || correlation.iter().any(|value| !value.is_finite()) {
+        return Vec::new();
+    }
+    let eigen = correlation.symmetric_eigen();
+    let (at, largest) = eigen.eigenvalues.argmax();
+    if largest < RELATED {
+        return Vec::new();
+    }
+    let vector = eigen.eigenvectors.column(at);
+    let shares = vector.iter().map(|v| (largest - 1.0).sqrt() * v);
+    let modes = configuration.modes.iter().map(|mode| mode.mode);
+    modes.zip(shares).collect()
 }
 
 /// Two poles nearer than this, relative, share one decay: 1 %.
@@ -98,7 +146,7 @@ pub(super) fn twin(configuration: &Configuration, mode: &ObservedMode) -> Option
 
 fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {
     let decay = mode.decay?;
-    let first = mode.amplitude?;
+    let first = beginning(mode)?.0;
     let share = |amplitude: Option<f64>| Some(amplitude? / first);
     let (early, late) = (share(decay.early.amplitude)?, share(decay.late.amplitude)?);
     (late > 0.0 && early > 1.05 * late).then_some((mode.mode, early, late))

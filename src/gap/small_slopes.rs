@@ -91,9 +91,7 @@ impl Forward<'_> {
                 predicted * (towards - away)
             }
             Row::Damping { mode } if *small == Small::Damping => {
-                let (all, nominal) = self
-                    .damping(mode, &solved[0], parameters)
-                    .unwrap_or((1.0, 1.0));
+                let (all, nominal) = self.damping(mode, solved, parameters).unwrap_or((1.0, 1.0));
                 nominal / all
             }
             Row::Damping { .. } | Row::Slope { .. } => 0.0,
@@ -114,6 +112,9 @@ impl Forward<'_> {
         match *small {
             Small::Scale => 1.0,
             Small::Discrepancy { mode: own } if own == mode => 1.0,
+            Small::Scatter { configuration: own } if own == configuration => {
+                self.frame.scatter_of(configuration, mode)
+            }
             Small::Drift { visit, direction } if visit == setup.visit => {
                 0.5 * joint_shares(one, index)[direction]
             }
@@ -152,7 +153,9 @@ impl Forward<'_> {
         };
         let x = setup.sensors[sensor].position;
         match *small {
-            Small::Gain { name } if setup.names[sensor] == name => predicted,
+            Small::Gain { visit, name } if setup.visit == visit && setup.names[sensor] == name => {
+                predicted
+            }
             Small::SensorPlace { place } if setup.places[sensor] == place => {
                 one.modes.slope(index, x) * one.modes.displacement(index, tap)
             }
@@ -175,7 +178,9 @@ impl Forward<'_> {
             return 0.0;
         };
         match *small {
-            Small::Gain { name } if setup.names[sensor] == name => 1.0,
+            Small::Gain { visit, name } if setup.visit == visit && setup.names[sensor] == name => {
+                1.0
+            }
             Small::SensorPlace { place } if setup.places[sensor] == place => {
                 let x = setup.sensors[sensor].position;
                 one.modes.slope(index, x) / one.modes.displacement(index, x)

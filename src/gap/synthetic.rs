@@ -35,6 +35,9 @@ pub struct TestPlan {
     pub drift: f64,
     /// Damping ratio of the beam by itself (1).
     pub damping: f64,
+    /// How far what is drawn scatters, in standard deviations (1): 1, or 0 for what the mean of endless
+    /// repetition would show, drift and errors of the readings being none.
+    pub scatter: f64,
 }
 
 /// One planned recording.
@@ -102,15 +105,24 @@ struct Scene<'a> {
 
 impl Scene<'_> {
     fn normal(&mut self) -> f64 {
-        self.random.sample(StandardNormal)
+        self.plan.scatter * self.random.sample::<f64, _>(StandardNormal)
     }
 
     /// The mean of the taps and the standard deviation that their scatter suggests.
     fn measured(&mut self, value: f64, std: f64) -> Observed {
+        let value = value + std * self.normal();
+        if self.plan.taps < 2 || self.plan.scatter == 0.0 {
+            let freedom = None;
+            return Observed {
+                value,
+                std,
+                freedom,
+            };
+        }
         let freedom = self.plan.taps as f64 - 1.0;
         let squares: f64 = (1..self.plan.taps).map(|_| self.normal().powi(2)).sum();
         Observed {
-            value: value + std * self.normal(),
+            value,
             std: std * (squares / freedom).sqrt().max(1e-3),
             freedom: Some(freedom),
         }
@@ -133,7 +145,6 @@ impl Scene<'_> {
         let circumstances = |level: f64| Circumstances {
             sensors: &sensors,
             level,
-            visit: index,
             ..Circumstances::default()
         };
         let seen = apply(
@@ -142,8 +153,8 @@ impl Scene<'_> {
             &circumstances(amplitude * effective_share(power)),
         );
         let modes = self.solve(&seen.specimen)?;
-        // Along the decay: the frequency at two amplitudes either side.
-        let ends = [1.2, 0.3]
+        // Along the decay: the frequency at the two amplitudes between which it is followed.
+        let ends = ENDS
             .map(|share| apply(self.effects, &nominal, &circumstances(amplitude * share)).specimen);
         let ends = [self.solve(&ends[0])?, self.solve(&ends[1])?];
         let scale = (
@@ -170,6 +181,7 @@ impl Scene<'_> {
             peak_force: Some(planned.level),
             level: Some(planned.level),
             taps: self.plan.taps,
+            decay_seconds: None,
             modes: seen_modes,
             covariance: None,
             common: 0.0,

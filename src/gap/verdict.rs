@@ -1,7 +1,7 @@
 //! From probabilities to an answer, or to none.
 
 use super::posterior::{APART, Entry, by_group, lead};
-use super::result::{Block, Hypothesis, Verdict};
+use super::result::{Block, Closure, Hypothesis, Verdict};
 use crate::effects::EffectId;
 
 /// Probability from which a name is given.
@@ -10,6 +10,8 @@ const NAMED: f64 = 0.8;
 const MISFIT: f64 = 0.01;
 /// The same for the worst of many blocks.
 const BLOCK_MISFIT: f64 = 0.001;
+/// Probability of an error of withheld readings from which the hypothesis counts as predicting them.
+const PREDICTED: f64 = 0.05;
 /// Probability that a set has to hold, and the longest one that is still short.
 const SET: (f64, usize) = (0.9, 4);
 
@@ -23,18 +25,37 @@ pub(super) struct Checks<'a> {
     pub(super) goodness: Option<f64>,
     /// The same of its blocks, the worst first.
     pub(super) blocks: &'a [Block],
-    /// Lower end of its closure on withheld readings; `None` where that says nothing.
-    pub(super) closure_low: Option<f64>,
+    /// Goodness of its prediction of withheld readings; `None` without any.
+    pub(super) withheld: Option<f64>,
+    /// Its closure on withheld readings; `None` where that says nothing.
+    pub(super) closure: Option<Closure>,
 }
 
 impl Checks<'_> {
     /// Whether the readings refute the hypothesis.
     pub(super) fn refuted(&self) -> bool {
-        self.goodness.is_some_and(|p| p < MISFIT)
-            || self
-                .blocks
-                .first()
-                .is_some_and(|block| block.goodness_of_fit < BLOCK_MISFIT)
+        self.refuting().is_some()
+    }
+
+    /// The probability of the misfit that refutes the hypothesis, the smallest where several do; of one
+    /// block among many that of any.
+    pub(super) fn refuting(&self) -> Option<f64> {
+        let block = self.blocks.first().map(|block| block.goodness_of_fit);
+        let overall = self.goodness.filter(|p| *p < MISFIT);
+        let withheld = self.withheld.filter(|p| *p < BLOCK_MISFIT);
+        let block = block
+            .filter(|p| *p < BLOCK_MISFIT)
+            .map(|p| (p * self.blocks.len() as f64).min(MISFIT));
+        let all = [overall, withheld, block].into_iter().flatten();
+        all.min_by(f64::total_cmp)
+    }
+
+    /// Whether withheld readings speak for the hypothesis: it closes some of the gap for certain, or predicts
+    /// them within what it leaves open.
+    fn holds(&self) -> bool {
+        let predicts = self.withheld.is_some_and(|p| p > PREDICTED);
+        self.closure
+            .is_none_or(|closure| closure.low > 0.0 || predicts && closure.value > 0.0)
     }
 }
 
@@ -54,7 +75,15 @@ pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>, none: &Checks<'_>)
     if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
     }
-    let holds = checks.closure_low.is_none_or(|low| low > 0.0);
+    // With as many unknowns as readings everything fits.
+    if checks.goodness.is_none() {
+        return Verdict::NotEnoughData(
+            "as many unknowns as readings: no explanation can be tested; observe more modes, or in \
+             another configuration"
+                .to_owned(),
+        );
+    }
+    let holds = checks.holds();
     if groups[0].1 >= NAMED && holds {
         return name_of(entries, &groups[0].0);
     }
@@ -116,24 +145,29 @@ fn alias_group(entries: &[Entry]) -> Vec<usize> {
         .collect()
 }
 
-/// The shortest list of groups that holds 90 %.
+/// The shortest list of groups that holds 90 %, each with its likely members.
 fn set_of(entries: &[Entry], groups: &[(Vec<usize>, f64)]) -> Verdict {
     let mut held = 0.0;
     let mut set = Vec::new();
+    let mut counted = 0;
     for (members, probability) in groups {
-        set.push(entries[members[0]].hypothesis.clone());
+        // A group is one of its members, and which one the readings need not know.
+        let likely = members
+            .iter()
+            .filter(|&&k| entries[k].probability > 0.02 * probability);
+        set.extend(likely.map(|&k| entries[k].hypothesis.clone()));
         held += probability;
+        counted += 1;
         if held >= SET.0 {
             break;
         }
     }
-    if set.len() <= SET.1 {
+    if counted <= SET.1 {
         Verdict::Set(set)
     } else {
         Verdict::NotEnoughData(format!(
-            "{} explanations are needed to hold {:.0} % of the probability; more readings of another kind \
-             would separate them (see the next tests)",
-            set.len(),
+            "{counted} explanations are needed to hold {:.0} % of the probability; more readings of another kind \
+             would separate them",
             100.0 * SET.0
         ))
     }

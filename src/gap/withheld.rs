@@ -4,6 +4,7 @@ use super::evidence::covariance;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
+use super::noise;
 use super::result::Closure;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -18,6 +19,8 @@ pub(super) struct WithheldErrors {
     /// Covariance of these errors if the hypothesis is true (%^2): the withheld readings' own
     /// uncertainty, and that of the prediction.
     spread: DMatrix<f64>,
+    /// Standard uncertainties of the readings alone (%).
+    stds: DVector<f64>,
 }
 
 impl WithheldErrors {
@@ -36,26 +39,41 @@ impl WithheldErrors {
         let posterior = covariance(&fit.branch.knowledge, &fit.branch.optimum)?;
         let mut spread = 1e4 * &model.slopes * posterior * model.slopes.transpose();
         let mut errors = DVector::zeros(rows.len());
+        let readings = frame
+            .withheld
+            .iter()
+            .map(|(_, reading)| 100.0 * reading.std);
+        let stds = DVector::from_iterator(rows.len(), readings);
         for (row, (_, reading)) in frame.withheld.iter().enumerate() {
             errors[row] = 100.0 * (reading.value - model.predicted[row]);
-            spread[(row, row)] += (100.0 * reading.std).powi(2);
+            spread[(row, row)] += stds[row].powi(2);
         }
-        Some(WithheldErrors { errors, spread })
+        Some(Self::from_parts(errors, spread, stds))
     }
 
-    /// From errors (%) and their covariance (%^2).
-    pub(super) fn from_parts(errors: DVector<f64>, spread: DMatrix<f64>) -> Self {
-        WithheldErrors { errors, spread }
+    /// From errors (%), their covariance (%^2) and the readings' own standard uncertainties (%).
+    pub(super) fn from_parts(
+        errors: DVector<f64>,
+        spread: DMatrix<f64>,
+        stds: DVector<f64>,
+    ) -> Self {
+        WithheldErrors {
+            errors,
+            spread,
+            stds,
+        }
     }
 
     /// Several of them that have nothing in common; `None` of none.
     pub(super) fn together<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let count: usize = parts.clone().map(|part| part.errors.len()).sum();
-        let mut all = Self::from_parts(DVector::zeros(count), DMatrix::zeros(count, count));
+        let zeros = DVector::zeros(count);
+        let mut all = Self::from_parts(zeros.clone(), DMatrix::zeros(count, count), zeros);
         let mut at = 0;
         for part in parts {
             let own = part.errors.len();
             all.errors.rows_mut(at, own).copy_from(&part.errors);
+            all.stds.rows_mut(at, own).copy_from(&part.stds);
             let mut block = all.spread.view_mut((at, at), (own, own));
             block.copy_from(&part.spread);
             at += own;
@@ -68,9 +86,25 @@ impl WithheldErrors {
         root_mean_square(&self.errors)
     }
 
-    /// Root mean square that uncertainty alone would leave (%).
+    /// Probability of errors as large or larger if the hypothesis is true.
+    pub(super) fn goodness(&self) -> Option<f64> {
+        let solved = self.spread.clone().cholesky()?.solve(&self.errors);
+        noise::chi_square_tail(self.errors.dot(&solved), self.errors.len() as f64)
+    }
+
+    /// Root mean square that the readings' uncertainty alone would leave (%).
     pub(super) fn floor(&self) -> f64 {
+        root_mean_square(&self.stds)
+    }
+
+    /// The same with what the prediction leaves open (%).
+    pub(super) fn reach(&self) -> f64 {
         (self.spread.trace() / self.errors.len() as f64).sqrt()
+    }
+
+    /// Whether these readings could show that the other hypothesis, which leaves this gap, is worse.
+    pub(super) fn decides(&self, before: &Self) -> bool {
+        before.rms() > 2.0 * self.reach()
     }
 }
 
@@ -91,7 +125,7 @@ pub(super) fn closure(
     }
     let share = |before: f64, after: f64| (before - after) / (before - floor * floor);
     let value = share(gap * gap, rest * rest);
-    let factor = after.spread.clone().cholesky()?;
+    let (reach, factor) = (after.reach(), after.spread.clone().cholesky()?);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut draws: Vec<f64> = (0..DRAWS)
         .filter_map(|_| {
@@ -102,7 +136,7 @@ pub(super) fn closure(
             // The same draw moves both errors; its own square is what it adds on average.
             let square = |errors: &DVector<f64>| {
                 let sum = (errors + &moved).norm_squared() / errors.len() as f64;
-                (sum - floor * floor).max(0.0)
+                (sum - reach * reach).max(0.0)
             };
             let (gap, rest) = (square(&before.errors), square(&after.errors));
             (gap > 0.0).then(|| (1.0 - rest / gap).max(-100.0))

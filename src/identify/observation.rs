@@ -29,6 +29,8 @@ pub struct Configuration {
     pub level: Option<f64>,
     /// Taps that entered; 0 of frequencies read elsewhere and of functions from a file.
     pub taps: usize,
+    /// Length of the decays that were fitted (s); `None` where nothing was recorded.
+    pub decay_seconds: Option<f64>,
     /// The modes with a number, ascending.
     pub modes: Vec<ObservedMode>,
     /// Covariance of the frequencies (Hz^2), row by row in the order of `modes`, without `common`;
@@ -114,7 +116,7 @@ pub struct AlongDecay {
     pub damping_slope: Observed,
     /// At the largest amplitude.
     pub early: DecayEnd,
-    /// At the smallest amplitude.
+    /// At the smallest amplitude, or at a tenth of the largest.
     pub late: DecayEnd,
     /// Whether the change is one of the mode itself.
     pub verdict: DecayVerdict,
@@ -176,18 +178,6 @@ impl ObservedMode {
 }
 
 impl Configuration {
-    /// Covariance of the frequencies with what they have in common (Hz^2), C + common^2 f f'; `None`
-    /// where a frequency has no uncertainty.
-    pub fn frequency_covariance(&self) -> Option<Vec<Vec<f64>>> {
-        let mut covariance = self.covariance.clone()?;
-        for (row, a) in covariance.iter_mut().zip(&self.modes) {
-            for (value, b) in row.iter_mut().zip(&self.modes) {
-                *value += self.common.powi(2) * a.frequency * b.frequency;
-            }
-        }
-        Some(covariance)
-    }
-
     /// The mode of this number, where it was seen.
     pub fn mode(&self, number: usize) -> Option<&ObservedMode> {
         self.modes.iter().find(|mode| mode.mode == number)

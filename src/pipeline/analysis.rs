@@ -11,6 +11,7 @@ use crate::identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode
 use crate::modal::ModeReading;
 use crate::quality::Verdict;
 use crate::recording::{ChannelInfo, Format};
+use crate::structure::specimen::Specimen;
 
 /// A finished analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,6 +143,8 @@ pub struct Identification {
     pub reason: Option<String>,
     /// Predicted beside measured frequencies; empty where no joint can be predicted with.
     pub prediction: Vec<PredictedMode>,
+    /// The structure that the prediction is of; `None` without a joint to predict with.
+    pub predicted: Option<Specimen>,
     /// How errors in the frequencies move the estimate, by each method that has one.
     pub perturbations: Vec<Perturbation>,
 }

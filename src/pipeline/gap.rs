@@ -3,11 +3,15 @@
 
 use super::{Analysis, observations};
 use crate::described::{described_beam, described_specimen, stiffness_of};
-use crate::description::{JointKind, JointModel, KnownStiffness, TestDescription};
+use crate::description::{JointKind, JointModel, KnownStiffness, SensorKind, TestDescription};
 use crate::gap::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
 use crate::structure::JointStiffness;
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::specimen::SpecimenJoint;
+
+/// What each of length, thickness, modulus and density adds to the uncertainty of all frequencies where
+/// its own is not stated (1): all four together 0.2 %, as [`GapSettings::scale_std`].
+const USUAL_SHARE: f64 = 0.001;
 
 /// Where the search for the joint begins if the frequencies gave no estimate: Kx and Ky (1) of the
 /// bolted cantilever of Ingole & Chatterjee.
@@ -36,9 +40,18 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
 
 /// The structure as described; what is not described of its joint is `found`, else usual.
 pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> Nominal {
-    let sensors = test.sensors.iter().map(|sensor| NominalSensor {
-        name: sensor.name.clone(),
-        mass: sensor.mass.filter(|_| test.analysis.sensor_mass),
+    // A microphone is not on the beam: what it weighs is no matter.
+    let sensors = test.sensors.iter().map(|sensor| match sensor.kind {
+        SensorKind::Sound => NominalSensor {
+            name: sensor.name.clone(),
+            mass: Some(0.0),
+            position: None,
+        },
+        _ => NominalSensor {
+            name: sensor.name.clone(),
+            mass: sensor.mass.filter(|_| test.analysis.sensor_mass),
+            position: sensor.position,
+        },
     });
     Nominal {
         specimen: described_specimen(test, joint(test, found)),
@@ -48,8 +61,8 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
     }
 }
 
-/// Known stiffnesses, else those found, else usual ones. A coupling that the joint's model has is held as
-/// found: what the diagnosis then calls `cross-coupling` comes on top of it.
+/// Where the search for the joint begins: known stiffnesses, else those found, else usual ones; and the
+/// coupling, where the joint's model has one.
 fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
     if test.joint.kind == JointKind::Free {
         return SpecimenJoint::Free;
@@ -71,7 +84,7 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint
 }
 
 /// f is proportional to h/L^2 sqrt(E/rho): the relative uncertainties that the description states, with
-/// these exponents. `None` where it states none of them.
+/// these exponents, and a usual one of what it does not state. `None` where it states none of them.
 fn scale_std(test: &TestDescription) -> Option<f64> {
     let (beam, tolerance) = (&test.beam, &test.beam.tolerance);
     let shares = [
@@ -80,11 +93,11 @@ fn scale_std(test: &TestDescription) -> Option<f64> {
         (tolerance.modulus, beam.modulus, 0.5),
         (tolerance.density, beam.density, 0.5),
     ];
-    let squares: Vec<f64> = shares
-        .iter()
-        .filter_map(|(std, value, power)| Some((power * (*std)? / value).powi(2)))
-        .collect();
-    (!squares.is_empty()).then(|| squares.iter().sum::<f64>().sqrt())
+    let square = |(std, value, power): &(Option<f64>, f64, f64)| {
+        std.map_or(USUAL_SHARE, |std| power * std / value).powi(2)
+    };
+    let stated = shares.iter().any(|(std, ..)| std.is_some());
+    stated.then(|| shares.iter().map(square).sum::<f64>().sqrt())
 }
 
 /// Frequencies read elsewhere may be off by half a line, all in one direction.

@@ -5,11 +5,13 @@ use super::consistent::{self, StructureDetails};
 use super::doubts;
 use super::model::TestedStructure;
 use super::perturbation::perturbations;
+use super::shapes::predicted_specimen;
 use super::warning::Warning;
 use crate::identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodness};
 use crate::identify::{
     Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
 };
+use crate::structure::specimen::Specimen;
 use crate::structure::{Beam, JointStiffness};
 
 /// Which estimate is the main one.
@@ -91,16 +93,9 @@ pub fn identify(
     }
     // An estimate that no joint can have has its warning already; it predicts nothing.
     let found = (consistent.as_deref(), estimate.as_ref());
-    let prediction = match prediction(structure, found, (&measured, &used), settings) {
-        Ok(prediction) => prediction,
-        Err(error) => {
-            warnings.extend(consistent.as_ref().map(|_| Warning::Estimate {
-                code: "no-prediction",
-                text: format!("the estimated joint cannot be predicted with: {error}"),
-            }));
-            Vec::new()
-        }
-    };
+    let (prediction, predicted, failed) =
+        predict_with(structure, found, (&measured, &used), settings);
+    warnings.extend(failed);
     warnings.extend(misfit(&prediction, &measured));
     let perturbations = perturbations(structure, estimator.as_ref(), (modes, &used), settings);
     (
@@ -113,6 +108,7 @@ pub fn identify(
             consistent,
             estimate,
             prediction,
+            predicted,
             perturbations,
         },
         warnings,
@@ -159,46 +155,86 @@ fn split<T>(result: Result<T, IdentifyError>) -> (Option<T>, Option<String>) {
     }
 }
 
-/// Frequencies of the main estimate, or of the closed form with known stiffnesses in their place,
-/// beside the measured ones; of a free beam with the estimated modulus.
-fn prediction(
+/// Beam and joint of the main estimate, or of the closed form with known stiffnesses in their place; of
+/// a free beam with the estimated modulus.
+fn estimated(
     structure: &TestedStructure,
     (consistent, estimate): (Option<&ConsistentEstimate>, Option<&Estimate>),
-    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
-    settings: &IdentifySettings,
-) -> Result<Vec<PredictedMode>, IdentifyError> {
-    let (beam, joint) = match (consistent, estimate) {
-        (Some(found), _) => (found.beam, Some(found.joint)),
+) -> Option<(Beam, JointStiffness)> {
+    let with = |beam: Beam| move |joint: JointStiffness| (beam, joint);
+    match (consistent, estimate) {
+        (Some(found), _) => Some((found.beam, found.joint)),
         (None, Some(Estimate::FreeBeam(found))) => {
             let beam = Beam {
                 modulus: found.modulus.value,
                 ..structure.beam
             };
-            (beam, Some(JointStiffness::FREE))
+            Some((beam, JointStiffness::FREE))
         }
         (None, Some(Estimate::Joint(found))) => {
-            (structure.beam, structure.known.over(found.pairs.joint()))
+            let joint = structure.known.over(found.pairs.joint());
+            joint.map(with(structure.beam))
         }
-        (None, None) => (structure.beam, structure.known.over(None)),
+        (None, None) => structure.known.over(None).map(with(structure.beam)),
+    }
+}
+
+/// The prediction, the structure it is of, and why there is none although there is an estimate.
+fn predict_with(
+    structure: &TestedStructure,
+    found: (Option<&ConsistentEstimate>, Option<&Estimate>),
+    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
+    settings: &IdentifySettings,
+) -> (Vec<PredictedMode>, Option<Specimen>, Option<Warning>) {
+    let Some((beam, joint)) = estimated(structure, found) else {
+        return (Vec::new(), None, None);
     };
-    let Some(joint) = joint else {
-        return Ok(Vec::new());
-    };
-    let estimated = consistent.is_some() || estimate.is_some();
-    let used = if estimated { used } else { &[] };
+    let any = found.0.is_some() || found.1.is_some();
+    let used = if any { used } else { &[] };
+    let details = predicting(structure, found.0, settings);
+    match prediction(structure, details, (&beam, &joint), (measured, used)) {
+        Ok(prediction) => {
+            let plain = StructureDetails::default();
+            let details = details.unwrap_or(&plain);
+            let predicted = predicted_specimen(structure, details, (&beam, &joint));
+            (prediction, Some(predicted), None)
+        }
+        Err(error) => {
+            let warning = found.0.map(|_| Warning::Estimate {
+                code: "no-prediction",
+                text: format!("the estimated joint cannot be predicted with: {error}"),
+            });
+            (Vec::new(), None, warning)
+        }
+    }
+}
+
+/// What the prediction knows beyond beam and joint; `None` = a plain beam. A fallback estimated without
+/// sensors' masses predicts without them: it has taken them in.
+fn predicting<'a>(
+    structure: &TestedStructure,
+    consistent: Option<&ConsistentEstimate>,
+    settings: &'a IdentifySettings,
+) -> Option<&'a StructureDetails> {
+    let attached = consistent.is_some() || structure.known.over(None).is_some();
+    (settings.method == EstimateMethod::Consistent && attached).then_some(&settings.details)
+}
+
+/// Frequencies of the estimated beam and joint beside the measured ones.
+fn prediction(
+    structure: &TestedStructure,
+    details: Option<&StructureDetails>,
+    (beam, joint): (&Beam, &JointStiffness),
+    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
+) -> Result<Vec<PredictedMode>, IdentifyError> {
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
     let beside = (measured, &numbers[..]);
-    // A fallback estimated without sensors' masses predicts without them: it has taken them in.
-    let attached = consistent.is_some() || structure.known.over(None).is_some();
-    match settings.method {
-        EstimateMethod::Consistent if attached => {
-            let held = (&beam, &joint);
-            consistent::predict(structure, &settings.details, held, beside, count)
-        }
-        EstimateMethod::Consistent | EstimateMethod::Pairs => {
-            let held = (structure.assembly, &joint);
-            predict(structure.theory, &beam, held, beside, count)
+    match details {
+        Some(details) => consistent::predict(structure, details, (beam, joint), beside, count),
+        None => {
+            let held = (structure.assembly, joint);
+            predict(structure.theory, beam, held, beside, count)
         }
     }
 }

@@ -74,11 +74,13 @@ pub fn run_test(
     settings: &IdentifySettings,
 ) -> Result<Analysis, PipelineError> {
     let structure = tested_structure(test);
-    // In parallel, but collected in the description's order.
+    // In parallel, but collected in the description's order, so that of several errors the first is told.
     let mut recordings = test
         .recordings
         .par_iter()
         .map(|recording| recordings::measure_described(test, recording, place))
+        .collect::<Vec<Result<_, _>>>()
+        .into_iter()
         .collect::<Result<Vec<_>, _>>()?;
     let mut warnings: Vec<Warning> = test
         .warnings

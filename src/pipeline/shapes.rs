@@ -1,8 +1,12 @@
 //! Shapes of the estimated structure's modes, for who wants to see where sensors and taps sit on them.
 
-use super::analysis::{Analysis, Estimate, Identification};
+use super::analysis::Analysis;
+use super::consistent::{StructureDetails, jointed};
 use super::model::TestedStructure;
-use crate::structure::{JointStiffness, mode_shapes};
+use crate::identify::consistent::JointedStructure;
+use crate::structure::joint::StiffnessUnits;
+use crate::structure::specimen::{Body, LapOverlap, Mesh, PointMass, Specimen, SpecimenJoint};
+use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness};
 
 /// Points along the beam: enough for five half waves between two of them to look smooth.
 const POINTS: usize = 121;
@@ -12,56 +16,105 @@ const POINTS: usize = 121;
 pub struct SampledShape {
     /// The model's number.
     pub mode: usize,
-    /// Frequency of this shape (Hz), of the uniform Euler beam.
+    /// Frequency of this shape (Hz).
     pub frequency: f64,
-    /// Positions (m) from the joint; of a lap joint or a free beam from the left end.
+    /// Positions (m) from the joint; of a lap joint or a free beam from the left end. The place of a lap
+    /// joint stands twice, for either half's end.
     pub positions: Vec<f64>,
     /// Displacement relative to the largest (1).
     pub displacements: Vec<f64>,
 }
 
-/// Shapes of the predicted modes: of the uniform Euler beam on the estimated joint. Shear, the masses
-/// of sensors and unequal halves move frequencies, and hardly the shapes. Empty where there is no
-/// joint to compute them with.
+/// Shapes of the predicted modes: of the structure that the prediction is of, shear, masses of sensors
+/// and a lap joint's two halves included. Empty where nothing could be predicted.
 pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
-    let joint = |structure: &TestedStructure| {
-        let found = analysis.identification.as_ref()?;
-        Some((
-            *structure,
-            joint_of(structure, found)?,
-            found.prediction.len(),
-        ))
+    let Some(found) = &analysis.identification else {
+        return Vec::new();
     };
-    let Some((structure, joint, count)) = analysis.structure.as_ref().and_then(joint) else {
+    let Some(specimen) = &found.predicted else {
         return Vec::new();
     };
     // A joint that no beam can stand on has no shapes; the warnings say so.
-    let shapes = mode_shapes(&structure.beam, structure.assembly, &joint, count);
-    shapes
-        .unwrap_or_default()
-        .iter()
-        .enumerate()
-        .map(|(index, shape)| {
-            let step = structure.beam.length / (POINTS - 1) as f64;
-            let positions: Vec<f64> = (0..POINTS).map(|point| step * point as f64).collect();
-            let raw: Vec<f64> = positions.iter().map(|x| shape.displacement(*x)).collect();
-            let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-            SampledShape {
-                mode: index + 1,
-                frequency: shape.frequency,
-                positions,
-                displacements: raw.iter().map(|value| value / largest).collect(),
-            }
-        })
-        .collect()
+    let Ok(modes) = specimen.modes(found.prediction.len(), Mesh::DIAGNOSIS) else {
+        return Vec::new();
+    };
+    let positions = positions(&specimen.body);
+    let shape = |mode: usize| {
+        let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
+        let raw: Vec<f64> = raw.collect();
+        let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        SampledShape {
+            mode: mode + 1,
+            frequency: modes.frequencies()[mode],
+            positions: positions.iter().map(|(x, _)| *x).collect(),
+            displacements: raw.iter().map(|value| value / largest).collect(),
+        }
+    };
+    (0..modes.len()).map(shape).collect()
 }
 
-/// The joint that predictions are made with.
-fn joint_of(structure: &TestedStructure, found: &Identification) -> Option<JointStiffness> {
-    match (&found.consistent, &found.estimate) {
-        (Some(consistent), _) => Some(consistent.joint),
-        (None, Some(Estimate::FreeBeam(_))) => Some(JointStiffness::FREE),
-        (None, Some(Estimate::Joint(joint))) => structure.known.over(joint.pairs.joint()),
-        (None, None) => structure.known.over(None),
+/// Places along all beams (m), and where the model is asked for each: a hair inside the beam that is
+/// meant, since two beams meet at a lap joint.
+fn positions(body: &Body) -> Vec<(f64, f64)> {
+    let beams = body.beams();
+    let points = POINTS.div_ceil(beams.len());
+    let hair = 1e-9 * body.length();
+    let mut start = 0.0;
+    let mut all = Vec::new();
+    for beam in beams {
+        let end = start + beam.length;
+        let share = |point: usize| point as f64 / (points - 1) as f64;
+        let places = (0..points).map(|point| start + share(point) * beam.length);
+        all.extend(places.map(|x| (x, x.clamp(start + hair, end - hair))));
+        start = end;
     }
+    all
+}
+
+/// The structure of a prediction with this beam on this joint; `details` as for the prediction.
+pub(super) fn predicted_specimen(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    (beam, joint): (&Beam, &JointStiffness),
+) -> Specimen {
+    let there = jointed(structure, details).with_beam(beam);
+    let units = StiffnessUnits::of(beam);
+    let held = match structure.assembly {
+        Assembly::Free => SpecimenJoint::Free,
+        Assembly::Cantilever | Assembly::Lap => SpecimenJoint::Springs {
+            kt: joint.kx * units.kt,
+            kr: joint.ky * units.kr,
+            coupling: joint.coupling(),
+        },
+    };
+    let mut specimen = Specimen::new(body(&there), held);
+    specimen.shear_rotary = match structure.theory {
+        BeamTheory::Euler => 0.0,
+        BeamTheory::Timoshenko => 1.0,
+    };
+    let overlap = |(length, mass)| LapOverlap { length, mass };
+    specimen.overlap = there.lap.overlap.map(overlap);
+    specimen.masses = there
+        .masses
+        .iter()
+        .map(|sensor| PointMass {
+            position: sensor.position,
+            mass: sensor.size,
+            inertia: 0.0,
+        })
+        .collect();
+    specimen
+}
+
+fn body(there: &JointedStructure) -> Body {
+    if there.assembly != Assembly::Lap {
+        return Body::One(there.beam);
+    }
+    let position = there.lap.position.unwrap_or(0.5 * there.beam.length);
+    let piece = |beam: Beam, length: f64| Beam { length, ..beam };
+    let right = there.lap.right.unwrap_or(there.beam);
+    Body::Joined([
+        piece(there.beam, position),
+        piece(right, there.beam.length - position),
+    ])
 }

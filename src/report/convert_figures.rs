@@ -73,6 +73,7 @@ fn stabilisation_figure(searches: &[BandSearch]) -> Option<StabilisationFigure> 
             .map(|pole| PoleMark {
                 order: pole.order,
                 frequency: pole.frequency,
+                damping_ratio: pole.damping_ratio,
                 stability: pole.stability,
             })
             .collect(),

@@ -1,14 +1,14 @@
 //! From a diagnosis to its part of the document.
 
 use super::document::{
-    BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
-    HypothesisSection, JointShiftSection, LeftOutRecordingSection, LeftOutSection, NextTestSection,
-    ParameterSection, PlaceMapSection, PullSection,
+    AlongDecaysSection, BaselineSection, ClosureSection, DecayChangeSection, GapPlaceSection,
+    GapSection, GapVerdictSection, HypothesisSection, JointShiftSection, LeftOutRecordingSection,
+    LeftOutSection, NextTestSection, ParameterSection, PlaceMapSection, PullSection,
 };
 use crate::effects::EffectId;
 use crate::gap::{
-    Closure, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
-    LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Verdict,
+    Closure, DecayFinding, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult,
+    JointShift, LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Verdict,
 };
 
 /// The section of a diagnosis, or of the reason why there is none.
@@ -45,10 +45,35 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
             }
             .to_owned(),
         ),
+        along_decays: found.along_decays.as_ref().map(along_decays),
         map: found.map.as_ref().map(map),
         baselines: baselines(&found.hypotheses),
         next_test: found.next_tests.iter().map(next_test).collect(),
         updated_model: None,
+    }
+}
+
+fn along_decays(found: &DecayFinding) -> AlongDecaysSection {
+    AlongDecaysSection {
+        effect: found
+            .is_of_joint()
+            .then(|| EffectId::JointNonlinearity.name().to_owned()),
+        ratio: found.ratio,
+        ratio_std: found.ratio_std,
+        exponent: found.exponent,
+        chance: found.chance,
+        goodness_of_fit: found.goodness_of_fit,
+        changes: found
+            .changes
+            .iter()
+            .map(|change| DecayChangeSection {
+                mode: change.mode,
+                recording: change.configuration.clone(),
+                percent_per_fold: change.percent_per_fold,
+                std: change.std,
+                explained: change.explained,
+            })
+            .collect(),
     }
 }
 

@@ -18,9 +18,10 @@ pub use super::document_fit::{
 };
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
 pub use super::document_gap::{
-    BaselineSection, ClosureSection, GapPlaceSection, GapSection, GapVerdictSection,
-    HypothesisSection, JointShiftSection, LeftOutRecordingSection, LeftOutSection, NextTestSection,
-    ParameterSection, PlaceMapSection, PullSection, UpdatedModelSection,
+    AlongDecaysSection, BaselineSection, ClosureSection, DecayChangeSection, GapPlaceSection,
+    GapSection, GapVerdictSection, HypothesisSection, JointShiftSection, LeftOutRecordingSection,
+    LeftOutSection, NextTestSection, ParameterSection, PlaceMapSection, PullSection,
+    UpdatedModelSection,
 };
 pub use super::document_perturbation::{
     AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,

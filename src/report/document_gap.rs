@@ -25,6 +25,9 @@ pub struct GapSection {
     pub fitted_modes: Option<usize>,
     /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
     pub decided_by: Option<String>,
+    /// What the decays by themselves say of a joint whose stiffness depends on the amplitude, whatever the
+    /// verdict; null where no frequency changes along them.
+    pub along_decays: Option<AlongDecaysSection>,
     /// What the residual of the nominal model calls for along the beam.
     pub map: Option<PlaceMapSection>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
@@ -45,6 +48,41 @@ pub struct UpdatedModelSection {
     /// Its natural frequencies (Hz), sensors where the first recording has them; `tapjoint predict` of the
     /// file gives the same.
     pub frequencies: Vec<f64>,
+}
+
+/// Frequencies that change along the decays, and what joint would do that.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct AlongDecaysSection {
+    /// "joint-nonlinearity" where a joint's law explains the changes; null where none does.
+    pub effect: Option<String>,
+    /// Relative change of the joint's rotational stiffness at the largest amplitude (1): negative where it
+    /// softens.
+    pub ratio: f64,
+    /// Its standard uncertainty (1).
+    pub ratio_std: f64,
+    /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
+    pub exponent: f64,
+    /// Probability that noise alone makes the frequencies change as much.
+    pub chance: f64,
+    /// Probability of a misfit as large or larger, if the joint's stiffness changes like that.
+    pub goodness_of_fit: Option<f64>,
+    /// The frequencies that were followed.
+    pub changes: Vec<DecayChangeSection>,
+}
+
+/// How a frequency changes along the decays of a recording.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct DecayChangeSection {
+    /// The mode.
+    pub mode: usize,
+    /// The recording.
+    pub recording: String,
+    /// Change per e-fold of its amplitude (%): negative where the frequency falls with the amplitude.
+    pub percent_per_fold: f64,
+    /// Its standard uncertainty (%).
+    pub std: f64,
+    /// What the joint's law makes of it (%).
+    pub explained: f64,
 }
 
 /// The answer.

@@ -46,6 +46,8 @@ pub struct PoleMark {
     pub order: usize,
     /// Frequency (Hz).
     pub frequency: f64,
+    /// Damping ratio (1).
+    pub damping_ratio: f64,
     /// What of it the order before had.
     pub stability: PoleStability,
 }

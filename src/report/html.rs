@@ -25,6 +25,7 @@ const PLOT_LIBRARY: &str = include_str!("../../assets/uPlot.iife.min.js");
 const PLOT_STYLE: &str = include_str!("../../assets/uPlot.min.css");
 const PLOT_LICENSE: &str = include_str!("../../assets/uPlot-LICENSE.txt");
 const SCRIPT: &str = include_str!("../../templates/report.js");
+const POINTS: &str = include_str!("../../templates/report_points.js");
 
 /// What makes pictures live; left out where there is none.
 struct Live {
@@ -32,6 +33,7 @@ struct Live {
     style: &'static str,
     license: &'static str,
     script: &'static str,
+    points: &'static str,
 }
 
 /// The page's pictures by the section they stand in.
@@ -115,6 +117,7 @@ pub fn render_html(document: &Document, figures: &PageFigures) -> Result<String,
             style: PLOT_STYLE,
             license: PLOT_LICENSE,
             script: SCRIPT,
+            points: POINTS,
         }),
         version: env!("CARGO_PKG_VERSION"),
     };

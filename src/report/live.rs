@@ -6,9 +6,9 @@ use serde::Serialize;
 use super::figures::{FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TimeOverview};
 use super::format::significant;
 
-/// Most points of a curve: more than two for each pixel of a wide screen, so that zooming finds more
-/// than the whole view shows, while five recordings stay far below the page's limit of 3 MB.
-const MOST_POINTS: usize = 3000;
+/// Most points of a curve: two for each pixel of the page's width, so that zooming finds more than the whole
+/// view shows, while five long recordings stay below the page's limit of 3 MB.
+const MOST_POINTS: usize = 2000;
 /// Significant digits of a value: hovering shows four.
 const DIGITS: usize = 4;
 
@@ -337,7 +337,7 @@ fn live_mark(peak: &PeakMark) -> Option<LiveMark> {
 }
 
 /// The plot as JSON that can stand inside a `script` element.
-pub(super) fn script_json(plot: &LivePlot) -> Result<String, serde_json::Error> {
+pub(super) fn script_json(plot: &impl Serialize) -> Result<String, serde_json::Error> {
     // Only a slash or a comment's beginning after < could end the element.
     Ok(serde_json::to_string(plot)?.replace('<', "\\u003c"))
 }

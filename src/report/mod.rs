@@ -1,4 +1,4 @@
-//! Words and pictures: JSON, CSV, HTML and PNG of a finished analysis. Computes no result.
+//! Words and pictures: JSON, CSV, HTML, PNG and SVG of a finished analysis. Computes no result.
 //!
 //! Everything is returned as bytes with a name; the command line writes the files.
 
@@ -27,6 +27,8 @@ pub mod format;
 mod gap_text;
 pub mod html;
 pub mod live;
+pub mod live_amplitude;
+pub mod live_points;
 pub mod plot;
 pub mod summary;
 pub mod tables;
@@ -56,8 +58,8 @@ pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;
 pub use html::render_html;
 pub use json::render_json;
-pub use resolution::{render_resolution, render_resolution_csv, render_resolution_png};
-pub use run::{render_cloud_png, render_frf_png, render_run, render_spectrum_png};
+pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
+pub use run::{render_cloud_picture, render_frf_picture, render_run, render_spectrum_picture};
 pub use schema::render_schema;
 pub use text::render_text;
 

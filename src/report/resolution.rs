@@ -1,8 +1,8 @@
 //! The study of resolution as text, table of values and picture.
 
 use super::ReportError;
-use super::plot::render_png;
 use super::plot::resolution::draw_resolution;
+use super::plot::{PictureFormat, render_picture};
 use super::tables::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 use super::text::{render_table, wrapped};
 use crate::study::resolution::{EstimateMethod, ResolutionStudy, WindowName};
@@ -149,6 +149,9 @@ fn rows(study: &ResolutionStudy) -> Vec<Vec<String>> {
 ///
 /// # Errors
 /// [`ReportError`] where it cannot be drawn.
-pub fn render_resolution_png(study: &ResolutionStudy) -> Result<Vec<u8>, ReportError> {
-    render_png(&draw_resolution(study))
+pub fn render_resolution_picture(
+    study: &ResolutionStudy,
+    format: PictureFormat,
+) -> Result<Vec<u8>, ReportError> {
+    render_picture(&draw_resolution(study), format)
 }

@@ -1,11 +1,14 @@
 //! All files of one run.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::document::Document;
 use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
 use super::live::{LivePlot, live_frf, live_spectrum, live_taps, script_json};
+use super::live_amplitude::live_amplitude;
+use super::live_points::{LivePoints, live_cloud, live_stabilisation};
 use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
 use super::plot::comparison::draw_frequencies;
@@ -16,7 +19,7 @@ use super::plot::shapes::draw_shapes;
 use super::plot::spectrum::draw_spectrum;
 use super::plot::stabilisation::draw_stabilisation;
 use super::plot::time::draw_taps;
-use super::plot::{Drawing, render_png, render_svg};
+use super::plot::{Drawing, PictureFormat, render_picture, render_svg};
 use super::{
     ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv,
     render_perturbation_csv,
@@ -39,13 +42,21 @@ struct Picture {
     caption: String,
     drawing: Drawing,
     /// The same curves for the page's script.
-    live: Option<LivePlot>,
+    live: Option<Live>,
+}
+
+/// What the page's script draws in the picture's place.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Live {
+    Curves(LivePlot),
+    Points(LivePoints),
 }
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
-/// `perturbation.csv` where something was perturbed, and the pictures that apply: `spectrum-*.png`,
-/// `frf-*.png`, `stabilisation-*.png`, `amplitude-*.png`, `taps-*.png`, `frequencies.png`,
-/// `mode-shapes.png`, `cloud.png`, `gap.png`, `gap-place.png`.
+/// `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
+/// `spectrum-*`, `frf-*`, `stabilisation-*`, `amplitude-*`, `taps-*`, `frequencies`, `mode-shapes`, `cloud`,
+/// `gap`, `gap-place`.
 ///
 /// # Errors
 /// The first [`ReportError`] of any file.
@@ -54,14 +65,14 @@ pub fn render_run(
     figures: &[RecordingFigure],
 ) -> Result<Vec<ReportFile>, ReportError> {
     let pictures = pictures(document, figures);
-    let rendered: Vec<(ReportFile, InlineFigure)> = pictures
+    let rendered: Vec<([ReportFile; 2], InlineFigure)> = pictures
         .par_iter()
-        .map(render_picture)
+        .map(rendered)
         .collect::<Result<_, _>>()?;
     let mut page = PageFigures::default();
     let mut files = Vec::new();
-    for (picture, (file, inline)) in pictures.iter().zip(rendered) {
-        files.push(file);
+    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered) {
+        files.extend(of_picture);
         match picture.shelf {
             Shelf::Spectra => page.spectra.push(inline),
             Shelf::Taps => page.taps.push(inline),
@@ -86,35 +97,55 @@ pub fn render_run(
     Ok(files)
 }
 
-/// The averaged spectra of a recording as PNG; `None` when no tap was accepted.
+/// The averaged spectra of a recording as a picture; `None` when no tap was accepted.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_spectrum_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_spectrum(figure).as_ref().map(render_png).transpose()
+pub fn render_spectrum_picture(
+    figure: &RecordingFigure,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    optional(draw_spectrum(figure), format)
 }
 
-/// The frequency response functions of a recording as PNG; `None` without a hammer or an accepted
+/// The frequency response functions of a recording as a picture; `None` without a hammer or an accepted
 /// tap.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_frf_png(figure: &RecordingFigure) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_frf(figure).as_ref().map(render_png).transpose()
+pub fn render_frf_picture(
+    figure: &RecordingFigure,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    optional(draw_frf(figure), format)
 }
 
-/// The estimates under changed frequencies as PNG; `None` where there are none.
+/// The estimates under changed frequencies as a picture; `None` where there are none.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_cloud_png(document: &Document) -> Result<Option<Vec<u8>>, ReportError> {
-    draw_cloud(document).as_ref().map(render_png).transpose()
+pub fn render_cloud_picture(
+    document: &Document,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    optional(draw_cloud(document), format)
 }
 
-fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), ReportError> {
-    let file = ReportFile {
-        name: format!("{}.png", picture.name),
-        bytes: render_png(&picture.drawing)?,
+fn optional(
+    drawing: Option<Drawing>,
+    format: PictureFormat,
+) -> Result<Option<Vec<u8>>, ReportError> {
+    let picture = drawing.map(|drawing| render_picture(&drawing, format));
+    picture.transpose()
+}
+
+/// A picture as files for screens and for papers, and for the page.
+fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
+    let file = |ending: &str, format: PictureFormat| {
+        Ok::<_, ReportError>(ReportFile {
+            name: format!("{}.{ending}", picture.name),
+            bytes: render_picture(&picture.drawing, format)?,
+        })
     };
     let inline = InlineFigure {
         caption: picture.caption.clone(),
@@ -126,7 +157,11 @@ fn render_picture(picture: &Picture) -> Result<(ReportFile, InlineFigure), Repor
             .transpose()
             .map_err(ReportError::Json)?,
     };
-    Ok((file, inline))
+    let files = [
+        file("png", PictureFormat::Png)?,
+        file("svg", PictureFormat::Svg)?,
+    ];
+    Ok((files, inline))
 }
 
 fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
@@ -150,8 +185,8 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
         Picture {
             shelf: Shelf::Comparison,
             name: "mode-shapes".to_owned(),
-            caption: "Shapes of the predicted modes, of the uniform Euler beam on the estimated joint. A sensor \
-                      or a tap near a node hardly sees the mode."
+            caption: "Shapes of the predicted modes, of the described beam on the estimated joint with what sits \
+                      on it. A sensor or a tap near a node hardly sees the mode."
                 .to_owned(),
             drawing,
             live: None,
@@ -165,7 +200,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
             caption: "Estimates when the frequencies are changed within what their readings allow."
                 .to_owned(),
             drawing,
-            live: None,
+            live: live_cloud(document).map(Live::Points),
         }
     }));
     pictures
@@ -199,26 +234,27 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
 
 fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
     let file = &figure.file;
+    let amplitude = figure.amplitude.as_ref();
     let kinds = [
         (
             Shelf::Spectra,
             "spectrum",
             draw_spectrum(figure),
-            live_spectrum(figure),
+            live_spectrum(figure).map(Live::Curves),
             format!("Averaged spectra of {file} with the resonances found."),
         ),
         (
             Shelf::Spectra,
             "frf",
             draw_frf(figure),
-            live_frf(figure),
+            live_frf(figure).map(Live::Curves),
             format!("Response per force (H1) of {file}, magnitude, phase and coherence."),
         ),
         (
             Shelf::Spectra,
             "stabilisation",
             draw_stabilisation(figure),
-            None,
+            live_stabilisation(figure).map(Live::Points),
             format!(
                 "Stabilisation diagram of {file}: poles that the fit finds at each order, marked by \
                  what of them the order before had."
@@ -228,14 +264,14 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
             Shelf::Spectra,
             "amplitude",
             figure.amplitude.as_ref().and_then(draw_amplitude),
-            None,
+            amplitude.and_then(live_amplitude).map(Live::Points),
             format!("Frequency and damping of the modes of {file} against amplitude."),
         ),
         (
             Shelf::Taps,
             "taps",
             draw_taps(figure),
-            live_taps(figure),
+            live_taps(figure).map(Live::Curves),
             format!("{file} over time; numbers count the taps."),
         ),
     ];

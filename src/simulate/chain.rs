@@ -80,17 +80,19 @@ pub(super) struct Rates {
 }
 
 impl Chain {
+    /// `random` is the recording's own; `gains` is the same in all recordings of a test, whose sensors are
+    /// the same.
     pub(super) fn new(
         signal: Signal,
         scale: f64,
         laboratory: &Laboratory,
         rates: Rates,
-        mut random: ChaCha8Rng,
+        (mut random, gains): (ChaCha8Rng, &mut ChaCha8Rng),
     ) -> Self {
         let (sensors, recorder) = (&laboratory.sensors, &laboratory.recorder);
         let inner = rates.file * rates.factor as f64;
         let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
-        let gain = 1.0 + sensors.sensitivity_error * normal(&mut random);
+        let gain = 1.0 + sensors.sensitivity_error * normal(gains);
         let accelerometer = signal == Signal::Response(Sensed::Acceleration);
         let mounting = accelerometer && sensors.mounting_resonance > 0.0;
         let full_scale = scale.abs();

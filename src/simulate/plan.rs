@@ -243,7 +243,6 @@ fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[SensorPlace], visit: u
     let circumstances = Circumstances {
         sensors: places,
         level: 0.0,
-        visit,
         drift: std::array::from_fn(|_| StandardNormal.sample(&mut random)),
     };
     apply(plan.effects, nominal, &circumstances)

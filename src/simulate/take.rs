@@ -41,6 +41,9 @@ pub struct TakePlan {
     pub seed: (u64, u64),
 }
 
+/// Streams of the channels' sensitivities, behind those of the recordings.
+const SENSITIVITIES: u64 = 1 << 42;
+
 impl TakePlan {
     /// Steps of the simulation for each sample.
     pub fn steps_per_sample(&self, laboratory: &Laboratory) -> usize {
@@ -106,7 +109,10 @@ impl Take {
         let channels = plan.channels.iter().zip(1..);
         let chains = channels
             .map(|((signal, scale), number)| {
-                Chain::new(*signal, *scale, laboratory, rates, random(number))
+                let mut gains = ChaCha8Rng::seed_from_u64(plan.seed.0);
+                gains.set_stream(SENSITIVITIES | number);
+                let random = (random(number), &mut gains);
+                Chain::new(*signal, *scale, laboratory, rates, random)
             })
             .collect();
         // The filter looks ahead by half its length: the simulation begins so much earlier.

@@ -12,10 +12,15 @@ use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
 use crate::description::{JointKind, TestDescription};
 use crate::effects::{Effect, EffectError, EffectId};
 use crate::gap::{
-    GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, observe,
+    GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
+    observe,
 };
 use crate::pipeline::nominal_with;
 use crate::structure::{Beam, JointStiffness};
+
+/// Non-centrality of a chi square of one degree of freedom that is noticed nine times out of ten at the
+/// 1 % level, (2.576 + 1.282)^2.
+pub(super) const NOTICED: f64 = 14.9;
 
 /// How a plan is judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,7 +109,10 @@ pub fn judge_plan(
 }
 
 /// The recordings of the description as the diagnosis will see them.
-fn plan_of(test: &TestDescription, settings: &PlanSettings) -> Result<TestPlan, PlanError> {
+pub(super) fn plan_of(
+    test: &TestDescription,
+    settings: &PlanSettings,
+) -> Result<TestPlan, PlanError> {
     if test.recordings.is_empty() {
         return Err(PlanError::NoRecordings);
     }
@@ -141,6 +149,7 @@ fn plan_of(test: &TestDescription, settings: &PlanSettings) -> Result<TestPlan, 
         slope_std: Some(0.5 * settings.frequency_std),
         drift: settings.drift,
         damping: 0.003,
+        scatter: 1.0,
     })
 }
 
@@ -157,10 +166,18 @@ fn case(
         None => Vec::new(),
     };
     let observed = observe(plan, nominal, &effects, random.random())?;
-    let truth = truth(number, &effects);
+    let exact = TestPlan {
+        scatter: 0.0,
+        drift: 0.0,
+        ..plan.clone()
+    };
+    let mut truth = truth(number, &effects);
+    let exact = observe(&exact, nominal, &effects, 0)?;
+    let chi_square = nominal_chi_square(&exact, nominal, &GapSettings::default())?;
+    truth.detectable = (!effects.is_empty()).then_some(chi_square > NOTICED);
     Ok(
         match diagnose(&observed, nominal, &GapSettings::default()) {
-            Ok(diagnosis) => (truth.with_limits(&diagnosis), Answer::of(&diagnosis)),
+            Ok(diagnosis) => (truth, Answer::of(&diagnosis)),
             Err(_) => (truth, Answer::none()),
         },
     )

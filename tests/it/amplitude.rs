@@ -473,7 +473,7 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
         let inside = match shape {
             Shape::Line { points, .. } => points.iter().all(held),
             Shape::Rectangle { from, to, .. } => held(from) && held(to),
-            Shape::Dot { center, .. } => held(center),
+            Shape::Dot { center, .. } | Shape::Ring { center, .. } => held(center),
             Shape::Text(text) => held(&text.at),
         };
         assert!(inside, "{shape:?}");

@@ -36,6 +36,7 @@ fn nominal(mass: Option<f64>, off: f64) -> Nominal {
         sensors: vec![NominalSensor {
             name: "A".to_string(),
             mass,
+            position: None,
         }],
         scale_std: None,
         reading_bias: None,
@@ -65,6 +66,7 @@ fn plan() -> TestPlan {
         slope_std: Some(1e-4),
         drift: 0.005,
         damping: 0.003,
+        scatter: 1.0,
     }
 }
 
@@ -212,6 +214,7 @@ fn read(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Observations {
             peak_force: None,
             level: None,
             taps: 0,
+            decay_seconds: None,
             modes: frequencies.iter().enumerate().map(mode).collect(),
             covariance: None,
             common: 0.0,

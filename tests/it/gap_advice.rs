@@ -29,6 +29,7 @@ fn nominal(off: f64, known_mass: f64) -> Nominal {
     let sensor = |name: &str, mass: Option<f64>| NominalSensor {
         name: name.to_owned(),
         mass,
+        position: None,
     };
     Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
@@ -50,6 +51,7 @@ fn poor_plan() -> TestPlan {
         slope_std: None,
         drift: 0.005,
         damping: 0.003,
+        scatter: 1.0,
     }
 }
 

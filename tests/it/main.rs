@@ -4,6 +4,7 @@
 
 mod amplitude;
 mod blind_check;
+mod blind_check_draw;
 mod cli;
 mod cli_frf;
 mod description;
@@ -11,6 +12,7 @@ mod effects;
 mod errors;
 mod gap;
 mod gap_advice;
+mod gap_decay;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;
@@ -23,6 +25,7 @@ mod observations;
 mod pairing;
 mod pipeline;
 mod pipeline_fits;
+mod predicted_shapes;
 mod quality;
 mod real_data;
 mod recording;

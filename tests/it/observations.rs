@@ -314,7 +314,7 @@ fn regress_frequencies_read_elsewhere_keep_their_stated_uncertainty() {
     };
     let numbers: Vec<usize> = configuration.modes.iter().map(|mode| mode.mode).collect();
     assert_eq!(numbers, [1, 2, 4]);
-    let covariance = configuration.frequency_covariance().unwrap();
+    let covariance = configuration.covariance.clone().unwrap();
     // half_line^2/3 + (scatter f)^2.
     let expected = 0.125f64.powi(2) / 3.0 + (0.003f64 * 118.0).powi(2);
     assert!((covariance[1][1] / expected - 1.0).abs() < 1e-12);

@@ -3,6 +3,7 @@
 mod fixture;
 mod numbers;
 mod pictures;
+mod vector_files;
 mod words;
 
 use tapjoint::report::document::Document;

@@ -19,6 +19,33 @@ const VISITOR: &str = r#"
     var box = target.getBoundingClientRect();
     target.dispatchEvent(new MouseEvent(type, { bubbles: true, clientX: box.left + x, clientY: box.top + y, view: window, button: 0, movementX: 1, movementY: 1 }));
   }
+  function finger(target, type, id, x, y) {
+    var box = target.getBoundingClientRect();
+    target.dispatchEvent(new PointerEvent(type, { bubbles: true, pointerId: id, pointerType: "touch", clientX: box.left + x, clientY: box.top + y }));
+  }
+  // Two fingers that part, or one that moves, as shares of the width.
+  function touch(target, from, to) {
+    var wide = target.clientWidth;
+    from.forEach(function (x, id) { finger(target, "pointerdown", id + 1, x * wide, 40); });
+    to.forEach(function (x, id) { finger(target, "pointermove", id + 1, x * wide, 40); });
+    to.forEach(function (x, id) { finger(target, "pointerup", id + 1, x * wide, 40); });
+  }
+  // What the first point says that the pointer meets on its way over a panel of points.
+  function met(figure) {
+    var over = figure.querySelector(".u-over"), tip = figure.querySelector(".tip");
+    for (var y = 10; y < over.clientHeight; y += 20)
+      for (var x = 5; x < over.clientWidth; x += 12) {
+        mouse(over, "mousemove", x, y);
+        if (tip.style.display === "block") return tip.textContent;
+      }
+    return "";
+  }
+  function drag(figure) {
+    var over = figure.querySelector(".u-over"), wide = over.clientWidth, high = over.clientHeight;
+    mouse(over, "mousedown", 0.1 * wide, 0.2 * high);
+    mouse(over, "mousemove", 0.9 * wide, 0.8 * high);
+    mouse(over, "mouseup", 0.9 * wide, 0.8 * high);
+  }
   function words(figure) { return Array.from(figure.querySelectorAll(".u-legend .u-value")).map(function (v) { return v.textContent; }); }
   function wait(milliseconds) { return new Promise(function (done) { setTimeout(done, milliseconds); }); }
   async function visit() {
@@ -32,24 +59,48 @@ const VISITOR: &str = r#"
     seen.wide = Array.from(document.querySelectorAll("div.table .box")).filter(function (box) { return box.scrollWidth > box.clientWidth + 1; }).length;
     seen.background = getComputedStyle(document.body).backgroundColor;
     seen.resources = performance.getEntriesByType("resource").map(function (entry) { return entry.name; });
-    var over = figures[0].querySelector(".u-over");
+    var first = Array.from(figures).filter(function (figure) { return !figure.querySelector(".host.points"); })[0];
+    var over = first.querySelector(".u-over");
     var wide = over.clientWidth;
     mouse(over, "mouseenter", 0.3 * wide, 40);
     mouse(over, "mousemove", 0.3 * wide, 40);
     await wait(100);
-    seen.hover = words(figures[0]);
+    seen.hover = words(first);
     mouse(over, "mousedown", 0.3 * wide, 40);
     mouse(over, "mousemove", 0.6 * wide, 40);
-    mouse(document.querySelector("figure.curves .u-over"), "mouseup", 0.6 * wide, 40);
+    mouse(over, "mouseup", 0.6 * wide, 40);
     await wait(100);
     mouse(over, "mousemove", 1, 40);
     await wait(100);
-    seen.zoomed = words(figures[0])[0];
-    figures[0].querySelector(".chips .reset").click();
+    seen.zoomed = words(first)[0];
+    first.querySelector(".chips .reset").click();
     await wait(100);
     mouse(over, "mousemove", 1, 40);
     await wait(100);
-    seen.reset = words(figures[0])[0];
+    seen.reset = words(first)[0];
+    touch(over, [0.4, 0.6], [0.2, 0.8]);
+    await wait(100);
+    mouse(over, "mousemove", 1, 40);
+    await wait(100);
+    seen.pinched = words(first)[0];
+    touch(over, [0.5], [0.75]);
+    await wait(100);
+    mouse(over, "mousemove", 1, 40);
+    await wait(100);
+    seen.moved = words(first)[0];
+    var points = Array.from(figures).filter(function (figure) { return figure.querySelector(".host.points"); });
+    seen.points = [];
+    for (var i = 0; i < points.length; i++) {
+      var one = { met: met(points[i]) };
+      drag(points[i]);
+      await wait(100);
+      one.zoomed = points[i].querySelector(".said").textContent;
+      Array.from(points[i].querySelectorAll(".chips .mode")).slice(-1).forEach(function (chip) { chip.click(); });
+      await wait(100);
+      one.after = points[i].querySelector(".said").textContent;
+      one.again = met(points[i]);
+      seen.points.push(one);
+    }
     var taps = Array.from(figures).filter(function (figure) { return /● tap 1/.test(figure.textContent); })[0];
     Array.from(taps.querySelectorAll(".chips button")).filter(function (b) { return /tap 2/.test(b.textContent); })[0].click();
     seen.tap = taps.querySelector(".said").textContent;
@@ -170,8 +221,8 @@ fn regress_the_page_works_in_a_browser() {
             Value::Array(vec![]),
             "{case}: something was fetched"
         );
-        // Of each of two recordings: spectra, responses, taps.
-        assert_eq!(seen["figures"], 6, "{case}");
+        // Of each of two recordings: spectra, responses, stabilisation, taps; and the cloud.
+        assert_eq!(seen["figures"], 9, "{case}");
         assert!(seen["live"].as_u64() >= Some(10), "{case}: {seen}");
         assert!(seen["pictures"].as_u64() >= Some(11), "{case}: {seen}");
         assert!(
@@ -205,11 +256,44 @@ fn regress_the_page_works_in_a_browser() {
         );
         let reset = number(seen["reset"].as_str().unwrap());
         assert!(reset < 2.0, "{case}: the whole view begins at {reset}");
+        // Two fingers that part to three times their distance leave a third of 200 Hz about its middle.
+        let pinched = number(seen["pinched"].as_str().unwrap());
+        assert!((pinched - 66.7).abs() < 2.0, "{case}: pinched to {pinched}");
+        // A finger that moves by a quarter of the width takes a quarter of that third along.
+        let moved = number(seen["moved"].as_str().unwrap());
+        assert!((moved - 50.0).abs() < 2.0, "{case}: moved to {moved}");
+        points_answer(&seen["points"], &case);
         assert!(
             seen["tap"].as_str().unwrap().starts_with("tap 2: used, "),
             "{case}: {}",
             seen["tap"]
         );
+    }
+}
+
+/// Stabilisation diagrams and the cloud say what a point is, zoom in both directions, and change views.
+fn points_answer(points: &Value, case: &str) {
+    let points = points.as_array().unwrap();
+    assert_eq!(points.len(), 3, "{case}");
+    let words = |figure: &Value, key: &str| figure[key].as_str().unwrap().to_owned();
+    let (cloud, diagrams): (Vec<&Value>, Vec<&Value>) = points
+        .iter()
+        .partition(|figure| words(figure, "met").contains("Kx"));
+    assert_eq!(cloud.len(), 1, "{case}: {points:?}");
+    assert!(
+        words(cloud[0], "zoomed").starts_with("shown: Kx "),
+        "{case}"
+    );
+    for diagram in diagrams {
+        for key in ["met", "again"] {
+            let said = words(diagram, key);
+            let all = ["frequency ", " Hz", "order ", "damping ", " %"];
+            assert!(all.iter().all(|part| said.contains(part)), "{case}: {said}");
+        }
+        let zoomed = words(diagram, "zoomed");
+        let whole = zoomed.starts_with("shown: frequency ") && zoomed.contains(", order ");
+        assert!(whole, "{case}: {zoomed}");
+        assert_eq!(words(diagram, "after"), "", "{case}: another view is whole");
     }
 }
 

@@ -12,6 +12,7 @@ mod mode;
 mod repeats;
 
 use super::analysis::{Analysis, ModeResult, RecordingResult};
+use crate::description::SensorKind;
 use crate::identify::observation::{
     Configuration, ExtraPeak, Observations, Observed, ObservedMode, ObservedSensor, ShapeValue,
 };
@@ -79,6 +80,7 @@ fn of_measured(modes: &[ModeResult]) -> Configuration {
         peak_force: None,
         level: None,
         taps: 0,
+        decay_seconds: None,
         covariance: covariance::independent(&modes),
         modes,
         // What was stated is meant to be all.
@@ -110,6 +112,8 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
             .iter()
             .map(|&(number, reading)| ModeSeen::new(number, reading, (recording, taps, only)))
             .collect();
+        // What was not fitted tap by tap says the same at every level.
+        seen.retain(|seen| place == 0 || seen.is_of_taps());
         repeats::judge_scatter(&mut seen);
         Configuration {
             file: Some(recording.file.clone()),
@@ -122,14 +126,13 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
                 Format::FrequencyResponses => 0,
                 _ => taps.len(),
             },
+            decay_seconds: Some(spectra.averages.lines.duration)
+                .filter(|_| recording.format != Format::FrequencyResponses),
             covariance: covariance::of_taps(&seen),
-            // Peaks and changes along the decays belong to all taps; they stand with the hardest.
+            // Changes along the decays belong to all taps; they stand with the hardest.
             modes: seen.iter().map(|seen| seen.observed(place == 0)).collect(),
             common: COMMON,
-            extra_peaks: match place {
-                0 => extra_peaks(recording, &spectra.readings),
-                _ => Vec::new(),
-            },
+            extra_peaks: extra_peaks(recording, &spectra.readings),
         }
     };
     levels.iter().enumerate().map(configuration).collect()
@@ -170,7 +173,10 @@ fn sensors(recording: &RecordingResult) -> Vec<ObservedSensor> {
     let positions = &recording.conditions.sensor_positions;
     let sensor = |response: &super::analysis::Response| ObservedSensor {
         name: response.name.clone(),
-        position: positions.get(&response.name).copied(),
+        position: positions
+            .get(&response.name)
+            .copied()
+            .filter(|_| response.kind != Some(SensorKind::Sound)),
     };
     recording.responses.iter().map(sensor).collect()
 }

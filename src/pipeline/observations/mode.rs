@@ -21,6 +21,11 @@ use crate::stats::{median, root_mean_square};
 /// A 95 % bound over the standard uncertainty of a normal distribution.
 const BOUND: f64 = 1.96;
 
+/// Amplitude at which a decay's late end is read, over the largest (1), where it was followed further: a
+/// change with any power of the amplitude from 1/2 on is over there by two thirds, and beyond it
+/// noise and neighbours bend the curve.
+const LATE_SHARE: f64 = 0.1;
+
 /// A mode, and the taps that count.
 pub(super) struct ModeSeen<'a> {
     number: usize,
@@ -77,6 +82,11 @@ impl<'a> ModeSeen<'a> {
         }
     }
 
+    /// Whether its frequency is that of these taps, and not of the whole recording.
+    pub fn is_of_taps(&self) -> bool {
+        !self.frequency.taps.is_empty()
+    }
+
     /// Natural frequency (Hz).
     pub fn frequency(&self) -> Observed {
         self.frequency.observed()
@@ -94,7 +104,9 @@ impl<'a> ModeSeen<'a> {
             freedom: frequency.freedom,
             repeats: self.frequency.taps.len(),
             damping: self.damping(),
-            constant: reference.and_then(|sensor| self.constant(sensor)),
+            constant: reference
+                .filter(|_| hardest)
+                .and_then(|sensor| self.constant(sensor)),
             amplitude: reference.and_then(|sensor| self.amplitude(sensor)),
             decay: self
                 .fit()
@@ -230,11 +242,13 @@ impl<'a> ModeSeen<'a> {
         };
         let amplitudes = || curve.points.iter().map(|point| point.amplitude);
         let end = |amplitude: f64| self.decay_end(curve, amplitude, shape);
+        let most = amplitudes().fold(0.0, f64::max);
+        let least = amplitudes().fold(f64::INFINITY, f64::min);
         Some(AlongDecay {
             frequency_slope: slope(frequency),
             damping_slope: slope(damping),
-            early: end(amplitudes().fold(0.0, f64::max))?,
-            late: end(amplitudes().fold(f64::INFINITY, f64::min))?,
+            early: end(most)?,
+            late: end(least.max(most * LATE_SHARE))?,
             verdict: match curve.verdict {
                 AmplitudeVerdict::Changes => DecayVerdict::Changes,
                 AmplitudeVerdict::Steady => DecayVerdict::Steady,

@@ -10,12 +10,12 @@ pub use tell_apart::tell_apart;
 
 use serde_json::{Value, json};
 
-use super::plot::render_png;
+use super::plot::{PictureFormat, render_picture};
 use super::{ReportError, ReportFile};
 use crate::study::blind_check::{Case, Planted, Row, Scores, Target, Truth, rows};
 
-/// All files: `score.json`, `cases.csv`, `truth.json`, `confusion.png`, `reliability.png`,
-/// `closure.png`.
+/// All files: `score.json`, `cases.csv`, `truth.json`, and as PNG and SVG `confusion`, `reliability`,
+/// `closure`.
 ///
 /// # Errors
 /// The first that cannot be made.
@@ -32,30 +32,35 @@ pub fn render_blind_check(cases: &[Case], scores: &Scores) -> Result<Vec<ReportF
         text("truth.json", truths_json(&truths)?),
     ];
     let drawings = [
-        ("confusion.png", Some(confusion_plot::draw_confusion(cases))),
+        ("confusion", Some(confusion_plot::draw_confusion(cases))),
         (
-            "reliability.png",
+            "reliability",
             Some(reliability_plot::draw_reliability(&scores.calibration)),
         ),
-        ("closure.png", closure_plot::draw_closure(cases)),
+        ("closure", closure_plot::draw_closure(cases)),
     ];
     for (name, drawing) in drawings {
         if let Some(drawing) = drawing {
-            files.push(ReportFile {
-                name: name.to_owned(),
-                bytes: render_png(&drawing)?,
-            });
+            for (ending, format) in [("png", PictureFormat::Png), ("svg", PictureFormat::Svg)] {
+                files.push(ReportFile {
+                    name: format!("{name}.{ending}"),
+                    bytes: render_picture(&drawing, format)?,
+                });
+            }
         }
     }
     Ok(files)
 }
 
-/// The confusion matrix as PNG.
+/// The confusion matrix as a picture.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
-pub fn render_confusion_png(cases: &[Case]) -> Result<Vec<u8>, ReportError> {
-    render_png(&confusion_plot::draw_confusion(cases))
+pub fn render_confusion_picture(
+    cases: &[Case],
+    format: PictureFormat,
+) -> Result<Vec<u8>, ReportError> {
+    render_picture(&confusion_plot::draw_confusion(cases), format)
 }
 
 /// The truths as a list of `{"name", "effects", "params"}`, one line for each.

@@ -32,7 +32,7 @@ const APART: f64 = 4.0;
 /// From this many taps on all points have one colour.
 const MOST_COLOURS: usize = 4;
 /// Half length of a bar: 95 % of a normal distribution.
-const BAR: f64 = 1.96;
+pub(in crate::report) const BAR: f64 = 1.96;
 /// Decades up to which 2 and 5 are labelled beside the powers of ten.
 const FEW_DECADES: f64 = 2.6;
 
@@ -48,24 +48,28 @@ pub struct AmplitudeFigure {
 }
 
 /// One quantity of a row.
-struct Quantity {
+pub(in crate::report) struct Quantity {
     title: &'static str,
-    trend: fn(&AmplitudeCurve) -> Option<&Trend>,
+    /// Name and unit.
+    pub(in crate::report) words: (&'static str, &'static str),
+    pub(in crate::report) trend: fn(&AmplitudeCurve) -> Option<&Trend>,
     /// Value and standard uncertainty of a point, in the unit drawn.
-    value: fn(&AmplitudePoint) -> (f64, f64),
+    pub(in crate::report) value: fn(&AmplitudePoint) -> (f64, f64),
     /// Unit drawn over the trend's unit.
-    factor: f64,
+    pub(in crate::report) factor: f64,
 }
 
-const FREQUENCY: Quantity = Quantity {
+pub(in crate::report) const FREQUENCY: Quantity = Quantity {
     title: "frequency (Hz)",
+    words: ("frequency", "Hz"),
     trend: |curve| curve.frequency.as_ref(),
     value: |point| (point.frequency, point.frequency_std),
     factor: 1.0,
 };
 
-const DAMPING: Quantity = Quantity {
+pub(in crate::report) const DAMPING: Quantity = Quantity {
     title: "damping ratio (%)",
+    words: ("damping ratio", "%"),
     trend: |curve| curve.damping.as_ref(),
     value: |point| (100.0 * point.damping_ratio, 100.0 * point.damping_std),
     factor: 100.0,
@@ -132,7 +136,7 @@ fn legend(modes: &[&(usize, AmplitudeCurve)]) -> Vec<(Sample, String)> {
 }
 
 /// Number of taps with points.
-fn taps(curve: &AmplitudeCurve) -> usize {
+pub(in crate::report) fn taps(curve: &AmplitudeCurve) -> usize {
     let taps = curve.points.iter().map(|point| point.tap + 1);
     taps.max().unwrap_or(0)
 }
@@ -204,19 +208,22 @@ fn draw_panel(
     let Some(trend) = (quantity.trend)(curve) else {
         return;
     };
-    let sizes = extent(curve.points.iter().map(|point| point.amplitude)).unwrap_or((1.0, 10.0));
+    let sizes = amplitudes(curve);
     // Amplitudes rise to the right as on every axis: a decay runs from right to left.
     let panel = Panel {
-        x: Axis::logarithmic((sizes.0 / 1.12, sizes.1 * 1.12), (left, right)),
-        y: Axis::linear(range(curve, quantity), (top + HEIGHT, top)),
+        x: amplitude_axis(curve, (left, right)),
+        y: quantity_axis(curve, quantity, (top + HEIGHT, top)),
     };
     let line = draw_band(drawing, &panel, (trend, quantity.factor), sizes);
     panel.draw_x_ticks(drawing, &amplitude_ticks(&panel.x));
     panel.draw_y_ticks(drawing, &panel.y.ticks(34.0));
     panel.draw_curve(drawing, line, Stroke::new(INK, 1.4));
-    for point in &curve.points {
-        let color = color(curve, point.tap);
-        draw_point(drawing, &panel, (point, quantity), color);
+    // All bars, then all dots: neighbours of one style are one path in an SVG.
+    for draw in [draw_bar, draw_dot] {
+        for point in &curve.points {
+            let color = color(curve, point.tap);
+            draw(drawing, &panel, (point, quantity), color);
+        }
     }
     panel.draw_frame(drawing);
     if !x_title.is_empty() {
@@ -225,6 +232,25 @@ fn draw_panel(
     let at = (left - 66.0, top + 0.5 * HEIGHT);
     let title = Text::new(quantity.title, at, LABEL_SIZE);
     drawing.text(title.aligned(Align::Middle).upwards());
+}
+
+fn amplitudes(curve: &AmplitudeCurve) -> (f64, f64) {
+    extent(curve.points.iter().map(|point| point.amplitude)).unwrap_or((1.0, 10.0))
+}
+
+/// All amplitudes, with some room.
+pub(in crate::report) fn amplitude_axis(curve: &AmplitudeCurve, pixels: (f64, f64)) -> Axis {
+    let (low, high) = amplitudes(curve);
+    Axis::logarithmic((low / 1.12, high * 1.12), pixels)
+}
+
+/// What [`range`] says.
+pub(in crate::report) fn quantity_axis(
+    curve: &AmplitudeCurve,
+    quantity: &Quantity,
+    pixels: (f64, f64),
+) -> Axis {
+    Axis::linear(range(curve, quantity), pixels)
 }
 
 /// Values of the points that are known well enough to tell something, and of those that differ from them
@@ -299,19 +325,29 @@ fn draw_band(
     line
 }
 
-fn draw_point(
+fn draw_bar(
     drawing: &mut Drawing,
     panel: &Panel,
     (point, quantity): (&AmplitudePoint, &Quantity),
     color: Color,
 ) {
     let (value, std) = (quantity.value)(point);
-    if !panel.y.holds(value) {
-        return;
+    if panel.y.holds(value) {
+        let x = panel.x.place(point.amplitude);
+        let low = panel.y.place(value - BAR * std);
+        let high = panel.y.place(value + BAR * std);
+        drawing.line(vec![(x, low), (x, high)], Stroke::new(color, 1.3));
     }
-    let (x, y) = panel.place(point.amplitude, value);
-    let low = panel.y.place(value - BAR * std);
-    let high = panel.y.place(value + BAR * std);
-    drawing.line(vec![(x, low), (x, high)], Stroke::new(color, 1.3));
-    drawing.dot((x, y), 3.4, color);
+}
+
+fn draw_dot(
+    drawing: &mut Drawing,
+    panel: &Panel,
+    (point, quantity): (&AmplitudePoint, &Quantity),
+    color: Color,
+) {
+    let (value, _) = (quantity.value)(point);
+    if panel.y.holds(value) {
+        drawing.dot(panel.place(point.amplitude, value), 3.4, color);
+    }
 }

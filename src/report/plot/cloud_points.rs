@@ -13,23 +13,23 @@ const CORNERS: usize = 120;
 
 /// The estimates of one method, as pairs of Kx and Ky.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Cloud {
+pub(in crate::report) struct Cloud {
     /// "pairs" or "consistent".
-    pub(super) method: String,
+    pub(in crate::report) method: String,
     /// At all ends of the bounds.
-    pub(super) patterns: Vec<Point>,
+    pub(in crate::report) patterns: Vec<Point>,
     /// Under random errors.
-    pub(super) random: Vec<Point>,
+    pub(in crate::report) random: Vec<Point>,
     /// With all frequencies changed alike: percent and place.
-    pub(super) shifted: Vec<(f64, Point)>,
+    pub(in crate::report) shifted: Vec<(f64, Point)>,
     /// The estimate itself.
-    pub(super) estimate: Option<Point>,
+    pub(in crate::report) estimate: Option<Point>,
     /// The 95 % region by the covariance; empty where there is none.
-    pub(super) ellipse: Vec<Point>,
+    pub(in crate::report) ellipse: Vec<Point>,
 }
 
 /// The clouds of all methods, the consistent estimate's first; one without two points is none.
-pub(super) fn clouds(document: &Document) -> Vec<Cloud> {
+pub(in crate::report) fn clouds(document: &Document) -> Vec<Cloud> {
     let methods = ["consistent", "pairs"].into_iter();
     methods
         .map(|method| cloud(document, method))
@@ -105,7 +105,7 @@ fn ellipse(estimate: &EstimateSection, method: &str) -> Vec<Point> {
 
 impl Cloud {
     /// Axes on which all of it can be seen but the outermost of the random ones.
-    pub(super) fn axes(&self, across: (f64, f64), upwards: (f64, f64)) -> (Axis, Axis) {
+    pub(in crate::report) fn axes(&self, across: (f64, f64), upwards: (f64, f64)) -> (Axis, Axis) {
         let each = |pick: fn(&Point) -> f64| {
             let shifted = self.shifted.iter().map(|(_, point)| point);
             let shown = self.patterns.iter().chain(shifted).chain(&self.estimate);

@@ -49,8 +49,22 @@ pub enum Shape {
         /// Fill.
         color: Color,
     },
+    /// A circle with paper inside.
+    Ring {
+        /// Centre.
+        center: Point,
+        /// Outer radius (pixels).
+        radius: f64,
+        /// Colour of the line.
+        color: Color,
+    },
     /// Text.
     Text(Text),
+}
+
+/// Inner radius of a ring (pixels): its line is two pixels wide.
+pub(super) fn ring_hole(radius: f64) -> f64 {
+    (radius - 2.0).max(1.0)
 }
 
 /// How a line is drawn.
@@ -221,8 +235,11 @@ impl Drawing {
 
     /// Adds a ring: a circle with white inside.
     pub fn ring(&mut self, center: Point, radius: f64, color: Color) {
-        self.dot(center, radius, color);
-        self.dot(center, (radius - 2.0).max(1.0), WHITE);
+        self.shapes.push(Shape::Ring {
+            center,
+            radius,
+            color,
+        });
     }
 
     /// Adds a diagonal cross.

@@ -22,11 +22,15 @@ pub enum Weight {
 /// Family under which the font is asked for in SVG.
 pub const FAMILY: &str = "sans-serif";
 
+/// How far the letters' baseline lies below the middle line (em): half the height of capitals, 0.73 em in
+/// this font.
+pub(super) const BASELINE: f64 = 0.365;
+
 static REGULAR: &[u8] = include_bytes!("../../../assets/DejaVuSans-sub.ttf");
 static BOLD: &[u8] = include_bytes!("../../../assets/DejaVuSans-Bold-sub.ttf");
 
 /// The embedded font, read once.
-fn face(weight: Weight) -> Option<&'static FontRef<'static>> {
+pub(super) fn face(weight: Weight) -> Option<&'static FontRef<'static>> {
     static FACES: OnceLock<[Option<FontRef<'static>>; 2]> = OnceLock::new();
     let read = |bytes: &'static [u8]| FontRef::try_from_slice(bytes).ok();
     let [regular, bold] = FACES.get_or_init(|| [read(REGULAR), read(BOLD)]);
@@ -99,8 +103,7 @@ pub fn cover(text: &Text, mut paint: impl FnMut(i32, i32, f64)) {
         Align::Middle => -text.width() / 2.0,
         Align::End => -text.width(),
     };
-    // Half the height of capitals, 0.73 em in this font, below the middle line.
-    let baseline = 0.365 * text.size;
+    let baseline = BASELINE * text.size;
     // Across, letters sit where they belong and the baseline on a whole pixel, which keeps the
     // horizontal strokes crisp; upwards, the same after the turn.
     let (origin, along) = match text.direction {

@@ -67,14 +67,12 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
         Stroke::new(INK, 1.0),
     );
     panel.draw_frame(drawing);
-    let count = recordings(pulls).len().max(1) as f64;
     for pull in pulls {
-        let place = recordings(pulls)
-            .iter()
-            .position(|name| *name == pull.recording)
-            .unwrap_or(0);
-        // Recordings stand beside each other over half the width of a mode.
-        let x = pull.mode as f64 + 0.5 * ((place as f64 + 0.5) / count - 0.5);
+        // The recordings that saw a mode stand beside each other over half its width.
+        let seen = recordings(pulls.iter().filter(|other| other.mode == pull.mode));
+        let place = seen.iter().position(|name| *name == pull.recording);
+        let share = (place.unwrap_or(0) as f64 + 0.5) / seen.len().max(1) as f64;
+        let x = pull.mode as f64 + 0.5 * (share - 0.5);
         drawing.ring(panel.place(x, pull.error_percent), 4.5, VERMILION);
         drawing.dot(panel.place(x, pull.error_percent_after), 4.0, BLUE);
     }
@@ -100,7 +98,7 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
 }
 
 /// Recordings in the order of their first error.
-fn recordings(pulls: &[PullSection]) -> Vec<&str> {
+fn recordings<'a>(pulls: impl Iterator<Item = &'a PullSection>) -> Vec<&'a str> {
     let mut names: Vec<&str> = Vec::new();
     for pull in pulls {
         if !names.contains(&pull.recording.as_str()) {
@@ -126,7 +124,7 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
             if named { BLUE } else { SKY },
             1.0,
         );
-        let middle = 0.5 * (top + bottom) + 5.0;
+        let middle = 0.5 * (top + bottom);
         let name = Text::new(&found.effect, (ODDS.0 - 10.0, middle), TICK_SIZE);
         drawing.text(name.aligned(Align::End));
         let value = format!("{:.1}", 100.0 * found.probability);

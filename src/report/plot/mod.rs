@@ -3,7 +3,7 @@
 pub mod amplitude;
 pub mod axis;
 pub mod cloud;
-mod cloud_points;
+pub(super) mod cloud_points;
 pub mod comparison;
 pub mod decimate;
 pub mod drawing;
@@ -20,13 +20,17 @@ pub mod time;
 
 mod closeup;
 mod font;
+mod format;
+mod letters;
 mod marks;
 pub(super) mod panel;
+mod paths;
 mod raster;
 mod vector;
 
 pub use drawing::Drawing;
 pub use font::Weight;
+pub use format::{PictureFormat, render_picture};
 pub(super) use marks::frequency as frequency_words;
 pub use raster::render_png;
-pub use vector::render_svg;
+pub use vector::{render_svg, render_svg_file};

@@ -7,9 +7,9 @@ use plotters::prelude::{BitMapBackend, DrawingBackend};
 use plotters::style::{Color as _, RGBAColor};
 
 use super::super::ReportError;
-use super::drawing::{Drawing, Point, Shape, Stroke};
+use super::drawing::{Drawing, Point, Shape, Stroke, ring_hole};
 use super::font;
-use super::palette::Color;
+use super::palette::{Color, WHITE};
 
 /// The picture as the bytes of a PNG file.
 ///
@@ -84,6 +84,14 @@ impl Canvas<'_> {
                 radius,
                 color,
             } => self.dot(*center, *radius, *color),
+            Shape::Ring {
+                center,
+                radius,
+                color,
+            } => {
+                self.dot(*center, *radius, *color);
+                self.dot(*center, ring_hole(*radius), WHITE);
+            }
             Shape::Text(text) => {
                 font::cover(text, |x, y, coverage| {
                     self.blend(x, y, text.color, coverage)

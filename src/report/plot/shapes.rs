@@ -44,7 +44,7 @@ pub fn draw_shapes(document: &Document) -> Option<Drawing> {
     for (index, shape) in shown.iter().enumerate() {
         let (column, row) = (index % ACROSS, index / ACROSS);
         let panel = panel(shape, column, TOP + row as f64 * (HEIGHT + SPACE));
-        draw_ground(&mut drawing, &panel, kind);
+        draw_ground(&mut drawing, &panel, kind, joint_of(shape));
         draw_shape(&mut drawing, &panel, shape, &places);
     }
     draw_legend(&mut drawing, (LEFT, 76.0), RIGHT, &legend(&places));
@@ -62,39 +62,33 @@ fn panel(shape: &ModeShapeSection, column: usize, top: f64) -> Panel {
 }
 
 /// The beam at rest, and what holds it.
-fn draw_ground(drawing: &mut Drawing, panel: &Panel, kind: Option<&str>) {
+fn draw_ground(drawing: &mut Drawing, panel: &Panel, kind: Option<&str>, lap: Option<f64>) {
     let y = panel.y.place(0.0);
     drawing.line(
         vec![(panel.x.from, y), (panel.x.to, y)],
         Stroke::new(GRID, 2.0),
     );
-    let middle = 0.5 * (panel.x.from + panel.x.to);
-    match kind {
-        Some("cantilever") => {
-            drawing.rectangle(
-                (panel.x.from - 9.0, y - 24.0),
-                (panel.x.from - 2.0, y + 24.0),
-                SOFT,
-                0.8,
-            );
-        }
-        Some("lap") => drawing.rectangle(
-            (middle - 3.0, y - 12.0),
-            (middle + 3.0, y + 12.0),
+    if let Some(joint) = lap.map(|joint| panel.x.place(joint)) {
+        let (from, to) = ((joint - 3.0, y - 12.0), (joint + 3.0, y + 12.0));
+        drawing.rectangle(from, to, SOFT, 0.8);
+    }
+    if kind == Some("cantilever") {
+        drawing.rectangle(
+            (panel.x.from - 9.0, y - 24.0),
+            (panel.x.from - 2.0, y + 24.0),
             SOFT,
             0.8,
-        ),
-        _ => {}
+        );
     }
 }
 
 fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, places: &Places) {
     let points = shape.positions.iter().zip(&shape.displacements);
-    panel.draw_curve(
-        drawing,
-        points.map(|(x, y)| (*x, *y)),
-        Stroke::new(BLUE, 2.5),
-    );
+    let points: Vec<(f64, f64)> = points.map(|(x, y)| (*x, *y)).collect();
+    // A lap joint's halves end at one place and need not meet.
+    for beam in points.chunk_by(|before, after| before.0 < after.0) {
+        panel.draw_curve(drawing, beam.iter().copied(), Stroke::new(BLUE, 2.5));
+    }
     let title = format!("mode {}", shape.mode);
     let at = (panel.x.from, panel.y.to - 8.0);
     drawing.text(Text::new(title, at, TICK_SIZE).bold());
@@ -123,6 +117,13 @@ fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, pl
             drawing.text_on_paper(text);
         }
     }
+}
+
+/// Where a lap joint sits (m): its place stands twice.
+fn joint_of(shape: &ModeShapeSection) -> Option<f64> {
+    let mut pairs = shape.positions.windows(2);
+    let twice = pairs.find(|pair| pair[0] == pair[1])?;
+    twice.first().copied()
 }
 
 /// Displacement at a place, between the points next to it.

@@ -35,7 +35,7 @@ const NARROW_RADIUS: f64 = 2.6;
 const FAINT: Color = Color(178, 186, 196);
 
 /// Classes from the best to the worst, with words for the legend.
-const CLASSES: [(PoleStability, &str); 5] = [
+pub(in crate::report) const CLASSES: [(PoleStability, &str); 5] = [
     (PoleStability::All, "stable: frequency and damping"),
     (
         PoleStability::FrequencyAndDamping,
@@ -183,7 +183,7 @@ fn draw_narrow(
 }
 
 /// "modes 1, 2 · 40 to 60 Hz".
-fn named(spectra: &SpectraFigure, band: &StabilisationBand) -> String {
+pub(in crate::report) fn named(spectra: &SpectraFigure, band: &StabilisationBand) -> String {
     let (low, high) = band.core;
     let within = |frequency: f64| (low..=high).contains(&frequency);
     let numbers: Vec<String> = spectra
@@ -212,9 +212,19 @@ fn whole_numbers(axis: &Axis, spacing: f64) -> Vec<Tick> {
     ticks
 }
 
-/// The largest level of all frequency response functions, or without a hammer of all responses, each
-/// over its own highest value: its logarithm fills the panel.
 fn draw_level(drawing: &mut Drawing, panel: &Panel, spectra: &SpectraFigure) {
+    let band = (panel.x.low, panel.x.high);
+    let points = level(spectra, band, panel.y.high);
+    panel.draw_curve(drawing, points, Stroke::new(FAINT, 1.3));
+}
+
+/// The largest level of all frequency response functions, or without a hammer of all responses, each
+/// over its own highest value: its logarithm fills the panel up to the order `top`.
+pub(in crate::report) fn level(
+    spectra: &SpectraFigure,
+    band: (f64, f64),
+    top: f64,
+) -> Vec<(f64, f64)> {
     let curves: Vec<&[f64]> = if spectra.frfs.is_empty() {
         spectra
             .responses
@@ -229,20 +239,15 @@ fn draw_level(drawing: &mut Drawing, panel: &Panel, spectra: &SpectraFigure) {
             .collect()
     };
     let level = composite(&curves);
-    let visible: Vec<f64> = over_lines(spectra, &level)
-        .filter(|(frequency, _)| panel.x.holds(*frequency))
-        .map(|(_, value)| value)
+    let visible: Vec<(f64, f64)> = over_lines(spectra, &level)
+        .filter(|(frequency, value)| (band.0..=band.1).contains(frequency) && value.is_finite())
         .collect();
-    let top = panel.y.from + LEVEL_SHARE * (panel.y.to - panel.y.from);
-    let scale = Panel {
-        x: panel.x,
-        y: magnitude_axis([visible.as_slice()], (panel.y.from, top)),
-    };
-    scale.draw_curve(
-        drawing,
-        over_lines(spectra, &level),
-        Stroke::new(FAINT, 1.3),
-    );
+    let values: Vec<f64> = visible.iter().map(|(_, value)| *value).collect();
+    let scale = magnitude_axis([values.as_slice()], (0.0, LEVEL_SHARE * top));
+    let placed = visible
+        .into_iter()
+        .map(|(x, value)| (x, scale.place(value)));
+    placed.collect()
 }
 
 /// On each line the largest of the curves, each relative to its own highest value.

@@ -1,59 +1,97 @@
-//! Pictures as SVG that stands inside an HTML page.
+//! Pictures as SVG: inside an HTML page with text in the reader's fonts, or as a file of its own whose
+//! letters are outlines of the embedded font and so need none.
 
 use plotters::prelude::{DrawingBackend, SVGBackend};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontTransform, RGBColor, ShapeStyle, TextStyle};
 
 use super::super::ReportError;
-use super::drawing::{Align, Direction, Drawing, Point, Shape, Text};
+use super::drawing::{Align, Direction, Drawing, Point, Shape, Text, ring_hole};
 use super::font::{self, Weight};
-use super::palette::Color;
+use super::letters::Letters;
+use super::palette::{Color, WHITE};
+use super::paths::{is_long, merged, same_style};
 
 /// Units of the SVG per pixel: the backend knows whole numbers only, a quarter of a pixel is fine
 /// enough for smooth curves.
-const UNITS: f64 = 4.0;
+pub(super) const UNITS: f64 = 4.0;
 
 /// The backend divides font sizes by this number.
 const BACKEND_FONT_RATIO: f64 = 1.24;
 
-/// The picture as an `<svg>` element without fixed size, which fills the width it is given.
+/// The picture as an `<svg>` element without fixed size, which fills the width it is given. A name
+/// space is not needed inside HTML, a description for screen readers is.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
 pub fn render_svg(drawing: &Drawing) -> Result<String, ReportError> {
-    let mut text = String::new();
-    let size = (
-        (f64::from(drawing.width) * UNITS) as u32,
-        (f64::from(drawing.height) * UNITS) as u32,
-    );
-    {
-        let mut backend = SVGBackend::with_string(&mut text, size);
-        for shape in &drawing.shapes {
-            put(&mut backend, shape).map_err(|problem| ReportError::Picture {
-                picture: drawing.description.clone(),
-                problem,
-            })?;
-        }
-        backend.present().map_err(|error| ReportError::Picture {
-            picture: drawing.description.clone(),
-            problem: error.to_string(),
-        })?;
-    }
-    Ok(inline(&text, drawing, size))
+    let body = elements(drawing, &mut None)?;
+    let (width, height) = size(drawing);
+    let words = escaped(&drawing.description);
+    Ok(format!(
+        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{words}\">{body}</svg>"
+    ))
 }
 
-/// Replaces the element's head: a name space is not needed inside HTML, a fixed size not wanted,
-/// a description for screen readers is.
-fn inline(svg: &str, drawing: &Drawing, size: (u32, u32)) -> String {
-    let body = svg.split_once('>').map_or("", |(_, body)| body);
-    // Full opacity is what SVG assumes.
-    let body = body.replace(" opacity=\"1\"", "");
-    format!(
-        "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{body}",
-        size.0,
-        size.1,
+/// The picture as an SVG file that looks the same on every machine: no font is asked for.
+///
+/// # Errors
+/// [`ReportError::Picture`] if it cannot be drawn, [`ReportError::Font`] without the embedded font.
+pub fn render_svg_file(drawing: &Drawing) -> Result<String, ReportError> {
+    font::check()?;
+    let mut letters = Some(Letters::default());
+    let body = elements(drawing, &mut letters)?;
+    let (width, height) = size(drawing);
+    let outlines = letters.map_or_else(String::new, |letters| letters.definitions());
+    // xlink: readers of SVG 1.1 know no other reference to a definition.
+    Ok(format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" \
+         version=\"1.1\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {width} {height}\">\n\
+         <title>{}</title>\n{outlines}{body}</svg>\n",
+        drawing.width,
+        drawing.height,
         escaped(&drawing.description)
-    )
+    ))
+}
+
+fn size(drawing: &Drawing) -> (u32, u32) {
+    let units = |pixels: u32| (f64::from(pixels) * UNITS) as u32;
+    (units(drawing.width), units(drawing.height))
+}
+
+/// All shapes in their order; neighbours of one style become one element.
+fn elements(drawing: &Drawing, letters: &mut Option<Letters>) -> Result<String, ReportError> {
+    let mut all = String::from("\n");
+    for group in drawing.shapes.chunk_by(same_style) {
+        match (group, letters.as_mut()) {
+            ([Shape::Text(text)], Some(letters)) => all.push_str(&letters.element(text)),
+            ([one], _) if !is_long(one) => all.push_str(&element(drawing, one)?),
+            _ => all.push_str(&merged(group)),
+        }
+    }
+    Ok(all)
+}
+
+/// One shape, by the backend.
+fn element(drawing: &Drawing, shape: &Shape) -> Result<String, ReportError> {
+    let failed = |problem: String| ReportError::Picture {
+        picture: drawing.description.clone(),
+        problem,
+    };
+    let mut text = String::new();
+    {
+        let mut backend = SVGBackend::with_string(&mut text, size(drawing));
+        put(&mut backend, shape).map_err(failed)?;
+        backend
+            .present()
+            .map_err(|error| failed(error.to_string()))?;
+    }
+    let inner = text.split_once(">\n").map_or("", |(_, inner)| inner);
+    let inner = inner
+        .rsplit_once("</svg>")
+        .map_or(inner, |(inner, _)| inner);
+    // Full opacity is what SVG assumes.
+    Ok(inner.replace(" opacity=\"1\"", ""))
 }
 
 fn escaped(text: &str) -> String {
@@ -108,6 +146,23 @@ fn put(backend: &mut SVGBackend<'_>, shape: &Shape) -> Result<(), String> {
         } => {
             let radius = (radius * UNITS).round() as u32;
             backend.draw_circle(place(*center), radius, &style(*color, 1.0, 1.0), true)
+        }
+        Shape::Ring {
+            center,
+            radius,
+            color,
+        } => {
+            let paper = Shape::Dot {
+                center: *center,
+                radius: ring_hole(*radius),
+                color: WHITE,
+            };
+            let disc = Shape::Dot {
+                center: *center,
+                radius: *radius,
+                color: *color,
+            };
+            return put(backend, &disc).and_then(|()| put(backend, &paper));
         }
         Shape::Text(text) => return put_text(backend, text),
     };

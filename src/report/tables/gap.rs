@@ -20,6 +20,7 @@ pub fn gap_story(document: &Document) -> Vec<String> {
     story.extend(place(gap));
     story.extend(how_far(gap));
     story.extend(price(gap));
+    story.extend(along_decays(gap));
     story.extend(next_test(gap));
     story
 }
@@ -209,6 +210,39 @@ fn share(closure: &ClosureSection) -> String {
         100.0 * closure.low,
         100.0 * closure.high
     )
+}
+
+/// What the decays say by themselves, where the verdict does not already say it.
+fn along_decays(gap: &GapSection) -> Option<String> {
+    let found = gap.along_decays.as_ref()?;
+    let change = found.changes.iter().max_by(|a, b| {
+        (a.percent_per_fold / a.std)
+            .abs()
+            .total_cmp(&(b.percent_per_fold / b.std).abs())
+    })?;
+    let seen = format!(
+        "Along the decays frequencies change with amplitude (mode {} in {} by {:+.3} % per factor e)",
+        change.mode, change.recording, change.percent_per_fold
+    );
+    let Some(effect) = &found.effect else {
+        return Some(format!(
+            "{seen}, but not as a joint whose stiffness depends on the amplitude would make them."
+        ));
+    };
+    if gap.verdict.effects.contains(effect) {
+        return None;
+    }
+    let direction = if found.ratio < 0.0 {
+        "softens"
+    } else {
+        "stiffens"
+    };
+    Some(format!(
+        "{seen}: the joint {direction}, its rotational stiffness changes by {:+.1} +-{:.1} % at the largest \
+         amplitude ({effect}). That is said by the decays alone and explains no misfit of the frequencies.",
+        100.0 * found.ratio,
+        100.0 * found.ratio_std
+    ))
 }
 
 /// What ignoring the effect costs.

@@ -16,7 +16,6 @@ mod model;
 mod modes;
 mod numbering;
 mod section;
-mod statics;
 mod tridiagonal;
 
 use super::{Beam, StructureError};

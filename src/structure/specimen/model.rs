@@ -182,12 +182,6 @@ impl Model {
         self.equations(place.node)
     }
 
-    /// Whether an element that begins at a node has hinges.
-    pub(super) fn is_hinged(&self, node: usize) -> bool {
-        let first = |h: &HingedElement| self.runs[h.run].first_node + h.index;
-        self.hinged.iter().any(|h| first(h) == node)
-    }
-
     fn hinged_at(&self, run: usize, index: usize) -> Option<&HingedElement> {
         self.hinged
             .iter()

@@ -1,15 +1,14 @@
 //! The modes of a specimen, and what they say of changes to it.
 
 use super::lanczos::{Pairs, lowest_pairs};
-use super::model::{Energies, Model, Motion, Place, Run};
-use super::statics::Statics;
+use super::model::{Energies, Model, Motion, Run};
 use super::{Mesh, Specimen};
 use crate::structure::StructureError;
 use std::f64::consts::PI;
 
 /// Added to a singular stiffness matrix, in units of mass: about the first elastic eigenvalue of a
 /// free beam, lambda^4 = 500.
-pub(super) const SHIFT: f64 = 500.0;
+const SHIFT: f64 = 500.0;
 
 /// Below this eigenvalue (the first elastic one of a free beam is 500) nothing withstands a motion.
 const NO_STIFFNESS: f64 = 1e-6;
@@ -23,7 +22,6 @@ pub struct SpecimenModes {
     suspension: Vec<f64>,
     frequencies: Vec<f64>,
     modes: Vec<Mode>,
-    statics: Statics,
 }
 
 /// A mode in the model's units.
@@ -69,9 +67,11 @@ impl SpecimenModes {
         };
         let pairs = lowest_pairs(&stiffness, &mass, bounds, &locked, count + loose)?;
         let Pairs { values, vectors } = pairs;
-        let rigid = (0..loose).filter(|&i| values[i] < NO_STIFFNESS);
-        let rigid = rigid.map(|i| vectors[i].clone()).collect();
-        let statics = Statics::new(&stiffness, mass, rigid)?;
+        if values[..loose].iter().any(|value| *value < -NO_STIFFNESS) {
+            return Err(StructureError::FiniteElements {
+                reason: "it is not stable: the axial force buckles it".to_owned(),
+            });
+        }
         let frequency = |square: f64| square.max(0.0).sqrt() * model.units.omega / (2.0 * PI);
         let suspension = values[..loose]
             .iter()
@@ -86,7 +86,6 @@ impl SpecimenModes {
             model,
             mesh,
             modes,
-            statics,
         })
     }
 
@@ -146,42 +145,11 @@ impl SpecimenModes {
         self.model.joint_energy(&self.modes[mode].motion) / self.modes[mode].square
     }
 
-    /// Rotation of the base (1/(m sqrt(kg))), 0 where it does not give.
-    pub fn base_rotation(&self, mode: usize) -> f64 {
-        self.modes[mode].motion.base.unwrap_or(0.0) / self.rotation_unit()
-    }
-
     /// Share of the base in the kinetic energy (1): near 1 where the mode is the base's own.
     pub fn base_participation(&self, mode: usize) -> f64 {
         let turn = self.modes[mode].motion.base.unwrap_or(0.0);
         let inertia = self.model.base.map_or(0.0, |base| base.inertia);
         inertia * turn * turn / self.modes[mode].energies.kinetic
-    }
-
-    /// Displacement at one position (m) per static force at another (m/N): the sum of
-    /// phi phi/omega^2 over all modes, rigid motions left out.
-    pub fn static_receptance(&self, response: f64, force: f64) -> f64 {
-        let (from, to) = (self.model.place(force), self.model.place(response));
-        let load = self.model.load(&from);
-        let answer = self.model.motion(&self.statics.solve(load));
-        let mut displacement = to.displacement(&answer.ends(to.node));
-        if to.node == from.node && !self.model.is_hinged(to.node) {
-            let section = self.model.section_at(to.node);
-            displacement += section.inner_compliance(to.within, from.within);
-        }
-        displacement / self.model.units.stiffness()
-    }
-
-    /// [`Self::static_receptance`] less the part of the modes computed (m/N): what a sum over these
-    /// modes misses below them.
-    pub fn residual_receptance(&self, response: f64, force: f64) -> f64 {
-        let modal: f64 = (0..self.len())
-            .map(|mode| {
-                let omega = 2.0 * PI * self.frequencies[mode];
-                self.displacement(mode, response) * self.displacement(mode, force) / omega.powi(2)
-            })
-            .sum();
-        self.static_receptance(response, force) - modal
     }
 
     /// Frequency (Hz) that Rayleigh's quotient gives for another specimen with this mode's shape.
@@ -288,18 +256,5 @@ impl Model {
             }
         }
         vector
-    }
-
-    /// A unit force at a place.
-    fn load(&self, place: &Place) -> Vec<f64> {
-        let mut load = vec![0.0; self.numbering.size];
-        let nodes = [place.node, place.node + 1].map(|node| self.numbering.nodes[node]);
-        let equations = nodes.into_iter().flatten();
-        for (row, weight) in equations.zip(place.weights.displacement) {
-            if let Some(entry) = load.get_mut(row) {
-                *entry += weight;
-            }
-        }
-        load
     }
 }

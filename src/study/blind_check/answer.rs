@@ -2,12 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::case::{Answer, CaseKind, Class, Truth, Verdict};
+use super::case::{Answer, Class, Verdict};
 use crate::effects::{EffectId, Place};
 use crate::gap::{Diagnosis, Hypothesis, Verdict as Found};
-
-/// Below this probability of its misfit the catalogue's best fit is refuted.
-const REFUTED: f64 = 0.01;
 
 impl Answer {
     /// Of a diagnosis.
@@ -42,10 +39,10 @@ impl Answer {
         }
     }
 
-    /// Of a test that could not be diagnosed: no verdict, every class as probable as the next.
+    /// Of a test that could not be diagnosed: no verdict and no probabilities.
     pub fn none() -> Self {
         Self {
-            verdict: Verdict::NotEnoughData,
+            verdict: Verdict::NoAnswer,
             effects: Vec::new(),
             classes: BTreeMap::new(),
             places: Vec::new(),
@@ -94,31 +91,4 @@ fn places(diagnosis: &Diagnosis) -> Vec<(Option<Place>, f64)> {
         (Some(Place::Acquisition), p.acquisition),
         (None, p.unknown),
     ]
-}
-
-impl Truth {
-    /// Notes what these very data could have shown, by the diagnosis' own sensitivities: whether the
-    /// planted size is one that is noticed nine times out of ten, and whether the catalogue's best fit
-    /// misses readings at the 1 % level.
-    pub fn with_limits(mut self, diagnosis: &Diagnosis) -> Self {
-        if let CaseKind::Single(id) = self.kind() {
-            self.detectable = detectable(&self, id, diagnosis);
-        }
-        if self.kind() == CaseKind::Outside {
-            self.refutable = diagnosis.goodness_of_fit.map(|fit| fit < REFUTED);
-        }
-        self
-    }
-}
-
-fn detectable(truth: &Truth, id: EffectId, diagnosis: &Diagnosis) -> Option<bool> {
-    let (_, values) = truth.catalogue().next()?;
-    let name = *id.size_parameters().first()?;
-    let planted = values.get(name)?.abs();
-    let found = diagnosis
-        .hypotheses
-        .iter()
-        .find(|found| found.hypothesis == Hypothesis::Effects(vec![id]))?;
-    let size = found.parameters.iter().find(|value| value.name == name)?;
-    Some(planted >= size.smallest_detectable?)
 }

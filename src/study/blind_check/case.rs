@@ -42,9 +42,10 @@ pub struct Truth {
     pub name: String,
     /// Empty: nothing.
     pub effects: Vec<Planted>,
-    /// Whether an ideal observer would notice that something is missing; `None` where unknown.
+    /// Whether readings of the usual uncertainty would show that something is missing: see
+    /// [`DrawnTest::with_limits`](super::DrawnTest::with_limits); `None` where nobody said.
     pub detectable: Option<bool>,
-    /// Whether an ideal observer could tell that nothing in the catalogue explains it.
+    /// Whether they would show that nothing in the catalogue explains it.
     pub refutable: Option<bool>,
 }
 
@@ -106,6 +107,8 @@ pub enum Verdict {
     Unknown,
     /// Too few data for the question.
     NotEnoughData,
+    /// The test could not be analysed or diagnosed.
+    NoAnswer,
 }
 
 impl Verdict {
@@ -118,6 +121,7 @@ impl Verdict {
             Self::Set => "set",
             Self::Unknown => "unknown",
             Self::NotEnoughData => "not-enough-data",
+            Self::NoAnswer => "no-answer",
         }
     }
 }

@@ -17,10 +17,12 @@ use super::outside::{Fastened, OutsideKind};
 use super::sizes::{GROUPS, draw_effect};
 use crate::description::{DescriptionError, TestDescription};
 use crate::effects::{Effect, EffectError, EffectId};
+use crate::gap::GapError;
 use crate::simulate::{Damping, Laboratory, SimulateError};
 use crate::structure::StructureError;
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
+use crate::study::plan::PlanError;
 
 /// How many recordings a drawn test has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,6 +32,16 @@ pub enum Extent {
     FiveRecordings,
     /// One recording with one sensor, five modes.
     OneRecording,
+}
+
+impl Extent {
+    /// Modes in the band.
+    fn modes(self) -> usize {
+        match self {
+            Self::FiveRecordings => 6,
+            Self::OneRecording => 5,
+        }
+    }
 }
 
 /// A blind check to be drawn.
@@ -93,6 +105,8 @@ pub struct DrawnTest {
     pub laboratory: Laboratory,
     /// Noise of the responses below their root mean square (dB).
     pub noise_db: f64,
+    /// Modes in its band.
+    pub modes: usize,
     /// What was planted.
     pub truth: Truth,
     /// Seed of the recording.
@@ -114,6 +128,12 @@ pub enum DrawError {
     /// The test cannot be simulated.
     #[error("a drawn test cannot be simulated: {0}")]
     Simulate(#[from] SimulateError),
+    /// A drawn test is no plan.
+    #[error("what a drawn test can show cannot be planned: {0}")]
+    Plan(#[from] PlanError),
+    /// What a drawn test can show cannot be said.
+    #[error("what a drawn test can show cannot be said: {0}")]
+    Limits(#[from] GapError),
     /// The description as the user believes it cannot be written.
     #[error("a drawn description cannot be written: {0}")]
     Believed(#[from] toml::de::Error),
@@ -168,6 +188,7 @@ impl Campaign {
             description: TestDescription::parse(&text, &name)?,
             laboratory: subject.laboratory(self.extent, &mut random)?,
             noise_db: self.noise_db,
+            modes: self.extent.modes(),
             seed: random.random(),
             truth: Truth {
                 name,
@@ -289,10 +310,7 @@ impl Subject {
         extent: Extent,
         random: &mut ChaCha8Rng,
     ) -> Result<Laboratory, StructureError> {
-        let modes = match extent {
-            Extent::FiveRecordings => 6,
-            Extent::OneRecording => 5,
-        };
+        let modes = extent.modes();
         let joint = JointStiffness::two_parameter(self.kx, self.ky);
         let frequencies = natural_frequencies(
             BeamTheory::Euler,

@@ -14,6 +14,7 @@ mod calibration;
 mod case;
 mod commitment;
 mod draw;
+mod limits;
 mod mutation;
 mod outside;
 mod rate;

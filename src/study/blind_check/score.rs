@@ -16,9 +16,11 @@ pub type Case = (Truth, Answer);
 pub struct Scores {
     /// Cases of each kind: nothing planted, one effect, several, outside the catalogue.
     pub counts: [usize; 4],
+    /// Tests without an answer: they could not be analysed or diagnosed.
+    pub failed: usize,
     /// One effect: the most probable effect group is the planted one.
     pub top_1: Rate,
-    /// The same among those that an ideal observer would notice.
+    /// The same among those that such readings show at all.
     pub top_1_detectable: Rate,
     /// One effect: the planted group is among the three most probable.
     pub top_3: Rate,
@@ -79,6 +81,10 @@ pub fn score(cases: &[Case]) -> Scores {
         .collect();
     Scores {
         counts: kinds.map(|kind| of(kind).count()),
+        failed: cases
+            .iter()
+            .filter(|(_, answer)| answer.verdict == Verdict::NoAnswer)
+            .count(),
         top_1: Rate::of(of(Kind::Single), |case| rank_within(case, 1)),
         top_1_detectable: Rate::of(of(Kind::Single), |case| {
             rank_within(case, 1).filter(|_| case.0.detectable == Some(true))
@@ -157,7 +163,7 @@ fn calls_effect(answer: &Answer) -> bool {
     match answer.verdict {
         Verdict::Named | Verdict::Group => true,
         Verdict::Set => !answer.set(SET_SHARE).contains(&Class::None),
-        Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData => false,
+        Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData | Verdict::NoAnswer => false,
     }
 }
 

@@ -149,11 +149,17 @@ pub fn rows(scores: &Scores) -> Vec<Row> {
     rows
 }
 
-fn figures(scores: &Scores) -> [Row; 7] {
+fn figures(scores: &Scores) -> [Row; 8] {
     use Target::{AtLeast, AtMost};
     let calibration = &scores.calibration;
     let (median, tenth) = (scores.closure.map(|c| c.0), scores.closure.map(|c| c.1));
     [
+        figure(
+            "no_answer",
+            "tests that could not be diagnosed",
+            (scores.counts.iter().sum::<usize>() > 0).then_some(scores.failed as f64),
+            AtMost(0.0),
+        ),
         figure(
             "set_size",
             "mean size of the 90 % set",

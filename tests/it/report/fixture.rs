@@ -328,6 +328,7 @@ fn stabilisation(band: [f64; 2]) -> StabilisationFigure {
             poles.push(PoleMark {
                 order,
                 frequency: *frequency,
+                damping_ratio: 0.004,
                 stability,
             });
         }

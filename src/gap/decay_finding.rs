@@ -1,0 +1,187 @@
+//! What the decays say by themselves of a joint whose stiffness depends on the amplitude.
+//!
+//! Nothing else in the catalogue changes a frequency along a decay. The finding therefore stands beside the
+//! verdict on the frequencies: a model may miss them for another reason, and its joint soften all the
+//! same.
+
+use super::along_decay::lawful_change;
+use super::forward::{Forward, Solved};
+use super::frame::{Frame, Row};
+use super::hypothesis::Fit;
+use super::noise;
+use crate::effects::JointLaw;
+
+/// Exponents that are tried: slip with two powers and in between, and the cubic spring.
+const EXPONENTS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
+/// Probability by chance below which a change counts: a false one in a thousand tests.
+const CHANCE: f64 = 0.001;
+/// Goodness of fit below which a joint's law does not explain the changes.
+const MISFIT: f64 = 0.001;
+/// Size of the law at which the changes are computed; they are proportional to it.
+const SMALL: f64 = 1e-3;
+
+/// Frequencies that change along the decays, and what joint would do that.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DecayFinding {
+    /// Relative change of the joint's rotational stiffness at the largest amplitude (1), over that at
+    /// rest: negative where it softens.
+    pub ratio: f64,
+    /// Its standard uncertainty (1).
+    pub ratio_std: f64,
+    /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
+    pub exponent: f64,
+    /// Probability that noise alone makes the frequencies change as much.
+    pub chance: f64,
+    /// Probability of a misfit as large or larger, if the joint's stiffness changes like that.
+    pub goodness_of_fit: Option<f64>,
+    /// The frequencies that were followed.
+    pub changes: Vec<DecayChange>,
+}
+
+/// How a frequency changes along the decays of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DecayChange {
+    /// The mode.
+    pub mode: usize,
+    /// The recording.
+    pub configuration: String,
+    /// Change per e-fold of its amplitude (%): negative where the frequency falls with the amplitude.
+    pub percent_per_fold: f64,
+    /// Its standard uncertainty (%).
+    pub std: f64,
+    /// What the joint's law makes of it (%).
+    pub explained: f64,
+}
+
+impl DecayFinding {
+    /// Whether a joint's law explains the changes.
+    pub fn is_of_joint(&self) -> bool {
+        self.goodness_of_fit.is_none_or(|p| p >= MISFIT)
+    }
+
+    /// "softens" or "stiffens".
+    pub fn direction(&self) -> &'static str {
+        if self.ratio < 0.0 {
+            "softens"
+        } else {
+            "stiffens"
+        }
+    }
+}
+
+/// A law whose size follows from the changes by linear regression.
+pub(super) struct Regression {
+    pub(super) law: JointLaw,
+    std: f64,
+    chi_squared: f64,
+}
+
+/// Rows of changes along the decays.
+fn slopes(frame: &Frame) -> Vec<usize> {
+    (0..frame.rows.len())
+        .filter(|&row| matches!(frame.rows[row], Row::Slope { .. }))
+        .collect()
+}
+
+/// The law that explains the changes along the decays best, with the joint of a fitted model.
+pub(super) fn best_law(frame: &Frame, nominal: &Fit) -> Option<Regression> {
+    // Without a rotation that is sought there is no such law.
+    frame.nominal.sought().iter().find(|one| one.0 == 1)?;
+    let rows = slopes(frame);
+    let forward = Forward::new(frame, &[]);
+    let solved = forward.solve(&nominal.branch.optimum.parameters)?;
+    let signs = [-1.0, 1.0].iter();
+    let laws = signs.flat_map(|sign| EXPONENTS.map(|exponent| (sign * SMALL, exponent)));
+    laws.filter_map(|(ratio, exponent)| {
+        regression(frame, (&rows, &solved), JointLaw { ratio, exponent })
+    })
+    .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))
+}
+
+/// `None` where the changes call for the other sign.
+fn regression(
+    frame: &Frame,
+    (rows, solved): (&[usize], &[Solved]),
+    unit: JointLaw,
+) -> Option<Regression> {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for &row in rows {
+        let reading = frame.readings[row];
+        let x = predicted(frame, row, solved, &unit) / reading.std;
+        let y = reading.value / reading.std;
+        let weight = noise::weight(y, reading.freedom).min(1.0);
+        xx += weight * x * x;
+        xy += weight * x * y;
+        yy += weight * y * y;
+    }
+    let times = xy / xx;
+    (xx > 0.0 && times > 0.0).then(|| Regression {
+        law: JointLaw {
+            ratio: (times * unit.ratio).clamp(-0.7, 0.7),
+            ..unit
+        },
+        std: unit.ratio.abs() / xx.sqrt(),
+        chi_squared: yy - xy * times,
+    })
+}
+
+fn predicted(frame: &Frame, row: usize, solved: &[Solved], law: &JointLaw) -> f64 {
+    match frame.rows[row] {
+        Row::Slope {
+            configuration,
+            mode,
+        } => lawful_change(
+            &frame.setups[configuration],
+            mode,
+            &solved[configuration],
+            law,
+        ),
+        _ => 0.0,
+    }
+}
+
+/// The finding, where frequencies change by more than chance.
+pub(super) fn decay_finding(frame: &Frame, nominal: &Fit) -> Option<DecayFinding> {
+    let rows = slopes(frame);
+    let square = |residual: f64, row: usize| {
+        let reading = frame.readings[row];
+        noise::gaussian_square(residual / reading.std, reading.freedom)
+    };
+    let still = rows
+        .iter()
+        .map(|&row| square(frame.readings[row].value, row));
+    let chance = noise::chi_square_tail(still.sum(), rows.len() as f64)?;
+    if chance > CHANCE {
+        return None;
+    }
+    let found = best_law(frame, nominal)?;
+    let forward = Forward::new(frame, &[]);
+    let solved = forward.solve(&nominal.branch.optimum.parameters)?;
+    let explained = |row: usize| predicted(frame, row, &solved, &found.law);
+    let left = rows
+        .iter()
+        .map(|&row| square(frame.readings[row].value - explained(row), row));
+    // Size and exponent were sought.
+    let goodness_of_fit = noise::chi_square_tail(left.sum(), rows.len() as f64 - 2.0);
+    let change = |&row: &usize| match frame.rows[row] {
+        Row::Slope {
+            configuration,
+            mode,
+        } => Some(DecayChange {
+            mode,
+            configuration: frame.setups[configuration].label.clone(),
+            percent_per_fold: 100.0 * frame.readings[row].value,
+            std: 100.0 * frame.readings[row].std,
+            explained: 100.0 * explained(row),
+        }),
+        _ => None,
+    };
+    Some(DecayFinding {
+        ratio: found.law.ratio,
+        ratio_std: found.std,
+        exponent: found.law.exponent,
+        chance,
+        goodness_of_fit,
+        changes: rows.iter().filter_map(change).collect(),
+    })
+}

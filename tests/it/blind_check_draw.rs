@@ -1,0 +1,147 @@
+//! The tests that a blind check draws, and what their recordings give away.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use assert_cmd::Command;
+use tapjoint::description::TestDescription;
+use tapjoint::study::blind_check::{Campaign, CaseKind, Extent, GROUPS, commitment};
+
+fn campaign(seed: u64) -> Campaign {
+    Campaign {
+        singles: GROUPS.len(),
+        nulls: 3,
+        outside: 5,
+        pairs: 3,
+        extent: Extent::OneRecording,
+        seed,
+        ..Campaign::default()
+    }
+}
+
+#[test]
+fn prop_a_campaign_holds_what_was_asked_for() {
+    let campaign = campaign(101);
+    let (mut counts, mut groups) = ([0; 4], BTreeSet::new());
+    for index in 0..campaign.len() {
+        let test = campaign.draw(index).unwrap();
+        let place = match test.truth.kind() {
+            CaseKind::Single(effect) => {
+                groups.insert(effect.group());
+                0
+            }
+            CaseKind::Null => 1,
+            CaseKind::Outside => 2,
+            CaseKind::Several => 3,
+        };
+        counts[place] += 1;
+        assert_eq!(test.fastened.is_empty(), place != 2);
+        // The joint's drift is always among the effects.
+        assert_eq!(test.effects.len(), 1 + test.truth.catalogue().count());
+    }
+    assert_eq!(counts, [GROUPS.len(), 3, 5, 3]);
+    // Effects are dealt out evenly over their groups.
+    assert_eq!(groups.len(), GROUPS.len());
+}
+
+#[test]
+fn prop_a_seed_draws_the_same_test_again_and_another_another() {
+    let text = |seed: u64, index: usize| {
+        let test = campaign(seed).draw(index).unwrap();
+        (test.text, format!("{:?}", test.truth), test.seed)
+    };
+    assert_eq!(text(101, 4), text(101, 4));
+    assert_ne!(text(101, 4), text(102, 4));
+    assert_ne!(text(101, 4).0, text(101, 5).0);
+}
+
+#[test]
+fn prop_the_description_gives_neither_joint_nor_effect_away() {
+    let campaign = campaign(103);
+    let mut all = (0..campaign.len()).map(|index| campaign.draw(index).unwrap());
+    let mut outside = all.find(|test| !test.fastened.is_empty()).unwrap();
+    let recorded = outside.record().unwrap();
+    let read = TestDescription::parse(&recorded.description, "test.toml").unwrap();
+    assert_eq!(
+        (read.joint.kt, read.joint.kr, read.joint.ktr),
+        (None, None, None)
+    );
+    assert!(
+        read.recordings
+            .iter()
+            .all(|recording| recording.level.is_none())
+    );
+    for word in ["effect", "fastened", "truth", "kt", "kr"] {
+        assert!(!recorded.description.contains(word), "{word}");
+    }
+    // What is fastened reaches the recording, and the description stays the same without it.
+    outside.fastened = Default::default();
+    let bare = outside.record().unwrap();
+    assert_eq!(bare.description, recorded.description);
+    assert_eq!(bare.recordings[0].file, recorded.recordings[0].file);
+    assert_ne!(bare.recordings[0].channels, recorded.recordings[0].channels);
+}
+
+#[test]
+fn limit_what_a_test_can_show_is_said_of_what_was_planted() {
+    let campaign = campaign(104);
+    let mut detectable = Vec::new();
+    for index in 0..campaign.len() {
+        let test = campaign.draw(index).unwrap();
+        match test.truth.kind() {
+            CaseKind::Single(_) => detectable.extend(test.with_limits().unwrap().detectable),
+            CaseKind::Null => {
+                let truth = test.with_limits().unwrap();
+                assert_eq!((truth.detectable, truth.refutable), (None, None));
+            }
+            CaseKind::Outside | CaseKind::Several => {}
+        }
+    }
+    assert_eq!(detectable.len(), GROUPS.len());
+    // Of a dozen effects from small to large, some but not all are seen by one recording.
+    assert!(detectable.contains(&true) && detectable.contains(&false));
+}
+
+#[test]
+fn prop_kept_tests_are_what_was_sealed_and_score_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("tapjoint").unwrap();
+        command.current_dir(folder.path()).args(arguments);
+        let output = command.assert().success().get_output().stdout.clone();
+        String::from_utf8(output).unwrap()
+    };
+    let drawn = [
+        "blind-check",
+        "--one-recording",
+        "--cases",
+        "1",
+        "--seed",
+        "105",
+    ];
+    let first = run(&[&drawn[..], &["--keep", "kept"]].concat());
+    let truth = fs::read_to_string(folder.path().join("kept/truth.json")).unwrap();
+    assert!(first.contains(&commitment(&truth)), "{first}");
+    run(&[
+        "blind-check",
+        "--folder",
+        "kept",
+        "--truth",
+        "kept/truth.json",
+        "--out",
+        "again",
+    ]);
+    let cases = |out: &str| {
+        let text = fs::read_to_string(folder.path().join(out).join("cases.csv")).unwrap();
+        // What a test can show is known of drawn ones only.
+        let row: Vec<String> = text
+            .lines()
+            .nth(1)
+            .unwrap()
+            .split(',')
+            .map(str::to_owned)
+            .collect();
+        [row[..2].to_vec(), row[4..].to_vec()].concat()
+    };
+    assert_eq!(cases("blind-check"), cases("again"));
+}

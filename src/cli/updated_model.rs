@@ -17,9 +17,7 @@ pub(super) fn add_model(
     file: &TestFile,
     (analysis, diagnosis): (&Analysis, Result<&Diagnosis, &GapError>),
 ) -> Option<String> {
-    let found = analysis.identification.as_ref();
-    let joint = found.and_then(|found| Some(found.consistent.as_ref()?.joint));
-    let model = updated_model(&file.test, diagnosis.ok()?, joint)?;
+    let model = updated_model(&file.test, diagnosis.ok()?)?;
     let highest = analysis.modes.iter().filter_map(|mode| mode.mode).max()?;
     // Read back, so that the report shows what the file gives.
     let written = TestDescription::parse(&model.text, FILE).ok()?;

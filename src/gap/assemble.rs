@@ -189,6 +189,7 @@ impl<'a> Context<'a> {
             },
             effects: self.effects(entry),
             joint: self.joint(entry),
+            coupling: self.coupling(entry),
             scale: self.scale(entry),
         }
     }
@@ -235,6 +236,12 @@ impl<'a> Context<'a> {
             }
         }
         Some(joint)
+    }
+
+    fn coupling(&self, entry: &Entry) -> f64 {
+        let mut sought = self.frame().nominal.sought().into_iter();
+        let index = sought.position(|(direction, _)| direction == COUPLING);
+        index.map_or(0.0, |k| entry.fit.branch.optimum.parameters[k])
     }
 
     fn scale(&self, entry: &Entry) -> f64 {

@@ -136,6 +136,8 @@ pub struct HypothesisResult {
     pub effects: Vec<Effect>,
     /// The joint's stiffnesses that go with them (N/m, N m/rad); `None` without a joint.
     pub joint: Option<[f64; 2]>,
+    /// The coupling of the joint's own model that goes with them (1), without the effects'.
+    pub coupling: f64,
     /// Logarithm of the common factor on all frequencies that goes with them, within the tolerance of the
     /// geometry (1).
     pub scale: f64,

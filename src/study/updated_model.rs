@@ -6,7 +6,7 @@ use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, 
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
 use crate::pipeline::nominal_with;
-use crate::structure::specimen::{Mesh, PointMass, SpecimenJoint};
+use crate::structure::specimen::{Mesh, PointMass};
 use crate::structure::{JointStiffness, StructureError};
 use toml::Value;
 
@@ -31,13 +31,7 @@ pub struct DescribedEffectError {
 
 /// The model that a diagnosis makes of the described one: with what it names, else with the most probable
 /// hypothesis that predicts anything. `None` where nothing predicts.
-///
-/// `joint` is the estimate from which the diagnosis began.
-pub fn updated_model(
-    test: &TestDescription,
-    diagnosis: &Diagnosis,
-    joint: Option<JointStiffness>,
-) -> Option<UpdatedModel> {
+pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<UpdatedModel> {
     let wanted = match &diagnosis.verdict {
         Verdict::NoGap => Some(Hypothesis::None),
         Verdict::Named(effects) => Some(Hypothesis::Effects(effects.clone())),
@@ -49,11 +43,7 @@ pub fn updated_model(
         None => all.find(|one| one.hypothesis != Hypothesis::Unknown),
     }?;
     let mut effects = found.effects.clone();
-    let held = match nominal_with(test, joint).specimen.joint {
-        SpecimenJoint::Springs { coupling, .. } => coupling,
-        SpecimenJoint::Free => 0.0,
-    };
-    add_coupling(&mut effects, held)?;
+    add_coupling(&mut effects, found.coupling)?;
     let mut text = heading(diagnosis, found);
     text.push_str(&described(test, found));
     for effect in &effects {

@@ -2,6 +2,7 @@
 
 use super::super::catalogue::Candidate;
 use super::super::frame::{Frame, Row, Small};
+use super::super::nominal::COUPLING;
 use super::super::setup::Setup;
 use super::step::Step;
 use crate::effects::EffectId;
@@ -87,6 +88,8 @@ impl Proposals {
     pub(super) fn new(frame: &Frame) -> Self {
         let mut whole = frame.clone();
         whole.setups.truncate(KEPT);
+        // What other taps scattered in common says nothing of planned ones.
+        whole.scatter.retain(|one| one.0.0 < KEPT);
         whole.modes += MORE_MODES;
         whole.rows.clear();
         whole.readings.clear();
@@ -160,6 +163,7 @@ impl Proposals {
             for level in [0.25, 3.0] {
                 let mut other = again.clone();
                 other.level *= level;
+                other.path = other.path.map(|path| path.over(1.0 / level));
                 let rows = self.visit(frame, other, 0.0);
                 self.propose(Step::TapLevel { level }, Structure::Whole, rows);
             }
@@ -175,12 +179,12 @@ impl Proposals {
         let length = frame.nominal.specimen.body.length();
         let first = &frame.setups[0];
         let sat = |place: f64| {
-            let sensors = frame.setups.iter().flat_map(|setup| &setup.sensors);
+            let sensors = frame.setups.iter().flat_map(|setup| &setup.carried);
             let mut near = sensors.map(|sensor| (sensor.position - place).abs());
             near.any(|distance| distance < MOVED * length)
         };
         let places: Vec<f64> = PLACES.iter().map(|share| share * length).collect();
-        if !first.sensors.is_empty() {
+        if !first.carried.is_empty() {
             for position in places.into_iter().filter(|place| !sat(*place)) {
                 let step = Step::MoveSensor {
                     name: name_of(frame),
@@ -221,6 +225,8 @@ impl Proposals {
         let mut alone = frame.setups[0].clone();
         alone.specimen = specimen.clone();
         alone.sensors.clear();
+        alone.carried.clear();
+        alone.path = None;
         alone.names.clear();
         alone.places.clear();
         bare.setups = vec![alone];
@@ -243,7 +249,8 @@ impl Proposals {
         let visits = self.whole.setups.iter().chain(&frame.setups);
         let visit = 1 + visits.map(|setup| setup.visit).max().unwrap_or(0);
         setup.visit = visit;
-        for (direction, _) in frame.nominal.sought() {
+        let sought = frame.nominal.sought().into_iter();
+        for (direction, _) in sought.filter(|one| one.0 != COUPLING) {
             self.whole.smalls.push(Small::Drift { visit, direction });
             self.whole.small_centres.push(0.0);
             self.whole.small_stds.push(drift);
@@ -265,13 +272,16 @@ impl Proposals {
     }
 }
 
-/// The first configuration with its first sensor elsewhere.
+/// The first configuration with the first sensor that it carries elsewhere.
 fn moved(frame: &Frame, position: f64) -> Setup {
     let mut other = frame.setups[0].clone();
-    let before = other.sensors[0];
-    other.sensors[0].position = position;
-    // What belongs to the sensor's place is another unknown now.
-    other.places[0] = usize::MAX;
+    let before = other.carried[0];
+    other.carried[0].position = position;
+    if let Some(index) = other.sensors.iter().position(|sensor| *sensor == before) {
+        other.sensors[index].position = position;
+        // What belongs to the sensor's place is another unknown now.
+        other.places[index] = usize::MAX;
+    }
     let masses = &mut other.specimen.masses;
     let own = |mass: &&mut PointMass| mass.position == before.position && mass.mass == before.mass;
     if let Some(mass) = masses.iter_mut().find(own) {

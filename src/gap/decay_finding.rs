@@ -54,8 +54,17 @@ pub struct DecayChange {
 }
 
 impl DecayFinding {
-    /// Whether a joint's law explains the changes.
+    /// Whether a joint does that: a law of its rotation explains the changes, or all frequencies that
+    /// change do so the same way. Joints soften in translation too, which modes feel that do not turn
+    /// them; how much the rotation changes is then not told.
     pub fn is_of_joint(&self) -> bool {
+        let stands_out = |change: &&DecayChange| change.percent_per_fold.abs() > 3.0 * change.std;
+        let mut changes = self.changes.iter().filter(stands_out);
+        self.is_lawful() || changes.all(|change| change.percent_per_fold * self.ratio > 0.0)
+    }
+
+    /// Whether a law of the joint's rotation explains the changes.
+    pub fn is_lawful(&self) -> bool {
         self.goodness_of_fit.is_none_or(|p| p >= MISFIT)
     }
 

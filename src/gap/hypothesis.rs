@@ -284,7 +284,7 @@ impl Search<'_> {
                 keep(&mut found, branch, &[at, at + 1]);
             }
         }
-        if let Some(from) = self.at_decays(forward, nodes)
+        if let Some(from) = self.start_of_decays(forward, nodes)
             && let Some(branch) = evaluate(forward, known, &from, &self.settings.drift_stds)
         {
             keep(&mut found, branch, &[at, at + 1]);
@@ -317,7 +317,7 @@ impl Search<'_> {
 
     /// The best node with the size and the exponent that the changes along the decays call for, of a
     /// joint whose stiffness depends on the amplitude.
-    fn at_decays(&self, forward: &Forward<'_>, nodes: &[Branch]) -> Option<Vec<f64>> {
+    fn start_of_decays(&self, forward: &Forward<'_>, nodes: &[Branch]) -> Option<Vec<f64>> {
         let index = forward.layout.effects.len() - 1;
         forward.layout.effects[index]
             .place

@@ -58,6 +58,7 @@ fn along_decays(found: &DecayFinding) -> AlongDecaysSection {
         effect: found
             .is_of_joint()
             .then(|| EffectId::JointNonlinearity.name().to_owned()),
+        lawful: found.is_lawful(),
         ratio: found.ratio,
         ratio_std: found.ratio_std,
         exponent: found.exponent,

@@ -53,8 +53,11 @@ pub struct UpdatedModelSection {
 /// Frequencies that change along the decays, and what joint would do that.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct AlongDecaysSection {
-    /// "joint-nonlinearity" where a joint's law explains the changes; null where none does.
+    /// "joint-nonlinearity" where a joint's law explains the changes, or all frequencies that change do so
+    /// the same way; null where neither holds.
     pub effect: Option<String>,
+    /// Whether a law of the joint's rotation explains the changes: only then `ratio` is its size.
+    pub lawful: bool,
     /// Relative change of the joint's rotational stiffness at the largest amplitude (1): negative where it
     /// softens.
     pub ratio: f64,

@@ -91,11 +91,6 @@ fn virtual_test(effects: &[Effect], seed: u64) -> Diagnosis {
     diagnosed(&text, folder.path())
 }
 
-fn law(ratio: f64, exponent: f64) -> Effect {
-    let pairs = [("ratio", ratio), ("exponent", exponent)];
-    Effect::from_pairs(EffectId::JointNonlinearity, &pairs).unwrap()
-}
-
 /// Named, and its ratio within three standard uncertainties: one case in 400 misses.
 fn assert_found(diagnosis: &Diagnosis, ratio: f64) {
     let blocks = &diagnosis.blocks;
@@ -115,13 +110,11 @@ fn assert_found(diagnosis: &Diagnosis, ratio: f64) {
 }
 
 #[test]
-fn recover_a_joint_that_stiffens_with_the_square_of_the_amplitude() {
-    assert_found(&virtual_test(&[law(0.03, 2.0)], 131), 0.03);
-}
-
-#[test]
-fn recover_a_joint_that_slips() {
-    assert_found(&virtual_test(&[law(-0.03, 1.0)], 132), -0.03);
+fn recover_the_joint_that_slips_among_the_samples() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("recordings/nonlinear");
+    let text = std::fs::read_to_string(folder.join("test.toml")).unwrap();
+    // 5 % softer by the hardest tap, as its truth.json has it.
+    assert_found(&diagnosed(&text, &folder), -0.05);
 }
 
 #[test]

@@ -248,11 +248,19 @@ fn along_decays(gap: &GapSection) -> Option<String> {
     } else {
         "stiffens"
     };
+    let size = if found.lawful {
+        format!(
+            "its rotational stiffness changes by {:+.1} +-{:.1} % at the largest amplitude",
+            100.0 * found.ratio,
+            100.0 * found.ratio_std
+        )
+    } else {
+        "modes that hardly turn it change too, so that its rotation alone does not say by how much"
+            .to_owned()
+    };
     Some(format!(
-        "{seen}: the joint {direction}, its rotational stiffness changes by {:+.1} +-{:.1} % at the largest \
-         amplitude ({effect}). That is said by the decays alone and explains no misfit of the frequencies.",
-        100.0 * found.ratio,
-        100.0 * found.ratio_std
+        "{seen}: the joint {direction} ({effect}); {size}. That is said by the decays alone and explains \
+         no misfit of the frequencies."
     ))
 }
 

@@ -1,10 +1,11 @@
 //! The hypotheses that name no effect of a certain size: something unknown, and a joint that is another
 //! one at every visit.
 
-use super::evidence::{Branch, evaluate, knowledge, log_mean, over_drifts};
+use super::evidence::{Branch, evaluate, log_mean, over_drifts};
 use super::forward::Forward;
 use super::frame::{Frame, Row, Small};
 use super::hypothesis::Fit;
+use super::knowledge::knowledge;
 use super::settings::GapSettings;
 
 /// Spreads of what no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.

@@ -9,6 +9,7 @@
 //!                          withheld    what it predicts of readings that took no part
 //!                          left_out    what it predicts of each recording from the others
 //!                          verdict     an answer, or the reason why there is none
+//!                          decay_finding  what the decays say by themselves
 //!                          advisor     which test would tell more
 //! ```
 //!
@@ -34,6 +35,7 @@ mod frame;
 mod hypothesis;
 mod joint_energy;
 mod joint_path;
+mod knowledge;
 mod least_squares;
 mod left_out;
 mod noise;
@@ -41,6 +43,7 @@ mod nominal;
 mod pairs;
 mod place_map;
 mod posterior;
+mod profile;
 mod quality;
 mod result;
 mod search;

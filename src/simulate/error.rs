@@ -108,6 +108,19 @@ pub enum SimulateError {
     /// The structure cannot exist.
     #[error("the structure cannot be simulated: {0}")]
     Structure(#[from] StructureError),
+    /// A joint whose moment has its crest below the hardest tap's rotation.
+    #[error(
+        "joint-nonlinearity: ratio {ratio} with exponent {exponent} is past the crest of the joint's moment, \
+         beyond which it would let go of the beam; allowed: {least:.3} and above"
+    )]
+    SoftensTooFar {
+        /// Relative change of the secant at the hardest tap (1).
+        ratio: f64,
+        /// Power of the amplitude.
+        exponent: f64,
+        /// The least ratio that can be simulated (1).
+        least: f64,
+    },
     /// The recording cannot be written.
     #[error(transparent)]
     Recording(#[from] RecordingError),

@@ -8,7 +8,7 @@ const SLIDERS: usize = 40;
 /// would slip as a whole.
 const BEYOND_HARDEST: f64 = 3.0;
 /// Least slope of a softening elastic joint, relative to that at rest.
-const LEAST_SLOPE: f64 = 0.02;
+pub(super) const LEAST_SLOPE: f64 = 0.02;
 
 /// Restoring moment of the joint's rotation, M(theta).
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use super::chain::Signal;
 use super::check::check_laboratory;
 use super::error::SimulateError;
 use super::hammer::TapPlan;
-use super::joint_moment::JointMoment;
+use super::joint_moment::{JointMoment, LEAST_SLOPE};
 use super::laboratory::{Laboratory, Tip};
 use super::nominal::{GivenJoint, nominal_specimen, sensor_places};
 use super::reduced::Sensed;
@@ -78,6 +78,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     {
         return Err(SimulateError::Resolution);
     }
+    check_softening(plan.effects)?;
     let mut recordings = Vec::new();
     let mut trials = Vec::new();
     for (visit, recording) in described.iter().enumerate() {
@@ -322,6 +323,33 @@ fn hardest(recordings: &[VirtualRecording], trials: &[Trial]) -> Option<(JointLa
     let law = recordings.first()?.seen.joint_law?;
     let rotations = trials.iter().map(|trial| trial.joint_rotation);
     Some((law, rotations.fold(0.0, f64::max)))
+}
+
+/// Refuses a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would
+/// then be simulated is not what the ratio says.
+fn check_softening(effects: &[Effect]) -> Result<(), SimulateError> {
+    let of = |effect: &Effect| {
+        Some(JointLaw {
+            ratio: effect.value("ratio")?,
+            exponent: effect.value("exponent")?,
+        })
+    };
+    let mut nonlinear = effects
+        .iter()
+        .filter(|effect| effect.id == EffectId::JointNonlinearity);
+    let Some(law) = nonlinear.find_map(of) else {
+        return Ok(());
+    };
+    let least = -(1.0 - LEAST_SLOPE) / (law.exponent + 1.0);
+    let coefficient = law.coefficient(1.0);
+    if coefficient >= least {
+        return Ok(());
+    }
+    Err(SimulateError::SoftensTooFar {
+        ratio: law.ratio,
+        exponent: law.exponent,
+        least: law.ratio * least / coefficient,
+    })
 }
 
 fn turning_stiffness(specimen: &Specimen) -> Result<f64, SimulateError> {

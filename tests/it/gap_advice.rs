@@ -232,8 +232,10 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     };
     let found = of("sensor-mass");
     assert_eq!(found.recordings.len(), 5);
-    assert!(found.after < 2.0 * found.floor, "{found:?}");
-    assert!(found.after < 0.3 * found.before, "{found:?}");
+    // The joint drifts by 0.5 % between recordings, which nobody can predict: it moves frequencies by 0.1 %,
+    // some four times what their readings leave open.
+    assert!(found.after < 6.0 * found.floor, "{found:?}");
+    assert!(found.after < 0.2 * found.before, "{found:?}");
     let closure = found.closure.unwrap();
     assert!(closure.low > 0.5 && closure.value > 0.85, "{closure:?}");
     // Without any effect a recording is no better predicted by the others.

@@ -34,7 +34,7 @@ impl Fastened {
 /// Kinds of physics outside the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OutsideKind {
-    /// Something touches the beam somewhere: a spring to the ground, away from any sensor.
+    /// Something touches the beam somewhere: a spring to the ground that stays where it is.
     SecondSupport,
     /// Mass spread over a part of the beam, such as tape or paint.
     MassPatch,

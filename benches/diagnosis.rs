@@ -42,6 +42,7 @@ fn strip(held: bool) -> Nominal {
             mass: None,
             position: None,
         }],
+        joint_before: None,
         scale_std: None,
         reading_bias: None,
     }

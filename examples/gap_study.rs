@@ -252,6 +252,7 @@ fn nominal(random: &mut ChaCha8Rng) -> Nominal {
             mass: None,
             position: None,
         }],
+        joint_before: None,
         scale_std: None,
         reading_bias: None,
     }

@@ -137,9 +137,9 @@ impl<'a> Context<'a> {
         Context {
             competition,
             settings,
-            before: Residuals::new(&competition.frame, &competition.baseline),
-            withheld_before: WithheldErrors::new(&competition.frame, &competition.baseline),
-            left_out_before: LeftOutErrors::new(&competition.frame, &competition.baseline),
+            before: Residuals::new(&competition.frame, &competition.described),
+            withheld_before: WithheldErrors::new(&competition.frame, &competition.described),
+            left_out_before: LeftOutErrors::new(&competition.frame, &competition.described),
         }
     }
 
@@ -252,10 +252,15 @@ impl<'a> Context<'a> {
 
     fn joint_shift(&self, entry: &Entry) -> JointShift {
         let mut shift = JointShift::default();
-        let before = &self.competition.baseline.branch.optimum.parameters;
+        let before = &self.competition.described.branch.optimum.parameters;
         let after = &entry.fit.branch.optimum.parameters;
-        for (k, (direction, _)) in self.frame().nominal.sought().iter().enumerate() {
-            let percent = Some(100.0 * ((after[k] - before[k]).exp() - 1.0));
+        let nominal = &self.frame().nominal;
+        for (k, (direction, _)) in nominal.sought().iter().enumerate() {
+            let estimated = nominal
+                .joint_before
+                .and_then(|joint| joint.get(*direction).copied());
+            let before = estimated.map_or(before[k], f64::ln);
+            let percent = Some(100.0 * ((after[k] - before).exp() - 1.0));
             match *direction {
                 COUPLING => {}
                 0 => shift.kx_percent = percent,

@@ -15,6 +15,9 @@ pub struct Nominal {
     pub specimen: Specimen,
     /// The sensors by name.
     pub sensors: Vec<NominalSensor>,
+    /// The joint's stiffnesses (N/m, N m/rad) that were estimated of the same frequencies without any effect,
+    /// to say how far one moves them; `None` where nothing was: the nominal model's own fit is taken then.
+    pub joint_before: Option<[f64; 2]>,
     /// Standard uncertainty of the one factor that beam length, thickness, modulus and density put on
     /// all frequencies (1); `None` where the description states no tolerance.
     pub scale_std: Option<f64>,

@@ -5,7 +5,7 @@ use super::catch_all::{fit_drift, fit_unknown};
 use super::error::GapError;
 use super::evidence::log_mean;
 use super::forward::Forward;
-use super::frame::Frame;
+use super::frame::{Frame, Small};
 use super::hypothesis::{Fit, Search, fit_nominal};
 use super::nominal::{COUPLING, Nominal};
 use super::pairs::add_pairs;
@@ -20,8 +20,10 @@ use rayon::prelude::*;
 /// What the hypotheses made of the readings.
 pub(super) struct Competition {
     pub(super) frame: Frame,
-    /// The nominal model without geometry tolerance, only its joint refitted: where the gap is
-    /// measured from.
+    /// The nominal model as described, only its joint refitted, the same for all recordings: where the gap
+    /// is measured from.
+    pub(super) described: Fit,
+    /// The same with a joint that may drift between recordings: where a cause is looked for along the beam.
     pub(super) baseline: Fit,
     /// The most probable first.
     pub(super) entries: Vec<Entry>,
@@ -204,9 +206,11 @@ fn compete_once(
         entries.push(Entry::new(Hypothesis::Unknown, fit));
     }
     let baseline = fit_baseline(&frame, settings).unwrap_or_else(|| none.clone());
+    let described = fit_described(&frame, settings).unwrap_or_else(|| baseline.clone());
     entries.push(Entry::new(Hypothesis::None, none));
     Some(Competition {
         frame,
+        described,
         baseline,
         entries,
     })
@@ -215,11 +219,29 @@ fn compete_once(
 /// The nominal model whose geometry is taken at its word.
 fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     let mut exact = frame.clone();
-    if let Some(scale) = exact.small_index(super::frame::Small::Scale) {
-        exact.small_stds[scale] = 1e-9;
+    if let Some(scale) = exact.small_index(Small::Scale) {
+        exact.small_stds[scale] = EXACT;
     }
     fit_nominal(&exact, settings)
 }
+
+/// The same with a joint that is one and the same in all visits, and with sensors that weigh what was said.
+fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+    let mut exact = frame.clone();
+    for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
+        if matches!(small, Small::Scale | Small::SensorMass { .. }) {
+            *std = EXACT;
+        }
+    }
+    let settings = GapSettings {
+        drift_stds: vec![EXACT],
+        ..settings.clone()
+    };
+    fit_nominal(&exact, &settings)
+}
+
+/// Standard deviation (1) of what is taken at its word: far below what any reading shows.
+const EXACT: f64 = 1e-8;
 
 /// The effects that can be hypotheses of these readings.
 fn candidates(frame: &Frame) -> Vec<Candidate> {

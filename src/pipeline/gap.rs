@@ -35,7 +35,15 @@ pub fn diagnose_test(
 pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
     let found = analysis.identification.as_ref();
     let estimate = found.and_then(|found| found.consistent.as_ref());
-    nominal_with(test, estimate.map(|estimate| estimate.joint))
+    // The estimate's stiffnesses are in units of the beam that was estimated with them.
+    let joint_before = estimate.map(|estimate| {
+        let units = StiffnessUnits::of(&estimate.beam);
+        [estimate.joint.kx * units.kt, estimate.joint.ky * units.kr]
+    });
+    Nominal {
+        joint_before: joint_before.filter(|joint| joint.iter().all(|k| *k > 0.0 && k.is_finite())),
+        ..nominal_with(test, estimate.map(|estimate| estimate.joint))
+    }
 }
 
 /// The structure as described; what is not described of its joint is `found`, else usual.
@@ -56,6 +64,7 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
     Nominal {
         specimen: described_specimen(test, joint(test, found)),
         sensors: sensors.collect(),
+        joint_before: None,
         scale_std: scale_std(test),
         reading_bias: reading_bias(test),
     }

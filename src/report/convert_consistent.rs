@@ -20,8 +20,9 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
         reason: goodness.uncertainty_factor().map(|factor| {
             format!(
                 "the model misses the frequencies by {} % rms; uncertainties that would allow \
-                     that are {factor:.1} times the stated ones",
-                significant(100.0 * goodness.relative_misfit, 2)
+                     that are {} times the stated ones",
+                significant(100.0 * goodness.relative_misfit, 2),
+                significant(factor, 2)
             )
         }),
         kx: value(Quantity::Kx),

@@ -38,6 +38,7 @@ fn nominal(mass: Option<f64>, off: f64) -> Nominal {
             mass,
             position: None,
         }],
+        joint_before: None,
         scale_std: None,
         reading_bias: None,
     }

@@ -34,6 +34,7 @@ fn nominal(off: f64, known_mass: f64) -> Nominal {
     Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
         sensors: vec![sensor("A", None), sensor("M", Some(known_mass))],
+        joint_before: None,
         scale_std: None,
         reading_bias: None,
     }
@@ -220,7 +221,12 @@ fn rich_plan() -> TestPlan {
 #[test]
 fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.0113)]);
-    let diagnosis = diagnosed(&rich_plan(), 0.0, &truth, 11);
+    // A joint that stays as it is: what it drifts by nobody can predict.
+    let plan = TestPlan {
+        drift: 1e-3,
+        ..rich_plan()
+    };
+    let diagnosis = diagnosed(&plan, 0.0, &truth, 11);
     assert_eq!(
         diagnosis.verdict,
         Verdict::Named(vec![EffectId::SensorMass])
@@ -232,10 +238,9 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     };
     let found = of("sensor-mass");
     assert_eq!(found.recordings.len(), 5);
-    // The joint drifts by 0.5 % between recordings, which nobody can predict: it moves frequencies by 0.1 %,
-    // some four times what their readings leave open.
-    assert!(found.after < 6.0 * found.floor, "{found:?}");
-    assert!(found.after < 0.2 * found.before, "{found:?}");
+    // Three times what the readings leave open, for the joint's drift of 0.1 %.
+    assert!(found.after < 3.0 * found.floor, "{found:?}");
+    assert!(found.after < 0.5 * found.before, "{found:?}");
     let closure = found.closure.unwrap();
     assert!(closure.low > 0.5 && closure.value > 0.85, "{closure:?}");
     // Without any effect a recording is no better predicted by the others.

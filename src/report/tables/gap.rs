@@ -306,10 +306,13 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
         ],
         rows: listed.collect(),
         note: format!(
-            "Fitted, withheld: errors of the frequencies left (rms); before {} and {} %. Size \u{b1} one \
-             standard deviation.",
+            "Fitted, withheld: errors of the frequencies left (rms); of the described model {} %{}. Size \u{b1} \
+             one standard deviation.",
             percent(gap.hypotheses[0].gap_before),
-            percent(gap.hypotheses[0].withheld_before)
+            match gap.hypotheses[0].withheld_before {
+                Some(before) => format!(" and {} %", significant(before, 2)),
+                None => String::new(),
+            }
         ),
     })
 }

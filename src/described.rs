@@ -38,6 +38,16 @@ pub fn stiffness_of(known: KnownStiffness) -> f64 {
     }
 }
 
+/// Coupling of a joint (1), sqrt(Kt Kr)/Ktr, from stiffnesses and 1/Ktr in one system of units; none where
+/// Ktr is rigid.
+pub fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
+    if cross_compliance == 0.0 {
+        0.0
+    } else {
+        kt.sqrt() * kr.sqrt() * cross_compliance
+    }
+}
+
 /// The specimen on this joint, without sensors.
 pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
     let mut specimen = Specimen::new(body(test), joint);

@@ -67,7 +67,7 @@ pub(super) struct BlindCheckArguments {
     /// What was planted in them: JSON list of {"name", "effects", "params"}
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,
-    /// Keep the drawn tests in this folder, each with its recordings and its description, and beside
+    /// Keep the drawn tests in this new folder, each with its recordings and its description, and beside
     /// them their truth.json: to look at, or for --folder
     #[arg(long, value_name = "DIR", conflicts_with = "folder")]
     keep: Option<PathBuf>,
@@ -148,6 +148,7 @@ fn drawn(
     keep: Option<&Path>,
     terminal: &Terminal,
 ) -> anyhow::Result<Vec<Case>> {
+    let staged = keep.map(Staged::prepare).transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
         .map(|index| campaign.draw(index))
@@ -164,9 +165,10 @@ fn drawn(
         .map(|test| {
             let recorded = test.record()?;
             let truth = test.with_limits()?;
-            let case = match keep {
-                Some(folder) => {
-                    diagnose_recorded(&recorded, &truth, &folder.join(&test.truth.name))?
+            let case = match &staged {
+                Some(staged) => {
+                    let folder = staged.folder.path().join(&test.truth.name);
+                    diagnose_recorded(&recorded, &truth, &folder)?
                 }
                 None => diagnose_in_passing(&recorded, &truth)?,
             };
@@ -179,12 +181,41 @@ fn drawn(
         })
         .collect::<anyhow::Result<Vec<Case>>>()?;
     check_names(&tests, &diagnosed)?;
-    if let Some(folder) = keep {
-        let path = folder.join("truth.json");
-        fs::write(&path, sealed)
-            .with_context(|| format!("{}: cannot be written", path.display()))?;
+    if let Some(staged) = staged {
+        staged.publish(&sealed)?;
     }
     Ok(diagnosed)
+}
+
+/// A folder of tests that appears whole or not at all.
+struct Staged {
+    folder: tempfile::TempDir,
+    name: PathBuf,
+}
+
+impl Staged {
+    fn prepare(name: &Path) -> anyhow::Result<Self> {
+        let shown = name.display();
+        if name.exists() {
+            bail!("{shown}: is there already; give the name of a new folder");
+        }
+        let parent = name
+            .parent()
+            .filter(|parent| !parent.as_os_str().is_empty());
+        let folder = tempfile::Builder::new()
+            .prefix(".tapjoint-")
+            .tempdir_in(parent.unwrap_or(Path::new(".")))
+            .with_context(|| format!("{shown}: cannot be written"))?;
+        let name = name.to_owned();
+        Ok(Self { folder, name })
+    }
+
+    fn publish(self, truths: &str) -> anyhow::Result<()> {
+        let written = || format!("{}: cannot be written", self.name.display());
+        fs::write(self.folder.path().join("truth.json"), truths).with_context(written)?;
+        fs::rename(self.folder.path(), &self.name).with_context(written)?;
+        Ok(())
+    }
 }
 
 /// The truths as the file that is written at the end.

@@ -6,7 +6,7 @@ use super::output::OutputFile;
 use super::terminal::Terminal;
 use super::updated_model::add_model;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{IdentifySettings, diagnose_test};
 use tapjoint::report::{document_of, gap_section, render_gap_text};
@@ -50,10 +50,14 @@ pub(super) fn run(
     let diagnosis = diagnose_test(&file.test, &analysis, &settings);
     let mut document = document_of(&analysis);
     let mut gap = gap_section(diagnosis.as_ref());
-    let text = add_model(&mut gap, &file, (&analysis, diagnosis.as_ref()));
+    let name = arguments.model.as_deref().and_then(Path::file_name);
+    let name = name.map(|name| name.to_string_lossy().into_owned());
+    let text = add_model(&mut gap, (&file, name), (&analysis, diagnosis.as_ref()));
     document.gap = Some(gap);
-    if let (Some(output), Some(text)) = (output, text) {
-        output.write(text.as_bytes())?;
+    match (output, text) {
+        (Some(output), Some(text)) => output.write(text.as_bytes())?,
+        (Some(_), None) => terminal.warn("there is no model to write: nothing was diagnosed"),
+        (None, _) => {}
     }
     terminal.say(&render_gap_text(&document))?;
     terminal.write_document(&document)?;

@@ -114,6 +114,8 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
             "{name}: has no estimate of the joint; give a report with one, or leave --report out"
         )
     })?;
+    let sound = joint.check();
+    sound.with_context(|| format!("{name}: its joint cannot be"))?;
     // A closed form has been estimated without masses and unequal halves, and holds their effect.
     let whole = estimate["method"] == "consistent" || structure.known.over(None).is_some();
     let details = structure_details(test, &structure.beam);
@@ -125,7 +127,8 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
         .as_array()
         .map_or(USUAL_MODES, Vec::len);
     Ok(DeckSource {
-        frequencies: frequencies_of(&structure, &joint, count)?,
+        frequencies: frequencies_of(&structure, &joint, count)
+            .with_context(|| format!("{name}: its joint cannot be predicted with"))?,
         structure,
         joint,
         origin: format!("from {name}"),
@@ -165,7 +168,10 @@ fn reported_joint(
     );
     // Null instead of a value is a rigid joint, null instead of the quantity an unknown one.
     let stiffness = |key: &str| match &estimate[key] {
-        Value::Object(found) => Some(found.get("value")?.as_f64().unwrap_or(f64::INFINITY)),
+        Value::Object(found) => match found.get("value")? {
+            Value::Null => Some(f64::INFINITY),
+            value => value.as_f64(),
+        },
         _ => None,
     };
     let known = &structure.known;

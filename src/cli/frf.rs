@@ -66,7 +66,7 @@ pub(super) struct FrfArguments {
     #[arg(long, value_enum, value_name = "FORM")]
     form: Option<FormArgument>,
     /// Draw magnitude, phase and coherence into this file, SVG where its name ends in .svg; of several recordings one file each,
-    /// named NAME-RECORDING.png
+    /// named NAME-RECORDING with the same ending
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
     /// Write all functions into this file, one row for each line

@@ -58,16 +58,22 @@ pub(super) fn run(
         .as_deref()
         .map(OutputFile::prepare)
         .transpose()?;
+    let mut test = file.test.clone();
+    let joint = planned_joint(&arguments.stiffness, &test)?;
+    if joint.is_some() {
+        // It takes the place of the described one.
+        (test.joint.kt, test.joint.kr, test.joint.ktr) = (None, None, None);
+    }
     let settings = PlanSettings {
         draws: arguments.draws,
         modes: arguments.modes,
         frequency_std: 0.01 * std,
-        joint: planned_joint(&arguments.stiffness, &file.test)?,
+        joint,
         seed,
         ..PlanSettings::default()
     };
     let progress = |done, of| terminal.count("tests diagnosed", done, of);
-    let cases = judge_plan(&file.test, &settings, &progress).with_context(|| file.name.clone())?;
+    let cases = judge_plan(&test, &settings, &progress).with_context(|| file.name.clone())?;
     terminal.say(&tell_apart(&cases))?;
     if let Some(png) = png {
         let picture = render_confusion_picture(&cases, png.picture_format())?;

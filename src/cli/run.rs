@@ -136,7 +136,11 @@ pub(super) fn run(
         };
         let diagnosis = diagnose_test(&file.test, &analysis, &settings);
         let mut gap = gap_section(diagnosis.as_ref());
-        model = add_model(&mut gap, file, (&analysis, diagnosis.as_ref()));
+        model = add_model(
+            &mut gap,
+            (file, Some(FILE.to_owned())),
+            (&analysis, diagnosis.as_ref()),
+        );
         document.gap = Some(gap);
     }
     drop(progress);

@@ -11,10 +11,10 @@ use tapjoint::study::updated_model::{described_effects, frequencies_with, update
 pub(super) const FILE: &str = "updated-model.toml";
 
 /// Adds the model that a diagnosis makes of the described one to the report's section, and returns its
-/// file; `None` where there is no such model.
+/// text, which is written under `name` if that is given; `None` where there is no such model.
 pub(super) fn add_model(
     gap: &mut GapSection,
-    file: &TestFile,
+    (file, name): (&TestFile, Option<String>),
     (analysis, diagnosis): (&Analysis, Result<&Diagnosis, &GapError>),
 ) -> Option<String> {
     let model = updated_model(&file.test, diagnosis.ok()?)?;
@@ -25,7 +25,7 @@ pub(super) fn add_model(
     let frequencies = frequencies_with(&written, &effects, None, highest).ok()?;
     gap.updated_model = Some(UpdatedModelSection {
         effect: model.hypothesis,
-        file: FILE.to_owned(),
+        file: name,
         frequencies,
     });
     Some(model.text)

@@ -62,7 +62,7 @@ impl JointLaw {
     /// Relative change of the stiffness that one mode feels while others move the joint too.
     ///
     /// Elastic: (A^2 + 2 sum B^2)^{p/2}, exact for the cubic spring, where another motion counts twice
-    /// (R = (p + 2)/2 of a small motion beside a large one); within 5 % for powers from 1/2 on.
+    /// (R = (p + 2)/2 of a small motion beside a large one); within 6 % for powers from 1/2 on.
     /// Micro-slip: (A + sum w B)^p. A faster motion shakes the sliders loose and counts more than its
     /// size; a slower one counts fully where the mode only modulates its speed, and hardly where the mode
     /// turns the velocity about. The weights are fitted to sliders in parallel under two to four

@@ -30,7 +30,8 @@ pub struct DecayFinding {
     pub ratio_std: f64,
     /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
     pub exponent: f64,
-    /// Probability that noise alone makes the frequencies change as much.
+    /// Probability of changes as large if there were none: noise, and what the model leaves open of them,
+    /// so that it is larger than noise alone would have it.
     pub chance: f64,
     /// Probability of a misfit as large or larger, if the joint's stiffness changes like that.
     pub goodness_of_fit: Option<f64>,
@@ -59,13 +60,15 @@ impl DecayFinding {
     /// them; how much the rotation changes is then not told.
     pub fn is_of_joint(&self) -> bool {
         let stands_out = |change: &&DecayChange| change.percent_per_fold.abs() > 3.0 * change.std;
-        let mut changes = self.changes.iter().filter(stands_out);
-        self.is_lawful() || changes.all(|change| change.percent_per_fold * self.ratio > 0.0)
+        let mut changes = self.changes.iter().filter(stands_out).peekable();
+        let same_way = changes.peek().is_some()
+            && changes.all(|change| change.percent_per_fold * self.ratio > 0.0);
+        self.is_lawful() || same_way
     }
 
-    /// Whether a law of the joint's rotation explains the changes.
+    /// Whether a law of the joint's rotation explains the changes; not where they are too few to tell.
     pub fn is_lawful(&self) -> bool {
-        self.goodness_of_fit.is_none_or(|p| p >= MISFIT)
+        self.goodness_of_fit.is_some_and(|p| p >= MISFIT)
     }
 
     /// "softens" or "stiffens".

@@ -78,7 +78,7 @@ impl JointPath {
             let rotation = solved.modes.joint_motion(index)[1];
             let at_sensor = solved
                 .modes
-                .displacement(index, setup.sensors.get(reference)?.position);
+                .displacement(index, configuration.sensors.get(reference)?.position?);
             let at_tap = setup
                 .tap
                 .map_or(1.0, |tap| solved.modes.displacement(index, tap));

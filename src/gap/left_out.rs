@@ -50,6 +50,13 @@ impl LeftOutErrors {
 
     /// What a hypothesis makes of the recordings that it has not seen, against the nominal model.
     pub(super) fn against(&self, before: &Self, seed: u64) -> Option<LeftOutRecordings> {
+        let labels = |errors: &Self| -> Vec<String> {
+            errors.recordings.iter().map(|one| one.0.clone()).collect()
+        };
+        // A recording that alone fixes an unknown cannot be left out.
+        if labels(self) != labels(before) {
+            return None;
+        }
         let (all_before, all_after) = (before.together()?, self.together()?);
         let recordings = self.recordings.iter().zip(&before.recordings);
         Some(LeftOutRecordings {

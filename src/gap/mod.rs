@@ -78,6 +78,7 @@ pub fn nominal_chi_square(
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<f64, GapError> {
+    settings.check()?;
     checks::check(observations, nominal)?;
     search::nominal_chi_square(observations, nominal, settings).ok_or(GapError::NoFit)
 }

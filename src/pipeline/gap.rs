@@ -2,7 +2,7 @@
 //! diagnosis.
 
 use super::{Analysis, observations};
-use crate::described::{described_beam, described_specimen, stiffness_of};
+use crate::described::{coupling, described_beam, described_specimen, stiffness_of};
 use crate::description::{JointKind, JointModel, KnownStiffness, SensorKind, TestDescription};
 use crate::gap::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
 use crate::structure::JointStiffness;
@@ -83,13 +83,15 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint
     };
     let [kx, ky] = USUAL_JOINT;
     let model = test.joint.model;
-    SpecimenJoint::Springs {
-        kt: start(test.joint.kt, found.map(|joint| joint.kx), (kx, units.kt)),
-        kr: start(test.joint.kr, found.map(|joint| joint.ky), (ky, units.kr)),
-        coupling: found
-            .filter(|_| model == JointModel::ThreeParameter)
-            .map_or(0.0, |joint| joint.coupling()),
-    }
+    let kt = start(test.joint.kt, found.map(|joint| joint.kx), (kx, units.kt));
+    let kr = start(test.joint.kr, found.map(|joint| joint.ky), (ky, units.kr));
+    let described = test.joint.ktr.map(stiffness_of);
+    let coupling = match (model, found, described) {
+        (JointModel::ThreeParameter, Some(joint), _) => joint.coupling(),
+        (JointModel::ThreeParameter, None, Some(ktr)) => coupling(kt, kr, 1.0 / ktr),
+        _ => 0.0,
+    };
+    SpecimenJoint::Springs { kt, kr, coupling }
 }
 
 /// f is proportional to h/L^2 sqrt(E/rho): the relative uncertainties that the description states, with

@@ -43,8 +43,8 @@ pub struct GapSection {
 pub struct UpdatedModelSection {
     /// The hypothesis that it takes for true.
     pub effect: String,
-    /// The file that holds it as a test description, beside this report.
-    pub file: String,
+    /// The file that holds it as a test description; null where none was written.
+    pub file: Option<String>,
     /// Its natural frequencies (Hz), sensors where the first recording has them; `tapjoint predict` of the
     /// file gives the same.
     pub frequencies: Vec<f64>,

@@ -1,6 +1,7 @@
 //! Frequency and damping against amplitude for the page's script: a view of two panels for every mode.
 
 use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointSet, rounded};
+use super::plot::amplitude::MOST_COLOURS;
 use super::plot::amplitude::{
     AmplitudeFigure, BAR, DAMPING, FREQUENCY, Quantity, amplitude_axis, quantity_axis, taps,
 };
@@ -8,8 +9,6 @@ use crate::modal::amplitude::{AmplitudeCurve, AmplitudePoint, Trend};
 
 /// Places at which the curve and its bound are computed.
 const CURVE_POINTS: usize = 80;
-/// From this many taps on all points have one colour.
-const MOST_COLOURS: usize = 4;
 
 /// All modes that have a curve; `None` without any.
 pub fn live_amplitude(figure: &AmplitudeFigure) -> Option<LivePoints> {

@@ -20,6 +20,8 @@ pub fn believed_description(
     simulated: &VirtualTest,
 ) -> Result<String, toml::de::Error> {
     let mut table: Table = text.parse()?;
+    // What is planted the user does not know.
+    table.remove("effect");
     if let Some(Value::Table(joint)) = table.get_mut("joint") {
         for key in ["kt", "kr", "ktr"] {
             joint.remove(key);

@@ -1,7 +1,7 @@
 //! From a test description to the specimen it describes.
 
 use super::error::SimulateError;
-use crate::described::{described_beam, described_specimen, stiffness_of};
+use crate::described::{coupling, described_beam, described_specimen, stiffness_of};
 use crate::description::{JointKind, RecordingDescription, SensorKind, TestDescription};
 use crate::effects::SensorPlace;
 use crate::structure::joint::StiffnessUnits;
@@ -70,15 +70,6 @@ fn joint(
         (Some(_), None) => ("kr is", "`kr = 1.2e3` (N m/rad)"),
     };
     Err(SimulateError::NoJoint { missing, keys })
-}
-
-/// sqrt(Kt Kr)/Ktr; none where a spring is rigid.
-fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
-    if cross_compliance == 0.0 {
-        0.0
-    } else {
-        kt.sqrt() * kr.sqrt() * cross_compliance
-    }
 }
 
 /// Where the sensors sit in a recording, with their masses by the datasheet.

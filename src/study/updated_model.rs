@@ -1,7 +1,7 @@
 //! The described model with what the diagnosis found: as a description that can be predicted with, and its
 //! natural frequencies.
 
-use crate::description::{JointKind, TestDescription};
+use crate::description::{JointKind, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
@@ -79,7 +79,7 @@ fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
 fn heading(diagnosis: &Diagnosis, found: &HypothesisResult) -> String {
     format!(
         "# The model with what the diagnosis found (verdict: {}; hypothesis: {}, {:.1} %).\n\
-         # Natural frequencies: tapjoint predict updated-model.toml\n\n",
+         # Natural frequencies: `tapjoint predict` with this file.\n\n",
         diagnosis.verdict.kind(),
         found.hypothesis.name(),
         100.0 * found.probability
@@ -171,7 +171,12 @@ fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
 /// Sensors where the first recording has them.
 fn sensors(test: &TestDescription) -> String {
     let moves = test.recordings.first().map(|recording| &recording.at);
-    let tables = test.sensors.iter().filter_map(|sensor| {
+    // A microphone is not on the beam.
+    let on_beam = test
+        .sensors
+        .iter()
+        .filter(|sensor| sensor.kind != SensorKind::Sound);
+    let tables = on_beam.filter_map(|sensor| {
         let moved = moves.and_then(|at| at.get(&sensor.name)).copied();
         let position = moved.or(sensor.position)?;
         let mut text = format!("\n[[sensor]]\nname = {}\n", quoted(&sensor.name));
@@ -233,6 +238,7 @@ pub fn frequencies_with(
         .sensors
         .iter()
         .zip(&nominal.sensors)
+        .filter(|(sensor, _)| sensor.kind != SensorKind::Sound)
         .filter_map(|(sensor, known)| {
             Some(SensorPlace {
                 position: sensor.position?,

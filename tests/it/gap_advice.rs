@@ -119,7 +119,7 @@ fn confounded() -> Vec<Effect> {
 }
 
 #[test]
-fn recover_the_truth_by_the_advised_test_more_than_by_the_last() {
+fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
     let (mut best, mut last, mut cases) = (0.0, 0.0, 0.0);
     for (index, truth) in confounded().iter().enumerate() {
         let seed = 300 + index as u64;

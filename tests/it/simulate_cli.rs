@@ -226,3 +226,27 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
         TEST
     );
 }
+
+#[test]
+fn prop_a_described_effect_is_planted_and_not_given_away() {
+    let planted = format!("{TEST}\n[[effect]]\nid = \"sensor-mass\"\nmass = 0.02\n");
+    let (with, without) = (folder(&planted), folder(TEST));
+    let short = ["--seconds", "3", "--taps", "1", "--seed", "5"];
+    for one in [&with, &without] {
+        simulate(one.path(), &short);
+    }
+    let text = |folder: &TempDir| fs::read_to_string(folder.path().join("out/test.toml")).unwrap();
+    assert_eq!(text(&with), text(&without));
+    assert!(!text(&with).contains("effect"));
+    let samples = |folder: &TempDir| fs::read(folder.path().join("out/taps.wav")).unwrap();
+    assert_ne!(samples(&with), samples(&without));
+    // It can be analysed, as a description with effects cannot.
+    tapjoint(with.path())
+        .args(["inspect", "out/taps.wav", "--quiet"])
+        .assert()
+        .code(0);
+    tapjoint(with.path())
+        .args(["run", "source.toml", "--quiet"])
+        .assert()
+        .code(2);
+}

@@ -159,9 +159,11 @@ impl Proposals {
         let rows = rows.collect();
         self.propose(more, Structure::Whole, rows);
         let sought = frame.nominal.sought();
+        let by_level = |a: &&Setup, b: &&Setup| a.level.total_cmp(&b.level);
+        let hardest = frame.setups.iter().max_by(by_level).unwrap_or(&again);
         if sought.iter().any(|(direction, _)| *direction == 1) {
             for level in [0.25, 3.0] {
-                let mut other = again.clone();
+                let mut other = hardest.clone();
                 other.level *= level;
                 other.path = other.path.map(|path| path.over(1.0 / level));
                 let rows = self.visit(frame, other, 0.0);

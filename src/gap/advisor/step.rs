@@ -22,7 +22,7 @@ pub enum Step {
     },
     /// Tap at another level.
     TapLevel {
-        /// Force over that of the hardest taps so far (1).
+        /// Force over that of the hardest recording so far (1).
         level: f64,
     },
     /// Weigh the sensor with its mounting.

@@ -30,7 +30,7 @@ const TELLING: f64 = 4.0;
 /// Standard uncertainties by which a point lies apart from the others: chance does not reach that far.
 const APART: f64 = 4.0;
 /// From this many taps on all points have one colour.
-const MOST_COLOURS: usize = 4;
+pub(in crate::report) const MOST_COLOURS: usize = 4;
 /// Half length of a bar: 95 % of a normal distribution.
 pub(in crate::report) const BAR: f64 = 1.96;
 /// Decades up to which 2 and 5 are labelled beside the powers of ten.

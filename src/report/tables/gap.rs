@@ -140,7 +140,10 @@ fn odds(gap: &GapSection) -> Option<f64> {
 
 /// The hypothesis that the verdict names.
 fn named(gap: &GapSection) -> Option<&HypothesisSection> {
-    let name = gap.verdict.effects.join("+");
+    let name = match gap.verdict.kind.as_str() {
+        "no-gap" => "none".to_owned(),
+        _ => gap.verdict.effects.join("+"),
+    };
     gap.hypotheses.iter().find(|found| found.effect == name)
 }
 

@@ -5,7 +5,7 @@ use super::catalogue::PlaceKind;
 use super::decay_finding::decay_finding;
 use super::evidence::log_likelihood;
 use super::forward::Layout;
-use super::frame::{Frame, Small};
+use super::frame::{Frame, Row, Small};
 use super::left_out::LeftOutErrors;
 use super::nominal::COUPLING;
 use super::place_map::place_map;
@@ -17,7 +17,7 @@ use super::result::{
 };
 use super::search::Competition;
 use super::settings::GapSettings;
-use super::verdict::{Checks, verdict};
+use super::verdict::{Checks, Room, verdict};
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
@@ -36,11 +36,41 @@ pub(super) fn doubt(competition: &mut Competition) {
         blocks: &blocks,
         withheld: WithheldErrors::new(frame, &entries[best].fit)
             .and_then(|errors| errors.goodness()),
+        room: Room::default(),
         closure: None,
     };
     if let Some(p) = checks.refuting() {
         let bound = -std::f64::consts::E * p * p.max(f64::MIN_POSITIVE).ln();
         raise_unknown(entries, 1.0 / (1.0 + bound.clamp(0.0, 1.0)));
+    }
+}
+
+/// What a hypothesis is tested with: each fitted mode once for every set of sensor places, since these see
+/// other shapes and carry other masses; slopes along decays and damping ratios for the effects that make them.
+fn room(frame: &Frame, entry: &Entry) -> Room {
+    let mut seen: Vec<(usize, Vec<f64>)> = Vec::new();
+    for row in &frame.rows {
+        let &Row::Frequency {
+            configuration,
+            mode,
+        } = row
+        else {
+            continue;
+        };
+        let sensors = frame.setups[configuration].sensors.iter();
+        let one = (mode, sensors.map(|sensor| sensor.position).collect());
+        if !seen.contains(&one) {
+            seen.push(one);
+        }
+    }
+    let made = |row: &&Row| match row {
+        Row::Slope { .. } => entry.effects().contains(&EffectId::JointNonlinearity),
+        Row::Damping { .. } => entry.effects().contains(&EffectId::JointDamping),
+        _ => false,
+    };
+    Room {
+        readings: seen.len() + frame.rows.iter().filter(made).count(),
+        parameters: Layout::new(frame, &entry.fit.effects).smalls(),
     }
 }
 
@@ -67,6 +97,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks: &blocks,
         withheld: WithheldErrors::new(frame, &entries[best].fit)
             .and_then(|errors| errors.goodness()),
+        room: room(frame, &entries[best]),
         closure: hypotheses[best].closure.filter(|_| context.decides(best)),
     };
     let nominal = entries
@@ -80,6 +111,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         goodness: nominal.as_ref().and_then(Residuals::goodness),
         blocks: &nominal_blocks,
         withheld: None,
+        room: Room::default(),
         closure: None,
     };
     let verdict = verdict(entries, &checks, &none);

@@ -149,6 +149,7 @@ fn misfits(frame: &Frame, fit: &Fit) -> bool {
             goodness: residuals.goodness(),
             blocks: &blocks,
             withheld: None,
+            room: super::verdict::Room::default(),
             closure: None,
         }
         .refuted()

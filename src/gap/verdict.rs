@@ -27,8 +27,29 @@ pub(super) struct Checks<'a> {
     pub(super) blocks: &'a [Block],
     /// Goodness of its prediction of withheld readings; `None` without any.
     pub(super) withheld: Option<f64>,
+    /// Readings that its parameters have to answer for, and how many these are.
+    pub(super) room: Room,
     /// Its closure on withheld readings; `None` where that says nothing.
     pub(super) closure: Option<Closure>,
+}
+
+/// What a hypothesis is tested with.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Room {
+    /// Frequencies of different modes and sensor places, and what else the effects act on.
+    pub(super) readings: usize,
+    /// Parameters of joint and effects.
+    pub(super) parameters: usize,
+}
+
+/// Readings beyond the parameters from which a name is given: with fewer nearly every effect of as many
+/// parameters explains them.
+const SPARE: usize = 2;
+
+impl Room {
+    fn is_crowded(self) -> bool {
+        self.readings < self.parameters + SPARE
+    }
 }
 
 impl Checks<'_> {
@@ -82,6 +103,15 @@ pub(super) fn verdict(entries: &[Entry], checks: &Checks<'_>, none: &Checks<'_>)
              another configuration"
                 .to_owned(),
         );
+    }
+    if checks.room.is_crowded() {
+        return Verdict::NotEnoughData(format!(
+            "{} has with the joint {} parameters for {} readings of different kind, which other causes would \
+             explain as well; observe more modes, or move a sensor",
+            first.hypothesis.name(),
+            checks.room.parameters,
+            checks.room.readings
+        ));
     }
     let holds = checks.holds();
     if groups[0].1 >= NAMED && holds {

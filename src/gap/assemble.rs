@@ -5,7 +5,7 @@ use super::catalogue::PlaceKind;
 use super::decay_finding::decay_finding;
 use super::evidence::log_likelihood;
 use super::forward::Layout;
-use super::frame::{Frame, Row, Small};
+use super::frame::{Frame, Small};
 use super::left_out::LeftOutErrors;
 use super::nominal::COUPLING;
 use super::place_map::place_map;
@@ -17,7 +17,8 @@ use super::result::{
 };
 use super::search::Competition;
 use super::settings::GapSettings;
-use super::verdict::{Checks, Room, verdict};
+use super::trial::{Room, Trial};
+use super::verdict::verdict;
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
@@ -27,50 +28,13 @@ use crate::effects::{Effect, EffectId};
 pub(super) fn doubt(competition: &mut Competition) {
     let Competition { frame, entries, .. } = competition;
     let Some(best) = best(entries) else { return };
-    let residuals = Residuals::new(frame, &entries[best].fit);
-    let blocks = residuals
-        .as_ref()
-        .map_or_else(Vec::new, |r| r.blocks(frame));
-    let checks = Checks {
-        goodness: residuals.as_ref().and_then(Residuals::goodness),
-        blocks: &blocks,
-        withheld: WithheldErrors::new(frame, &entries[best].fit)
-            .and_then(|errors| errors.goodness()),
-        room: Room::default(),
-        closure: None,
+    let fit = &entries[best].fit;
+    let Some(trial) = Trial::new(frame, fit) else {
+        return;
     };
-    if let Some(p) = checks.refuting() {
+    if let Some(p) = trial.with_withheld(frame, fit).refuting() {
         let bound = -std::f64::consts::E * p * p.max(f64::MIN_POSITIVE).ln();
         raise_unknown(entries, 1.0 / (1.0 + bound.clamp(0.0, 1.0)));
-    }
-}
-
-/// What a hypothesis is tested with: each fitted mode once for every set of sensor places, since these see
-/// other shapes and carry other masses; slopes along decays and damping ratios for the effects that make them.
-fn room(frame: &Frame, entry: &Entry) -> Room {
-    let mut seen: Vec<(usize, Vec<f64>)> = Vec::new();
-    for row in &frame.rows {
-        let &Row::Frequency {
-            configuration,
-            mode,
-        } = row
-        else {
-            continue;
-        };
-        let sensors = frame.setups[configuration].sensors.iter();
-        let one = (mode, sensors.map(|sensor| sensor.position).collect());
-        if !seen.contains(&one) {
-            seen.push(one);
-        }
-    }
-    let made = |row: &&Row| match row {
-        Row::Slope { .. } => entry.effects().contains(&EffectId::JointNonlinearity),
-        Row::Damping { .. } => entry.effects().contains(&EffectId::JointDamping),
-        _ => false,
-    };
-    Room {
-        readings: seen.len() + frame.rows.iter().filter(made).count(),
-        parameters: Layout::new(frame, &entry.fit.effects).smalls(),
     }
 }
 
@@ -87,34 +51,18 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let context = Context::new(competition, settings);
     let hypotheses: Vec<HypothesisResult> = (0..entries.len()).map(|k| context.result(k)).collect();
     let best = best(entries).unwrap_or(0);
-    let after = Residuals::new(frame, &entries[best].fit);
-    let blocks = after
-        .as_ref()
-        .map_or_else(Vec::new, |residuals| residuals.blocks(frame));
-    let goodness = after.as_ref().and_then(Residuals::goodness);
-    let checks = Checks {
-        goodness,
-        blocks: &blocks,
-        withheld: WithheldErrors::new(frame, &entries[best].fit)
-            .and_then(|errors| errors.goodness()),
-        room: room(frame, &entries[best]),
-        closure: hypotheses[best].closure.filter(|_| context.decides(best)),
-    };
-    let nominal = entries
+    let fit = &entries[best].fit;
+    let after = Residuals::new(frame, fit);
+    let mut trial = Trial::new(frame, fit).map(|trial| trial.with_withheld(frame, fit));
+    if let Some(trial) = &mut trial {
+        trial.room = Some(Room::of(frame, &entries[best]));
+        trial.closure = hypotheses[best].closure.filter(|_| context.decides(best));
+    }
+    let none = entries
         .iter()
         .find(|entry| entry.hypothesis == Hypothesis::None)
-        .and_then(|none| Residuals::new(frame, &none.fit));
-    let nominal_blocks = nominal
-        .as_ref()
-        .map_or_else(Vec::new, |residuals| residuals.blocks(frame));
-    let none = Checks {
-        goodness: nominal.as_ref().and_then(Residuals::goodness),
-        blocks: &nominal_blocks,
-        withheld: None,
-        room: Room::default(),
-        closure: None,
-    };
-    let verdict = verdict(entries, &checks, &none);
+        .and_then(|none| Trial::new(frame, &none.fit));
+    let verdict = verdict(entries, trial.as_ref(), none.as_ref());
     let pulls = match (&context.before, &after) {
         (Some(before), Some(after)) => pulls(frame, before, after),
         _ => Vec::new(),
@@ -124,9 +72,9 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         verdict,
         places: places(entries),
         pulls,
-        blocks,
+        goodness_of_fit: trial.as_ref().and_then(|trial| trial.goodness),
+        blocks: trial.map_or_else(Vec::new, |trial| trial.blocks),
         noise_floor: noise_floor(frame),
-        goodness_of_fit: goodness,
         misfit: after.as_ref().map(Residuals::misfit),
         joint_shift: hypotheses[best].joint_shift,
         hypotheses,

@@ -5,7 +5,9 @@ use super::catalogue::Size;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Small};
 use super::knowledge::with_drift;
-use super::least_squares::{Knowledge, Optimum, factor_of, maximise, maximise_linear, optimum_at};
+use super::least_squares::{
+    Knowledge, Optimum, factor_of, log_determinant, maximise, maximise_linear, optimum_at,
+};
 use super::noise::{self, Reading};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -178,13 +180,7 @@ fn log_evidence(
     let Some(factor) = factor_of(&optimum.curvature, &free) else {
         return f64::NEG_INFINITY;
     };
-    let log_det = 2.0
-        * factor
-            .l_dirty()
-            .diagonal()
-            .iter()
-            .map(|x| x.ln())
-            .sum::<f64>();
+    let log_det = log_determinant(&factor);
     let mut log = -optimum.objective;
     log += readings
         .iter()

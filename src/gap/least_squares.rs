@@ -253,6 +253,16 @@ fn bounded_step(optimum: &Optimum, knowledge: &[Knowledge], damping: f64) -> Opt
     }
 }
 
+/// ln det A of A = L L'.
+pub(super) fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * factor
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .map(|x| x.ln())
+        .sum::<f64>()
+}
+
 /// Cholesky factor of the rows and columns `kept` of a matrix.
 pub(super) fn factor_of(matrix: &DMatrix<f64>, kept: &[usize]) -> Option<Cholesky<f64, Dyn>> {
     Cholesky::new(matrix.select_rows(kept).select_columns(kept))

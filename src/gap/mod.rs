@@ -8,6 +8,7 @@
 //!                          quality     misfit overall, by block, with each mode left out
 //!                          withheld    what it predicts of readings that took no part
 //!                          left_out    what it predicts of each recording from the others
+//!                          trial       what all of this says of one explanation
 //!                          verdict     an answer, or the reason why there is none
 //!                          decay_finding  what the decays say by themselves
 //!                          advisor     which test would tell more
@@ -51,6 +52,7 @@ mod settings;
 mod setup;
 mod small_slopes;
 mod synthetic;
+mod trial;
 mod verdict;
 mod withheld;
 

@@ -7,6 +7,7 @@ use super::quality::Residuals;
 use super::result::Hypothesis;
 use super::search::Competition;
 use super::settings::GapSettings;
+use super::trial::Trial;
 use rayon::prelude::*;
 
 /// How many of the best single effects a second one is put beside.
@@ -143,17 +144,7 @@ fn distinct(found: Vec<Entry>) -> Vec<Entry> {
 
 /// Whether the readings refute a fit.
 fn misfits(frame: &Frame, fit: &Fit) -> bool {
-    Residuals::new(frame, fit).is_none_or(|residuals| {
-        let blocks = residuals.blocks(frame);
-        super::verdict::Checks {
-            goodness: residuals.goodness(),
-            blocks: &blocks,
-            withheld: None,
-            room: super::verdict::Room::default(),
-            closure: None,
-        }
-        .refuted()
-    })
+    Trial::new(frame, fit).is_none_or(|trial| trial.refuted())
 }
 
 /// Whether the readings that took no part, or each mode from the others, are predicted better.

@@ -4,7 +4,7 @@
 use super::evidence::{Branch, covariance, log_integral};
 use super::forward::Forward;
 use super::hypothesis::Search;
-use super::least_squares::{Knowledge, Optimum, factor_of, maximise};
+use super::least_squares::{Knowledge, Optimum, factor_of, log_determinant, maximise};
 
 impl Search<'_> {
     /// What the profile of the likelihood over the size adds to the evidence of its parabola. Only
@@ -73,13 +73,7 @@ fn marginal_log(branch: &Branch, optimum: &Optimum, size: usize) -> Option<f64> 
         .filter(|&k| k != size && branch.knowledge[k].low < branch.knowledge[k].high)
         .collect();
     let factor = factor_of(&optimum.curvature, &free)?;
-    let log_det = 2.0
-        * factor
-            .l_dirty()
-            .diagonal()
-            .iter()
-            .map(|x| x.ln())
-            .sum::<f64>();
+    let log_det = log_determinant(&factor);
     Some(-optimum.objective - 0.5 * log_det)
 }
 

@@ -1,5 +1,6 @@
 //! Tests of what is said about bad input: the file, the line, the key, what is allowed, what to do.
 
+use crate::shared::strip_table;
 use std::fs;
 use std::path::Path;
 
@@ -900,14 +901,10 @@ fn regress_texts_that_are_no_quantities() {
 // ---------------------------------------------------------------- recordings, through the program
 
 /// A test of the kind whose recording the cases below spoil.
-const SPOILED: &str = r#"name = "spoiled"
-[beam]
-length = 0.423
-width = 0.05
-thickness = 0.005
-modulus = 207e9
-density = 7850
-[joint]
+const SPOILED: &str = concat!(
+    "name = \"spoiled\"\n",
+    strip_table!(),
+    r#"[joint]
 kind = "cantilever"
 [hammer]
 channel = "force"
@@ -917,7 +914,8 @@ channel = "tip"
 position = 0.338
 [[recording]]
 file = "taps.csv"
-"#;
+"#
+);
 
 /// A CSV recording of three taps, with a header and a time column; row n stands in line n + 2.
 fn good_csv() -> Vec<String> {

@@ -1,78 +1,28 @@
 //! The diagnosis of the gap, on observations drawn from structures on another mesh and off all grids.
 
+use crate::shared::{five_recordings, strip_on_springs};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     Diagnosis, GapError, GapSettings, Hypothesis, HypothesisResult, Nominal, NominalSensor,
-    PlannedConfiguration, TestPlan, Verdict, diagnose, observe,
+    Verdict, diagnose, observe,
 };
 use tapjoint::identify::observation::{Configuration, Observations, ObservedMode};
-use tapjoint::structure::Beam;
-use tapjoint::structure::specimen::{Body, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::SpecimenJoint;
 
 const LENGTH: f64 = 0.423;
 
-fn beam() -> Beam {
-    Beam {
-        length: LENGTH,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    }
-}
-
 /// The paper's cantilever with one sensor, of a mass that may be known, and its joint off by `off`.
 fn nominal(mass: Option<f64>, off: f64) -> Nominal {
-    let beam = beam();
-    let unit = beam.bending_stiffness() / beam.length;
-    let joint = SpecimenJoint::Springs {
-        kt: off * 1400.0 * unit / beam.length.powi(2),
-        kr: off * 1.25 * unit,
-        coupling: 0.0,
+    let sensor = NominalSensor {
+        name: "A".to_string(),
+        mass,
+        position: None,
     };
-    Nominal {
-        specimen: Specimen::new(Body::One(beam), joint),
-        sensors: vec![NominalSensor {
-            name: "A".to_string(),
-            mass,
-            position: None,
-        }],
-        joint_before: None,
-        scale_std: None,
-        reading_bias: None,
-    }
-}
-
-/// Five recordings: two sensor places, three tap places, two tap levels.
-fn plan() -> TestPlan {
-    let one = |sensor: f64, tap: f64, level: f64| PlannedConfiguration {
-        sensors: vec![("A".to_string(), sensor * LENGTH)],
-        tap: tap * LENGTH,
-        level,
-    };
-    TestPlan {
-        configurations: vec![
-            one(0.8, 0.95, 1.0),
-            one(0.8, 0.95, 0.25),
-            one(0.8, 0.55, 1.0),
-            one(0.45, 0.95, 1.0),
-            one(0.45, 0.3, 1.0),
-        ],
-        modes: 6,
-        taps: 5,
-        frequency_std: 3e-4,
-        shape_std: Some(0.03),
-        damping_std: Some(0.03),
-        slope_std: Some(1e-4),
-        drift: 0.005,
-        damping: 0.003,
-        scatter: 1.0,
-    }
+    strip_on_springs(off, vec![sensor])
 }
 
 fn diagnosed(mass: Option<f64>, effects: &[Effect], seed: u64) -> Diagnosis {
-    let observed = observe(&plan(), &nominal(mass, 1.0), effects, seed).unwrap();
+    let observed = observe(&five_recordings(), &nominal(mass, 1.0), effects, seed).unwrap();
     diagnose(&observed, &nominal(mass, 0.8), &GapSettings::default()).unwrap()
 }
 
@@ -260,7 +210,7 @@ fn regress_what_cannot_be_diagnosed_is_refused_with_a_reason() {
 
 #[test]
 fn regress_sensors_that_see_nothing_are_refused() {
-    let mut observed = observe(&plan(), &nominal(None, 1.0), &[], 1).unwrap();
+    let mut observed = observe(&five_recordings(), &nominal(None, 1.0), &[], 1).unwrap();
     for sensor in observed
         .configurations
         .iter_mut()

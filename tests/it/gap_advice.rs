@@ -1,43 +1,22 @@
 //! Which test the diagnosis advises next, and whether making it decides; recordings left out in turn.
 
+use crate::shared::{five_recordings, strip_on_springs};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     Diagnosis, GapSettings, NextTest, Nominal, NominalSensor, PlannedConfiguration, Step, TestPlan,
     Verdict, diagnose, observe,
 };
-use tapjoint::structure::Beam;
-use tapjoint::structure::specimen::{Body, Specimen, SpecimenJoint};
 
 const LENGTH: f64 = 0.423;
 
 /// A bolted cantilever with a sensor of unknown mass, and a mass that may be fastened.
 fn nominal(off: f64, known_mass: f64) -> Nominal {
-    let beam = Beam {
-        length: LENGTH,
-        width: 0.05,
-        thickness: 0.005,
-        modulus: 207e9,
-        density: 7850.0,
-        poisson: 0.3,
-    };
-    let unit = beam.bending_stiffness() / beam.length;
-    let joint = SpecimenJoint::Springs {
-        kt: off * 1400.0 * unit / beam.length.powi(2),
-        kr: off * 1.25 * unit,
-        coupling: 0.0,
-    };
     let sensor = |name: &str, mass: Option<f64>| NominalSensor {
         name: name.to_owned(),
         mass,
         position: None,
     };
-    Nominal {
-        specimen: Specimen::new(Body::One(beam), joint),
-        sensors: vec![sensor("A", None), sensor("M", Some(known_mass))],
-        joint_before: None,
-        scale_std: None,
-        reading_bias: None,
-    }
+    strip_on_springs(off, vec![sensor("A", None), sensor("M", Some(known_mass))])
 }
 
 /// Frequencies of one recording and nothing else.
@@ -194,37 +173,13 @@ fn prop_advice_is_ranked_and_bounded_by_what_is_not_known() {
     assert_eq!(ids.len(), tests.len());
 }
 
-/// Five recordings as in a careful test.
-fn rich_plan() -> TestPlan {
-    let one = |sensor: f64, tap: f64, level: f64| PlannedConfiguration {
-        sensors: vec![("A".to_owned(), sensor * LENGTH)],
-        tap: tap * LENGTH,
-        level,
-    };
-    TestPlan {
-        configurations: vec![
-            one(0.8, 0.95, 1.0),
-            one(0.8, 0.95, 0.25),
-            one(0.8, 0.55, 1.0),
-            one(0.45, 0.95, 1.0),
-            one(0.45, 0.3, 1.0),
-        ],
-        modes: 6,
-        taps: 5,
-        shape_std: Some(0.03),
-        damping_std: Some(0.03),
-        slope_std: Some(1e-4),
-        ..poor_plan()
-    }
-}
-
 #[test]
 fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.0113)]);
     // A joint that stays as it is: what it drifts by nobody can predict.
     let plan = TestPlan {
         drift: 1e-3,
-        ..rich_plan()
+        ..five_recordings()
     };
     let diagnosis = diagnosed(&plan, 0.0, &truth, 11);
     assert_eq!(
@@ -253,7 +208,7 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
 #[test]
 fn limit_two_recordings_leave_none_out() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.0113)]);
-    let mut plan = rich_plan();
+    let mut plan = five_recordings();
     plan.configurations.truncate(2);
     let diagnosis = diagnosed(&plan, 0.0, &truth, 12);
     let mut all = diagnosis.hypotheses.iter();

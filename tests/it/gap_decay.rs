@@ -1,6 +1,7 @@
 //! Joints whose stiffness depends on the amplitude: what recordings of them are diagnosed as.
 
 use crate::shared::data;
+use crate::shared::virtual_strip;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -11,20 +12,8 @@ use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::{WavFormat, write_wav};
 use tapjoint::simulate::{Laboratory, TestPlan, VirtualTest, believed_description, plan_test};
 
-const CANTILEVER: &str = r#"
-name = "virtual"
-[beam]
-length = 0.423
-width = 0.05
-thickness = 0.005
-modulus = 207e9
-density = 7850
-[joint]
-kind = "cantilever"
-model = "2p"
-kt = 1.994e6
-kr = 1223.0
-beam = "euler"
+const CANTILEVER: &str = virtual_strip!(
+    r#"model = "2p"
 [hammer]
 channel = 1
 scale = 400
@@ -43,7 +32,8 @@ band = [0, 700]
 file = "soft.wav"
 tap = 0.385
 band = [0, 700]
-"#;
+"#
+);
 
 fn diagnosed(text: &str, folder: &Path) -> Diagnosis {
     let test = TestDescription::parse(text, "test.toml").unwrap();

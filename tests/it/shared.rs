@@ -1,7 +1,10 @@
-//! What several modules begin with: a beam, and the real recordings where they are at hand.
+//! What several modules begin with: a beam, its tests, and the real recordings where they are at hand.
 
 use std::path::PathBuf;
+use tapjoint::gap::{Nominal, NominalSensor, PlannedConfiguration, TestPlan};
 use tapjoint::structure::Beam;
+use tapjoint::structure::joint::StiffnessUnits;
+use tapjoint::structure::specimen::{Body, Specimen, SpecimenJoint};
 
 /// The cantilever of Ingole & Chatterjee, table 2.
 pub fn steel_strip() -> Beam {
@@ -15,33 +18,76 @@ pub fn steel_strip() -> Beam {
     }
 }
 
-/// The same cantilever with a joint, as a virtual test is described.
-pub const VIRTUAL_CANTILEVER: &str = r#"
-name = "virtual"
-[beam]
-length = 0.423
-width = 0.05
-thickness = 0.005
-modulus = 207e9
-density = 7850
-[joint]
-kind = "cantilever"
-kt = 1.994e6
-kr = 1223.0
-beam = "euler"
-[hammer]
-channel = 1
-[[sensor]]
-name = "A"
-position = 0.338
-[[sensor]]
-name = "B"
-position = 0.205
-[[recording]]
-file = "taps.csv"
-tap = 0.385
-band = [0, 1000]
-"#;
+/// The strip's table in a description.
+macro_rules! strip_table {
+    () => {
+        "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9\ndensity = 7850\n"
+    };
+}
+pub(crate) use strip_table;
+
+/// The strip on a joint as a virtual test is described; what is given goes on in [joint].
+macro_rules! virtual_strip {
+    ($rest:literal) => {
+        concat!(
+            "name = \"virtual\"\n",
+            $crate::shared::strip_table!(),
+            "[joint]\nkind = \"cantilever\"\nkt = 1.994e6\nkr = 1223.0\nbeam = \"euler\"\n",
+            $rest
+        )
+    };
+}
+pub(crate) use virtual_strip;
+
+/// The strip on springs of `off` times the joint of Ingole & Chatterjee, without coupling.
+pub fn strip_on_springs(off: f64, sensors: Vec<NominalSensor>) -> Nominal {
+    let beam = steel_strip();
+    let units = StiffnessUnits::of(&beam);
+    let joint = SpecimenJoint::Springs {
+        kt: off * 1400.0 * units.kt,
+        kr: off * 1.25 * units.kr,
+        coupling: 0.0,
+    };
+    Nominal {
+        specimen: Specimen::new(Body::One(beam), joint),
+        sensors,
+        joint_before: None,
+        scale_std: None,
+        reading_bias: None,
+    }
+}
+
+/// A planned recording of sensor A, places as shares of the length.
+pub fn planned(sensor: f64, tap: f64, level: f64) -> PlannedConfiguration {
+    let length = steel_strip().length;
+    PlannedConfiguration {
+        sensors: vec![("A".to_owned(), sensor * length)],
+        tap: tap * length,
+        level,
+    }
+}
+
+/// Five recordings of six modes: two sensor places, three tap places, two tap levels.
+pub fn five_recordings() -> TestPlan {
+    TestPlan {
+        configurations: vec![
+            planned(0.8, 0.95, 1.0),
+            planned(0.8, 0.95, 0.25),
+            planned(0.8, 0.55, 1.0),
+            planned(0.45, 0.95, 1.0),
+            planned(0.45, 0.3, 1.0),
+        ],
+        modes: 6,
+        taps: 5,
+        frequency_std: 3e-4,
+        shape_std: Some(0.03),
+        damping_std: Some(0.03),
+        slope_std: Some(1e-4),
+        drift: 0.005,
+        damping: 0.003,
+        scatter: 1.0,
+    }
+}
 
 /// A file or folder of the folder that TAPJOINT_DATA names; `None` where it is not set. A file that is
 /// missing there fails the test.

@@ -7,7 +7,23 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-use crate::shared::VIRTUAL_CANTILEVER as TEST;
+use crate::shared::virtual_strip;
+
+const TEST: &str = virtual_strip!(
+    r#"[hammer]
+channel = 1
+[[sensor]]
+name = "A"
+position = 0.338
+[[sensor]]
+name = "B"
+position = 0.205
+[[recording]]
+file = "taps.csv"
+tap = 0.385
+band = [0, 1000]
+"#
+);
 
 fn folder(text: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,6 @@
 //! Virtual tests as a whole: what the recordings say against closed forms, and what may not change them.
 
+use crate::shared::virtual_strip;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -12,20 +13,8 @@ use tapjoint::simulate::{
     TestPlan, Tip, VirtualTest, plan_test, truth_of,
 };
 
-const CANTILEVER: &str = r#"
-name = "virtual"
-[beam]
-length = 0.423
-width = 0.05
-thickness = 0.005
-modulus = 207e9
-density = 7850
-[joint]
-kind = "cantilever"
-kt = 1.994e6
-kr = 1223.0
-beam = "euler"
-[hammer]
+const CANTILEVER: &str = virtual_strip!(
+    r#"[hammer]
 channel = 1
 [[sensor]]
 name = "A"
@@ -33,7 +22,8 @@ position = 0.338
 [[recording]]
 file = "taps.csv"
 tap = 0.3
-"#;
+"#
+);
 
 fn described(text: &str) -> TestDescription {
     TestDescription::parse(text, "test.toml").unwrap()

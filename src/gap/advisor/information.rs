@@ -1,5 +1,6 @@
 //! How much a reading tells about which hypothesis is true.
 
+use super::super::least_squares::log_determinant;
 use nalgebra::{DMatrix, DVector};
 
 /// What one hypothesis expects of the readings of a test: a normal distribution, in units in which each
@@ -22,12 +23,9 @@ pub(super) fn distance(a: &Outlook, b: &Outlook) -> Option<f64> {
     let middle = (0.5 * (&a.spread + &b.spread)).cholesky()?;
     let apart = &a.mean - &b.mean;
     let by_mean = apart.dot(&middle.solve(&apart)) / 8.0;
-    let log_det = |factor: &nalgebra::Cholesky<f64, nalgebra::Dyn>| {
-        let diagonal = factor.l_dirty().diagonal();
-        2.0 * diagonal.iter().map(|x| x.ln()).sum::<f64>()
-    };
-    let own = log_det(&a.spread.clone().cholesky()?) + log_det(&b.spread.clone().cholesky()?);
-    let by_spread = 0.5 * (log_det(&middle) - 0.5 * own);
+    let own = log_determinant(&a.spread.clone().cholesky()?)
+        + log_determinant(&b.spread.clone().cholesky()?);
+    let by_spread = 0.5 * (log_determinant(&middle) - 0.5 * own);
     Some(by_mean + by_spread.max(0.0))
 }
 

@@ -1,0 +1,128 @@
+//! One explanation on trial: how well it fits the readings, block by block, what it predicts of those that
+//! took no part, and whether enough readings are left to test it.
+
+use super::forward::Layout;
+use super::frame::{Frame, Row};
+use super::hypothesis::Fit;
+use super::posterior::Entry;
+use super::quality::Residuals;
+use super::result::{Block, Closure};
+use super::withheld::WithheldErrors;
+use crate::effects::EffectId;
+
+/// Goodness of fit below which an explanation is refused.
+const MISFIT: f64 = 0.01;
+/// The same for the worst of many blocks.
+const BLOCK_MISFIT: f64 = 0.001;
+/// Probability of an error of withheld readings from which the hypothesis counts as predicting them.
+const PREDICTED: f64 = 0.05;
+
+/// What the readings say of one explanation.
+#[derive(Debug, Clone)]
+pub(super) struct Trial {
+    /// Goodness of fit, all readings together.
+    pub(super) goodness: Option<f64>,
+    /// The same of its blocks, the worst first.
+    pub(super) blocks: Vec<Block>,
+    /// Goodness of its prediction of withheld readings; `None` without any.
+    pub(super) withheld: Option<f64>,
+    /// Readings that its parameters have to answer for, and how many these are; `None` where nobody asked.
+    pub(super) room: Option<Room>,
+    /// Its closure on withheld readings; `None` where that says nothing.
+    pub(super) closure: Option<Closure>,
+}
+
+/// What a hypothesis is tested with.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    /// Frequencies of different modes and sensor places, and what else the effects act on.
+    pub(super) readings: usize,
+    /// Parameters of joint and effects.
+    pub(super) parameters: usize,
+}
+
+/// Readings beyond the parameters from which a name is given: with fewer nearly every effect of as many
+/// parameters explains them.
+const SPARE: usize = 2;
+
+impl Room {
+    /// What a hypothesis is tested with: each fitted mode once for every set of sensor places, since these see
+    /// other shapes and carry other masses; slopes along decays and damping ratios for the effects that make them.
+    pub(super) fn of(frame: &Frame, entry: &Entry) -> Self {
+        let mut seen: Vec<(usize, Vec<f64>)> = Vec::new();
+        for row in &frame.rows {
+            let &Row::Frequency {
+                configuration,
+                mode,
+            } = row
+            else {
+                continue;
+            };
+            let sensors = frame.setups[configuration].sensors.iter();
+            let one = (mode, sensors.map(|sensor| sensor.position).collect());
+            if !seen.contains(&one) {
+                seen.push(one);
+            }
+        }
+        let made = |row: &&Row| match row {
+            Row::Slope { .. } => entry.effects().contains(&EffectId::JointNonlinearity),
+            Row::Damping { .. } => entry.effects().contains(&EffectId::JointDamping),
+            _ => false,
+        };
+        Room {
+            readings: seen.len() + frame.rows.iter().filter(made).count(),
+            parameters: Layout::new(frame, &entry.fit.effects).smalls(),
+        }
+    }
+
+    /// Whether nothing is left to test a name with.
+    pub(super) fn is_crowded(self) -> bool {
+        self.readings < self.parameters + SPARE
+    }
+}
+
+impl Trial {
+    /// Of a fit by the readings that it was made of; `None` where the fit has no uncertainty.
+    pub(super) fn new(frame: &Frame, fit: &Fit) -> Option<Self> {
+        let residuals = Residuals::new(frame, fit)?;
+        Some(Trial {
+            goodness: residuals.goodness(),
+            blocks: residuals.blocks(frame),
+            withheld: None,
+            room: None,
+            closure: None,
+        })
+    }
+
+    /// The same with what the fit predicts of readings that took no part.
+    pub(super) fn with_withheld(mut self, frame: &Frame, fit: &Fit) -> Self {
+        self.withheld = WithheldErrors::new(frame, fit).and_then(|errors| errors.goodness());
+        self
+    }
+
+    /// Whether the readings refute the hypothesis.
+    pub(super) fn refuted(&self) -> bool {
+        self.refuting().is_some()
+    }
+
+    /// The probability of the misfit that refutes the hypothesis, the smallest where several do; of one
+    /// block among many that of any.
+    pub(super) fn refuting(&self) -> Option<f64> {
+        let block = self.blocks.first().map(|block| block.goodness_of_fit);
+        let overall = self.goodness.filter(|p| *p < MISFIT);
+        let withheld = self.withheld.filter(|p| *p < BLOCK_MISFIT);
+        let block = block
+            .filter(|p| *p < BLOCK_MISFIT)
+            .map(|p| (p * self.blocks.len() as f64).min(MISFIT));
+        let all = [overall, withheld, block].into_iter().flatten();
+        all.min_by(f64::total_cmp)
+    }
+
+    /// Whether withheld readings speak for the hypothesis: it closes some of the gap for certain, or predicts
+    /// them within what it leaves open.
+    pub(super) fn holds(&self) -> bool {
+        let predicts = self.withheld.is_some_and(|p| p > PREDICTED);
+        self.closure
+            .is_none_or(|closure| closure.low > 0.0 || predicts && closure.value > 0.0)
+    }
+}

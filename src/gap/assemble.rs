@@ -13,7 +13,7 @@ use super::posterior::{APART, Entry, confounded, lead, places, raise_unknown, sp
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
     Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LeftOutRecordings,
-    ParameterValue,
+    ParameterValue, Verdict,
 };
 use super::search::Competition;
 use super::settings::GapSettings;
@@ -34,7 +34,7 @@ pub(super) fn doubt(competition: &mut Competition) {
     };
     if let Some(p) = trial.with_withheld(frame, fit).refuting() {
         let bound = -std::f64::consts::E * p * p.max(f64::MIN_POSITIVE).ln();
-        raise_unknown(entries, 1.0 / (1.0 + bound.clamp(0.0, 1.0)));
+        raise_unknown(entries, best, 1.0 / bound.clamp(f64::MIN_POSITIVE, 1.0));
     }
 }
 
@@ -61,8 +61,12 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let none = entries
         .iter()
         .find(|entry| entry.hypothesis == Hypothesis::None)
-        .and_then(|none| Trial::new(frame, &none.fit));
+        .and_then(|none| Some(Trial::new(frame, &none.fit)?.with_withheld(frame, &none.fit)));
     let verdict = verdict(entries, trial.as_ref(), none.as_ref());
+    let joint_shift = match verdict {
+        Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => hypotheses[best].joint_shift,
+        Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => JointShift::default(),
+    };
     let pulls = match (&context.before, &after) {
         (Some(before), Some(after)) => pulls(frame, before, after),
         _ => Vec::new(),
@@ -76,7 +80,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         blocks: trial.map_or_else(Vec::new, |trial| trial.blocks),
         noise_floor: noise_floor(frame),
         misfit: after.as_ref().map(Residuals::misfit),
-        joint_shift: hypotheses[best].joint_shift,
+        joint_shift,
         hypotheses,
         map: place_map(frame, &competition.baseline),
         decided_by: decided_by(frame, entries),
@@ -162,6 +166,7 @@ impl<'a> Context<'a> {
             closure: self.closure(withheld.as_ref()),
             left_out_recordings: self.left_out(entry),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
+            misfit: residuals.as_ref().map(Residuals::misfit),
             joint_shift: if predicts {
                 self.joint_shift(entry)
             } else {

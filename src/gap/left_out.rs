@@ -15,6 +15,8 @@ const LEAST_RECORDINGS: usize = 3;
 #[derive(Debug, Clone)]
 pub(super) struct LeftOutErrors {
     recordings: Vec<(String, WithheldErrors)>,
+    /// All of them at once: what two recordings are predicted from is mostly the same.
+    together: WithheldErrors,
 }
 
 impl LeftOutErrors {
@@ -30,22 +32,23 @@ impl LeftOutErrors {
             return None;
         }
         let residuals = Residuals::new(frame, fit)?;
-        let recordings: Vec<(String, WithheldErrors)> = visits
-            .into_iter()
-            .filter_map(|visit| {
-                let label = &frame
-                    .setups
-                    .iter()
-                    .find(|setup| setup.visit == visit)?
-                    .label;
-                Some((label.clone(), without(frame, &residuals, visit)?))
-            })
-            .collect();
-        (!recordings.is_empty()).then_some(LeftOutErrors { recordings })
-    }
-
-    fn together(&self) -> Option<WithheldErrors> {
-        WithheldErrors::together(self.recordings.iter().map(|(_, errors)| errors))
+        let mut recordings = Vec::new();
+        let mut all: Vec<Predicted> = Vec::new();
+        for visit in visits {
+            let mut setups = frame.setups.iter();
+            let label = &setups.find(|setup| setup.visit == visit)?.label;
+            let Some(own) = without(frame, &residuals, visit) else {
+                continue;
+            };
+            let errors = errors_of(frame, &residuals, std::slice::from_ref(&own));
+            recordings.push((label.clone(), errors));
+            all.push(own);
+        }
+        let together = (!all.is_empty()).then(|| errors_of(frame, &residuals, &all))?;
+        Some(LeftOutErrors {
+            recordings,
+            together,
+        })
     }
 
     /// What a hypothesis makes of the recordings that it has not seen, against the nominal model.
@@ -57,7 +60,7 @@ impl LeftOutErrors {
         if labels(self) != labels(before) {
             return None;
         }
-        let (all_before, all_after) = (before.together()?, self.together()?);
+        let (all_before, all_after) = (&before.together, &self.together);
         let recordings = self.recordings.iter().zip(&before.recordings);
         Some(LeftOutRecordings {
             recordings: recordings
@@ -71,15 +74,20 @@ impl LeftOutErrors {
             before: all_before.rms(),
             after: all_after.rms(),
             floor: all_after.floor(),
-            closure: closure(&all_before, &all_after, seed),
+            closure: closure(all_before, all_after, seed),
         })
     }
 }
 
-/// Errors of one visit's frequencies without anything of that visit: with the influence H of each reading
-/// on each prediction, the residual of a block that took no part is (I - H)_bb^-1 r_b, and its covariance
-/// (I - H)_bb^-1 (Cook & Weisberg 1982).
-fn without(frame: &Frame, residuals: &Residuals, visit: usize) -> Option<WithheldErrors> {
+/// The frequencies of one visit, and what predicts them from the readings of all others.
+struct Predicted {
+    rows: Vec<usize>,
+    /// One row each, one column for every residual.
+    predictor: DMatrix<f64>,
+}
+
+/// Predicts one visit's frequencies without anything of that visit.
+fn without(frame: &Frame, residuals: &Residuals, visit: usize) -> Option<Predicted> {
     let of = |configuration: usize| frame.setups[configuration].visit == visit;
     let rows: Vec<usize> = (0..frame.rows.len())
         .filter(|&row| match frame.rows[row] {
@@ -96,16 +104,30 @@ fn without(frame: &Frame, residuals: &Residuals, visit: usize) -> Option<Withhel
     if frequencies.is_empty() {
         return None;
     }
-    let block = residuals.spread.select_rows(&rows).select_columns(&rows);
-    let own = DVector::from_iterator(rows.len(), rows.iter().map(|&row| residuals.unit[row]));
-    let factor = block.cholesky()?;
-    let (predicted, spread) = (factor.solve(&own), factor.inverse());
-    let percent = |k: usize| 100.0 * frame.readings[rows[frequencies[k]]].std;
-    let count = frequencies.len();
-    let errors = DVector::from_fn(count, |k, _| percent(k) * predicted[frequencies[k]]);
-    let covariance = DMatrix::from_fn(count, count, |i, j| {
-        percent(i) * percent(j) * spread[(frequencies[i], frequencies[j])]
-    });
-    let stds = DVector::from_fn(count, |k, _| percent(k));
-    Some(WithheldErrors::from_parts(errors, covariance, stds))
+    Some(Predicted {
+        predictor: residuals.predictor(&rows)?.select_rows(&frequencies),
+        rows: frequencies.into_iter().map(|k| rows[k]).collect(),
+    })
+}
+
+/// Errors of what was predicted, with their covariance: predictions from mostly the same readings hang
+/// together.
+fn errors_of(frame: &Frame, residuals: &Residuals, all: &[Predicted]) -> WithheldErrors {
+    let count = all.iter().map(|one| one.rows.len()).sum();
+    let mut predictor = DMatrix::zeros(count, residuals.raw.len());
+    let mut at = 0;
+    for one in all {
+        predictor
+            .rows_mut(at, one.rows.len())
+            .copy_from(&one.predictor);
+        at += one.rows.len();
+    }
+    let covariance = &predictor * residuals.residual_covariance() * predictor.transpose();
+    let rows = all.iter().flat_map(|one| &one.rows);
+    let stds = DVector::from_iterator(count, rows.map(|&row| 100.0 * frame.readings[row].std));
+    WithheldErrors::from_parts(
+        100.0 * predictor * residuals.residuals(),
+        1e4 * covariance,
+        stds,
+    )
 }

@@ -1,5 +1,6 @@
 //! Two effects at once, where no single one suffices.
 
+use super::catalogue::{Candidate, PlaceKind};
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search};
 use super::posterior::{Entry, set_probabilities};
@@ -59,7 +60,27 @@ pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
     let pairs = distinct(found.into_iter().flatten().collect());
     let tried = tasks.len();
     competition.entries.extend(pairs);
+    spread_over_the_beam(&mut competition.entries);
     set_probabilities(&mut competition.entries, tried);
+}
+
+/// What is unknown may be spread over a part of the beam. Two changes at places of their own imitate every
+/// such change, with as many parameters as its place, extent, mass and stiffness: it explains what they
+/// explain, and from these readings nobody can tell which it was.
+fn spread_over_the_beam(entries: &mut [Entry]) {
+    let is_local = |candidate: &Candidate| {
+        let place = candidate.place.as_ref();
+        place.is_some_and(|place| place.kind == PlaceKind::Position)
+    };
+    let most = entries
+        .iter()
+        .filter(|entry| entry.effects().len() > 1 && entry.fit.effects.iter().all(is_local))
+        .map(|entry| entry.fit.log_evidence)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut all = entries.iter_mut();
+    if let Some(unknown) = all.find(|entry| entry.hypothesis == Hypothesis::Unknown) {
+        unknown.fit.log_evidence = unknown.fit.log_evidence.max(most);
+    }
 }
 
 /// How many pairs are fitted in earnest.

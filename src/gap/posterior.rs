@@ -13,6 +13,8 @@ pub(super) struct Entry {
     pub(super) fit: Fit,
     /// Its probability (1).
     pub(super) probability: f64,
+    /// What it had beforehand, in units of one group of effects (1).
+    pub(super) prior: f64,
     /// Standard deviation of the joint's drift, where that is the hypothesis.
     pub(super) drift: Option<f64>,
 }
@@ -23,6 +25,7 @@ impl Entry {
             hypothesis,
             fit,
             probability: 0.0,
+            prior: 1.0,
             drift: None,
         }
     }
@@ -50,9 +53,9 @@ const NONE_SHARE: f64 = 4.0;
 /// has [`NONE_SHARE`] of them. The pairs that were `tried` share one unit among themselves, the accepted
 /// and the others. Sorts the most probable first.
 pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
-    let share = |entry: &Entry| -> f64 {
+    let prior = |entry: &Entry| -> f64 {
         if entry.effects().len() > 1 {
-            return tried.max(1) as f64;
+            return 1.0 / tried.max(1) as f64;
         }
         let same = |other: &&Entry| match (&entry.hypothesis, &other.hypothesis) {
             (Hypothesis::Effects(_), Hypothesis::Effects(others)) => {
@@ -64,11 +67,15 @@ pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
             Hypothesis::None => NONE_SHARE,
             _ => 1.0,
         };
-        entries.iter().filter(same).count() as f64 / weight
+        weight / entries.iter().filter(same).count() as f64
     };
+    let priors: Vec<f64> = entries.iter().map(prior).collect();
+    for (entry, prior) in entries.iter_mut().zip(priors) {
+        entry.prior = prior;
+    }
     let logs: Vec<f64> = entries
         .iter()
-        .map(|entry| entry.fit.log_evidence - share(entry).ln())
+        .map(|entry| entry.fit.log_evidence + entry.prior.ln())
         .collect();
     let total = log_sum(&logs);
     for (entry, log) in entries.iter_mut().zip(&logs) {
@@ -77,22 +84,22 @@ pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
     entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }
 
-/// Gives what is unknown this probability, if that is more than it has, at the cost of all others.
-pub(super) fn raise_unknown(entries: &mut [Entry], probability: f64) {
+/// Gives what is unknown odds of at least `bayes_factor` times those beforehand against the hypothesis
+/// `refuted`; all others keep theirs among each other.
+pub(super) fn raise_unknown(entries: &mut [Entry], refuted: usize, bayes_factor: f64) {
     let is_unknown = |entry: &Entry| entry.hypothesis == Hypothesis::Unknown;
-    let has = entries.iter().find(|entry| is_unknown(entry));
-    let Some(has) = has.map(|entry| entry.probability) else {
+    let Some(unknown) = entries.iter().position(is_unknown) else {
         return;
     };
-    if has >= probability {
+    let odds = bayes_factor * entries[unknown].prior / entries[refuted].prior;
+    let weight = odds * entries[refuted].probability;
+    if weight <= entries[unknown].probability {
         return;
     }
+    let total = 1.0 - entries[unknown].probability + weight;
+    entries[unknown].probability = weight;
     for entry in entries.iter_mut() {
-        entry.probability = if is_unknown(entry) {
-            probability
-        } else {
-            entry.probability * (1.0 - probability) / (1.0 - has)
-        };
+        entry.probability /= total;
     }
     entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }

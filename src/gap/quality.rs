@@ -13,6 +13,9 @@ pub(super) struct Residuals {
     pub(super) raw: Vec<f64>,
     /// In standard deviations, as normal deviates.
     pub(super) unit: DVector<f64>,
+    /// Standard deviations with which the fit weighted the readings, natural units: outlying readings have
+    /// larger ones than their own.
+    pub(super) weighted_stds: DVector<f64>,
     /// Their covariance if the hypothesis is true: I - H, H being the influence of each reading on
     /// each prediction.
     pub(super) spread: DMatrix<f64>,
@@ -28,6 +31,7 @@ impl Residuals {
         let count = frame.readings.len();
         let mut raw = Vec::with_capacity(count);
         let mut unit = DVector::zeros(count);
+        let mut weighted_stds = DVector::zeros(count);
         let mut influence = optimum.model.slopes.clone();
         for (row, reading) in frame.readings.iter().enumerate() {
             let residual = reading.value - optimum.model.predicted[row];
@@ -36,9 +40,8 @@ impl Residuals {
             unit[row] = noise::gaussian_square(own, reading.freedom)
                 .sqrt()
                 .copysign(own);
-            influence
-                .row_mut(row)
-                .scale_mut(noise::weight(own, reading.freedom).sqrt() / reading.std);
+            weighted_stds[row] = reading.std / noise::weight(own, reading.freedom).sqrt();
+            influence.row_mut(row).scale_mut(1.0 / weighted_stds[row]);
         }
         let known = &fit.branch.knowledge;
         let posterior = covariance(known, optimum)?;
@@ -59,6 +62,7 @@ impl Residuals {
         Some(Residuals {
             raw,
             unit,
+            weighted_stds,
             spread,
             prior,
             wide: free + damping,
@@ -115,7 +119,7 @@ impl Residuals {
     }
 
     /// Root mean square of the errors (%) with which each mode's frequencies are predicted from all
-    /// other readings: (I - H)_bb^-1 r_b for the block b of the mode. `None` where a mode is needed.
+    /// other readings. `None` where a mode is needed.
     pub(super) fn left_out_rms(&self, frame: &Frame) -> Option<f64> {
         let mut errors = Vec::new();
         for mode in 1..=frame.fitted_modes {
@@ -125,15 +129,38 @@ impl Residuals {
             if rows.is_empty() {
                 continue;
             }
-            let block = self.spread.select_rows(&rows).select_columns(&rows);
-            let residual =
-                DVector::from_iterator(rows.len(), rows.iter().map(|&row| self.unit[row]));
-            let predicted = block.cholesky()?.solve(&residual);
-            for (&row, error) in rows.iter().zip(predicted.iter()) {
-                errors.push(100.0 * error * frame.readings[row].std);
-            }
+            let predictor = self.predictor(&rows)?;
+            errors.extend((predictor * self.residuals()).iter().map(|x| 100.0 * x));
         }
         (!errors.is_empty()).then(|| crate::stats::root_mean_square(&errors))
+    }
+
+    /// Reading less prediction, natural units.
+    pub(super) fn residuals(&self) -> DVector<f64> {
+        DVector::from_column_slice(&self.raw)
+    }
+
+    /// Covariance of [`residuals`](Self::residuals) if the hypothesis is true, natural units.
+    pub(super) fn residual_covariance(&self) -> DMatrix<f64> {
+        let stds = DMatrix::from_diagonal(&self.weighted_stds);
+        &stds * &self.spread * &stds
+    }
+
+    /// What takes all residuals to the errors with which the readings `rows` are predicted from all others,
+    /// natural units: with the influence H of each reading on each prediction, both over the standard
+    /// deviations s of the fit, these are s_b (I - H)_bb^-1 r_b/s_b (Cook & Weisberg 1982). `None` where the
+    /// other readings leave a parameter open.
+    pub(super) fn predictor(&self, rows: &[usize]) -> Option<DMatrix<f64>> {
+        let block = self.spread.select_rows(rows).select_columns(rows);
+        let inverse = block.cholesky()?.inverse();
+        let mut predictor = DMatrix::zeros(rows.len(), self.raw.len());
+        for (i, &to) in rows.iter().enumerate() {
+            for (j, &from) in rows.iter().enumerate() {
+                let stds = self.weighted_stds[to] / self.weighted_stds[from];
+                predictor[(i, from)] = inverse[(i, j)] * stds;
+            }
+        }
+        Some(predictor)
     }
 }
 

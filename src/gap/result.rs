@@ -23,7 +23,7 @@ pub struct Diagnosis {
     pub goodness_of_fit: Option<f64>,
     /// What that rests on; `None` without a fit.
     pub misfit: Option<Misfit>,
-    /// What adding the best hypothesis does to the joint.
+    /// What adding the best hypothesis does to the joint; nothing where no effect is answered.
     pub joint_shift: JointShift,
     /// What the residual of the nominal model calls for along the beam; `None` where the readings are
     /// too few.
@@ -130,6 +130,8 @@ pub struct HypothesisResult {
     pub left_out_recordings: Option<LeftOutRecordings>,
     /// Goodness of fit.
     pub goodness_of_fit: Option<f64>,
+    /// What that rests on.
+    pub misfit: Option<Misfit>,
     /// What it does to the joint.
     pub joint_shift: JointShift,
     /// The effects with their best values, to predict with.

@@ -64,23 +64,6 @@ impl WithheldErrors {
         }
     }
 
-    /// Several of them that have nothing in common; `None` of none.
-    pub(super) fn together<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
-        let count: usize = parts.clone().map(|part| part.errors.len()).sum();
-        let zeros = DVector::zeros(count);
-        let mut all = Self::from_parts(zeros.clone(), DMatrix::zeros(count, count), zeros);
-        let mut at = 0;
-        for part in parts {
-            let own = part.errors.len();
-            all.errors.rows_mut(at, own).copy_from(&part.errors);
-            all.stds.rows_mut(at, own).copy_from(&part.stds);
-            let mut block = all.spread.view_mut((at, at), (own, own));
-            block.copy_from(&part.spread);
-            at += own;
-        }
-        (count > 0).then_some(all)
-    }
-
     /// Root mean square of the errors (%).
     pub(super) fn rms(&self) -> f64 {
         root_mean_square(&self.errors)

@@ -117,6 +117,7 @@ fn val_a_score_counted_by_hand() {
     assert_eq!(scores.outside_named, of(0, 1));
     assert_eq!(scores.outside_refused, of(1, 1));
     assert_eq!(scores.several_found_or_refused, of(0, 1));
+    assert_eq!(scores.several_detectable, of(0, 1));
     // Sets: {sensor-mass} holds it; {joint-mass, none} does not hold added-mass, but the null;
     // {none, unknown} does not hold cross-coupling, but the other null; {unknown, none} the outside.
     assert_eq!(scores.set_coverage, of(4, 6));

@@ -153,6 +153,37 @@ fn recover_a_deep_crack_by_itself() {
     assert!((depth / 0.0355 - 1.0).abs() < 0.1, "{depth}");
 }
 
+#[test]
+fn regress_a_withheld_mode_that_is_missed_is_a_gap() {
+    let mut observed = observe(&five_recordings(), &nominal(None, 1.0), &[], 22).unwrap();
+    for configuration in &mut observed.configurations {
+        // Thirty standard uncertainties.
+        configuration.modes.last_mut().unwrap().frequency *= 1.01;
+    }
+    let diagnosis = diagnose(&observed, &nominal(None, 0.8), &GapSettings::default()).unwrap();
+    assert!(diagnosis.fitted_modes < 6, "the highest is withheld");
+    assert_ne!(diagnosis.verdict, Verdict::NoGap);
+}
+
+#[test]
+fn prop_two_changes_of_the_beam_are_no_more_than_something_spread_over_it() {
+    let crack = [("compliance", 0.03), ("position", 0.137)];
+    let mass = [("mass", 0.015), ("position", 0.3)];
+    let both = [
+        effect(EffectId::LocalCrack, &crack),
+        effect(EffectId::AddedMass, &mass),
+    ];
+    let diagnosis = diagnosed(Some(0.004), &both, 34);
+    assert_eq!(diagnosis.verdict, Verdict::Unknown);
+    assert_eq!(diagnosis.joint_shift.kx_percent, None);
+    let pair = diagnosis
+        .hypotheses
+        .iter()
+        .find(|one| matches!(&one.hypothesis, Hypothesis::Effects(effects) if effects.len() == 2));
+    let pair = pair.expect("it is shown as the likeness of what is unknown");
+    assert!(pair.probability > 0.0 && pair.probability < 0.1, "{pair:?}");
+}
+
 // ---------------------------------------------------------------------------------------------
 // Questions without an answer
 

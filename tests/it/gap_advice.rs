@@ -206,6 +206,27 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
 }
 
 #[test]
+fn regress_large_errors_of_left_out_recordings_are_told_whole() {
+    let truth = effect(EffectId::SensorMass, &[("mass", 0.06)]);
+    let plan = TestPlan {
+        drift: 1e-3,
+        ..five_recordings()
+    };
+    let diagnosis = diagnosed(&plan, 0.0, &truth, 13);
+    let mut all = diagnosis.hypotheses.iter();
+    let none = all.find(|one| one.hypothesis.name() == "none").unwrap();
+    let found = none.left_out_recordings.clone().unwrap();
+    // Who has not seen a recording misses it by no less than who has; both fit the nominal model, whose
+    // errors are a hundred noise floors here.
+    assert!(none.gap_before > 30.0 * found.floor, "{}", none.gap_before);
+    assert!(
+        found.before > none.gap_before,
+        "{found:?} {}",
+        none.gap_before
+    );
+}
+
+#[test]
 fn limit_two_recordings_leave_none_out() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.0113)]);
     let mut plan = five_recordings();

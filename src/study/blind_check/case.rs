@@ -42,7 +42,8 @@ pub struct Truth {
     pub name: String,
     /// Empty: nothing.
     pub effects: Vec<Planted>,
-    /// Whether readings of the usual uncertainty would show that something is missing: see
+    /// Whether readings of the usual uncertainty would show that something is missing, of several effects
+    /// each: see
     /// [`DrawnTest::with_limits`](super::DrawnTest::with_limits); `None` where nobody said.
     pub detectable: Option<bool>,
     /// Whether they would show that nothing in the catalogue explains it.

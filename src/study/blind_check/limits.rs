@@ -2,7 +2,8 @@
 
 use super::case::{CaseKind, Truth};
 use super::draw::{DrawError, DrawnTest};
-use crate::gap::{GapSettings, diagnose, nominal_chi_square, observe};
+use crate::effects::Effect;
+use crate::gap::{GapSettings, Hypothesis, diagnose, nominal_chi_square, observe};
 use crate::identify::observation::Observations;
 use crate::pipeline::nominal_with;
 use crate::stats::chi_square_quantile;
@@ -14,8 +15,9 @@ const FREQUENCY_STD: f64 = 5e-5;
 
 impl DrawnTest {
     /// The truth, with what readings without scatter show of it: whether the nominal model misses them by
-    /// what is noticed nine times out of ten (one effect), and whether the best of the catalogue misses
-    /// them so far that with the usual scatter chi square would exceed its 1 % limit (outside it).
+    /// what is noticed nine times out of ten (one effect), whether so do both of two effects alone (two
+    /// effects), and whether the best of the catalogue misses them so far that with the usual scatter chi
+    /// square would exceed its 1 % limit (outside it).
     ///
     /// # Errors
     /// [`DrawError`]: a defect of the drawing.
@@ -24,7 +26,8 @@ impl DrawnTest {
         match truth.kind() {
             CaseKind::Single(_) => truth.detectable = Some(self.is_detectable()?),
             CaseKind::Outside => truth.refutable = self.is_refutable()?,
-            CaseKind::Null | CaseKind::Several => {}
+            CaseKind::Several => truth.detectable = self.are_both_detectable()?,
+            CaseKind::Null => {}
         }
         Ok(truth)
     }
@@ -33,6 +36,21 @@ impl DrawnTest {
         let nominal = nominal_with(&self.description, None);
         let chi_square = nominal_chi_square(&self.exact()?, &nominal, &GapSettings::default())?;
         Ok(chi_square > NOTICED)
+    }
+
+    /// Whether readings without scatter are missed by each of the planted effects without the others;
+    /// `None` where an effect is no hypothesis of such a test.
+    fn are_both_detectable(&self) -> Result<Option<bool>, DrawError> {
+        let nominal = nominal_with(&self.description, None);
+        let found = diagnose(&self.exact()?, &nominal, &GapSettings::default())?;
+        let alone = |effect: &Effect| {
+            let own = Hypothesis::Effects(vec![effect.id]);
+            let mut all = found.hypotheses.iter();
+            let misfit = all.find(|one| one.hypothesis == own)?.misfit?;
+            Some(misfit.chi_square)
+        };
+        let misses: Option<Vec<f64>> = self.effects.iter().map(alone).collect();
+        Ok(misses.map(|misses| misses.iter().all(|miss| *miss > NOTICED)))
     }
 
     fn is_refutable(&self) -> Result<Option<bool>, DrawError> {

@@ -46,6 +46,8 @@ pub struct Scores {
     pub outside_unknown: Rate,
     /// Several effects: all named, or refused.
     pub several_found_or_refused: Rate,
+    /// The same among those of whose effects each is noticed beside the other.
+    pub several_detectable: Rate,
     /// Several effects: all named.
     pub several_found: Rate,
     /// The 90 % set holds what was planted (nothing, one effect, outside).
@@ -110,8 +112,9 @@ pub fn score(cases: &[Case]) -> Scores {
         outside_unknown: Rate::of(of(Kind::Outside), |(_, answer)| {
             Some(answer.verdict == Verdict::Unknown)
         }),
-        several_found_or_refused: Rate::of(of(Kind::Several), |case| {
-            Some(is_refused(&case.1) || is_named(&case.1) && names_exactly(case))
+        several_found_or_refused: Rate::of(of(Kind::Several), |case| Some(found_or_refused(case))),
+        several_detectable: Rate::of(of(Kind::Several), |case| {
+            (case.0.detectable == Some(true)).then(|| found_or_refused(case))
         }),
         several_found: Rate::of(of(Kind::Several), |case| {
             Some(is_named(&case.1) && names_exactly(case))
@@ -170,6 +173,10 @@ fn calls_effect(answer: &Answer) -> bool {
 /// Neither a name nor a clean bill: the user is told that the catalogue does not decide it.
 fn is_refused(answer: &Answer) -> bool {
     matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData)
+}
+
+fn found_or_refused(case: &Case) -> bool {
+    is_refused(&case.1) || is_named(&case.1) && names_exactly(case)
 }
 
 fn rank_within((truth, answer): &Case, most: usize) -> Option<bool> {

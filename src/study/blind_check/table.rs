@@ -133,6 +133,12 @@ pub fn rows(scores: &Scores) -> Vec<Row> {
             AtLeast(0.80),
         ),
         rate(
+            "several_detectable",
+            "the same where both can be noticed",
+            s.several_detectable,
+            Target::None,
+        ),
+        rate(
             "several_found",
             "two: both found",
             s.several_found,

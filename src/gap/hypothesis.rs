@@ -291,14 +291,19 @@ impl Search<'_> {
         }
         let deepest = |a: &Branch, b: &Branch| a.optimum.objective.total_cmp(&b.optimum.objective);
         found.sort_by(deepest);
-        // A search along a bent valley may stop short of its end: once more from either side of it.
+        // A search along a bent valley may stop short of its end: once more from either side of it. Between
+        // nodes that are far apart for what the readings resolve a deeper one may lie: once more from these.
         if found
             .first()
             .is_some_and(|one| stands_out(one, at, spacing))
         {
+            let mut starts = around(&found[0].optimum.parameters, nodes, (at + 1, spacing));
             for aside in [-0.4 * spacing, 0.4 * spacing] {
                 let mut from = found[0].optimum.parameters.clone();
                 from[at + 1] += aside;
+                starts.push(from);
+            }
+            for from in starts {
                 if let Some(branch) = evaluate(forward, known, &from, &self.settings.drift_stds) {
                     keep(&mut found, branch, &[at, at + 1]);
                 }
@@ -332,6 +337,16 @@ impl Search<'_> {
         start[at + 1] = law.exponent;
         Some(start)
     }
+}
+
+/// The parameters of the nodes whose place, the parameter `at`, is next to this one or next but one.
+fn around(parameters: &[f64], nodes: &[Branch], (at, spacing): (usize, f64)) -> Vec<Vec<f64>> {
+    let near = |node: &&Branch| {
+        let apart = (node.optimum.parameters[at] - parameters[at]).abs();
+        apart > 0.5 * spacing && apart < 2.0 * spacing
+    };
+    let near = nodes.iter().filter(near);
+    near.map(|node| node.optimum.parameters.clone()).collect()
 }
 
 /// Whether the readings fix an effect's place within the nodes' spacing, and its size so far from

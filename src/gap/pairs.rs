@@ -84,7 +84,7 @@ fn spread_over_the_beam(entries: &mut [Entry]) {
 }
 
 /// How many pairs are fitted in earnest.
-const EARNEST: usize = 6;
+const EARNEST: usize = 4;
 
 /// The pairs whose linearised models explain the readings best, and better than the best single one by what
 /// is needed.

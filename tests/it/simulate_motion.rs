@@ -247,8 +247,10 @@ fn val_micro_slip_loses_the_energy_that_the_structure_loses() {
         motion.forced_steps()
     );
     assert!(lost > 0.2 * begin, "{lost} J of {begin} J is hardly a loss");
+    // Steps meet their moment to 1e-6 of it, where sliders make kinks, and errors of both signs
+    // cancel: 3e-8 was found.
     assert!(
-        (missing / lost - 1.0).abs() < 1e-4,
+        (missing / lost - 1.0).abs() < 1e-6,
         "{missing} J for {lost} J"
     );
 }
@@ -370,8 +372,9 @@ fn limit_few_modes_with_their_springs_move_as_many_modes_do() {
         .zip(&seen[1])
         .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
     println!("{worst:.2e} of {largest:.2e}");
-    // What the modes from the fourth on do beside following: (f1/f4)^2 of a small share.
-    assert!(worst < 1e-3 * largest, "{worst} m of {largest} m");
+    // The modes from the fourth on follow but for (f1/f4)^2 = 2e-3 of their share of the joint's
+    // rotation, itself a few hundredths: 3.4e-5 was found.
+    assert!(worst < 1e-4 * largest, "{worst} m of {largest} m");
 }
 
 #[test]

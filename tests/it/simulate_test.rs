@@ -320,7 +320,9 @@ fn prop_a_wrong_clock_changes_what_the_file_says_of_time_alone() {
         let both = truth.modes.iter().zip(&right.modes);
         assert!(both.len() > 3);
         for (mode, same) in both {
-            assert_eq!(mode, same);
+            // The number of modes computed with them differs, and with it their rounding.
+            assert!((mode.frequency / same.frequency - 1.0).abs() < 1e-12);
+            assert_eq!((mode.mode, mode.damping), (same.mode, same.damping));
         }
         let scale = 1.0 + relative;
         assert_eq!(truth.frequency_scale, scale);

@@ -27,10 +27,14 @@ impl SpecimenModes {
     /// # Errors
     /// [`StructureError`] where the modes do not settle.
     pub fn hung(&self, suspension: Option<[f64; 2]>) -> Result<(Self, usize), StructureError> {
-        if self.loose.is_empty() {
+        let supported = self.model.is_supported();
+        if self.loose.is_empty() || !(supported || suspension.is_some()) {
             return Ok((self.clone(), 0));
         }
-        let basis: Vec<&Mode> = self.loose.iter().chain(&self.modes).collect();
+        // Where nothing else holds it the suspension does not reach the elastic modes.
+        let reached = if supported { self.modes.len() } else { 0 };
+        let (reached, others) = self.modes.split_at(reached);
+        let basis: Vec<&Mode> = self.loose.iter().chain(reached).collect();
         let matrix = self.stiffness_among(&basis, suspension);
         let turns = MOST_TURNS * basis.len();
         let pairs = SymmetricEigen::try_new(matrix, f64::EPSILON, turns).ok_or_else(|| {
@@ -40,16 +44,19 @@ impl SpecimenModes {
         })?;
         let mut order: Vec<usize> = (0..basis.len()).collect();
         order.sort_by(|&a, &b| pairs.eigenvalues[a].total_cmp(&pairs.eigenvalues[b]));
+        // Rounding among rigid motions alone is relative to the suspension.
+        let nothing = if supported {
+            NO_STIFFNESS
+        } else {
+            1e-14 * pairs.eigenvalues.amax()
+        };
         let free = order[..self.loose.len()].iter();
-        let free = free.filter(|&&i| pairs.eigenvalues[i] < NO_STIFFNESS);
-        let free = free.count();
-        let modes: Vec<Mode> = order[free..]
-            .iter()
-            .map(|&index| {
-                let shares = pairs.eigenvectors.column(index);
-                self.mixed(&basis, pairs.eigenvalues[index], shares.as_slice())
-            })
-            .collect();
+        let free = free.filter(|&&i| pairs.eigenvalues[i] < nothing).count();
+        let hung = order[free..].iter().map(|&index| {
+            let shares = pairs.eigenvectors.column(index);
+            self.mixed(&basis, pairs.eigenvalues[index], shares.as_slice())
+        });
+        let modes: Vec<Mode> = hung.chain(others.iter().cloned()).collect();
         let frequencies = modes.iter().map(|mode| self.model.frequency(mode.square));
         let hung = Self {
             frequencies: frequencies.collect(),

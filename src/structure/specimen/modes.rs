@@ -228,7 +228,7 @@ impl Model {
     }
 
     /// Whether something beside the joint withstands rigid motions.
-    fn is_supported(&self) -> bool {
+    pub(super) fn is_supported(&self) -> bool {
         !self.springs.is_empty() || self.runs.iter().any(|run| run.section.axial_force != 0.0)
     }
 

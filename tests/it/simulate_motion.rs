@@ -334,8 +334,8 @@ fn val_the_non_linear_joint_agrees_with_runge_and_kutta() {
         "{worst:.2e} of {largest:.2e}, forced {}",
         motion.forced_steps()
     );
-    // Both solutions keep seven digits over the tenth of a second.
-    assert!(worst < 1e-7 * largest, "{worst} m of {largest} m");
+    // Runge and Kutta err by omega t (omega h)^4/120 = 1e-9 of the third mode, which has a small share.
+    assert!(worst < 1e-9 * largest, "{worst} m of {largest} m");
 }
 
 #[test]

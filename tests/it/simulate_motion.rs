@@ -193,6 +193,8 @@ fn val_energy_stays_through_a_thousand_periods_of_a_cubic_joint() {
             "ratio {ratio}: {worst:.2e}, forced {}",
             motion.forced_steps()
         );
+        // A step errs by less than 1e-8 of the moment over omega h = 1e-2 of a radian; 6e5 of them,
+        // with errors of both signs, add up to less than 1e-7.
         assert!(worst < 1e-6, "ratio {ratio}: energy strays by {worst}");
     }
 }

@@ -163,6 +163,9 @@ fn regress_a_pivot_has_a_finite_joint_compliance() {
 
 // ---------------------------------------------------------------- hanging
 
+/// Name, suspension (Hz), and cables of (place, stiffness).
+type Case = (&'static str, [f64; 2], Vec<(f64, f64)>);
+
 /// The strip, hanging at these frequencies (Hz), with cables of (place, stiffness).
 struct Hanging {
     suspension: [f64; 2],
@@ -307,7 +310,7 @@ fn limit_a_soft_suspension_leaves_the_free_beam() {
 #[test]
 fn val_a_beam_hung_on_cables_has_the_receptance_of_its_parts() {
     let length = steel_strip().length;
-    let cases: [(&str, [f64; 2], Vec<(f64, f64)>); 6] = [
+    let cases: [Case; 6] = [
         ("hung alone", [1.5, 2.0], vec![]),
         ("one cable", [1.5, 2.0], vec![(0.8 * length, 300.0)]),
         // They hold up and down more than rocking, which then comes first.

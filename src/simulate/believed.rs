@@ -54,8 +54,9 @@ pub fn believed_description(
 fn band_above(simulated: &VirtualTest, file: &str) -> Option<[f64; 2]> {
     let mut recordings = simulated.recordings.iter();
     let recording = recordings.find(|recording| recording.file == file)?;
-    let suspended = recording.structure.suspension_frequencies();
-    let highest = suspended.reduce(f64::max)?;
+    // The suspension as the user chose it: what cables add to it belongs to what is planted.
+    let [up, rock] = simulated.suspension?;
+    let highest = up.max(rock);
     let reach = f64::from(recording.take.sample_rate) / 2.56;
     // Five times the suspension's frequency, in whole hertz: it is 4 % of a resonance there.
     Some([(5.0 * highest).ceil(), reach])

@@ -155,14 +155,12 @@ impl Chain {
 
 impl Disturbance {
     fn next(&mut self) -> f64 {
-        let mut sum = self.offset;
-        if self.noise > 0.0 {
-            let noise: f64 = StandardNormal.sample(&mut self.random);
-            sum += self.noise * noise;
-        }
+        // Both are drawn for every sample, so that switching one off does not change the other.
+        let [noise, push]: [f64; 2] =
+            std::array::from_fn(|_| StandardNormal.sample(&mut self.random));
+        let mut sum = self.offset + self.noise * noise;
         if self.drift > 0.0 {
             // An Ornstein-Uhlenbeck process of constant variance.
-            let push: f64 = StandardNormal.sample(&mut self.random);
             let keep = self.drift_memory;
             self.drifted = keep * self.drifted + self.drift * (1.0 - keep * keep).sqrt() * push;
             sum += self.drifted;

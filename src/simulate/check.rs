@@ -10,10 +10,13 @@ pub(super) fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateEr
         &laboratory.sensors,
         &laboratory.recorder,
     );
+    let [up, rock] = laboratory.specimen.suspension.unwrap_or([1.0; 2]);
     let positive = [
         ("the peak force", hammer.peak_force),
         ("the number of taps", hammer.taps as f64),
         ("the time between taps", hammer.interval.unwrap_or(1.0)),
+        ("the suspension's frequency, up and down,", up),
+        ("the suspension's frequency, rocking,", rock),
         (
             "the sample rate",
             f64::from(recorder.sample_rate.unwrap_or(1)),

@@ -14,7 +14,7 @@ use super::joint_moment::{JointMoment, LEAST_SLOPE};
 use super::laboratory::{Laboratory, Tip};
 use super::nominal::{GivenJoint, nominal_specimen, sensor_places};
 use super::reduced::Sensed;
-use super::seen::SeenStructure;
+use super::seen::{SeenStructure, hangs};
 use super::take::{Take, TakePlan};
 use super::trial::{Trial, round_scale, try_out};
 use crate::structure::specimen::{Specimen, SpecimenJoint};
@@ -44,6 +44,9 @@ pub struct VirtualTest {
     pub scales: Vec<Scale>,
     /// The nominal structure, without sensors that were moved.
     pub nominal: Specimen,
+    /// Frequencies (Hz) of the described structure on its suspension, up and down and rocking, where it
+    /// hangs: what a user knows of them.
+    pub suspension: Option<[f64; 2]>,
     /// Law of the joint that is not linear, with the largest rotation (rad) that it refers to.
     pub joint_law: Option<(JointLaw, f64)>,
 }
@@ -104,8 +107,11 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
             recording.take.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
         }
     }
+    let nominal = nominal_specimen(test, described[0].0, plan.joint)?;
+    let suspension = plan.laboratory.specimen.suspension;
     Ok(VirtualTest {
-        nominal: nominal_specimen(test, described[0].0, plan.joint)?,
+        suspension: suspension.filter(|_| hangs(&nominal)),
+        nominal,
         recordings,
         scales,
         joint_law,
@@ -219,7 +225,9 @@ fn prepare(
     let interval = interval(laboratory, &structure, block);
     take.taps.interval = interval;
     let seconds = laboratory.hammer.lead + laboratory.hammer.taps as f64 * interval;
-    take.frames = (seconds * f64::from(sample_rate)).round() as u64;
+    // The hand that stops the recorder goes by true time, like the taps: whatever the clock makes of
+    // it, the last tap rings down in the file.
+    take.frames = (seconds * take.true_rate()).round() as u64;
     Ok(VirtualRecording {
         file: file.clone(),
         level,

@@ -45,9 +45,14 @@ pub struct TakePlan {
 const SENSITIVITIES: u64 = 1 << 42;
 
 impl TakePlan {
+    /// Samples per true second (Hz): the clock's seconds are too long where frequencies read high.
+    pub fn true_rate(&self) -> f64 {
+        f64::from(self.sample_rate) / self.frequency_scale
+    }
+
     /// Steps of the simulation for each sample.
     pub fn steps_per_sample(&self, laboratory: &Laboratory) -> usize {
-        let rate = f64::from(self.sample_rate);
+        let rate = self.true_rate();
         let resonance = RATE_OVER_RESONANCE * laboratory.sensors.mounting_resonance;
         let wanted = (LEAST_RATE.max(resonance) / rate).ceil() as usize;
         wanted.max(LEAST_FACTOR)
@@ -57,8 +62,8 @@ impl TakePlan {
     pub fn highest_mode(&self, laboratory: &Laboratory) -> f64 {
         // Below half the simulation's rate, and far enough above the band that what is left of the modes
         // beyond is their compliance.
-        let inner = f64::from(self.sample_rate) * self.steps_per_sample(laboratory) as f64;
-        (1.8 * f64::from(self.sample_rate)).min(0.45 * inner)
+        let inner = self.true_rate() * self.steps_per_sample(laboratory) as f64;
+        (1.8 * self.true_rate()).min(0.45 * inner)
     }
 }
 
@@ -82,8 +87,7 @@ impl Take {
     /// Prepares a recording of a structure.
     pub fn new(structure: SeenStructure, plan: &TakePlan, laboratory: &Laboratory) -> Self {
         let factor = plan.steps_per_sample(laboratory);
-        // The clock's seconds are too long where frequencies read high.
-        let file_rate = f64::from(plan.sample_rate) / plan.frequency_scale;
+        let file_rate = plan.true_rate();
         let step = 1.0 / (file_rate * factor as f64);
         let delay = match laboratory.recorder.anti_alias {
             AntiAlias::On => HALF_LENGTH * factor,

@@ -33,7 +33,7 @@ pub(super) fn try_out(
             Signal::Response(sensed) => Some(*sensed),
         })
         .collect();
-    let rate = f64::from(plan.sample_rate) * plan.steps_per_sample(laboratory) as f64;
+    let rate = plan.true_rate() * plan.steps_per_sample(laboratory) as f64;
     let step = 1.0 / rate;
     let mut motion = Motion::new(structure.reduced().clone(), &sensed, (0.0, step), None);
     let (length, shape) = plan.taps.pulse;

@@ -79,7 +79,7 @@ pub struct RecordingTruth {
     pub file: String,
     /// Sample rate that the file states (Hz).
     pub sample_rate: u32,
-    /// Length (s).
+    /// Length (s), in true seconds.
     pub seconds: f64,
     /// How hard it was struck (1).
     pub level: f64,
@@ -169,7 +169,7 @@ fn recording_of(
     RecordingTruth {
         file: recording.file.clone(),
         sample_rate: plan.sample_rate,
-        seconds: plan.frames as f64 / f64::from(plan.sample_rate),
+        seconds: plan.frames as f64 / plan.true_rate(),
         level: recording.level,
         frequency_scale: plan.frequency_scale,
         joint: joint_of(&recording.seen.specimen, units),

@@ -37,6 +37,7 @@ mod shared;
 mod simulate;
 mod simulate_cli;
 mod simulate_motion;
+mod simulate_seen;
 mod simulate_test;
 mod specimen;
 mod spectral;

@@ -187,6 +187,21 @@ fn regress_a_hanging_beam_is_described_above_its_suspension() {
 }
 
 #[test]
+fn regress_the_believed_band_does_not_give_a_cable_away() {
+    let lap = TEST
+        .replace("cantilever", "lap")
+        .replace("band = [0, 1000]", "");
+    let folder = folder(&lap);
+    let short = ["--taps", "1", "--seconds", "0.8"];
+    simulate(folder.path(), &short);
+    let path = folder.path().join("out/test.toml");
+    let bare = fs::read_to_string(&path).unwrap();
+    let cable = ["--with", "sensor-cable:stiffness=2000"];
+    simulate(folder.path(), &[&short[..], &cable].concat());
+    assert_eq!(fs::read_to_string(&path).unwrap(), bare);
+}
+
+#[test]
 fn regress_bad_orders_are_refused_and_nothing_is_written() {
     let no_joint = TEST.replace("kt = 1.994e6", "");
     let measured = TEST.split("[[recording]]").next().unwrap().to_owned()

@@ -67,17 +67,18 @@ fn recorded(test: &VirtualTest, laboratory: &Laboratory) -> Vec<Vec<f64>> {
 
 /// Receptance of an Euler beam on springs, w(x)/F(a), by its general solution left and right of the
 /// force. Damping in proportion to mass and stiffness makes both complex.
-struct ClosedForm {
-    stiffness: f64,
-    mass: f64,
-    length: f64,
-    springs: (f64, f64),
-    damping: (f64, f64),
-    places: (f64, f64),
+pub struct ClosedForm {
+    pub stiffness: f64,
+    pub mass: f64,
+    pub length: f64,
+    pub springs: (f64, f64),
+    pub damping: (f64, f64),
+    /// Of the force and of the answer.
+    pub places: (f64, f64),
 }
 
 impl ClosedForm {
-    fn receptance(&self, omega: f64) -> Complex64 {
+    pub fn receptance(&self, omega: f64) -> Complex64 {
         let soft = Complex64::new(1.0, omega * self.damping.1);
         let heavy = Complex64::new(1.0, -self.damping.0 / omega);
         let bending = self.stiffness * soft;
@@ -215,12 +216,12 @@ fn val_frequency_response_of_the_recording_is_the_closed_form() {
 fn val_a_clock_error_is_a_pure_scaling_of_time() {
     // A clock whose seconds are a quarter too long takes the samples of one of four fifths the rate.
     let description = described(CANTILEVER);
-    let mut laboratory = Laboratory::ideal();
-    // The filter has a length of its own for each rate of the simulation.
-    laboratory.recorder.anti_alias = AntiAlias::Off;
+    // With all filters and disturbances: they too go by true time, or by samples.
+    let mut laboratory = Laboratory::default();
     laboratory.hammer.taps = 1;
     laboratory.hammer.interval = Some(0.3);
     laboratory.recorder.sample_rate = Some(5120);
+    laboratory.recorder.hum = 1e-3;
     let test = plan_test(&plan(&description, &[], &laboratory, 1)).unwrap();
     let recording = &test.recordings[0];
     let mut fast = recording.take.clone();
@@ -296,7 +297,126 @@ fn val_sliders_lose_what_masings_loop_encloses() {
     }
 }
 
+#[test]
+fn prop_a_wrong_clock_changes_what_the_file_says_of_time_alone() {
+    let description = described(CANTILEVER);
+    let mut laboratory = Laboratory::ideal();
+    laboratory.hammer.taps = 4;
+    laboratory.hammer.interval = Some(0.25);
+    laboratory.recorder.sample_rate = Some(5120);
+    let run = |relative: f64| {
+        let effects = [Effect::from_pairs(EffectId::Timebase, &[("relative", relative)]).unwrap()];
+        let plan = plan(&description, &effects, &laboratory, 1);
+        let test = plan_test(&plan).unwrap();
+        let truth = truth_of(&plan, &test).recordings.remove(0);
+        (recorded(&test, &laboratory), truth)
+    };
+    let (_, right) = run(0.0);
+    for relative in [-0.2, -0.03, 0.2] {
+        let (channels, truth) = run(relative);
+        assert_eq!(truth.taps, right.taps);
+        assert_eq!(truth.gains, right.gains);
+        // How far modes are followed goes by the rate; those that both follow are the same.
+        let both = truth.modes.iter().zip(&right.modes);
+        assert!(both.len() > 3);
+        for (mode, same) in both {
+            // The number of modes computed with them differs, and with it their rounding.
+            assert!((mode.frequency / same.frequency - 1.0).abs() < 1e-12);
+            assert_eq!((mode.mode, mode.damping), (same.mode, same.damping));
+        }
+        let scale = 1.0 + relative;
+        assert_eq!(truth.frequency_scale, scale);
+        // A whole number of samples.
+        assert!((truth.seconds - right.seconds).abs() <= 1.0 / 5120.0);
+        let seconds = channels[0].len() as f64 / 5120.0;
+        assert!((seconds * scale - truth.seconds).abs() < 1e-12);
+        let largest = channels[0]
+            .iter()
+            .fold(0.0, |most: f64, x| most.max(x.abs()));
+        for tap in &truth.taps {
+            // In the file's seconds all times are shorter where frequencies are higher.
+            let centre = (tap.time + 0.5 * tap.length) / scale;
+            let crest = channels[0][(centre * 5120.0).round() as usize];
+            assert!(
+                crest > 0.5 * largest,
+                "{relative}: {crest} N of {largest} N"
+            );
+        }
+    }
+}
+
 // ---------------------------------------------------------------- seeds, switches, streams
+
+#[test]
+fn prop_effects_change_neither_taps_nor_gains_nor_noise() {
+    let text = CANTILEVER
+        .replace("channel = 1", "channel = 1\nscale = 100.0")
+        .replace("position = 0.338", "position = 0.338\nscale = 1000.0");
+    let description = described(&text);
+    let mut laboratory = Laboratory::default();
+    laboratory.hammer.taps = 2;
+    laboratory.hammer.interval = Some(0.3);
+    // The anti-alias filter looks ahead.
+    laboratory.recorder.anti_alias = AntiAlias::Off;
+    let run = |effects: &[Effect]| {
+        let test = plan_test(&plan(&description, effects, &laboratory, 11)).unwrap();
+        let take = test.recordings[0].begin(&laboratory);
+        (take.taps(), take.gains(), recorded(&test, &laboratory))
+    };
+    let (taps, gains, bare) = run(&[]);
+    let rate = 5120.0;
+    let first = (taps[0].time * rate) as usize;
+    assert!(first > 1000 && bare[1][..first].iter().any(|x| *x != bare[1][0]));
+    for (id, pairs) in [
+        (EffectId::SensorMass, [("mass", 0.02)]),
+        (EffectId::SensorCable, [("stiffness", 500.0)]),
+        (EffectId::CrossCoupling, [("coupling", -0.2)]),
+        (EffectId::JointMass, [("mass", 0.1)]),
+        (EffectId::JointNonlinearity, [("ratio", -0.1)]),
+        (EffectId::JointDamping, [("loss_factor", 0.1)]),
+        (EffectId::JointDrift, [("std", 0.05)]),
+        (EffectId::Fixture, [("ratio", 0.1)]),
+        (EffectId::Modulus, [("relative", 0.03)]),
+        (EffectId::AxialLoad, [("force", 60.0)]),
+        (EffectId::ShearRotary, [("factor", 1.0)]),
+    ] {
+        let effect = Effect::from_pairs(id, &pairs).unwrap();
+        let (same_taps, same_gains, with) = run(std::slice::from_ref(&effect));
+        assert_eq!(taps, same_taps, "{id:?}");
+        assert_eq!(gains, same_gains, "{id:?}");
+        // The hammer's channel sees no beam; the sensor's none before the first tap.
+        assert_eq!(bare[0], with[0], "{id:?}");
+        assert_eq!(bare[1][..first], with[1][..first], "{id:?}");
+        assert_ne!(bare[1], with[1], "{id:?}");
+    }
+}
+
+#[test]
+fn prop_noise_and_drift_do_not_change_each_other() {
+    let text = CANTILEVER
+        .replace("channel = 1", "channel = 1\nscale = 100.0")
+        .replace("position = 0.338", "position = 0.338\nscale = 1000.0");
+    let description = described(&text);
+    let run = |noise: f64, drift: f64| {
+        let mut laboratory = Laboratory::ideal();
+        laboratory.hammer.taps = 1;
+        laboratory.hammer.interval = Some(0.3);
+        laboratory.sensors.noise = noise;
+        laboratory.recorder.drift = drift;
+        let test = plan_test(&plan(&description, &[], &laboratory, 11)).unwrap();
+        recorded(&test, &laboratory).remove(1)
+    };
+    let [quiet, noisy, drifting, both] =
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1e-4), (1.0, 1e-4)].map(|(n, d)| run(n, d));
+    let most = quiet.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    for n in 0..quiet.len() {
+        let sum = noisy[n] + drifting[n] - quiet[n];
+        // Rounding of three sums.
+        assert!((both[n] - sum).abs() < 1e-13 * most.max(1.0), "sample {n}");
+    }
+    assert_ne!(noisy, quiet);
+    assert_ne!(drifting, quiet);
+}
 
 #[test]
 fn regress_same_seed_same_samples_and_switches_leave_the_taps_alone() {

@@ -11,6 +11,7 @@
 
 mod band;
 mod checks;
+mod hung;
 mod lanczos;
 mod model;
 mod modes;

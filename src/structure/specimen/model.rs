@@ -201,7 +201,7 @@ impl Model {
     }
 
     /// Equations whose motion deforms the joint, its component, and the sign.
-    fn joint_ends(&self) -> Vec<(usize, usize, f64)> {
+    pub(super) fn joint_ends(&self) -> Vec<(usize, usize, f64)> {
         let nodes = &self.numbering.nodes;
         if let [left, right] = self.runs.as_slice() {
             let (before, after) = (nodes[left.elements], nodes[right.first_node]);
@@ -292,6 +292,19 @@ impl Model {
 }
 
 impl Motion {
+    /// self + factor other.
+    pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
+        let nodes = self.nodes.iter().zip(&other.nodes);
+        Self {
+            nodes: nodes
+                .map(|(a, b)| [a[0] + factor * b[0], a[1] + factor * b[1]])
+                .collect(),
+            base: self
+                .base
+                .map(|turn| turn + factor * other.base.unwrap_or(0.0)),
+        }
+    }
+
     pub(super) fn scaled(mut self, factor: f64) -> Self {
         self.nodes
             .as_flattened_mut()

@@ -8,30 +8,32 @@ use std::f64::consts::PI;
 
 /// Added to a singular stiffness matrix, in units of mass: about the first elastic eigenvalue of a
 /// free beam, lambda^4 = 500.
-const SHIFT: f64 = 500.0;
+pub(super) const SHIFT: f64 = 500.0;
 
 /// Below this eigenvalue (the first elastic one of a free beam is 500) nothing withstands a motion.
-const NO_STIFFNESS: f64 = 1e-6;
+pub(super) const NO_STIFFNESS: f64 = 1e-6;
 
 /// The lowest elastic modes of a specimen. Modes count from 0; positions run from the left end (m).
 /// Shapes are mass-normalised: their modal mass is 1 kg.
 #[derive(Debug, Clone)]
 pub struct SpecimenModes {
-    model: Model,
-    mesh: Mesh,
-    suspension: Vec<f64>,
-    frequencies: Vec<f64>,
-    modes: Vec<Mode>,
+    pub(super) model: Model,
+    pub(super) mesh: Mesh,
+    pub(super) suspension: Vec<f64>,
+    pub(super) frequencies: Vec<f64>,
+    /// Motions that are rigid but for springs to the ground and the axial force.
+    pub(super) loose: Vec<Mode>,
+    pub(super) modes: Vec<Mode>,
 }
 
 /// A mode in the model's units.
 #[derive(Debug, Clone)]
-struct Mode {
+pub(super) struct Mode {
     /// omega^2.
-    square: f64,
+    pub(super) square: f64,
     /// Of unit modal mass.
-    motion: Motion,
-    energies: Energies,
+    pub(super) motion: Motion,
+    pub(super) energies: Energies,
 }
 
 impl Mode {
@@ -74,20 +76,22 @@ impl SpecimenModes {
                 reason: "it is not stable: the axial force buckles it".to_owned(),
             });
         }
-        let frequency = |square: f64| square.max(0.0).sqrt() * model.units.omega / (2.0 * PI);
+        let frequency = |square: f64| model.frequency(square);
         let suspension = values[..loose]
             .iter()
             .filter(|value| **value >= NO_STIFFNESS);
-        let modes: Vec<Mode> = vectors[loose..]
+        let all: Vec<Mode> = vectors
             .iter()
             .map(|vector| Mode::new(&model, vector))
             .collect();
+        let (loose, modes) = all.split_at(loose);
         Ok(Self {
             suspension: suspension.map(|square| frequency(*square)).collect(),
             frequencies: modes.iter().map(|mode| frequency(mode.square)).collect(),
+            loose: loose.to_vec(),
+            modes: modes.to_vec(),
             model,
             mesh,
-            modes,
         })
     }
 
@@ -207,11 +211,16 @@ impl SpecimenModes {
             }
             _ => model.energies(motion),
         };
-        energies.quotient().max(0.0).sqrt() * model.units.omega / (2.0 * PI)
+        model.frequency(energies.quotient())
     }
 }
 
 impl Model {
+    /// Frequency (Hz) of an omega^2 in the model's units.
+    pub(super) fn frequency(&self, square: f64) -> f64 {
+        square.max(0.0).sqrt() * self.units.omega / (2.0 * PI)
+    }
+
     /// Magnitude of the highest omega^2: that of an element's end alone.
     fn highest_square(&self) -> f64 {
         let ratio = |run: &Run| run.section.stiffness[0][0] / run.section.mass[0][0];
@@ -219,7 +228,7 @@ impl Model {
     }
 
     /// Whether something beside the joint withstands rigid motions.
-    fn is_supported(&self) -> bool {
+    pub(super) fn is_supported(&self) -> bool {
         !self.springs.is_empty() || self.runs.iter().any(|run| run.section.axial_force != 0.0)
     }
 
@@ -239,7 +248,7 @@ impl Model {
     }
 
     /// Translation (0) or rotation (1) of the runs from `first` on, about the first one's left end.
-    fn rigid_vector(&self, kind: usize, first: usize) -> Vec<f64> {
+    pub(super) fn rigid_vector(&self, kind: usize, first: usize) -> Vec<f64> {
         let mut vector = vec![0.0; self.numbering.size];
         for run in &self.runs[first..] {
             for index in 0..=run.elements {

@@ -15,7 +15,7 @@ use crate::gap::{
     GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
     observe,
 };
-use crate::pipeline::nominal_with;
+use crate::pipeline::{fastened_masses, nominal_with};
 use crate::structure::{Beam, JointStiffness};
 
 /// Non-centrality of a chi square of one degree of freedom that is noticed nine times out of ten at the
@@ -134,6 +134,7 @@ pub(super) fn plan_of(
             tap: recording.tap.ok_or_else(|| PlanError::NoTap {
                 file: recording.file.display().to_string(),
             })?,
+            masses: fastened_masses(recording),
             level: recording.level.unwrap_or(1.0) / hardest,
         })
     });

@@ -10,8 +10,10 @@
 //! are smooth in every position and good on a coarse mesh.
 
 mod band;
+mod beam_modes;
 mod checks;
 mod lanczos;
+mod layout;
 mod model;
 mod modes;
 mod numbering;
@@ -19,6 +21,7 @@ mod section;
 mod tridiagonal;
 
 use super::{Beam, StructureError};
+pub use layout::LapLayout;
 pub use modes::SpecimenModes;
 
 /// The beam, or the two beams that a joint joins.

@@ -185,11 +185,15 @@ fn case(
 }
 
 /// Groups of effects that a structure can have: a lap joint has no coupling and no fixture, a beam by itself
-/// no joint and nothing that pulls on it.
+/// no joint. Nothing pulls on either: both are free, and a force that pushed them would buckle them.
 fn groups_of(kind: JointKind) -> Vec<&'static [EffectId]> {
     let cannot: &[EffectId] = match kind {
         JointKind::Cantilever => &[],
-        JointKind::Lap => &[EffectId::CrossCoupling, EffectId::Fixture],
+        JointKind::Lap => &[
+            EffectId::CrossCoupling,
+            EffectId::Fixture,
+            EffectId::AxialLoad,
+        ],
         JointKind::Free => &[
             EffectId::CrossCoupling,
             EffectId::Fixture,

@@ -59,6 +59,7 @@ fn plan(recordings: usize, modes: usize) -> TestPlan {
     ];
     let recording = |&(sensor, tap, level): &(f64, f64, f64)| PlannedConfiguration {
         sensors: vec![("A".to_owned(), sensor * LENGTH)],
+        masses: Vec::new(),
         tap: tap * LENGTH,
         level,
     };

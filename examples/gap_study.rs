@@ -262,6 +262,7 @@ fn plan(five: bool, drift: f64, noise: f64) -> TestPlan {
     let length = beam().length;
     let one = |sensor: f64, tap: f64, level: f64| PlannedConfiguration {
         sensors: vec![("A".to_string(), sensor * length)],
+        masses: Vec::new(),
         tap: tap * length,
         level,
     };

@@ -1,10 +1,12 @@
 //! From a test description to the structure it describes, in the theory's terms: for the pipeline and
 //! for virtual tests alike.
 
-use crate::description::{BeamTheory, JointKind, KnownStiffness, RightHalf, TestDescription};
-use crate::structure::Beam;
+use crate::description::{
+    self, FastenedMass, JointKind, KnownStiffness, RecordingDescription, RightHalf, TestDescription,
+};
 use crate::structure::beam::DEFAULT_POISSON;
-use crate::structure::specimen::{Body, LapOverlap, Specimen, SpecimenJoint};
+use crate::structure::specimen::{LapLayout, PointMass, Specimen, SpecimenJoint};
+use crate::structure::{Assembly, Beam, BeamTheory};
 
 /// The beam; of a lap joint the left half's properties and the total length.
 pub fn described_beam(test: &TestDescription) -> Beam {
@@ -19,7 +21,7 @@ pub fn described_beam(test: &TestDescription) -> Beam {
 }
 
 /// The right half of a lap joint: the left one's length and what is not said to differ.
-pub fn right_half(right: &RightHalf, left: &Beam) -> Beam {
+fn right_half(right: &RightHalf, left: &Beam) -> Beam {
     Beam {
         length: left.length,
         width: right.width.unwrap_or(left.width),
@@ -48,34 +50,46 @@ pub fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
     }
 }
 
-/// The specimen on this joint, without sensors.
-pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
-    let mut specimen = Specimen::new(body(test), joint);
-    specimen.shear_rotary = match test.joint.beam {
-        BeamTheory::Euler => 0.0,
-        BeamTheory::Timoshenko => 1.0,
-    };
-    specimen.overlap = test.joint.overlap.map(|overlap| LapOverlap {
-        length: overlap.length,
-        mass: overlap.mass,
-    });
-    specimen
+/// Where a described lap joint's halves differ from two equal pieces; nothing of one beam.
+pub fn lap_layout(test: &TestDescription) -> LapLayout {
+    let joint = &test.joint;
+    let beam = described_beam(test);
+    LapLayout {
+        position: joint.position,
+        right: joint.right.as_ref().map(|right| right_half(right, &beam)),
+        overlap: joint.overlap.as_ref().map(|o| (o.length, o.mass)),
+    }
 }
 
-fn body(test: &TestDescription) -> Body {
-    let whole = described_beam(test);
-    if test.joint.kind != JointKind::Lap {
-        return Body::One(whole);
+/// How the described beam is held.
+pub fn assembly_of(kind: JointKind) -> Assembly {
+    match kind {
+        JointKind::Cantilever => Assembly::Cantilever,
+        JointKind::Lap => Assembly::Lap,
+        JointKind::Free => Assembly::Free,
     }
-    let position = test.joint.position.unwrap_or(0.5 * whole.length);
-    let left = Beam {
-        length: position,
-        ..whole
+}
+
+/// The described theory of bending.
+pub fn theory_of(theory: description::BeamTheory) -> BeamTheory {
+    match theory {
+        description::BeamTheory::Euler => BeamTheory::Euler,
+        description::BeamTheory::Timoshenko => BeamTheory::Timoshenko,
+    }
+}
+
+/// The specimen on this joint, without sensors and what is fastened for single recordings.
+pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
+    let held = (&described_beam(test), assembly_of(test.joint.kind));
+    Specimen::jointed(theory_of(test.joint.beam), held, &lap_layout(test), joint)
+}
+
+/// The known masses that are fastened to the beam for a recording.
+pub fn fastened_masses(recording: &RecordingDescription) -> Vec<PointMass> {
+    let point = |fastened: &FastenedMass| PointMass {
+        position: fastened.position,
+        mass: fastened.mass,
+        inertia: 0.0,
     };
-    let other = test.joint.right.clone().unwrap_or_default();
-    let right = Beam {
-        length: whole.length - position,
-        ..right_half(&other, &whole)
-    };
-    Body::Joined([left, right])
+    recording.masses.iter().map(point).collect()
 }

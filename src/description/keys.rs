@@ -80,6 +80,7 @@ pub(super) const RECORDING: KnownTable = KnownTable {
         "band",
         "block",
         "at",
+        "mass",
         "sample_rate",
         "form",
         "sensor",
@@ -87,6 +88,10 @@ pub(super) const RECORDING: KnownTable = KnownTable {
         "temperature",
         "date",
     ],
+};
+pub(super) const FASTENED: KnownTable = KnownTable {
+    header: "[[recording.mass]]",
+    keys: &["position", "mass"],
 };
 pub(super) const MEASURED: KnownTable = KnownTable {
     header: "[measured]",
@@ -127,9 +132,9 @@ pub(super) const EFFECT: KnownTable = KnownTable {
     ],
 };
 
-const ALL: [&KnownTable; 11] = [
-    &TOP, &BEAM, &TOLERANCE, &RIGHT, &JOINT, &OVERLAP, &HAMMER, &SENSOR, &RECORDING, &MEASURED,
-    &ANALYSIS,
+const ALL: [&KnownTable; 12] = [
+    &TOP, &BEAM, &TOLERANCE, &RIGHT, &JOINT, &OVERLAP, &HAMMER, &SENSOR, &RECORDING, &FASTENED,
+    &MEASURED, &ANALYSIS,
 ];
 
 /// What the field also calls these keys; no spelling distance leads from "rho" to "density".

@@ -249,6 +249,15 @@ pub enum FrfForm {
     Receptance,
 }
 
+/// A known mass that is fastened to the beam for one recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FastenedMass {
+    /// Where it sits (m).
+    pub position: f64,
+    /// What it weighs (kg).
+    pub mass: f64,
+}
+
 /// One recording of the test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingDescription {
@@ -267,6 +276,8 @@ pub struct RecordingDescription {
     pub block: Option<usize>,
     /// Sensors moved for this recording: name to position (m).
     pub at: BTreeMap<String, f64>,
+    /// Known masses fastened to the beam for this recording, in the order of the file.
+    pub masses: Vec<FastenedMass>,
     /// Sample rate (Hz) of a CSV file without a time column.
     pub sample_rate: Option<f64>,
     /// Given when the file holds frequency response functions instead of time series.

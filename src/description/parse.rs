@@ -66,12 +66,12 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
     let sensors = array_of_tables(top, "sensor", "[[sensor]]")?;
     let sensors = read_sensors(&sensors, hammer_channel.as_ref(), &beam, &mut warnings)?;
     let surroundings = Surroundings {
-        length: beam.length,
+        beam: &beam,
         sensors: &sensors,
     };
     let recordings = array_of_tables(top, "recording", "[[recording]]")?
         .iter()
-        .map(|entry| read_recording(entry, &surroundings))
+        .map(|entry| read_recording(entry, &surroundings, &mut warnings))
         .collect::<Result<Vec<_>, _>>()?;
     let measured = measured(top, &recordings, &mut warnings)?;
     let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;

@@ -1,11 +1,11 @@
 //! `[[recording]]`: the files, and what is particular to each.
 
 use super::beam::along;
-use super::error::{DescriptionError, DescriptionProblem};
+use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
 use super::keys;
 use super::limits::Limits;
 use super::reader::{Entry, Table, quantities_by_name};
-use super::{FrfForm, RecordingDescription, SensorDescription};
+use super::{BeamDescription, FastenedMass, FrfForm, RecordingDescription, SensorDescription};
 use crate::quantity::Dimension;
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -37,10 +37,16 @@ const TEMPERATURE: Limits = Limits::between(
     "give degrees Celsius, or a unit: \"293 K\"",
 );
 
+/// What is fastened to a beam that is tapped: a kilogram and more on the heaviest ones.
+const FASTENED_MASS: Limits = Limits::positive(
+    1e3,
+    "give what it weighs in kg, or with its unit: \"50 g\"; leave the table out where nothing is fastened",
+);
+
 /// What the recordings refer to.
 pub(super) struct Surroundings<'s> {
-    /// Length of the beam (m).
-    pub(super) length: f64,
+    /// The beam.
+    pub(super) beam: &'s BeamDescription,
     /// The sensors declared.
     pub(super) sensors: &'s [SensorDescription],
 }
@@ -49,11 +55,18 @@ pub(super) struct Surroundings<'s> {
 pub(super) fn read_recording(
     entry: &Entry<'_>,
     surroundings: &Surroundings<'_>,
+    warnings: &mut Vec<DescriptionWarning>,
 ) -> Result<RecordingDescription, DescriptionError> {
     let table = entry.table(&keys::RECORDING)?;
     let file = table.need("file", "a file", "file = \"taps.wav\"")?;
-    let position = along(surroundings.length);
+    let position = along(surroundings.beam.length);
     let at = table.optional("at", |entry| read_moves(entry, surroundings))?;
+    let masses = table.optional("mass", |entry| {
+        let wanted = "a list of tables, each under its own header [[recording.mass]],";
+        let entries = entry.list(wanted)?;
+        let read = |entry| read_fastened(entry, surroundings.beam, &mut *warnings);
+        entries.iter().map(read).collect::<Result<Vec<_>, _>>()
+    })?;
     let (form, sensor) = read_form(&table, surroundings)?;
     Ok(RecordingDescription {
         file: file.text("a file such as \"taps.wav\"")?.into(),
@@ -63,6 +76,7 @@ pub(super) fn read_recording(
         band: table.optional("band", read_band)?,
         block: table.optional("block", |entry| entry.count(&BLOCK))?,
         at: at.unwrap_or_default(),
+        masses: masses.unwrap_or_default(),
         sample_rate: table.optional("sample_rate", |entry| {
             entry.within(Dimension::Rate, &SAMPLE_RATE)
         })?,
@@ -103,11 +117,33 @@ fn read_moves(
     surroundings: &Surroundings<'_>,
 ) -> Result<BTreeMap<String, f64>, DescriptionError> {
     let table = entry.free_table("a table of sensors and positions such as { A = 0.20 }")?;
-    let position = along(surroundings.length);
+    let position = along(surroundings.beam.length);
     quantities_by_name(&table, |name, entry| {
         check_sensor(name, entry, surroundings.sensors)?;
         entry.within(Dimension::Length, &position)
     })
+}
+
+fn read_fastened(
+    entry: &Entry<'_>,
+    beam: &BeamDescription,
+    warnings: &mut Vec<DescriptionWarning>,
+) -> Result<FastenedMass, DescriptionError> {
+    let table = entry.table(&keys::FASTENED)?;
+    let position = table.need("position", "its place on the beam (m)", "position = 0.20")?;
+    let weight = table.need("mass", "what it weighs (kg)", "mass = \"50 g\"")?;
+    let position = position.within(Dimension::Length, &along(beam.length))?;
+    let mass = weight.within(Dimension::Mass, &FASTENED_MASS)?;
+    let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
+    if mass > beam_mass {
+        warnings.push(weight.warning(Doubt::Implausible {
+            value: mass,
+            unit: "kg",
+            usual: format!("less than the beam's {}", with_unit(beam_mass, "kg")),
+            question: "did you mean g? Write \"50 g\"",
+        }));
+    }
+    Ok(FastenedMass { position, mass })
 }
 
 fn check_sensor(

@@ -75,6 +75,7 @@ file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
 # block = 2048                 # samples, block/2.56 lines are shown; default: what fits the shortest tap
 # at = { A = 0.20 }            # m, sensors moved for this recording, default: none
+# mass = [{ position = 0.423, mass = "15 g" }]   # known masses fastened for this recording, default: none
 # sample_rate = 5120           # Hz, for a CSV file without a time column, default: from the file
 # torque = 12                  # N m, carried to the outputs, default: none
 # temperature = 21             # degrees Celsius, carried to the outputs, default: none

@@ -56,7 +56,12 @@ fn one_structure(observations: &Observations) -> Result<(), GapError> {
     for (second, configuration) in observations.configurations.iter().enumerate() {
         for mode in &configuration.modes {
             for first in 0..second {
-                let Some(other) = observations.configurations[first].mode(mode.mode) else {
+                let other = &observations.configurations[first];
+                // What is fastened moves frequencies further.
+                let Some(other) = other
+                    .mode(mode.mode)
+                    .filter(|_| other.masses == configuration.masses)
+                else {
                     continue;
                 };
                 let ratio = mode.frequency / other.frequency;

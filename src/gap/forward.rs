@@ -209,19 +209,9 @@ impl<'a> Forward<'a> {
     }
 
     fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
-        let based = specimen.base.is_some_and(|base| base.ratio > 0.0);
-        let count = self.frame.modes + usize::from(based);
-        let modes = specimen.modes(count, Mesh::DIAGNOSIS).ok()?;
-        let mut numbers: Vec<usize> = (0..count).collect();
-        if based {
-            // The mode in which the base moves most is its own; the others keep the beam's numbers.
-            let most = numbers.iter().copied().max_by(|&a, &b| {
-                modes
-                    .base_participation(a)
-                    .total_cmp(&modes.base_participation(b))
-            })?;
-            numbers.remove(most);
-        }
+        let (modes, numbers) = specimen
+            .beam_modes(self.frame.modes, Mesh::DIAGNOSIS)
+            .ok()?;
         Some((Arc::new(modes), numbers))
     }
 

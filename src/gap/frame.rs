@@ -5,7 +5,7 @@ use super::decay_readings::{average_std, bent_std, widen};
 use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
-use super::setup::{Setup, setup, twin};
+use super::setup::{Lists, Setup, setup, twin};
 use crate::identify::observation::Observations;
 use nalgebra::DMatrix;
 
@@ -44,6 +44,10 @@ pub(super) enum Small {
     SensorMass { name: usize },
     /// Place of a sensor (m), the same in all configurations where it has the same stated one.
     SensorPlace { place: usize },
+    /// A fastened mass over its stated one (1).
+    FastenedMass { fastened: usize },
+    /// Place of a fastened mass (m).
+    FastenedPlace { fastened: usize },
     /// Where the hammer struck in one visit (m).
     TapPlace { visit: usize },
     /// Calibration of a sensor as it was mounted for one visit (1).
@@ -105,13 +109,12 @@ impl Frame {
         } else {
             highest
         };
-        let mut names = Vec::new();
-        let mut places = Vec::new();
+        let mut lists = Lists::default();
         let setups: Vec<Setup> = observations
             .configurations
             .iter()
             .enumerate()
-            .map(|(index, c)| setup(index, c, nominal, (&mut names, &mut places)))
+            .map(|(index, c)| setup(index, c, nominal, &mut lists))
             .collect();
         let mut frame = Frame {
             nominal: nominal.clone(),
@@ -131,7 +134,8 @@ impl Frame {
         frame.add_shapes(observations);
         frame.add_damping(observations, settings);
         frame.add_slopes(observations);
-        frame.add_smalls(&names, &places, settings);
+        frame.add_smalls(&lists, settings);
+        frame.add_fastened(&lists.fastened, settings);
         frame
     }
 
@@ -275,7 +279,8 @@ impl Frame {
         }
     }
 
-    fn add_smalls(&mut self, names: &[String], places: &[(usize, f64)], settings: &GapSettings) {
+    fn add_smalls(&mut self, lists: &Lists, settings: &GapSettings) {
+        let (names, places) = (&lists.names, &lists.places);
         let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
         self.small(Small::Scale, 0.0, scale);
         let mut visits: Vec<usize> = self.setups.iter().map(|setup| setup.visit).collect();
@@ -344,7 +349,7 @@ impl Frame {
         self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
     }
 
-    fn small(&mut self, small: Small, centre: f64, std: f64) {
+    pub(super) fn small(&mut self, small: Small, centre: f64, std: f64) {
         self.smalls.push(small);
         self.small_centres.push(centre);
         self.small_stds.push(std);

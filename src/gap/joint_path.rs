@@ -10,6 +10,7 @@ use super::forward::Solved;
 use super::setup::Setup;
 use crate::effects::{JointLaw, JointLawKind, ModeMotion};
 use crate::identify::observation::Configuration;
+use crate::structure::specimen::SpecimenModes;
 
 /// Times at which an average over a decay is taken; they lie denser where the decay begins. 16 leave
 /// 0.5 % of the average.
@@ -39,6 +40,20 @@ pub(super) struct JointPath {
     modes: Vec<ModePath>,
     /// Length of the decays that were fitted (s).
     seconds: f64,
+}
+
+/// Amplitude of the joint's rotation after a tap at a place (m) at a level (1), in units of the tap's force:
+/// what it moves, summed over these modes as sqrt(sum (phi_i(tap) theta_i/omega_i)^2).
+pub(super) fn joint_amplitude(
+    modes: &SpecimenModes,
+    (tap, level): (f64, f64),
+    which: impl Iterator<Item = usize>,
+) -> f64 {
+    let square = |mode: usize| {
+        let omega = std::f64::consts::TAU * modes.frequencies()[mode];
+        (modes.displacement(mode, tap) * modes.joint_motion(mode)[1] / omega).powi(2)
+    };
+    level * which.map(square).sum::<f64>().sqrt()
 }
 
 /// Relative changes of the stiffness that the modes of one configuration feel.

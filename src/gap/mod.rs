@@ -31,6 +31,7 @@ mod decay_finding;
 mod decay_readings;
 mod error;
 mod evidence;
+mod fastened;
 mod forward;
 mod frame;
 mod hypothesis;

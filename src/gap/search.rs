@@ -7,6 +7,7 @@ use super::evidence::log_mean;
 use super::forward::Forward;
 use super::frame::{Frame, Small};
 use super::hypothesis::{Fit, Search, fit_nominal};
+use super::joint_path::joint_amplitude;
 use super::nominal::{COUPLING, Nominal};
 use super::pairs::add_pairs;
 use super::posterior::{Entry, set_probabilities};
@@ -229,7 +230,10 @@ fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
 fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     let mut exact = frame.clone();
     for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
-        if matches!(small, Small::Scale | Small::SensorMass { .. }) {
+        if matches!(
+            small,
+            Small::Scale | Small::SensorMass { .. } | Small::FastenedMass { .. }
+        ) {
             *std = EXACT;
         }
     }
@@ -284,9 +288,8 @@ fn possible(frame: &Frame, effect: EffectId) -> bool {
     }
 }
 
-/// Amplitude of the joint's rotation in each configuration: the taps' force times what it moves, summed
-/// over the modes as sqrt(sum (phi_i(tap) theta_i/omega_i)^2), over that of the hardest. Where a tap has
-/// no place, the force alone.
+/// Amplitude of the joint's rotation in each configuration over that of the hardest. Where a tap has no
+/// place, the force alone.
 fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
     let forward = Forward::new(frame, &[]);
     let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
@@ -294,14 +297,8 @@ fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
     };
     let amplitude = |(setup, one): (&Setup, &super::forward::Solved)| -> Option<f64> {
         let tap = setup.tap?;
-        let squares = (1..=frame.fitted_modes).filter_map(|mode| {
-            let index = one.index(mode)?;
-            let omega = std::f64::consts::TAU * one.modes.frequencies()[index];
-            let moved =
-                one.modes.displacement(index, tap) * one.modes.joint_motion(index)[1] / omega;
-            Some(moved * moved)
-        });
-        Some(setup.level * squares.sum::<f64>().sqrt())
+        let modes = (1..=frame.fitted_modes).filter_map(|mode| one.index(mode));
+        Some(joint_amplitude(&one.modes, (tap, setup.level), modes))
     };
     let all: Option<Vec<f64>> = frame.setups.iter().zip(&solved).map(amplitude).collect();
     let Some(all) = all else { return };

@@ -17,7 +17,10 @@ pub struct GapSettings {
     pub frequency_floor: f64,
     /// Relative standard uncertainty of a sensor's stated mass: 10 %, cable and mounting.
     pub sensor_mass_std: f64,
-    /// Standard uncertainty of the places of sensors and taps (m): 1 mm.
+    /// Relative standard uncertainty of a mass that is fastened to be known: 1 %, a kitchen scale's 0.1 g
+    /// of 10 g, and the wax under it.
+    pub fastened_mass_std: f64,
+    /// Standard uncertainty of the places of sensors, fastened masses and taps (m): 1 mm.
     pub position_std: f64,
     /// Standard uncertainty of the calibration of hammer and sensor together (1), anew in every visit: 3 %,
     /// since a sensor that is mounted again is not aligned as before.
@@ -62,6 +65,7 @@ impl Default for GapSettings {
             scale_std: 0.002,
             frequency_floor: 5e-5,
             sensor_mass_std: 0.1,
+            fastened_mass_std: 0.01,
             position_std: 0.001,
             gain_std: 0.03,
             damping_scatter: 0.4,

@@ -5,7 +5,7 @@ use super::joint_path::JointPath;
 use super::nominal::Nominal;
 use crate::effects::SensorPlace;
 use crate::identify::observation::{Configuration, ExtraPeak, ObservedMode};
-use crate::structure::specimen::Specimen;
+use crate::structure::specimen::{PointMass, Specimen};
 use nalgebra::DMatrix;
 
 /// One configuration as the model needs it.
@@ -18,6 +18,8 @@ pub(super) struct Setup {
     /// Places and masses of the sensors, in the order of the observations. One without a place has no
     /// mass, and its shape is not compared.
     pub(super) sensors: Vec<SensorPlace>,
+    /// Known masses that are fastened, each with its index among all distinct ones.
+    pub(super) fastened: Vec<(usize, PointMass)>,
     /// Those that sit on the structure at a known place.
     pub(super) carried: Vec<SensorPlace>,
     /// Names of the sensors, as indices.
@@ -48,12 +50,23 @@ fn index_in<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
         })
 }
 
-/// A configuration with its sensors on the structure; grows the lists of names and places.
+/// What all configurations have of sensors and masses, each once.
+#[derive(Debug, Default)]
+pub(super) struct Lists {
+    /// Names of the sensors.
+    pub(super) names: Vec<String>,
+    /// Index of the name and stated place (m) of the sensors.
+    pub(super) places: Vec<(usize, f64)>,
+    /// Masses that are fastened.
+    pub(super) fastened: Vec<PointMass>,
+}
+
+/// A configuration with its sensors and masses on the structure; grows the lists.
 pub(super) fn setup(
     index: usize,
     configuration: &Configuration,
     nominal: &Nominal,
-    (names, places): (&mut Vec<String>, &mut Vec<(usize, f64)>),
+    lists: &mut Lists,
 ) -> Setup {
     let sensors: Vec<SensorPlace> = configuration
         .sensors
@@ -72,20 +85,25 @@ pub(super) fn setup(
         .filter(|(sensor, _)| sensor.position.is_some() && !nominal.is_apart(&sensor.name))
         .map(|(_, place)| *place)
         .collect();
-    let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
+    let masses_of_sensors: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
     let name_indices: Vec<usize> = configuration
         .sensors
         .iter()
-        .map(|sensor| index_in(names, sensor.name.clone()))
+        .map(|sensor| index_in(&mut lists.names, sensor.name.clone()))
         .collect();
     let place_indices = name_indices
         .iter()
         .zip(&sensors)
-        .map(|(&name, sensor)| index_in(places, (name, sensor.position)))
+        .map(|(&name, sensor)| index_in(&mut lists.places, (name, sensor.position)))
         .collect();
+    let masses = configuration.masses.iter();
+    let fastened = masses.map(|mass| (index_in(&mut lists.fastened, *mass), *mass));
+    let mut specimen = nominal.with_masses(&masses_of_sensors);
+    specimen.masses.extend_from_slice(&configuration.masses);
     Setup {
+        fastened: fastened.collect(),
         label: label(index, configuration),
-        specimen: nominal.with_masses(&masses),
+        specimen,
         sensors,
         carried,
         names: name_indices,

@@ -1,5 +1,6 @@
 //! What the small unknowns do to each reading.
 
+use super::fastened::fastened_slope;
 use super::forward::{Forward, Solved};
 use super::frame::{Row, Small};
 use super::joint_energy::joint_shares;
@@ -137,7 +138,7 @@ impl Forward<'_> {
                         * one.modes.slope(index, sensor.position)
                 })
                 .sum(),
-            _ => 0.0,
+            _ => fastened_slope(small, setup, (one, index)),
         }
     }
 

@@ -2,13 +2,14 @@
 //! on the finer mesh, not from the diagnosis's own predictions.
 
 use super::error::GapError;
+use super::joint_path::joint_amplitude;
 use super::nominal::Nominal;
 use crate::effects::{Circumstances, Effect, EffectId, SensorPlace, apply};
 use crate::identify::observation::{
     AlongDecay, Configuration, DecayEnd, DecayVerdict, Observations, Observed, ObservedMode,
     ObservedSensor, ShapeValue, effective_share,
 };
-use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
+use crate::structure::specimen::{Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -45,6 +46,8 @@ pub struct TestPlan {
 pub struct PlannedConfiguration {
     /// Name and place (m) of each sensor.
     pub sensors: Vec<(String, f64)>,
+    /// Known masses that are fastened.
+    pub masses: Vec<PointMass>,
     /// Where the hammer strikes (m).
     pub tap: f64,
     /// Force over that of the hardest taps (1).
@@ -81,13 +84,7 @@ fn amplitudes(plan: &TestPlan, truth: &Nominal) -> Result<Vec<f64>, GapError> {
     let all: Vec<f64> = plan
         .configurations
         .iter()
-        .map(|one| {
-            let square = |mode: usize| {
-                let omega = std::f64::consts::TAU * modes.frequencies()[mode];
-                (modes.displacement(mode, one.tap) * modes.joint_motion(mode)[1] / omega).powi(2)
-            };
-            one.level * (0..plan.modes).map(square).sum::<f64>().sqrt()
-        })
+        .map(|one| joint_amplitude(&modes, (one.tap, one.level), 0..plan.modes))
         .collect();
     let most = all.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     Ok(all.into_iter().map(|amplitude| amplitude / most).collect())
@@ -140,6 +137,7 @@ impl Scene<'_> {
             .collect();
         let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
         let mut nominal = self.truth.with_masses(&masses);
+        nominal.masses.extend_from_slice(&planned.masses);
         self.drift(&mut nominal);
         let power = self.power();
         let circumstances = |level: f64| Circumstances {
@@ -177,6 +175,7 @@ impl Scene<'_> {
                     position: Some(*position),
                 })
                 .collect(),
+            masses: planned.masses.clone(),
             tap: Some(planned.tap),
             peak_force: Some(planned.level),
             level: Some(planned.level),
@@ -208,19 +207,7 @@ impl Scene<'_> {
     }
 
     fn solve(&self, specimen: &Specimen) -> Result<Numbered, GapError> {
-        let based = specimen.base.is_some_and(|base| base.ratio > 0.0);
-        let count = self.plan.modes + usize::from(based);
-        let modes = specimen.modes(count, Mesh::SIMULATION)?;
-        let mut numbers: Vec<usize> = (0..count).collect();
-        if based {
-            let share = |mode: &usize| modes.base_participation(*mode);
-            let most = numbers
-                .iter()
-                .copied()
-                .max_by(|a, b| share(a).total_cmp(&share(b)));
-            numbers.retain(|mode| Some(*mode) != most);
-        }
-        Ok((modes, numbers))
+        Ok(specimen.beam_modes(self.plan.modes, Mesh::SIMULATION)?)
     }
 
     fn mode(

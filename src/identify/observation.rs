@@ -5,6 +5,8 @@
 //! the measurement gives it (scatter of the repeated taps, noise that the fits leave). No number here
 //! knows of a hypothesis or of its residual.
 
+use crate::structure::specimen::PointMass;
+
 /// All configurations of a test.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Observations {
@@ -21,6 +23,8 @@ pub struct Configuration {
     pub recording: Option<usize>,
     /// The sensors, in the order of the description; empty of frequencies read elsewhere.
     pub sensors: Vec<ObservedSensor>,
+    /// Known masses that were fastened to the beam; sensors are no part of them.
+    pub masses: Vec<PointMass>,
     /// Where the hammer struck (m); `None` where nobody said.
     pub tap: Option<f64>,
     /// Median peak force of the taps (N); `None` without a hammer.

@@ -11,7 +11,7 @@ use crate::identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode
 use crate::modal::ModeReading;
 use crate::quality::Verdict;
 use crate::recording::{ChannelInfo, Format};
-use crate::structure::specimen::Specimen;
+use crate::structure::specimen::{PointMass, Specimen};
 use crate::structure::{Beam, JointStiffness};
 
 /// A finished analysis.
@@ -74,6 +74,8 @@ pub struct Conditions {
     pub tap: Option<f64>,
     /// Where each sensor sits (m), moved ones at their place in this recording.
     pub sensor_positions: BTreeMap<String, f64>,
+    /// Known masses that are fastened to the beam.
+    pub masses: Vec<PointMass>,
     /// Tightening torque (N m).
     pub torque: Option<f64>,
     /// Temperature (degrees Celsius).

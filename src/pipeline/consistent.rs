@@ -1,8 +1,10 @@
 //! The consistent estimate of a described test: what the description says, in the estimator's terms.
 
 use super::model::TestedStructure;
-use crate::described::right_half;
-use crate::description::{FitParameter, SensorDescription, SensorKind, TestDescription, Weights};
+use crate::described::{fastened_masses, lap_layout};
+use crate::description::{
+    FitParameter, RecordingDescription, SensorDescription, SensorKind, TestDescription, Weights,
+};
 use crate::identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
     JointedStructure, LapLayout, Parameter, ResidualWeights,
@@ -21,7 +23,7 @@ pub(super) const NO_SPRING: f64 = 1e-9;
 pub struct StructureDetails {
     /// Where a lap joint's halves differ from two equal pieces.
     pub lap: LapLayout,
-    /// Masses (kg) of the sensors, where they sit in the reference configuration.
+    /// Masses (kg) of the sensors, where they sit in the reference configuration, and what is fastened there.
     pub masses: Vec<PointAttachment>,
     /// Relative standard uncertainties of the beam's properties.
     pub tolerances: BeamTolerances,
@@ -33,16 +35,11 @@ pub struct StructureDetails {
 
 /// The details of a described test.
 pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetails {
-    let joint = &test.joint;
     let tolerance = &test.beam.tolerance;
     let relative = |std: Option<f64>, value: f64| std.map(|std| std / value);
     StructureDetails {
-        lap: LapLayout {
-            position: joint.position,
-            right: joint.right.as_ref().map(|right| right_half(right, beam)),
-            overlap: joint.overlap.as_ref().map(|o| (o.length, o.mass)),
-        },
-        masses: sensor_masses(test),
+        lap: lap_layout(test),
+        masses: masses_in(test, test.recordings.first()),
         tolerances: BeamTolerances {
             length: relative(tolerance.length, beam.length),
             width: relative(tolerance.width, beam.width),
@@ -55,29 +52,37 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
     }
 }
 
-/// Sensors whose mass and place are known; the first recording is the reference configuration. A
-/// microphone loads nothing.
-fn sensor_masses(test: &TestDescription) -> Vec<PointAttachment> {
-    if !test.analysis.sensor_mass {
-        return Vec::new();
-    }
-    test.sensors
-        .iter()
-        .filter(|sensor| sensor.kind != SensorKind::Sound)
-        .filter_map(|sensor| {
-            Some(PointAttachment {
-                position: reference_place(test, sensor)?,
-                size: sensor.mass.filter(|mass| *mass > 0.0)?,
-            })
+/// What is known to sit on the beam in a recording: sensors whose mass and place are known, and what is
+/// fastened. A microphone loads nothing.
+pub(super) fn masses_in(
+    test: &TestDescription,
+    recording: Option<&RecordingDescription>,
+) -> Vec<PointAttachment> {
+    let sensors = test.sensors.iter().filter(|sensor| {
+        test.analysis.sensor_mass && sensor.kind != SensorKind::Sound && sensor.mass > Some(0.0)
+    });
+    let sensors = sensors.filter_map(|sensor| {
+        Some(PointAttachment {
+            position: place_in(recording, sensor)?,
+            size: sensor.mass?,
         })
-        .collect()
+    });
+    let fastened = recording.map(fastened_masses).unwrap_or_default();
+    let fastened = fastened.iter().map(|mass| PointAttachment {
+        position: mass.position,
+        size: mass.mass,
+    });
+    sensors.chain(fastened).collect()
+}
+
+fn place_in(recording: Option<&RecordingDescription>, sensor: &SensorDescription) -> Option<f64> {
+    let moved = recording.and_then(|recording| recording.at.get(&sensor.name).copied());
+    moved.or(sensor.position)
 }
 
 /// Where a sensor sits (m) in the reference configuration, that of the first recording.
 pub(super) fn reference_place(test: &TestDescription, sensor: &SensorDescription) -> Option<f64> {
-    let first = test.recordings.first();
-    let moved = first.and_then(|recording| recording.at.get(&sensor.name).copied());
-    moved.or(sensor.position)
+    place_in(test.recordings.first(), sensor)
 }
 
 /// The structure that the estimator takes.

@@ -40,9 +40,12 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
         .filter(|reading| reading.label.is_none())
         .map(|reading| resonance(reading, spectra))
         .collect();
+    let masses = recording.conditions.masses.iter();
+    let fastened = masses.map(|mass| (mass.position, mass.mass));
     Some(RecordingEvidence {
         file: recording.file.clone(),
         tap_position: recording.conditions.tap,
+        fastened: fastened.collect(),
         taps: recording
             .measurement
             .taps

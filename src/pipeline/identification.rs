@@ -121,7 +121,7 @@ pub fn identify(
 }
 
 /// The modes with a number, ascending.
-fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
+pub(super) fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
     modes
         .iter()
         .filter_map(|mode| {

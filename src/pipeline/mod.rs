@@ -20,6 +20,7 @@ mod frf;
 mod functions;
 mod gap;
 mod identification;
+mod loaded;
 mod measure;
 mod model;
 mod modes;
@@ -59,6 +60,7 @@ pub use shapes::{SampledShape, sampled_shapes};
 pub use warning::{AmplitudeChange, Warning};
 pub use wired::{Wiring, run_wired};
 
+pub use crate::described::fastened_masses;
 use crate::description::{ChannelRef, TestDescription};
 use crate::recording::Recording;
 
@@ -105,6 +107,7 @@ pub fn run_test(
             let known = (&structure, &details);
             let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
+            loaded::number_loaded(&mut recordings, &found, test, known);
             found
         }
     };

@@ -1,7 +1,7 @@
 //! From what the description says to what the theory takes.
 
-use crate::described::{described_beam, stiffness_of};
-use crate::description::{self, JointKind, KnownStiffness, TestDescription};
+use crate::described::{assembly_of, described_beam, stiffness_of, theory_of};
+use crate::description::{JointKind, JointModel, KnownStiffness, TestDescription};
 use crate::identify::PairsModel;
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness};
@@ -54,24 +54,16 @@ impl KnownJoint {
 /// The structure that a test description describes.
 pub fn tested_structure(test: &TestDescription) -> TestedStructure {
     let beam = described_beam(test);
-    let (assembly, regression) = match (test.joint.kind, test.joint.model) {
-        (JointKind::Free, _) => (Assembly::Free, None),
-        (JointKind::Lap, _) => (Assembly::Lap, Some(PairsModel::Lap)),
-        (JointKind::Cantilever, description::JointModel::TwoParameter) => {
-            (Assembly::Cantilever, Some(PairsModel::TwoParameter))
-        }
-        (JointKind::Cantilever, description::JointModel::ThreeParameter) => {
-            (Assembly::Cantilever, Some(PairsModel::ThreeParameter))
-        }
-    };
     TestedStructure {
         beam,
-        assembly,
-        theory: match test.joint.beam {
-            description::BeamTheory::Timoshenko => BeamTheory::Timoshenko,
-            description::BeamTheory::Euler => BeamTheory::Euler,
+        assembly: assembly_of(test.joint.kind),
+        theory: theory_of(test.joint.beam),
+        regression: match (test.joint.kind, test.joint.model) {
+            (JointKind::Free, _) => None,
+            (JointKind::Lap, _) => Some(PairsModel::Lap),
+            (JointKind::Cantilever, JointModel::TwoParameter) => Some(PairsModel::TwoParameter),
+            (JointKind::Cantilever, JointModel::ThreeParameter) => Some(PairsModel::ThreeParameter),
         },
-        regression,
         known: known_joint(test, &beam),
     }
 }

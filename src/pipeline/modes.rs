@@ -31,7 +31,7 @@ const OTHER_CONFIGURATION: f64 = 0.05;
 const FREE_BEAM_MODES: usize = 30;
 
 /// Indices of the recordings of the reference configuration: the first, and all others with its
-/// sensor positions and tap level.
+/// sensor positions, fastened masses and tap level.
 pub(super) fn reference_configuration(
     test: &TestDescription,
     recordings: &[RecordingResult],
@@ -43,7 +43,7 @@ pub(super) fn reference_configuration(
     (0..recordings.len())
         .filter(|&index| {
             let same_places = match (test.recordings.first(), test.recordings.get(index)) {
-                (Some(a), Some(b)) => a.at == b.at,
+                (Some(a), Some(b)) => a.at == b.at && a.masses == b.masses,
                 _ => true,
             };
             let same_level = match (level(first), level(&recordings[index])) {
@@ -167,7 +167,7 @@ fn standard_uncertainty(
     Some((reading.unwrap_or(0.0) + repeat.unwrap_or(0.0)).sqrt())
 }
 
-fn own_readings(recording: &RecordingResult) -> Vec<ModeReading> {
+pub(super) fn own_readings(recording: &RecordingResult) -> Vec<ModeReading> {
     recording
         .measurement
         .spectra
@@ -275,7 +275,7 @@ pub(super) fn number_in_order(modes: &mut [ModeResult]) {
 /// The numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
 /// to it, within their half lines together and [`OTHER_CONFIGURATION`], and no reading serves two
 /// modes.
-fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
+pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
         let distance = |index: &usize| (mode.frequency - readings[*index].frequency).abs();

@@ -17,6 +17,7 @@ pub(super) fn of_neglect(
     let consistent = method == EstimateMethod::Consistent;
     let mut texts = Vec::new();
     texts.extend(of_masses(test, structure, method));
+    texts.extend(of_fastened(test, structure, method));
     if structure.regression.is_some() {
         texts.extend(of_regression(test, structure, method));
     }
@@ -152,6 +153,37 @@ fn of_masses(
             "{size} is in neither the estimate nor the prediction; {lowers}"
         )),
     }
+}
+
+/// What is fastened in the reference configuration.
+fn of_fastened(
+    test: &TestDescription,
+    structure: &TestedStructure,
+    method: EstimateMethod,
+) -> Option<String> {
+    let first = test.recordings.first()?;
+    let mass: f64 = first.masses.iter().map(|fastened| fastened.mass).sum();
+    if mass <= 0.0 {
+        return None;
+    }
+    let size = format!(
+        "what is fastened to the beam in {}, {:.3} g or {:.1} % of the beam,",
+        first.file.display(),
+        1e3 * mass,
+        100.0 * mass / structure.beam.mass()
+    );
+    let closed = match structure.regression {
+        None => "closed form",
+        Some(_) => "pair regression",
+    };
+    Some(match method {
+        EstimateMethod::Consistent => format!(
+            "{size} is in the prediction and the consistent estimate; the {closed} beside it neglects it"
+        ),
+        EstimateMethod::Pairs => format!(
+            "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
+        ),
+    })
 }
 
 /// Whether a lap joint sits off the middle by more than a thousandth of the length.

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::analysis::{Conditions, Overview, RecordingResult, Response};
 use super::functions::{FunctionSettings, form_of_description, measure_functions};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
+use crate::described::fastened_masses;
 use crate::description::{
     ChannelRef, FrfForm, RecordingDescription, Scale, SensorDescription, SensorKind,
     TestDescription,
@@ -192,6 +193,7 @@ fn conditions(test: &TestDescription, description: &RecordingDescription) -> Con
     Conditions {
         tap: description.tap,
         sensor_positions: test.sensors.iter().filter_map(place).collect(),
+        masses: fastened_masses(description),
         torque: description.torque,
         temperature: description.temperature,
         date: description.date.clone(),

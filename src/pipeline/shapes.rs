@@ -3,10 +3,9 @@
 use super::analysis::Analysis;
 use super::consistent::{StructureDetails, jointed};
 use super::model::TestedStructure;
-use crate::identify::consistent::JointedStructure;
 use crate::structure::joint::StiffnessUnits;
-use crate::structure::specimen::{Body, LapOverlap, Mesh, PointMass, Specimen, SpecimenJoint};
-use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness};
+use crate::structure::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint};
+use crate::structure::{Assembly, Beam, JointStiffness};
 
 /// Points along the beam: enough for five half waves between two of them to look smooth.
 const POINTS: usize = 121;
@@ -87,34 +86,20 @@ pub(super) fn predicted_specimen(
             coupling: joint.coupling(),
         },
     };
-    let mut specimen = Specimen::new(body(&there), held);
-    specimen.shear_rotary = match structure.theory {
-        BeamTheory::Euler => 0.0,
-        BeamTheory::Timoshenko => 1.0,
-    };
-    let overlap = |(length, mass)| LapOverlap { length, mass };
-    specimen.overlap = there.lap.overlap.map(overlap);
+    let mut specimen = Specimen::jointed(
+        there.theory,
+        (&there.beam, there.assembly),
+        &there.lap,
+        held,
+    );
     specimen.masses = there
         .masses
         .iter()
-        .map(|sensor| PointMass {
-            position: sensor.position,
-            mass: sensor.size,
+        .map(|mass| PointMass {
+            position: mass.position,
+            mass: mass.size,
             inertia: 0.0,
         })
         .collect();
     specimen
-}
-
-fn body(there: &JointedStructure) -> Body {
-    if there.assembly != Assembly::Lap {
-        return Body::One(there.beam);
-    }
-    let position = there.lap.position.unwrap_or(0.5 * there.beam.length);
-    let piece = |beam: Beam, length: f64| Beam { length, ..beam };
-    let right = there.lap.right.unwrap_or(there.beam);
-    Body::Joined([
-        piece(there.beam, position),
-        piece(right, there.beam.length - position),
-    ])
 }

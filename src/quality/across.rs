@@ -40,7 +40,7 @@ fn swapped<'a>(
         (Some(a), Some(b)) => (a - b).abs() <= settings.same_position,
         _ => false,
     };
-    if near(first.tap_position, second.tap_position) {
+    if near(first.tap_position, second.tap_position) || first.fastened != second.fastened {
         return Vec::new();
     }
     let at = |recording: &'a RecordingEvidence, place: Option<f64>| {
@@ -154,7 +154,8 @@ pub fn check_mass_loading(
     // Each arrangement once, beside the first recording.
     if let Some((first, later)) = recordings.split_first() {
         let mut seen = vec![first];
-        for second in later {
+        // A mass that is fastened moves frequencies by itself.
+        for second in later.iter().filter(|one| one.fastened == first.fastened) {
             if seen
                 .iter()
                 .any(|known| same_sensors(known, second, settings))
@@ -206,7 +207,7 @@ fn same_arrangement(
         (Some(a), Some(b)) => (a - b).abs() <= settings.same_position,
         (a, b) => a == b,
     };
-    same_tap && same_sensors(first, second, settings)
+    same_tap && first.fastened == second.fastened && same_sensors(first, second, settings)
 }
 
 /// One verdict for each mode of both recordings: its shift in standard deviations.

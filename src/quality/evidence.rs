@@ -86,6 +86,8 @@ pub struct RecordingEvidence {
     pub file: String,
     /// Where the hammer strikes (m); `None` where nobody said.
     pub tap_position: Option<f64>,
+    /// Places (m) and masses (kg) of what is fastened to the beam for this recording.
+    pub fastened: Vec<(f64, f64)>,
     /// All taps, accepted and rejected, in order of time.
     pub taps: Vec<TapEvidence>,
     /// The axis of all that is given line by line.

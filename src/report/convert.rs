@@ -5,8 +5,8 @@ use super::convert_fit::fit_section;
 use super::convert_perturbation::with_perturbations;
 use super::convert_quality::verdict_section;
 use super::document::{
-    ChannelSection, Document, ModeSection, ModeShapeSection, PredictionSection, RecordingSection,
-    TapSection, TestSection, VERSION, WarningSection,
+    ChannelSection, Document, FastenedMassSection, ModeSection, ModeShapeSection,
+    PredictionSection, RecordingSection, TapSection, TestSection, VERSION, WarningSection,
 };
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::{FrequencySource, ModeReading};
@@ -16,6 +16,7 @@ use crate::pipeline::{
 };
 use crate::recording::{Format, Separator, UffCoding};
 use crate::spectral::Window;
+use crate::structure::specimen::PointMass;
 use crate::structure::{Assembly, BeamTheory, NaturalMode};
 
 /// The document of a whole analysis.
@@ -166,6 +167,7 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
         averages: spectra.map_or(0, |spectra| spectra.averages.taps),
         tap: recording.conditions.tap,
         sensor_positions: recording.conditions.sensor_positions.clone(),
+        masses: recording.conditions.masses.iter().map(fastened).collect(),
         torque: recording.conditions.torque,
         temperature: recording.conditions.temperature,
         date: recording.conditions.date.clone(),
@@ -176,6 +178,13 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
             .and(decay),
         remaining_at_end: spectra.and_then(|spectra| Some(spectra.decay?.remaining)),
         modes,
+    }
+}
+
+fn fastened(mass: &PointMass) -> FastenedMassSection {
+    FastenedMassSection {
+        position: mass.position,
+        mass: mass.mass,
     }
 }
 

@@ -210,6 +210,7 @@ fn next_test(test: &NextTest) -> NextTestSection {
         id: test.step.id().to_owned(),
         action: test.action.clone(),
         separates: test.separates.clone(),
+        unpredicted: test.unpredicted.clone(),
         bits: test.bits,
         effort: test.step.effort(),
     }

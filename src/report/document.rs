@@ -107,6 +107,15 @@ pub struct TestSection {
     pub mass_per_length: Option<f64>,
 }
 
+/// A known mass on the beam.
+#[derive(Debug, Clone, Copy, Default, Serialize, JsonSchema)]
+pub struct FastenedMassSection {
+    /// Where it sits (m).
+    pub position: f64,
+    /// What it weighs (kg).
+    pub mass: f64,
+}
+
 /// One recording.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct RecordingSection {
@@ -146,6 +155,8 @@ pub struct RecordingSection {
     pub tap: Option<f64>,
     /// Where each sensor sits (m), moved ones at their place in this recording.
     pub sensor_positions: BTreeMap<String, f64>,
+    /// Known masses fastened to the beam for this recording, as described.
+    pub masses: Vec<FastenedMassSection>,
     /// Tightening torque (N m), as described.
     pub torque: Option<f64>,
     /// Temperature (degrees Celsius), as described.

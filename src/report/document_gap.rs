@@ -265,6 +265,8 @@ pub struct NextTestSection {
     pub action: String,
     /// Which hypotheses it would tell apart.
     pub separates: Vec<String>,
+    /// Hypotheses that could not be predicted in this test: nothing is said of them.
+    pub unpredicted: Vec<String>,
     /// Information about which hypothesis is true that it is expected to bring at least (bit).
     pub bits: f64,
     /// What it costs, in multiples of reading again what is recorded; tests are ranked by bits over this.

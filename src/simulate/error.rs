@@ -36,7 +36,7 @@ pub enum SimulateError {
     },
     /// Two recordings have one file and are not the same.
     #[error(
-        "line {line}: {file} was described before with another `tap`, `level` or `at`; give each recording a file of its own"
+        "line {line}: {file} was described before with another `tap`, `level`, `at` or `mass`; give each recording a file of its own"
     )]
     SameFile {
         /// The file.

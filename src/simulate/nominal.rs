@@ -1,7 +1,9 @@
 //! From a test description to the specimen it describes.
 
 use super::error::SimulateError;
-use crate::described::{coupling, described_beam, described_specimen, stiffness_of};
+use crate::described::{
+    coupling, described_beam, described_specimen, fastened_masses, stiffness_of,
+};
 use crate::description::{JointKind, RecordingDescription, SensorKind, TestDescription};
 use crate::effects::SensorPlace;
 use crate::structure::joint::StiffnessUnits;
@@ -34,6 +36,7 @@ pub(super) fn nominal_specimen(
             });
         }
     }
+    specimen.masses.extend(fastened_masses(recording));
     Ok(specimen)
 }
 

@@ -150,8 +150,9 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<Wanted<'_>>, SimulateErr
             continue;
         };
         let first = found.0;
-        let other = (recording.tap, recording.level, &recording.at);
-        if (first.tap, first.level, &first.at) != other {
+        let arranged =
+            |one: &RecordingDescription| (one.tap, one.level, one.at.clone(), one.masses.clone());
+        if arranged(first) != arranged(recording) {
             return Err(SimulateError::SameFile { file, line });
         }
         found.2 = [found.2, highest].into_iter().flatten().reduce(f64::max);

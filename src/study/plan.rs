@@ -15,7 +15,7 @@ use crate::gap::{
     GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
     observe,
 };
-use crate::pipeline::nominal_with;
+use crate::pipeline::{fastened_masses, nominal_with};
 use crate::structure::{Beam, JointStiffness};
 
 /// Non-centrality of a chi square of one degree of freedom that is noticed nine times out of ten at the
@@ -134,6 +134,7 @@ pub(super) fn plan_of(
             tap: recording.tap.ok_or_else(|| PlanError::NoTap {
                 file: recording.file.display().to_string(),
             })?,
+            masses: fastened_masses(recording),
             level: recording.level.unwrap_or(1.0) / hardest,
         })
     });
@@ -184,11 +185,15 @@ fn case(
 }
 
 /// Groups of effects that a structure can have: a lap joint has no coupling and no fixture, a beam by itself
-/// no joint and nothing that pulls on it.
+/// no joint. Nothing pulls on either: both are free, and a force that pushed them would buckle them.
 fn groups_of(kind: JointKind) -> Vec<&'static [EffectId]> {
     let cannot: &[EffectId] = match kind {
         JointKind::Cantilever => &[],
-        JointKind::Lap => &[EffectId::CrossCoupling, EffectId::Fixture],
+        JointKind::Lap => &[
+            EffectId::CrossCoupling,
+            EffectId::Fixture,
+            EffectId::AxialLoad,
+        ],
         JointKind::Free => &[
             EffectId::CrossCoupling,
             EffectId::Fixture,

@@ -1,11 +1,11 @@
 //! The described model with what the diagnosis found: as a description that can be predicted with, and its
 //! natural frequencies.
 
-use crate::description::{JointKind, SensorKind, TestDescription};
+use crate::description::{FastenedMass, JointKind, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
-use crate::pipeline::nominal_with;
+use crate::pipeline::{fastened_masses, nominal_with};
 use crate::structure::specimen::{Mesh, PointMass};
 use crate::structure::{JointStiffness, StructureError};
 use toml::Value;
@@ -114,6 +114,7 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
     text.push_str(&right_half(test, found.scale));
     text.push_str(&joint(test, found));
     text.push_str(&sensors(test));
+    text.push_str(&fastened(test));
     if !test.analysis.sensor_mass {
         text.push_str("\n[analysis]\nsensor_mass = false\n");
     }
@@ -192,6 +193,20 @@ fn sensors(test: &TestDescription) -> String {
     tables.collect()
 }
 
+/// What is fastened in the first recording: no recording describes it any more.
+fn fastened(test: &TestDescription) -> String {
+    let masses = test.recordings.first().map(|recording| &recording.masses);
+    let table = |fastened: &FastenedMass| {
+        let (mass, position) = (fastened.mass, fastened.position);
+        let values = line("mass", mass) + &line("position", position);
+        format!(
+            "\n[[effect]]\nid = \"{}\"\n{values}",
+            EffectId::AddedMass.name()
+        )
+    };
+    masses.into_iter().flatten().map(table).collect()
+}
+
 fn table_of(effect: &Effect) -> String {
     let values = effect.values().map(|(info, value)| line(info.name, value));
     format!(
@@ -252,6 +267,8 @@ pub fn frequencies_with(
         mass: sensor.mass,
         inertia: 0.0,
     }));
+    let masses = test.recordings.first().map(fastened_masses);
+    specimen.masses.extend(masses.into_iter().flatten());
     // A joint that changes with amplitude is seen at the amplitude that counts for a whole decay.
     let power = effects.iter().find_map(|effect| effect.value("exponent"));
     let circumstances = Circumstances {
@@ -260,15 +277,9 @@ pub fn frequencies_with(
         ..Circumstances::default()
     };
     let seen = apply(effects, &specimen, &circumstances);
-    let based = seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
-    let all = count + usize::from(based);
-    let modes = seen.specimen.modes(all, Mesh::SIMULATION)?;
-    let moving = |mode: &usize| modes.base_participation(*mode);
-    let fixture = (0..all)
-        .max_by(|a, b| moving(a).total_cmp(&moving(b)))
-        .filter(|_| based);
-    Ok((0..all)
-        .filter(|mode| Some(*mode) != fixture)
+    let (modes, own) = seen.specimen.beam_modes(count, Mesh::SIMULATION)?;
+    Ok(own
+        .into_iter()
         .map(|mode| seen.read(modes.frequencies()[mode]))
         .collect())
 }

@@ -221,6 +221,7 @@ fn read(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Observations {
             file: None,
             recording: None,
             sensors: Vec::new(),
+            masses: Vec::new(),
             tap: None,
             peak_force: None,
             level: None,

@@ -6,17 +6,18 @@ use tapjoint::gap::{
     Diagnosis, GapSettings, NextTest, Nominal, NominalSensor, PlannedConfiguration, Step, TestPlan,
     Verdict, diagnose, observe,
 };
+use tapjoint::structure::specimen::PointMass;
 
 const LENGTH: f64 = 0.423;
 
-/// A bolted cantilever with a sensor of unknown mass, and a mass that may be fastened.
-fn nominal(off: f64, known_mass: f64) -> Nominal {
-    let sensor = |name: &str, mass: Option<f64>| NominalSensor {
-        name: name.to_owned(),
-        mass,
+/// A bolted cantilever with a sensor of unknown mass.
+fn nominal(off: f64) -> Nominal {
+    let sensor = NominalSensor {
+        name: "A".to_owned(),
+        mass: None,
         position: None,
     };
-    strip_on_springs(off, vec![sensor("A", None), sensor("M", Some(known_mass))])
+    strip_on_springs(off, vec![sensor])
 }
 
 /// Frequencies of one recording and nothing else.
@@ -38,6 +39,7 @@ fn poor_plan() -> TestPlan {
 fn recording(sensor: f64, level: f64) -> PlannedConfiguration {
     PlannedConfiguration {
         sensors: vec![("A".to_owned(), sensor)],
+        masses: Vec::new(),
         tap: 0.95 * LENGTH,
         level,
     }
@@ -47,8 +49,8 @@ fn effect(id: EffectId, pairs: &[(&str, f64)]) -> Effect {
     Effect::from_pairs(id, pairs).unwrap()
 }
 
-/// The plan with the test added, and the mass it needs; `None` of tests that are no recordings.
-fn with_test(step: &Step) -> Option<(TestPlan, f64)> {
+/// The plan with the test added; `None` of tests that are no recordings.
+fn with_test(step: &Step) -> Option<TestPlan> {
     let mut plan = poor_plan();
     let first = recording(0.8 * LENGTH, 1.0);
     match step {
@@ -63,19 +65,22 @@ fn with_test(step: &Step) -> Option<(TestPlan, f64)> {
         Step::MoveSensor { position, .. } => plan.configurations.push(recording(*position, 1.0)),
         Step::KnownMass { mass, position } => {
             let mut heavier = first;
-            heavier.sensors.push(("M".to_owned(), *position));
+            heavier.masses.push(PointMass {
+                position: *position,
+                mass: *mass,
+                inertia: 0.0,
+            });
             plan.configurations.push(heavier);
-            return Some((plan, *mass));
         }
         _ => return None,
     }
-    Some((plan, 0.0))
+    Some(plan)
 }
 
 /// The diagnosis of what a plan observes of the truth.
-fn diagnosed(plan: &TestPlan, mass: f64, truth: &Effect, seed: u64) -> Diagnosis {
-    let observed = observe(plan, &nominal(1.0, mass), std::slice::from_ref(truth), seed).unwrap();
-    diagnose(&observed, &nominal(0.8, mass), &GapSettings::default()).unwrap()
+fn diagnosed(plan: &TestPlan, truth: &Effect, seed: u64) -> Diagnosis {
+    let observed = observe(plan, &nominal(1.0), std::slice::from_ref(truth), seed).unwrap();
+    diagnose(&observed, &nominal(0.8), &GapSettings::default()).unwrap()
 }
 
 /// Probability of the truth's group.
@@ -102,7 +107,7 @@ fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
     let (mut best, mut last, mut cases) = (0.0, 0.0, 0.0);
     for (index, truth) in confounded().iter().enumerate() {
         let seed = 300 + index as u64;
-        let before = diagnosed(&poor_plan(), 0.0, truth, seed);
+        let before = diagnosed(&poor_plan(), truth, seed);
         assert!(!before.next_tests.is_empty());
         let makeable: Vec<&NextTest> = before
             .next_tests
@@ -120,8 +125,8 @@ fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
         }
         let own = of_truth(&before, truth);
         let gain = |test: &NextTest| {
-            let (plan, mass) = with_test(&test.step).unwrap();
-            of_truth(&diagnosed(&plan, mass, truth, seed), truth) - own
+            let plan = with_test(&test.step).unwrap();
+            of_truth(&diagnosed(&plan, truth, seed), truth) - own
         };
         let gains = (gain(first), gain(least));
         println!(
@@ -146,7 +151,7 @@ fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
 #[test]
 fn prop_advice_is_ranked_and_bounded_by_what_is_not_known() {
     let truth = effect(EffectId::AxialLoad, &[("force", 40.0)]);
-    let diagnosis = diagnosed(&poor_plan(), 0.0, &truth, 310);
+    let diagnosis = diagnosed(&poor_plan(), &truth, 310);
     let entropy: f64 = diagnosis
         .hypotheses
         .iter()
@@ -181,7 +186,7 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
         drift: 1e-3,
         ..five_recordings()
     };
-    let diagnosis = diagnosed(&plan, 0.0, &truth, 11);
+    let diagnosis = diagnosed(&plan, &truth, 11);
     assert_eq!(
         diagnosis.verdict,
         Verdict::Named(vec![EffectId::SensorMass])
@@ -231,7 +236,7 @@ fn limit_two_recordings_leave_none_out() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.0113)]);
     let mut plan = five_recordings();
     plan.configurations.truncate(2);
-    let diagnosis = diagnosed(&plan, 0.0, &truth, 12);
+    let diagnosis = diagnosed(&plan, &truth, 12);
     let mut all = diagnosis.hypotheses.iter();
     assert!(all.all(|one| one.left_out_recordings.is_none()));
 }

@@ -62,6 +62,7 @@ pub fn planned(sensor: f64, tap: f64, level: f64) -> PlannedConfiguration {
     let length = steel_strip().length;
     PlannedConfiguration {
         sensors: vec![("A".to_owned(), sensor * length)],
+        masses: Vec::new(),
         tap: tap * length,
         level,
     }

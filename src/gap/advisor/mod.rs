@@ -44,42 +44,101 @@ pub(super) fn advise(competition: &Competition, verdict: &Verdict) -> Vec<NextTe
     let frame = &competition.frame;
     let weight = GRAVITY * beam_mass(frame);
     let runners = in_the_running(&competition.entries, verdict);
-    let known: Vec<(f64, &Entry, State)> = runners
-        .into_iter()
-        .filter_map(|(p, entry)| Some((p, entry, State::new(frame, entry, weight)?)))
-        .collect();
-    if known.len() < 2 {
+    if runners.len() < 2 {
         return Vec::new();
     }
-    let total: f64 = known.iter().map(|(p, ..)| p).sum();
-    let probabilities: Vec<f64> = known.iter().map(|(p, ..)| p / total).collect();
-    let names: Vec<String> = known
-        .iter()
-        .map(|(_, entry, _)| entry.hypothesis.name())
+    let runners = Runners::new(&runners);
+    let states = runners.entries.iter();
+    let states: Vec<Option<State>> = states
+        .map(|entry| State::new(frame, entry, weight))
         .collect();
     let planned = Proposals::new(frame);
-    let seen: Vec<Seen> = known
+    let seen: Vec<Option<Seen>> = states
         .par_iter()
-        .map(|(.., state)| Seen::new(state, &planned))
+        .map(|state| Some(Seen::new(state.as_ref()?, &planned)))
         .collect();
     let judged = planned.all.iter().enumerate().filter_map(|(k, proposal)| {
-        let outlooks =
-            known
-                .iter()
-                .zip(&seen)
-                .map(|((.., state), seen)| match &proposal.readings {
-                    Readings::Direct => direct(state, frame, &proposal.step),
-                    Readings::Frequencies(..) => seen.outlook(&planned, k),
-                });
-        let apart = distances(&outlooks.collect::<Option<Vec<Outlook>>>()?)?;
-        Some(NextTest {
-            step: proposal.step.clone(),
-            action: proposal.step.sentence(),
-            separates: separated(&probabilities, &names, &apart),
-            bits: information(&probabilities, &apart),
-        })
+        let outlook = |(state, seen): (&Option<State>, &Option<Seen>)| match &proposal.readings {
+            Readings::Direct => direct(state.as_ref()?, frame, &proposal.step),
+            Readings::Frequencies(..) => seen.as_ref()?.outlook(&planned, k),
+        };
+        runners.judge(&proposal.step, states.iter().zip(&seen).map(outlook))
     });
     ranked(judged.collect())
+}
+
+/// The hypotheses that are weighed.
+struct Runners<'a> {
+    entries: Vec<&'a Entry>,
+    names: Vec<String>,
+    /// Their probabilities, which sum to 1.
+    probabilities: Vec<f64>,
+}
+
+impl<'a> Runners<'a> {
+    fn new(runners: &[(f64, &'a Entry)]) -> Self {
+        let total: f64 = runners.iter().map(|(p, _)| p).sum();
+        let entries: Vec<&Entry> = runners.iter().map(|(_, entry)| *entry).collect();
+        Runners {
+            names: entries
+                .iter()
+                .map(|entry| entry.hypothesis.name())
+                .collect(),
+            probabilities: runners.iter().map(|(p, _)| p / total).collect(),
+            entries,
+        }
+    }
+
+    /// What a test tells, from what each hypothesis expects of it.
+    fn judge(
+        &self,
+        step: &Step,
+        outlooks: impl Iterator<Item = Option<Outlook>>,
+    ) -> Option<NextTest> {
+        let told = told((&self.names, &self.probabilities), outlooks.collect())?;
+        Some(NextTest {
+            step: step.clone(),
+            action: step.sentence(),
+            separates: told.separates,
+            unpredicted: told.unpredicted,
+            bits: told.bits,
+        })
+    }
+}
+
+/// What a test tells of which hypotheses.
+struct Told {
+    separates: Vec<String>,
+    unpredicted: Vec<String>,
+    bits: f64,
+}
+
+/// Information about which of the hypotheses that could be predicted is true. They hold the share P of all
+/// probability: knowing whether the truth is among them cannot hurt, so that all hypotheses together are told
+/// apart by P times that at least. `None` where fewer than two could be predicted.
+fn told(
+    (names, probabilities): (&[String], &[f64]),
+    outlooks: Vec<Option<Outlook>>,
+) -> Option<Told> {
+    let missing = |k: &usize| outlooks[*k].is_none();
+    let (without, with): (Vec<usize>, Vec<usize>) = (0..names.len()).partition(missing);
+    let name = |k: &usize| names[*k].clone();
+    let (unpredicted, names): (Vec<String>, Vec<String>) = (
+        without.iter().map(name).collect(),
+        with.iter().map(name).collect(),
+    );
+    let share: f64 = with.iter().map(|k| probabilities[*k]).sum();
+    let probabilities: Vec<f64> = with.iter().map(|k| probabilities[*k] / share).collect();
+    let outlooks: Vec<Outlook> = outlooks.into_iter().flatten().collect();
+    if outlooks.len() < 2 {
+        return None;
+    }
+    let apart = distances(&outlooks)?;
+    Some(Told {
+        separates: separated(&probabilities, &names, &apart),
+        unpredicted,
+        bits: share * information(&probabilities, &apart),
+    })
 }
 
 /// The hypotheses that are weighed, with their probabilities. Where nothing explains the readings, their
@@ -191,5 +250,47 @@ fn rows_of(proposal: &Proposal, wanted: Structure) -> &[(super::frame::Row, f64)
     match &proposal.readings {
         Readings::Frequencies(structure, rows) if *structure == wanted => rows,
         _ => &[],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+
+    const NAMES: [&str; 3] = ["none", "sensor-mass", "modulus"];
+
+    fn outlook(mean: f64) -> Option<Outlook> {
+        Some(Outlook {
+            mean: DVector::from_element(1, mean),
+            spread: DMatrix::identity(1, 1),
+        })
+    }
+
+    fn told_of(outlooks: [Option<Outlook>; 3]) -> Option<Told> {
+        let names = NAMES.map(str::to_owned);
+        told((&names, &[0.5, 0.25, 0.25]), outlooks.to_vec())
+    }
+
+    #[test]
+    fn regress_a_hypothesis_that_cannot_be_predicted_is_said_and_the_others_are_told_apart() {
+        let all = told_of([outlook(0.0), outlook(100.0), outlook(-100.0)]).unwrap();
+        assert!(all.unpredicted.is_empty());
+        // Three that lie far apart: the whole entropy of 1/2, 1/4, 1/4.
+        assert!((all.bits - 1.5).abs() < 1e-9, "{}", all.bits);
+        let two = told_of([outlook(0.0), outlook(100.0), None]).unwrap();
+        assert_eq!(two.unpredicted, ["modulus"]);
+        assert_eq!(two.separates, ["none", "sensor-mass"]);
+        // Three quarters of the entropy of 2/3 and 1/3.
+        let entropy =
+            -(2.0 / 3.0_f64) * (2.0 / 3.0_f64).log2() - (1.0 / 3.0_f64) * (1.0 / 3.0_f64).log2();
+        assert!((two.bits - 0.75 * entropy).abs() < 1e-9, "{}", two.bits);
+        assert!(two.bits < all.bits);
+    }
+
+    #[test]
+    fn limit_of_one_hypothesis_alone_nothing_is_told() {
+        assert!(told_of([outlook(0.0), None, None]).is_none());
+        assert!(told_of([None, None, None]).is_none());
     }
 }

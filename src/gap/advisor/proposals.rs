@@ -228,6 +228,7 @@ impl Proposals {
         alone.specimen = specimen.clone();
         alone.sensors.clear();
         alone.carried.clear();
+        alone.fastened.clear();
         alone.path = None;
         alone.names.clear();
         alone.places.clear();

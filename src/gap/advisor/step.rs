@@ -121,7 +121,8 @@ impl Step {
                 "move {name} to {position:.3} m, leave the joint untouched, and tap again"
             ),
             Step::KnownMass { mass, position } => format!(
-                "fasten {} at {position:.3} m, leave the joint untouched, and tap again",
+                "fasten {0} at {position:.3} m, leave the joint untouched, tap again, and describe that \
+                 [[recording]] with mass = [{{ position = {position:.3}, mass = \"{0}\" }}]",
                 weight(*mass)
             ),
             Step::Retighten => {
@@ -161,7 +162,10 @@ pub struct NextTest {
     pub action: String,
     /// Hypotheses that it would tell apart, those that contribute most first.
     pub separates: Vec<String>,
-    /// Information about which hypothesis is true that it is expected to bring at least (bit).
+    /// Hypotheses that could not be predicted in this test, so that nothing is said of them.
+    pub unpredicted: Vec<String>,
+    /// Information about which hypothesis is true that it is expected to bring at least (bit); what it might
+    /// tell of hypotheses that could not be predicted is no part of it.
     pub bits: f64,
 }
 

@@ -2,19 +2,9 @@
 //! frequencies are computed.
 
 use crate::structure::finite_elements::PointAttachment;
+use crate::structure::specimen::LapLayout;
 use crate::structure::{Assembly, Beam, BeamTheory, StructureError};
 use std::f64::consts::PI;
-
-/// Where a lap joint's halves differ from two equal pieces of one beam.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct LapLayout {
-    /// The joint's place (m) from the left end; `None` = the middle.
-    pub position: Option<f64>,
-    /// The right half, where it differs; its `length` is not used.
-    pub right: Option<Beam>,
-    /// Length (m) of the overlap and the mass (kg) it adds.
-    pub overlap: Option<(f64, f64)>,
-}
 
 /// By which route frequencies are computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -37,7 +27,7 @@ pub struct JointedStructure {
     pub assembly: Assembly,
     /// Of a lap joint.
     pub lap: LapLayout,
-    /// Masses (kg) on the beam: sensors.
+    /// Masses (kg) on the beam: sensors, and what is fastened.
     pub masses: Vec<PointAttachment>,
     /// Springs (N/m) between beam and ground: suspension, cables.
     pub springs: Vec<PointAttachment>,

@@ -32,11 +32,12 @@ mod covariance;
 mod starts;
 mod valleys;
 
+pub use crate::structure::specimen::LapLayout;
 pub use estimate::estimate_consistently;
 pub use estimator::{ConsistentEstimator, Neighbourhood, PointFit};
 pub use goodness::{Goodness, Verdict, exceedance};
 pub use identifiability::{ExtraMode, FlatDirection, Identifiability, NeededAccuracy};
-pub use layout::{JointedStructure, LapLayout, Route};
+pub use layout::{JointedStructure, Route};
 pub use least_squares::StopReason;
 pub use model::{FrequencyModel, ModeResponse, PARAMETERS, Parameter, Point};
 pub use monte_carlo::{ConsistentMonteCarlo, QuantitySpread};

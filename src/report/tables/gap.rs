@@ -88,11 +88,20 @@ fn next_test(gap: &GapSection) -> Option<String> {
         _ => "To decide",
     };
     Some(format!(
-        "{purpose}: {} (about {:.2} bit; it tells {} apart).",
+        "{purpose}: {} (about {:.2} bit; it tells {} apart{}).",
         test.action,
         test.bits,
-        test.separates.join(", ")
+        test.separates.join(", "),
+        not_predicted(test, "; it could not be predicted for ")
     ))
+}
+
+/// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
+fn not_predicted(test: &NextTestSection, lead: &str) -> String {
+    match test.unpredicted.as_slice() {
+        [] => String::new(),
+        names => format!("{lead}{}", names.join(", ")),
+    }
 }
 
 /// Tests that would tell more; `None` where none would.
@@ -103,7 +112,7 @@ pub fn next_tests(document: &Document) -> Option<Table> {
     }
     let row = |test: &NextTestSection| {
         vec![
-            test.action.clone(),
+            test.action.clone() + &not_predicted(test, "; could not be predicted for "),
             format!("{:.2}", test.bits),
             format!("{:.0}", test.effort),
             test.separates.join(", "),

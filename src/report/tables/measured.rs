@@ -6,9 +6,10 @@ use super::{Table, number, words};
 
 /// Where taps and sensors were, and under what conditions: beside the spectra's columns these would
 /// need a page wider than a screen.
-const CONDITIONS: [&str; 5] = [
+const CONDITIONS: [&str; 6] = [
     "Tap at (m)",
     "Sensors at (m)",
+    "Fastened",
     "Torque (N m)",
     "Temperature (°C)",
     "Date",
@@ -59,6 +60,7 @@ fn all_columns(document: &Document) -> Option<Table> {
             number("Left at end (%)").on_page(),
             number("Tap at (m)").on_page(),
             words("Sensors at (m)").on_page(),
+            words("Fastened").on_page(),
             number("Torque (N m)").on_page(),
             number("Temperature (°C)").on_page(),
             words("Date").on_page(),
@@ -101,6 +103,7 @@ fn recording_row(recording: &RecordingSection) -> Vec<String> {
         optional(recording.remaining_at_end.map(|level| 100.0 * level), 2),
         exact(recording.tap),
         places(recording),
+        fastened(recording),
         exact(recording.torque),
         exact(recording.temperature),
         recording.date.clone().unwrap_or_else(|| MISSING.into()),
@@ -118,6 +121,21 @@ fn places(recording: &RecordingSection) -> String {
         MISSING.to_owned()
     } else {
         places.join(", ")
+    }
+}
+
+/// "15 g at 0.423 m".
+fn fastened(recording: &RecordingSection) -> String {
+    let masses = recording.masses.iter();
+    let masses = masses.map(|one| {
+        let grams = significant(1e3 * one.mass, 4);
+        format!("{grams} g at {} m", trimmed(one.position, 4))
+    });
+    let masses: Vec<String> = masses.collect();
+    if masses.is_empty() {
+        MISSING.to_owned()
+    } else {
+        masses.join(", ")
     }
 }
 

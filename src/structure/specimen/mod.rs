@@ -10,9 +10,11 @@
 //! are smooth in every position and good on a coarse mesh.
 
 mod band;
+mod beam_modes;
 mod checks;
 mod hung;
 mod lanczos;
+mod layout;
 mod model;
 mod modes;
 mod numbering;
@@ -20,6 +22,7 @@ mod section;
 mod tridiagonal;
 
 use super::{Beam, StructureError};
+pub use layout::LapLayout;
 pub use modes::SpecimenModes;
 
 /// The beam, or the two beams that a joint joins.

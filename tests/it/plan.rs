@@ -1,0 +1,125 @@
+//! Plans of lap joints and free beams: what a test of them could tell apart.
+
+use crate::shared::strip_table;
+use tapjoint::description::TestDescription;
+use tapjoint::effects::{EffectId, Group, Place};
+use tapjoint::report::blind_check::tell_apart;
+use tapjoint::study::blind_check::{Case, Class, Planted, Verdict};
+use tapjoint::study::plan::{PlanSettings, judge_plan};
+
+/// A joint of this kind, a sensor of unknown mass that is moved once.
+fn described(joint: &str) -> TestDescription {
+    let rest = concat!(
+        "[hammer]\nchannel = 1\n",
+        "[[sensor]]\nname = \"A\"\nchannel = 2\nposition = 0.03\n",
+        "[[recording]]\nfile = \"a.wav\"\ntap = 0.4\n",
+        "[[recording]]\nfile = \"b.wav\"\ntap = 0.4\nat = { A = 0.33 }\n",
+    );
+    let text = format!("{}[joint]\n{joint}{rest}", strip_table!());
+    TestDescription::parse(&text, "test.toml").unwrap()
+}
+
+/// One test for each kind of effect, and one of none.
+fn judged(test: &TestDescription) -> Vec<Case> {
+    let settings = PlanSettings {
+        draws: 1,
+        modes: 5,
+        seed: 101,
+        ..PlanSettings::default()
+    };
+    judge_plan(test, &settings, &|_, _| ()).unwrap()
+}
+
+fn groups(cases: &[Case]) -> Vec<Group> {
+    let planted = cases.iter().flat_map(|(truth, _)| &truth.effects);
+    let group = |planted: &Planted| match planted {
+        Planted::Catalogue(id, _) => Some(id.group()),
+        Planted::Outside(_) => None,
+    };
+    planted.filter_map(group).collect()
+}
+
+/// What no structure of this kind can have: neither drawn nor answered nor in the table.
+fn assert_never(cases: &[Case], impossible: &[Group]) {
+    let drawn = groups(cases);
+    let table = tell_apart(cases);
+    for group in impossible {
+        assert!(!drawn.contains(group), "{group:?} was drawn");
+        assert!(!table.contains(group.name()), "{}: {table}", group.name());
+        for (truth, answer) in cases {
+            let odds = answer.classes.get(&Class::Group(*group));
+            assert!(odds.is_none(), "{}: {group:?} {odds:?}", truth.name);
+        }
+    }
+}
+
+/// Every test was answered.
+fn assert_answered(cases: &[Case]) {
+    for (truth, answer) in cases {
+        let total: f64 = answer.classes.values().sum();
+        assert!((total - 1.0).abs() < 1e-6, "{}: {total}", truth.name);
+    }
+    let (_, nothing) = cases.last().unwrap();
+    assert_ne!(nothing.verdict, Verdict::Named);
+}
+
+/// Half of what shows, at least, came back as the right kind.
+fn assert_told_apart(cases: &[Case]) {
+    let odds = |(truth, answer): &Case| {
+        let own = Class::Group(groups(&[(truth.clone(), answer.clone())])[0]);
+        answer.classes.get(&own).copied().unwrap_or(0.0)
+    };
+    let shown = cases
+        .iter()
+        .filter(|(truth, _)| truth.detectable == Some(true));
+    let odds: Vec<f64> = shown.map(odds).collect();
+    let first = odds.iter().filter(|odds| **odds > 0.5).count();
+    assert!(2 * first >= odds.len(), "{odds:?}");
+}
+
+#[test]
+fn regress_a_free_beam_has_no_joint_to_tell_of() {
+    let cases = judged(&described("kind = \"free\"\n"));
+    assert_never(
+        &cases,
+        &[
+            Group::Own(EffectId::CrossCoupling),
+            Group::Own(EffectId::JointMass),
+            Group::Own(EffectId::JointNonlinearity),
+            Group::Own(EffectId::JointDamping),
+            Group::Own(EffectId::Fixture),
+        ],
+    );
+    assert!(groups(&cases).contains(&Group::Own(EffectId::SensorCable)));
+    for (truth, answer) in &cases {
+        let joint = answer
+            .places
+            .iter()
+            .filter(|(place, _)| matches!(place, Some(Place::Joint | Place::Fixture)));
+        let odds: f64 = joint.map(|(_, odds)| odds).sum();
+        assert!(odds == 0.0, "{}: {odds}", truth.name);
+    }
+    assert_answered(&cases);
+    assert_told_apart(&cases);
+}
+
+#[test]
+fn regress_a_lap_joint_is_planned_with_cables_and_masses() {
+    let cases = judged(&described("kind = \"lap\"\n"));
+    assert_never(
+        &cases,
+        &[
+            Group::Own(EffectId::CrossCoupling),
+            Group::Own(EffectId::Fixture),
+        ],
+    );
+    let drawn = groups(&cases);
+    for group in [
+        Group::Own(EffectId::SensorCable),
+        Group::Own(EffectId::JointMass),
+        Group::Own(EffectId::JointNonlinearity),
+    ] {
+        assert!(drawn.contains(&group), "{drawn:?}");
+    }
+    assert_answered(&cases);
+}

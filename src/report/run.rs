@@ -65,13 +65,19 @@ pub fn render_run(
     figures: &[RecordingFigure],
 ) -> Result<Vec<ReportFile>, ReportError> {
     let pictures = pictures(document, figures);
-    let rendered: Vec<([ReportFile; 2], InlineFigure)> = pictures
-        .par_iter()
-        .map(rendered)
-        .collect::<Result<_, _>>()?;
+    type Rendered = Vec<([ReportFile; 2], InlineFigure)>;
+    let (rendered, json) = rayon::join(
+        || {
+            pictures
+                .par_iter()
+                .map(rendered)
+                .collect::<Result<Rendered, _>>()
+        },
+        || render_json(document),
+    );
     let mut page = PageFigures::default();
     let mut files = Vec::new();
-    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered) {
+    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered?) {
         files.extend(of_picture);
         match picture.shelf {
             Shelf::Spectra => page.spectra.push(inline),
@@ -83,7 +89,7 @@ pub fn render_run(
     }
     let mut words = vec![
         ("report.html", render_html(document, &page)?),
-        ("report.json", render_json(document)?),
+        ("report.json", json?),
         ("parameters.csv", render_parameters_csv(document)?),
         ("modes.csv", render_modes_csv(document)?),
     ];
@@ -165,11 +171,11 @@ fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), Report
 }
 
 fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
-    let stems = stems(figures);
-    let mut pictures = Vec::new();
-    for (figure, stem) in figures.iter().zip(&stems) {
-        pictures.extend(recording_pictures(figure, stem));
-    }
+    let stems = stems(figures.iter().map(|figure| figure.file.as_str()));
+    let of_recordings = figures.par_iter().zip(&stems);
+    let of_recordings =
+        of_recordings.flat_map_iter(|(figure, stem)| recording_pictures(figure, stem));
+    let mut pictures: Vec<Picture> = of_recordings.collect();
     pictures.extend(draw_frequencies(document).map(|drawing| {
         Picture {
             shelf: Shelf::Comparison,
@@ -290,10 +296,10 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
 }
 
 /// File names without folder and ending, safe as part of a name, each different.
-fn stems(figures: &[RecordingFigure]) -> Vec<String> {
+pub(super) fn stems<'a>(files: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut stems: Vec<String> = Vec::new();
-    for figure in figures {
-        let stem = stem(&figure.file);
+    for file in files {
+        let stem = stem(file);
         let mut unique = stem.clone();
         let mut number = 2;
         while stems.contains(&unique) {

@@ -8,6 +8,7 @@ use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
 use super::live::{LivePlot, live_frf, live_spectrum, live_taps, script_json};
 use super::live_amplitude::live_amplitude;
+use super::live_model::{live_frequencies, live_gap, live_place_map, live_shapes};
 use super::live_points::{LivePoints, live_cloud, live_stabilisation};
 use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
@@ -184,7 +185,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
                   reading alone explains the error."
                 .to_owned(),
             drawing,
-            live: None,
+            live: live_frequencies(document).map(Live::Points),
         }
     }));
     pictures.extend(draw_shapes(document).map(|drawing| {
@@ -195,7 +196,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
                       on it. A sensor or a tap near a node hardly sees the mode."
                 .to_owned(),
             drawing,
-            live: None,
+            live: live_shapes(document).map(Live::Points),
         }
     }));
     pictures.extend(gap_pictures(document));
@@ -217,22 +218,24 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
         (
             "gap",
             draw_gap(document),
+            live_gap(document),
             "The gap: every frequency's error with the described model and with the best hypothesis, and \
              how probable each hypothesis is.",
         ),
         (
             "gap-place",
             draw_place_map(document),
+            live_place_map(document),
             "Where along the beam a local change of stiffness or of mass would explain the errors.",
         ),
     ];
-    let picture = |(name, drawing, caption): (&str, Option<_>, &str)| {
+    let picture = |(name, drawing, live, caption): (&str, Option<_>, Option<LivePoints>, &str)| {
         Some(Picture {
             shelf: Shelf::Gap,
             name: name.to_owned(),
             caption: caption.to_owned(),
             drawing: drawing?,
-            live: None,
+            live: live.map(Live::Points),
         })
     };
     kinds.into_iter().filter_map(picture).collect()

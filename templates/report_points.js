@@ -136,7 +136,7 @@ function saying(panel, point) {
   var parts = [set.words ? set.name + ", " + set.words[i] : set.name];
   // Where an axis has names, the point's own words say which.
   if (!panel.x.at) parts.push(one(panel.x.label, set.x[i], panel.x.unit));
-  var bar = set.high ? " ± " + digits(0.5 * (set.high[i] - set.low[i])) : "";
+  var bar = set.high ? " ± " + +(0.5 * (set.high[i] - set.low[i])).toPrecision(2) : "";
   if (!panel.y.at) parts.push(panel.y.label + " " + tickWords(set.y[i]) + bar + unit(panel.y.unit));
   if (set.extra) parts.push(one(panel.extra[0], set.extra[i], panel.extra[1]));
   return parts.join(" · ");

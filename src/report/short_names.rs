@@ -135,7 +135,7 @@ mod tests {
         let cases: [(&[&str], usize, &[&str]); 8] = [
             (&["a.wav", "b.wav"], 8, &["a.wav", "b.wav"]),
             (&["first.wav", "moved.wav"], 8, &["first", "moved"]),
-            (&["low.wav", "low.csv"], 5, &["l…wav", "l…csv"]),
+            (&["low.wav", "low.csv"], 5, &["…wav", "…csv"]),
             (&["run-1.wav", "run-1-b.wav"], 7, &["run-1", "run-1-b"]),
             (&["day/first.wav", "day/low.wav"], 9, &["first", "low"]),
             (

@@ -6,8 +6,9 @@
 The Nastran deck is parsed by pyNastran (an implementation of its own), the Abaqus deck by the reader
 below, which knows the keywords from Abaqus' manual and nothing of tapjoint. Both are assembled here with
 two-node beam elements and solved by scipy: the springs at the joint must be the inverse of the compliance
-that the report states, both decks must give one stiffness and one mass matrix, and the frequencies those
-that the report predicts. Needs Python with numpy, scipy, pyNastran.
+that the report states, a rigid direction must be held (of a lap joint: tied) and not sprung, both decks must
+give one stiffness and one mass matrix, and the frequencies those that the report predicts. Needs Python
+3.11 or later with numpy, scipy, pyNastran.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import tomllib
 
 import numpy as np
 import scipy.linalg
@@ -68,10 +70,34 @@ def assemble(model):
         for i, a in ends:
             for j, b in ends:
                 springs[i, j] += a * b * spring.k
-    held = [row(node, int(c)) for spc in sum(model.spcs.values(), []) for node in spc.nodes
-            for c in spc.components]
-    free = [i for i in range(size) if i not in held]
-    return (k + springs)[np.ix_(free, free)], m[np.ix_(free, free)], springs
+    held, tied = nastran_constraints(model, row)
+    keep = kept(size, held, tied)
+    return keep.T @ (k + springs) @ keep, keep.T @ m @ keep, springs, (held, tied)
+
+
+def nastran_constraints(model, row):
+    """Rows that are held, and pairs of rows that are tied. Grids' own constraints are those of a plane beam."""
+    chosen, held = [], []
+    for case in model.subcases.values():
+        chosen += [case["SPC"][0]] if "SPC" in case else []
+    for spc in sum(model.spcs.values(), []):
+        # A set that the case control does not name holds nothing.
+        assert spc.conid in chosen, f"SPC set {spc.conid} is not chosen: {chosen}"
+        held += [row(node, int(c)) for node in spc.nodes for c in spc.components]
+    tied = []
+    for rigid in model.rigid_elements.values():
+        assert rigid.type == "RBE2", rigid
+        tied += [(row(node, int(c)), row(rigid.gn, int(c))) for node in rigid.Gmi for c in rigid.cm]
+    return held, tied
+
+
+def kept(size, held, tied):
+    """Columns: what each degree of freedom that is left moves."""
+    whole = np.eye(size)
+    for dependent, leader in tied:
+        whole[:, leader] += whole[:, dependent]
+    gone = set(held) | {dependent for dependent, _ in tied}
+    return whole[:, [i for i in range(size) if i not in gone]]
 
 
 def frequencies(k, m, count):
@@ -80,10 +106,34 @@ def frequencies(k, m, count):
     return hz[hz > 1.0][:count]
 
 
-def compliance(estimate):
-    value = lambda key: (estimate[key] or {}).get("value")
+def compliance(estimate, rigid):
+    """The joint's compliance as the report has it; 0 in rigid directions."""
+    value = lambda key: ((estimate or {}).get(key) or {}).get("value")
+    give = lambda key: 0.0 if key in rigid or not value(key) else 1 / value(key)
     cross = -1 / value("ktr") if value("ktr") else 0.0
-    return np.array([[1 / value("kt"), cross], [cross, 1 / value("kr")]])
+    return np.array([[give("kt"), cross], [cross, give("kr")]])
+
+
+def compare_joint(report, rigid, springs, constraints):
+    """How far the joint's springs are from the inverse of the compliance; rigid directions are rigid."""
+    held, tied = constraints
+    lap = report["test"]["kind"] == "lap"
+    directions = ["kt", "kr"]
+    # Row 0 and 1 are w and theta of the first grid, which is the joint's of a cantilever.
+    stiff = [key for place, key in enumerate(directions) if place in held]
+    if lap:
+        stiff = [key for place, key in enumerate(directions) if any(row % 2 == place for row, _ in tied)]
+    assert sorted(stiff) == sorted(rigid), f"rigid in the deck: {stiff}, in the description: {rigid}"
+    print(f"rigid: {', '.join(rigid) or 'nothing'}")
+    if lap:
+        return 0.0
+    free = [place for place, key in enumerate(directions) if key not in rigid]
+    assert not np.any(springs[[place for place in (0, 1) if place not in free]]), "sprung and rigid"
+    block = np.ix_(free, free)
+    error = np.abs(springs[block] @ compliance(report["estimate"], rigid)[block] - np.eye(len(free)))
+    error = error.max() if free else 0.0
+    print(f"springs times reported compliance differ from 1 by {error:.1e}")
+    return error
 
 
 def abaqus_blocks(text):
@@ -106,7 +156,7 @@ class AbaqusDeck:
 
     def __init__(self, text):
         self.nodes, self.sets, self.sections, self.materials = {}, {}, [], {}
-        self.masses, self.springs, self.kinds, self.held = {}, [], {}, []
+        self.masses, self.springs, self.kinds, self.held, self.tied = {}, [], {}, [], []
         material = None
         for keyword, given, data in abaqus_blocks(text):
             if keyword == "NODE":
@@ -132,9 +182,15 @@ class AbaqusDeck:
             elif keyword == "SPRING":
                 self.springs.append((given["ELSET"], [int(dof) for dof in data[0]], float(data[1][0])))
             elif keyword == "BOUNDARY":
-                self.held = data
-        # A plane beam still stretches; nothing but that may be held.
-        assert self.held == [["ALL", "1", "1"]], self.held
+                self.held += data
+            elif keyword == "EQUATION":
+                # u_i - u_j = 0: the only kind that a rigid joint needs.
+                assert data[0] == ["2"], data
+                (one, c, x), (other, d, y) = data[1][:3], data[1][3:]
+                assert c == d and float(x) == -float(y) != 0, data
+                self.tied.append((int(one), int(other), int(c)))
+        # A plane beam still stretches; beside that nothing is held but a rigid joint.
+        assert self.held[0] == ["ALL", "1", "1"], self.held
 
     def assemble(self, beam=None):
         """As for the Nastran deck; another beam element than that of Nastran's may be tried."""
@@ -167,7 +223,11 @@ class AbaqusDeck:
                 for i, x in zip(ends, signs):
                     for j, y in zip(ends, signs):
                         k[i, j] += x * y * stiffness
-        return k, m
+        held = [row(int(node), d) for node, first, last in self.held[1:]
+                for d in range(int(first), int(last) + 1) if d in (W, THETA)]
+        tied = [(row(one, d), row(other, d)) for one, other, d in self.tied]
+        keep = kept(size, held, tied)
+        return keep.T @ k @ keep, keep.T @ m @ keep
 
 
 def linear_element(length, bend, mass, shear):
@@ -214,12 +274,10 @@ def main():
                                 check=True, capture_output=True, text=True).stdout
         model = BDF(debug=None)
         model.read_bdf(deck)
-    k, m, springs = assemble(model)
-    worst = 0.0
-    if report["test"]["kind"] == "cantilever":
-        error = np.abs(springs[:2, :2] @ compliance(report["estimate"]) - np.eye(2)).max()
-        print(f"springs times reported compliance differ from 1 by {error:.1e}")
-        worst = max(worst, error)
+    k, m, springs, constraints = assemble(model)
+    joint = tomllib.loads(options.test.read_text())["joint"]
+    rigid = [key for key in ("kt", "kr") if joint.get(key) == "rigid"]
+    worst = compare_joint(report, rigid, springs[:2, :2], constraints)
     predicted = [row["predicted"] for row in report["prediction"]]
     worst = max(worst, compare_decks((k, m), AbaqusDeck(abaqus), predicted))
     for number, (ours, theirs) in enumerate(zip(frequencies(k, m, len(predicted)), predicted), 1):

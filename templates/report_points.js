@@ -1,5 +1,5 @@
 // Panels of single points, drawn by uPlot's axes and zoom and by hand: stabilisation diagram, clouds of
-// estimates, frequency and damping against amplitude. And fingers on all plots.
+// estimates, frequency and damping against amplitude, errors and shapes of the model. And fingers on all plots.
 
 var reach = 24; // pixels within which a point answers the pointer
 
@@ -27,6 +27,9 @@ function ticks(low, high, log) {
 }
 
 
+// A set that is only looked at.
+function mute(set) { return set.mark === "line" || set.mark === "band"; }
+
 function within(axis, value) { return value >= axis[0] && value <= axis[1]; }
 
 function drawSet(u, panel, set, lit) {
@@ -34,26 +37,38 @@ function drawSet(u, panel, set, lit) {
   function px(i) { return u.valToPos(set.x[i], "x", true); }
   function py(value) { return u.valToPos(value, "y", true); }
   c.strokeStyle = c.fillStyle = color("--" + set.color);
-  c.lineWidth = (set.mark === "line" ? set.size : 1.6) * ratio;
-  if (set.mark === "line" || set.mark === "band") {
+  var curve = set.mark === "curve";
+  c.lineWidth = (set.mark === "line" || curve ? set.size : 1.6) * ratio;
+  if (mute(set) || curve) {
     c.beginPath();
     var upper = set.mark === "band" ? set.high : set.y;
     upper.forEach(function (value, i) { c[i ? "lineTo" : "moveTo"](px(i), py(value)); });
-    if (set.mark === "line") return c.stroke();
-    for (var i = set.low.length - 1; i >= 0; i--) c.lineTo(px(i), py(set.low[i]));
-    c.globalAlpha = 0.25;
-    c.fill();
-    c.globalAlpha = 1;
-    return;
+    if (set.mark !== "band") c.stroke();
+    else {
+      for (var i = set.low.length - 1; i >= 0; i--) c.lineTo(px(i), py(set.low[i]));
+      c.globalAlpha = 0.25;
+      c.fill();
+      c.globalAlpha = 1;
+    }
+    if (!curve) return;
   }
   var xs = panel.view.x, ys = panel.view.y;
   set.x.forEach(function (value, i) {
     if (!within(xs, value) || !within(ys, set.y[i])) return;
-    var x = px(i), y = py(set.y[i]), r = lit && lit.set === set && lit.index === i ? 1.8 * size : size;
+    var chosen = lit && lit.set === set && lit.index === i;
+    var x = px(i), y = py(set.y[i]), r = chosen ? 1.8 * size : size;
+    if (set.mark === "bar") {
+      var from = u.valToPos(0, "x", true);
+      c.globalAlpha = chosen ? 1 : 0.8;
+      c.fillRect(from, y - size, Math.max(x - from, ratio), 2 * size);
+      c.globalAlpha = 1;
+      return;
+    }
     if (set.low) {
       c.lineWidth = 1.2 * ratio;
       c.beginPath(); c.moveTo(x, py(set.low[i])); c.lineTo(x, py(set.high[i])); c.stroke();
     }
+    if (curve && !chosen) return;
     c.beginPath();
     if (set.mark === "cross") {
       c.moveTo(x - r, y - r); c.lineTo(x + r, y + r);
@@ -61,7 +76,7 @@ function drawSet(u, panel, set, lit) {
       c.stroke();
     } else {
       c.arc(x, y, r, 0, 2 * Math.PI);
-      if (set.mark === "dot") c.fill(); else c.stroke();
+      if (set.mark === "dot" || curve) c.fill(); else c.stroke();
     }
   });
 }
@@ -103,10 +118,12 @@ function drawPanel(panel) {
 function nearest(u, panel, left, top) {
   var best = null, near = reach;
   panel.sets.forEach(function (set) {
-    if (set.mark === "line" || set.mark === "band") return;
+    if (mute(set)) return;
     set.x.forEach(function (value, i) {
       if (!within(panel.view.x, value) || !within(panel.view.y, set.y[i])) return;
-      var distance = Math.hypot(u.valToPos(value, "x") - left, u.valToPos(set.y[i], "y") - top);
+      // A bar answers all along its row.
+      var aside = set.mark === "bar" ? 0 : u.valToPos(value, "x") - left;
+      var distance = Math.hypot(aside, u.valToPos(set.y[i], "y") - top);
       if (distance <= near) { near = distance; best = { set: set, index: i }; }
     });
   });
@@ -116,9 +133,11 @@ function nearest(u, panel, left, top) {
 function saying(panel, point) {
   var set = point.set, i = point.index;
   function one(label, value, of) { return label + " " + tickWords(value) + unit(of); }
-  var parts = [set.words ? set.name + ", " + set.words[i] : set.name, one(panel.x.label, set.x[i], panel.x.unit)];
-  var bar = set.high ? " ± " + digits(0.5 * (set.high[i] - set.low[i])) : "";
-  parts.push(panel.y.label + " " + tickWords(set.y[i]) + bar + unit(panel.y.unit));
+  var parts = [set.words ? set.name + ", " + set.words[i] : set.name];
+  // Where an axis has names, the point's own words say which.
+  if (!panel.x.at) parts.push(one(panel.x.label, set.x[i], panel.x.unit));
+  var bar = set.high ? " ± " + +(0.5 * (set.high[i] - set.low[i])).toPrecision(2) : "";
+  if (!panel.y.at) parts.push(panel.y.label + " " + tickWords(set.y[i]) + bar + unit(panel.y.unit));
   if (set.extra) parts.push(one(panel.extra[0], set.extra[i], panel.extra[1]));
   return parts.join(" · ");
 }
@@ -154,17 +173,24 @@ function pointOptions(figure, panel, holder) {
   function scale(key) {
     return { time: false, auto: false, distr: logarithmic(panel[key]) ? 3 : 1, range: function () { return panel.view[key]; } };
   }
+  function room(axis) {
+    var longest = Math.max.apply(null, (axis.names || [""]).map(function (name) { return name.length; }));
+    return Math.min(Math.max(7 * longest + 12, 58), 0.45 * holder.clientWidth);
+  }
   function axis(key) {
+    var at = panel[key].at;
     return {
-      label: named(panel[key]), labelSize: 20, size: key === "x" ? 32 : 58, stroke: color("--ink"),
+      label: named(panel[key]), labelSize: 20, size: key === "x" ? 32 : room(panel.y), stroke: color("--ink"),
       grid: { stroke: color("--rule"), width: 1 }, ticks: { stroke: color("--rule"), width: 1 },
-      splits: function (u, index, low, high) { return ticks(low, high, logarithmic(panel[key])); },
+      splits: function (u, index, low, high) {
+        return at ? at.filter(function (place) { return place >= low && place <= high; }) : ticks(low, high, logarithmic(panel[key]));
+      },
       filter: function (u, splits) { return splits; },
-      values: function (u, splits) { return splits.map(tickWords); }
+      values: function (u, splits) { return splits.map(at ? function (place) { return panel[key].names[at.indexOf(place)]; } : tickWords); }
     };
   }
   return {
-    width: Math.max(holder.clientWidth, 240), height: 380, padding: [panel.rules.length ? 22 : 10, 16, 0, 0],
+    width: Math.max(holder.clientWidth, 240), height: panel.height, padding: [panel.rules.length ? 22 : 10, 16, 0, 0],
     legend: { show: false }, series: [{}, { show: true, points: { show: false } }],
     axes: [axis("x"), axis("y")], scales: { x: scale("x"), y: scale("y") },
     cursor: {
@@ -186,8 +212,10 @@ function pointOptions(figure, panel, holder) {
 }
 
 function key(panel) {
-  var signs = { dot: "●", ring: "○", cross: "✕", line: "―", band: "▮" }, line = element("p", "key");
+  var signs = { dot: "●", ring: "○", cross: "✕", line: "―", curve: "―", band: "▮", bar: "▮" }, line = element("p", "key"), listed = {};
   panel.sets.forEach(function (set) {
+    if (!set.name || listed[set.name]) return;
+    listed[set.name] = true;
     var sign = element("span", "", signs[set.mark] + " ");
     sign.style.color = "var(--" + set.color + ")";
     var entry = element("span", "", set.name);
@@ -201,6 +229,7 @@ function buildPoints(figure) {
   figure.panels.forEach(function (u) { u.destroy(); });
   figure.host.textContent = figure.said.textContent = "";
   figure.host.classList.add("points");
+  figure.host.classList.toggle("many", figure.plot.views[figure.shown].panels.length > 3);
   figure.panels = figure.plot.views[figure.shown].panels.map(function (panel) {
     var holder = element("div", "");
     if (panel.title) holder.appendChild(element("p", "head", panel.title));

@@ -3,7 +3,8 @@
 //! A file is written under a temporary name in its own folder and renamed at the end. A report
 //! folder is filled in a temporary folder: if the report folder is new, that folder is renamed to
 //! it in one step; if it exists, the temporary one lies inside it and its files are renamed one by
-//! one, each replacing its predecessor whole, and files of other names are left alone. The
+//! one, each replacing its predecessor whole, and files of other names are left alone but those that the
+//! caller knows to be leftovers of its own. The
 //! temporary file or folder is made before any work, which shows that writing will be possible;
 //! when the work fails, it is removed.
 
@@ -44,6 +45,14 @@ pub(super) enum OutputError {
     ReadOnly {
         /// That file.
         path: PathBuf,
+    },
+    /// A leftover of an earlier run that stays beside what is new.
+    #[error("{}: an earlier run left this, and it cannot be removed: {cause}; remove it, all else is written", path.display())]
+    Leftover {
+        /// That file.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
     },
     /// Writing failed on the way; nothing half-written is left.
     #[error("{}: could not be written: {cause}; nothing was changed there", path.display())]
@@ -204,6 +213,31 @@ impl OutputFolder {
         }
     }
 
+    /// The text of a file that the folder already has; `None` where there is none.
+    pub(super) fn earlier(&self, name: &str) -> Option<String> {
+        fs::read_to_string(self.path.join(name)).ok()
+    }
+
+    /// The same as [`publish`](Self::publish), and then removes those of the `stale` files that were not
+    /// made again. Only files go, never folders.
+    ///
+    /// # Errors
+    /// [`OutputError::Failed`], or [`OutputError::Leftover`] where a file cannot be removed.
+    pub(super) fn publish_without(self, stale: &[String]) -> Result<PathBuf, OutputError> {
+        let stale: Vec<&String> = stale
+            .iter()
+            .filter(|name| !self.staging.path().join(name).exists())
+            .collect();
+        let folder = self.publish()?;
+        for path in stale.into_iter().map(|name| folder.join(name)) {
+            let is_file = fs::symlink_metadata(&path).is_ok_and(|found| !found.is_dir());
+            if is_file {
+                fs::remove_file(&path).map_err(|cause| OutputError::Leftover { path, cause })?;
+            }
+        }
+        Ok(folder)
+    }
+
     fn rename_folder(&self) -> io::Result<()> {
         fs::create_dir_all(folder_of(&self.path))?;
         fs::rename(self.staging.path(), &self.path)
@@ -324,6 +358,27 @@ mod tests {
             fs::read_to_string(folder.path().join("report.json")).unwrap(),
             "new"
         );
+    }
+
+    #[test]
+    fn regress_leftovers_go_and_strangers_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["notes.txt", "old.png", "report.json"] {
+            fs::write(folder.path().join(name), "old").unwrap();
+        }
+        fs::create_dir(folder.path().join("folder")).unwrap();
+        let output = OutputFolder::prepare(folder.path()).unwrap();
+        assert_eq!(output.earlier("report.json").as_deref(), Some("old"));
+        output.add("report.json", b"new").unwrap();
+        let stale = ["old.png", "report.json", "gone.png", "folder"].map(str::to_owned);
+        output.publish_without(&stale).unwrap();
+        assert_eq!(
+            names(folder.path()),
+            ["folder", "notes.txt", "report.json"],
+            "leftovers"
+        );
+        let kept = fs::read_to_string(folder.path().join("report.json")).unwrap();
+        assert_eq!(kept, "new");
     }
 
     #[test]

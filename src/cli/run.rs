@@ -7,18 +7,21 @@ use super::choices::{MethodsArgument, ReadingArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFolder;
 use super::terminal::Terminal;
-use super::updated_model::{FILE, add_model};
+use super::updated_model::add_model;
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
-use tapjoint::report::{document_of, figures_of, gap_section, render_run, render_text};
+use tapjoint::report::{
+    MODEL_FILE, document_of, earlier_files, figures_of, gap_section, render_run, render_text,
+};
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
 ///
 /// Writes report.html, report.json, parameters.csv, modes.csv, perturbation.csv, the model with what the
-/// diagnosis found (updated-model.toml) and pictures into a folder.
+/// diagnosis found (updated-model.toml) and pictures into a folder. What an earlier run left there is
+/// replaced or removed; other files stay.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
@@ -138,19 +141,22 @@ pub(super) fn run(
         let mut gap = gap_section(diagnosis.as_ref());
         model = add_model(
             &mut gap,
-            (file, Some(FILE.to_owned())),
+            (file, Some(MODEL_FILE.to_owned())),
             (&analysis, diagnosis.as_ref()),
         );
         document.gap = Some(gap);
     }
     drop(progress);
     if let Some(model) = model {
-        request.output.add(FILE, model.as_bytes())?;
+        request.output.add(MODEL_FILE, model.as_bytes())?;
     }
     for file in render_run(&document, &figures_of(&analysis))? {
         request.output.add(&file.name, &file.bytes)?;
     }
-    let folder = request.output.publish()?;
+    // Where the folder holds an earlier report, what this run does not make again would belong to nothing.
+    let earlier = request.output.earlier("report.json");
+    let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
+    let folder = request.output.publish_without(&stale)?;
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;

@@ -189,6 +189,15 @@ pub enum ChannelRef {
     Name(String),
 }
 
+/// Where a description names a channel, for messages about recordings that do not have it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChannelPlace {
+    /// Its line, counted from 1.
+    pub line: usize,
+    /// Its key: "sensor[2].channel"; "sensor[2].name" where the name alone says it.
+    pub key: String,
+}
+
 /// What a channel's signal is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scale {
@@ -203,6 +212,8 @@ pub enum Scale {
 pub struct HammerDescription {
     /// Where its signal is.
     pub channel: ChannelRef,
+    /// Where that is said.
+    pub place: ChannelPlace,
     /// Newtons per unit of the file (integer WAV: full scale = 1); `None` when the file does not
     /// say, so that a unit in a CSV header may decide (else 1).
     pub scale: Option<Scale>,
@@ -228,6 +239,8 @@ pub struct SensorDescription {
     pub name: String,
     /// Where its signal is; when the file is silent, the column of the sensor's name.
     pub channel: ChannelRef,
+    /// Where that is said.
+    pub place: ChannelPlace,
     /// SI units per unit of the file, negative when mounted the other way; `None` when not given.
     pub scale: Option<Scale>,
     /// Where it sits (m); `None` for a microphone, or when unknown (it then has no mass either).

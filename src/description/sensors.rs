@@ -5,7 +5,10 @@ use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Dou
 use super::keys;
 use super::limits::Limits;
 use super::reader::{Entry, Table};
-use super::{BeamDescription, ChannelRef, HammerDescription, Scale, SensorDescription, SensorKind};
+use super::{
+    BeamDescription, ChannelPlace, ChannelRef, HammerDescription, Scale, SensorDescription,
+    SensorKind,
+};
 use crate::quantity::Dimension;
 
 const KINDS: [(&str, SensorKind); 4] = [
@@ -36,6 +39,7 @@ pub(super) fn read_hammer(table: &Table<'_>) -> Result<HammerDescription, Descri
     let channel = table.need("channel", "the hammer's channel", "channel = 1")?;
     Ok(HammerDescription {
         channel: read_channel(&channel)?,
+        place: place_of(&channel),
         scale: read_scale(table, Dimension::Force, Dimension::ForceSensitivity)?,
     })
 }
@@ -114,15 +118,15 @@ fn read_sensor(
     beam: &BeamDescription,
     warnings: &mut Vec<DescriptionWarning>,
 ) -> Result<SensorDescription, DescriptionError> {
-    let name = table
-        .need("name", "a name", "name = \"A\"")?
-        .text("a name such as \"A\"")?;
+    let named = table.need("name", "a name", "name = \"A\"")?;
+    let name = named.text("a name such as \"A\"")?;
     let kind = table.optional("kind", |entry| entry.choice(&KINDS))?;
     let kind = kind.unwrap_or(SensorKind::Acceleration);
     let channel = table.optional("channel", read_channel)?;
     let (signal, sensitivity) = dimensions(kind);
     let sensor = SensorDescription {
         channel: channel.unwrap_or_else(|| ChannelRef::Name(name.clone())),
+        place: place_of(&table.get("channel").unwrap_or(named)),
         name,
         scale: read_scale(table, signal, sensitivity)?,
         position: table.optional("position", |entry| read_position(entry, kind, beam.length))?,
@@ -192,6 +196,14 @@ fn check_mass(
         warnings.push(entry.warning(doubt));
     }
     Ok(())
+}
+
+/// Where a channel is named.
+fn place_of(entry: &Entry<'_>) -> ChannelPlace {
+    ChannelPlace {
+        line: entry.line,
+        key: entry.path.clone(),
+    }
 }
 
 fn read_channel(entry: &Entry<'_>) -> Result<ChannelRef, DescriptionError> {

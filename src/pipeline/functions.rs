@@ -3,9 +3,9 @@
 use num_complex::Complex64;
 
 use super::analysis::{Analysis, Conditions, RecordingResult, Response};
+use super::error::PipelineError;
 use super::fits::{Candidates, source_of, stabilisation};
 use super::measure::{MeasuredSpectra, Measurement};
-use super::recordings::PipelineError;
 use super::warning::Warning;
 use super::wired::analysis_of;
 use crate::description::{FrfForm, ReadingMethod, SensorKind};

@@ -13,6 +13,7 @@ mod analysis;
 mod consistent;
 mod decays;
 mod doubts;
+mod error;
 mod evidence;
 mod fits;
 mod force;
@@ -47,6 +48,7 @@ pub use consistent::{
     StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
     structure_details,
 };
+pub use error::PipelineError;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use functions::{FunctionSettings, run_functions};
 pub use gap::{diagnose_test, nominal, nominal_with};
@@ -55,7 +57,7 @@ pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, m
 pub use model::{KnownJoint, TestedStructure, tested_structure};
 pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::observations;
-pub use recordings::{PipelineError, inspect_bare, measure_bare, si_unit};
+pub use recordings::{inspect_bare, measure_bare, si_unit};
 pub use shapes::{SampledShape, sampled_shapes};
 pub use warning::{AmplitudeChange, Warning};
 pub use wired::{Wiring, run_wired};

@@ -3,60 +3,20 @@
 use std::path::Path;
 
 use super::analysis::{Conditions, Overview, RecordingResult, Response};
+use super::error::PipelineError;
 use super::functions::{FunctionSettings, form_of_description, measure_functions};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
 use crate::described::fastened_masses;
 use crate::description::{
-    ChannelRef, FrfForm, RecordingDescription, Scale, SensorDescription, SensorKind,
+    ChannelPlace, ChannelRef, FrfForm, RecordingDescription, Scale, SensorDescription, SensorKind,
     TestDescription,
 };
 use crate::recording::ResponseForm;
 use crate::recording::{ReadSettings, Recording, RecordingError, open_frequency_responses};
-use crate::spectral::SpectralError;
 use crate::taps::{TapSettings, TapSource, find_taps};
 
 /// Pieces of the overview of a recording over time: two for each pixel of a usual picture.
 const OVERVIEW_PIECES: u64 = 2400;
-
-/// What stops an analysis.
-#[derive(Debug, thiserror::Error)]
-pub enum PipelineError {
-    /// A recording could not be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A recording could not be measured.
-    #[error(transparent)]
-    Measure(#[from] MeasureError),
-    /// A band that does not fit a file of frequency response functions.
-    #[error("{file}: {problem}")]
-    Functions {
-        /// The recording.
-        file: String,
-        /// What does not fit.
-        problem: SpectralError,
-    },
-    /// A band or block of the description that does not fit its recording.
-    #[error("{file}:{line}: {recording}: {problem}")]
-    Setting {
-        /// The description.
-        file: String,
-        /// Its line.
-        line: usize,
-        /// The recording.
-        recording: String,
-        /// What does not fit.
-        problem: SpectralError,
-    },
-    /// A description without sensors.
-    #[error(
-        "{file}: the recordings need at least one [[sensor]] with its channel, or there is no response \
-         to analyse"
-    )]
-    NoSensors {
-        /// The description.
-        file: String,
-    },
-}
 
 /// Opens and measures one recording of a described test.
 pub(super) fn measure_described(
@@ -73,7 +33,7 @@ pub(super) fn measure_described(
             file: test_file.to_string(),
         });
     }
-    let (recording, source) = open_described(test, description, folder)?;
+    let (recording, source) = open_described(test, description, (folder, test_file))?;
     let mut settings = MeasureSettings::new(source);
     settings.band = description.band;
     settings.block = description.block;
@@ -167,19 +127,27 @@ fn described_units(test: &TestDescription, source: &TapSource) -> Vec<(usize, &'
 fn open_described(
     test: &TestDescription,
     description: &RecordingDescription,
-    folder: &Path,
-) -> Result<(Recording, TapSource), RecordingError> {
+    (folder, test_file): (&Path, &str),
+) -> Result<(Recording, TapSource), PipelineError> {
     let settings = ReadSettings {
         sample_rate: description.sample_rate,
     };
     let mut recording = Recording::open(&folder.join(&description.file), &settings)?;
+    let mut find = |reference: &ChannelRef, scale: Option<Scale>, place: &ChannelPlace| {
+        channel(&mut recording, reference, scale).map_err(|problem| PipelineError::Channel {
+            file: test_file.to_string(),
+            line: place.line,
+            key: place.key.clone(),
+            problem,
+        })
+    };
     let hammer = match &test.hammer {
-        Some(hammer) => Some(channel(&mut recording, &hammer.channel, hammer.scale)?),
+        Some(hammer) => Some(find(&hammer.channel, hammer.scale, &hammer.place)?),
         None => None,
     };
     let mut channels = Vec::with_capacity(test.sensors.len());
     for sensor in &test.sensors {
-        channels.push(channel(&mut recording, &sensor.channel, sensor.scale)?);
+        channels.push(find(&sensor.channel, sensor.scale, &sensor.place)?);
     }
     Ok((recording, source(hammer, channels)))
 }

@@ -1,10 +1,11 @@
 //! A bare recording of which the caller says what its channels are.
 
 use super::analysis::{Analysis, RecordingResult, Response};
+use super::error::PipelineError;
 use super::evidence;
 use super::measure::MeasureSettings;
 use super::modes::modes_of_bare;
-use super::recordings::{PipelineError, finish};
+use super::recordings::finish;
 use crate::recording::Recording;
 use crate::taps::TapSource;
 

@@ -302,7 +302,7 @@ pub enum RecordingError {
         value: f64,
     },
     /// A channel number that does not exist.
-    #[error("{file}: no channel {number}; there are: {existing}")]
+    #[error("{file}: no channel {number}; there are: {existing}; name one of these")]
     UnknownChannelNumber {
         /// The file.
         file: String,
@@ -312,7 +312,9 @@ pub enum RecordingError {
         existing: String,
     },
     /// A channel name that does not exist.
-    #[error("{file}: no channel named \"{name}\"{nearest}; there are: {existing}")]
+    #[error(
+        "{file}: no channel named \"{name}\"{nearest}; there are: {existing}; name one of these"
+    )]
     UnknownChannelName {
         /// The file.
         file: String,

@@ -1,6 +1,6 @@
 //! Frequency and damping against amplitude for the page's script: a view of two panels for every mode.
 
-use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointSet, rounded};
+use super::live_points::{HEIGHT, LivePoints, LiveView, PointAxis, PointPanel, PointSet, rounded};
 use super::plot::amplitude::MOST_COLOURS;
 use super::plot::amplitude::{
     AmplitudeFigure, BAR, DAMPING, FREQUENCY, Quantity, amplitude_axis, quantity_axis, taps,
@@ -58,6 +58,7 @@ fn panel(
         .unwrap_or((&figure.amplitude, ""));
     Some(PointPanel {
         title: String::new(),
+        height: HEIGHT,
         x: PointAxis::of(&x, amplitude, amplitude_unit),
         y: PointAxis::of(&y, label, unit),
         extra: Some(["time after the tap", "s"]),

@@ -14,6 +14,8 @@ use crate::modal::polyreference::PoleStability;
 
 /// Most points of the level behind a stabilisation diagram: it is faint, and the spectra have all of it.
 const LEVEL_POINTS: usize = 400;
+/// Height of a panel (pixels).
+pub(super) const HEIGHT: u32 = 380;
 /// Significant digits of positions, so that close poles stay apart when they are zoomed.
 const DIGITS: usize = 7;
 
@@ -40,6 +42,8 @@ pub struct LiveView {
 pub struct PointPanel {
     /// What it shows.
     pub title: String,
+    /// Height (pixels).
+    pub height: u32,
     /// Horizontal axis.
     pub x: PointAxis,
     /// Vertical axis.
@@ -63,6 +67,12 @@ pub struct PointAxis {
     pub scale: &'static str,
     /// Its ends as long as nothing is zoomed (unit).
     pub range: [f64; 2],
+    /// Places with names instead of numbers; empty where the axis has numbers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub at: Vec<f64>,
+    /// Their names.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
 }
 
 /// Points that look alike.
@@ -72,7 +82,8 @@ pub struct PointSet {
     pub name: String,
     /// Colour by its name in the page's style.
     pub color: String,
-    /// "dot", "ring", "cross", "line" or "band".
+    /// "dot", "ring", "cross", "line", "band", "bar" from 0 to its place, or "curve": a line whose points
+    /// answer the pointer.
     pub mark: &'static str,
     /// Radius, of a line its width (pixels).
     pub size: f64,
@@ -141,7 +152,15 @@ impl PointAxis {
                 Scale::Logarithmic => "logarithmic",
             },
             range: [axis.low, axis.high],
+            at: Vec::new(),
+            names: Vec::new(),
         }
+    }
+
+    /// The same axis with names at some places.
+    pub(super) fn named(mut self, places: impl IntoIterator<Item = (f64, String)>) -> PointAxis {
+        (self.at, self.names) = places.into_iter().unzip();
+        self
     }
 }
 
@@ -188,6 +207,7 @@ fn pole_panel(spectra: &SpectraFigure, band: &StabilisationBand) -> PointPanel {
     };
     PointPanel {
         title: String::new(),
+        height: HEIGHT,
         x: axis("frequency", "Hz", band.core),
         y: axis("order", "", (0.0, top)),
         extra: Some(["damping", "%"]),
@@ -295,6 +315,7 @@ fn cloud_panel(cloud: &Cloud) -> PointPanel {
     ];
     PointPanel {
         title: String::new(),
+        height: HEIGHT,
         x: PointAxis::of(&x, "Kx", ""),
         y: PointAxis::of(&y, "Ky", ""),
         extra: None,

@@ -22,12 +22,14 @@ mod document_gap;
 mod document_perturbation;
 mod document_quality;
 mod document_shapes;
+mod earlier;
 pub mod figures;
 pub mod format;
 mod gap_text;
 pub mod html;
 pub mod live;
 pub mod live_amplitude;
+pub mod live_model;
 pub mod live_points;
 pub mod plot;
 pub mod summary;
@@ -43,7 +45,9 @@ mod json;
 mod resolution;
 mod run;
 mod schema;
+mod short_names;
 mod stages;
+mod text_table;
 
 pub use convert::{
     document as document_of, inspection as inspection_of, lambdas as lambdas_of,
@@ -55,6 +59,7 @@ pub use convert_frf::{frf_document, render_frf_csv};
 pub use convert_gap::gap_section;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use csv_perturbation::render_perturbation_csv;
+pub use earlier::{MODEL_FILE, earlier_files};
 pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;
 pub use html::render_html;

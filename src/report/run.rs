@@ -8,6 +8,7 @@ use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
 use super::live::{LivePlot, live_frf, live_spectrum, live_taps, script_json};
 use super::live_amplitude::live_amplitude;
+use super::live_model::{live_frequencies, live_gap, live_place_map, live_shapes};
 use super::live_points::{LivePoints, live_cloud, live_stabilisation};
 use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
@@ -65,13 +66,19 @@ pub fn render_run(
     figures: &[RecordingFigure],
 ) -> Result<Vec<ReportFile>, ReportError> {
     let pictures = pictures(document, figures);
-    let rendered: Vec<([ReportFile; 2], InlineFigure)> = pictures
-        .par_iter()
-        .map(rendered)
-        .collect::<Result<_, _>>()?;
+    type Rendered = Vec<([ReportFile; 2], InlineFigure)>;
+    let (rendered, json) = rayon::join(
+        || {
+            pictures
+                .par_iter()
+                .map(rendered)
+                .collect::<Result<Rendered, _>>()
+        },
+        || render_json(document),
+    );
     let mut page = PageFigures::default();
     let mut files = Vec::new();
-    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered) {
+    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered?) {
         files.extend(of_picture);
         match picture.shelf {
             Shelf::Spectra => page.spectra.push(inline),
@@ -83,7 +90,7 @@ pub fn render_run(
     }
     let mut words = vec![
         ("report.html", render_html(document, &page)?),
-        ("report.json", render_json(document)?),
+        ("report.json", json?),
         ("parameters.csv", render_parameters_csv(document)?),
         ("modes.csv", render_modes_csv(document)?),
     ];
@@ -165,11 +172,11 @@ fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), Report
 }
 
 fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
-    let stems = stems(figures);
-    let mut pictures = Vec::new();
-    for (figure, stem) in figures.iter().zip(&stems) {
-        pictures.extend(recording_pictures(figure, stem));
-    }
+    let stems = stems(figures.iter().map(|figure| figure.file.as_str()));
+    let of_recordings = figures.par_iter().zip(&stems);
+    let of_recordings =
+        of_recordings.flat_map_iter(|(figure, stem)| recording_pictures(figure, stem));
+    let mut pictures: Vec<Picture> = of_recordings.collect();
     pictures.extend(draw_frequencies(document).map(|drawing| {
         Picture {
             shelf: Shelf::Comparison,
@@ -178,7 +185,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
                   reading alone explains the error."
                 .to_owned(),
             drawing,
-            live: None,
+            live: live_frequencies(document).map(Live::Points),
         }
     }));
     pictures.extend(draw_shapes(document).map(|drawing| {
@@ -189,7 +196,7 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
                       on it. A sensor or a tap near a node hardly sees the mode."
                 .to_owned(),
             drawing,
-            live: None,
+            live: live_shapes(document).map(Live::Points),
         }
     }));
     pictures.extend(gap_pictures(document));
@@ -211,22 +218,24 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
         (
             "gap",
             draw_gap(document),
+            live_gap(document),
             "The gap: every frequency's error with the described model and with the best hypothesis, and \
              how probable each hypothesis is.",
         ),
         (
             "gap-place",
             draw_place_map(document),
+            live_place_map(document),
             "Where along the beam a local change of stiffness or of mass would explain the errors.",
         ),
     ];
-    let picture = |(name, drawing, caption): (&str, Option<_>, &str)| {
+    let picture = |(name, drawing, live, caption): (&str, Option<_>, Option<LivePoints>, &str)| {
         Some(Picture {
             shelf: Shelf::Gap,
             name: name.to_owned(),
             caption: caption.to_owned(),
             drawing: drawing?,
-            live: None,
+            live: live.map(Live::Points),
         })
     };
     kinds.into_iter().filter_map(picture).collect()
@@ -290,10 +299,10 @@ fn recording_pictures(figure: &RecordingFigure, stem: &str) -> Vec<Picture> {
 }
 
 /// File names without folder and ending, safe as part of a name, each different.
-fn stems(figures: &[RecordingFigure]) -> Vec<String> {
+pub(super) fn stems<'a>(files: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut stems: Vec<String> = Vec::new();
-    for figure in figures {
-        let stem = stem(&figure.file);
+    for file in files {
+        let stem = stem(file);
         let mut unique = stem.clone();
         let mut number = 2;
         while stems.contains(&unique) {

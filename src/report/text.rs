@@ -3,18 +3,14 @@
 use super::brief::brief;
 use super::document::Document;
 use super::format::signed_percent;
-use super::tables::{self, Kind, Place, Table};
+use super::tables::{self, Table};
+use super::text_table::cut;
+pub use super::text_table::render_table;
 
 /// Width of the terminal (characters).
 pub const WIDTH: usize = 80;
-/// Space between columns (characters).
-const GAP: usize = 2;
-/// Narrowest a column of words is cut to (characters).
-const NARROWEST: usize = 8;
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
-/// Most rows printed: a terminal is no place for a thousand taps.
-const MOST_ROWS: usize = 40;
 
 /// Everything the document holds.
 pub fn render_text(document: &Document) -> String {
@@ -182,194 +178,6 @@ pub(super) fn table_or_nothing(table: Option<Table>) -> String {
 fn joined(tables: &[Option<Table>]) -> String {
     let texts: Vec<String> = tables.iter().flatten().map(render_table).collect();
     texts.join("\n")
-}
-
-/// A table with its caption, in 80 columns: words that do not fit go on below, and heads go to two
-/// lines where one has no room.
-pub fn render_table(table: &Table) -> String {
-    let shown: Vec<usize> = (0..table.columns.len())
-        .filter(|index| {
-            let column = table.columns.get(*index);
-            column.is_some_and(|column| column.place == Place::Everywhere)
-        })
-        .collect();
-    let single: Vec<Vec<String>> = table.columns.iter().map(|c| vec![c.name.clone()]).collect();
-    let double: Vec<Vec<String>> = table.columns.iter().map(|c| two_lines(&c.name)).collect();
-    let wide = natural_widths(table, &shown, &single);
-    let (heads, natural) = if wide.iter().sum::<usize>() <= room(wide.len()) {
-        (single, wide)
-    } else {
-        let narrow = natural_widths(table, &shown, &double);
-        (double, narrow)
-    };
-    let widths = fitted_widths(table, &shown, natural);
-    let mut text = wrapped(&table.caption, 0);
-    text.push_str(&row(table, &shown, &widths, &heads));
-    let total = widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1);
-    text.push_str(&"-".repeat(total.min(WIDTH)));
-    text.push('\n');
-    for cells in table.rows.iter().take(MOST_ROWS) {
-        let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
-        text.push_str(&row(table, &shown, &widths, &cells));
-    }
-    let more = table.rows.len().saturating_sub(MOST_ROWS);
-    if more > 0 {
-        text.push_str(&format!("... and {more} more\n"));
-    }
-    text
-}
-
-/// A head on two lines: its unit below its name, or its last word.
-fn two_lines(name: &str) -> Vec<String> {
-    let place = name.rfind(" (").or_else(|| name.rfind(' '));
-    match place.map(|place| name.split_at(place)) {
-        Some((first, second)) => vec![first.to_owned(), second.trim_start().to_owned()],
-        None => vec![String::new(), name.to_owned()],
-    }
-}
-
-/// Characters that columns share.
-fn room(columns: usize) -> usize {
-    WIDTH.saturating_sub(GAP * columns.saturating_sub(1))
-}
-
-fn length(text: &str) -> usize {
-    text.chars().count()
-}
-
-/// Widths that hold every head and cell on one line.
-fn natural_widths(table: &Table, shown: &[usize], heads: &[Vec<String>]) -> Vec<usize> {
-    let width = |index: &usize| {
-        let head = heads.get(*index).into_iter().flatten();
-        let rows = table.rows.iter().take(MOST_ROWS);
-        let cells = rows.filter_map(|row| row.get(*index));
-        head.chain(cells)
-            .map(|text| length(text))
-            .max()
-            .unwrap_or(0)
-    };
-    shown.iter().map(width).collect()
-}
-
-/// Widths of the shown columns; where they pass the terminal's, columns of words shrink.
-fn fitted_widths(table: &Table, shown: &[usize], natural: Vec<usize>) -> Vec<usize> {
-    let mut widths = natural;
-    let room = room(widths.len());
-    while widths.iter().sum::<usize>() > room {
-        let widest_words = shown
-            .iter()
-            .enumerate()
-            .filter(|(_, index)| is_words(table, **index))
-            .max_by_key(|(place, _)| widths.get(*place))
-            .map(|(place, _)| place);
-        let width = widest_words.and_then(|place| widths.get_mut(place));
-        match width {
-            Some(width) if *width > NARROWEST => *width -= 1,
-            _ => break,
-        }
-    }
-    widths
-}
-
-fn is_words(table: &Table, index: usize) -> bool {
-    let column = table.columns.get(index);
-    column.is_some_and(|column| column.kind == Kind::Words)
-}
-
-/// Whether a column holds names of files, which are shortened rather than broken.
-fn is_name(table: &Table, index: usize) -> bool {
-    let column = table.columns.get(index);
-    column.is_some_and(|column| matches!(column.name.as_str(), "Recording" | "File"))
-}
-
-/// A name of at most `width` characters: its middle gives way, for the beginning tells the test and
-/// the end the visit.
-fn shortened(name: &str, width: usize) -> String {
-    let letters: Vec<char> = name.chars().collect();
-    if letters.len() <= width {
-        return name.to_owned();
-    }
-    // The column's own head is a word, not a name: a shorter word stands for it.
-    if name == "Recording" {
-        return "File".to_owned();
-    }
-    let kept = width.saturating_sub(1);
-    let (head, tail) = (kept - kept / 2, kept / 2);
-    let first = letters.iter().take(head);
-    let last = letters.iter().skip(letters.len() - tail);
-    first.chain(&['\u{2026}']).chain(last).collect()
-}
-
-/// One row, on as many lines as its longest cell of words needs.
-fn row(table: &Table, shown: &[usize], widths: &[usize], cells: &[Vec<String>]) -> String {
-    let columns: Vec<Vec<String>> = shown
-        .iter()
-        .zip(widths)
-        .map(|(index, width)| {
-            let cell = cells.get(*index).into_iter().flatten();
-            if is_name(table, *index) {
-                cell.map(|text| shortened(text, *width)).collect()
-            } else if is_words(table, *index) {
-                cell.flat_map(|text| broken(text, *width)).collect()
-            } else {
-                cell.map(|text| cut(text, *width)).collect()
-            }
-        })
-        .collect();
-    let lines = columns.iter().map(Vec::len).max().unwrap_or(0);
-    (0..lines)
-        .map(|line| {
-            let padded: Vec<String> = columns
-                .iter()
-                .zip(shown.iter().zip(widths))
-                .map(|(column, (index, width))| {
-                    let text = column.get(line).map_or("", String::as_str);
-                    let text = text.replace('\u{a0}', " ");
-                    if is_words(table, *index) {
-                        format!("{text:<width$}")
-                    } else {
-                        format!("{text:>width$}")
-                    }
-                })
-                .collect();
-            cut(padded.join("  ").trim_end(), WIDTH) + "\n"
-        })
-        .collect()
-}
-
-/// A text in lines of at most `width` characters, broken between words where that is possible.
-fn broken(text: &str, width: usize) -> Vec<String> {
-    // A number stays with its unit: "mains 50 Hz".
-    let text = text.replace(" Hz", "\u{a0}Hz");
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        let mut rest: Vec<char> = word.chars().collect();
-        let used = lines.last().map_or(0, |line| length(line));
-        if used > 0 && used + 1 + rest.len() <= width {
-            if let Some(line) = lines.last_mut() {
-                line.push(' ');
-                line.extend(rest);
-            }
-            continue;
-        }
-        while !rest.is_empty() {
-            let piece: String = rest.drain(..rest.len().min(width.max(1))).collect();
-            match lines.last_mut() {
-                Some(line) if line.is_empty() => line.push_str(&piece),
-                _ => lines.push(piece),
-            }
-        }
-    }
-    lines
-}
-
-/// A text of at most `width` characters; "…" stands for what is missing.
-fn cut(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
-        return text.to_owned();
-    }
-    let kept: String = text.chars().take(width.saturating_sub(1)).collect();
-    kept + "\u{2026}"
 }
 
 /// Whether a line may be broken here.

@@ -7,7 +7,7 @@ use tapjoint::pipeline::{
     Analysis, IdentifySettings, frequencies_of, jointed_structure, run_test, structure_details,
     tested_structure,
 };
-use tapjoint::report::deck::{Deck, deck_of, source_of};
+use tapjoint::report::deck::{Deck, deck_of, render_nastran, source_of};
 use tapjoint::structure::finite_elements::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness};
@@ -17,6 +17,9 @@ const LAP: &str = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodu
     density = 2700\nmodulus = 70e9\n[joint]\nkind = \"lap\"\nposition = 0.17
     overlap = { length = 0.04, mass = 0.05 }\n[[sensor]]\nname = \"A\"\nchannel = 2
     position = 0.4\nmass = \"24 g\"\n[analysis]\nfit = [\"kt\", \"kr\", \"modulus\"]\n";
+
+const BEAM: &str = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9
+    density = 7850\n";
 
 fn described(text: &str, frequencies: &[f64]) -> TestDescription {
     let list: Vec<String> = frequencies.iter().map(f64::to_string).collect();
@@ -112,4 +115,21 @@ fn recover_the_closed_form_where_least_squares_has_too_few_modes() {
     for (head, measured) in deck.frequencies.iter().zip(&frequencies) {
         assert!((head / measured - 1.0).abs() < 1e-6);
     }
+}
+
+#[test]
+fn regress_a_nastran_deck_chooses_the_set_that_holds_a_rigid_joint() {
+    let held = |joint: &str| {
+        let text = format!("{BEAM}[joint]\nkind = \"cantilever\"\n{joint}");
+        let test = described(&text, &[17.8, 121.7, 355.4]);
+        let source = source_of(&test, &analysed(&test)).unwrap();
+        let deck = render_nastran(&deck_of("rigid", &source).unwrap());
+        // What the case control, above the bulk data, does not name has no effect.
+        let (control, bulk) = deck.split_once("BEGIN BULK").unwrap();
+        let sets = bulk.lines().filter(|line| line.starts_with("SPC1,1,"));
+        (control.contains("SPC = 1\n"), sets.count())
+    };
+    assert_eq!(held("kt = \"rigid\"\n"), (true, 1));
+    assert_eq!(held("kt = \"rigid\"\nkr = \"rigid\"\n"), (true, 2));
+    assert_eq!(held(""), (false, 0));
 }

@@ -1136,16 +1136,21 @@ fn regress_a_float_recording_with_nan_names_channel_and_sample() {
 #[test]
 fn regress_channels_and_places_that_do_not_exist() {
     let csv = good_csv().join("\n");
-    let cases: [(String, &str, &[&str]); 5] = [
+    let cases: [(String, &str, &[&str]); 6] = [
+        (
+            SPOILED.replace("channel = \"tip\"\n", ""),
+            "test.toml:13: `sensor[1].name`: taps.csv: no channel named \"A\"",
+            &["\"tip\""],
+        ),
         (
             SPOILED.replace("\"tip\"", "\"tpi\""),
-            "taps.csv: no channel named \"tpi\"",
-            &["\"tip\"", "\"force\""],
+            "test.toml:14: `sensor[1].channel`: taps.csv: no channel named \"tpi\"",
+            &["\"tip\"", "\"force\"", "name one of these"],
         ),
         (
             SPOILED.replace("\"force\"", "7"),
-            "taps.csv: no channel 7",
-            &["there are: "],
+            "test.toml:11: `hammer.channel`: taps.csv: no channel 7",
+            &["there are: 1 (\"force\"), 2 (\"tip\"); name one of these"],
         ),
         (
             SPOILED.replace("0.338", "0.5"),

@@ -31,8 +31,8 @@ const VISITOR: &str = r#"
     to.forEach(function (x, id) { finger(target, "pointerup", id + 1, x * wide, 40); });
   }
   // What the first point says that the pointer meets on its way over a panel of points.
-  function met(figure) {
-    var over = figure.querySelector(".u-over"), tip = figure.querySelector(".tip");
+  function met(figure, panel) {
+    var over = figure.querySelectorAll(".u-over")[panel || 0], tip = over.querySelector(".tip");
     for (var y = 10; y < over.clientHeight; y += 20)
       for (var x = 5; x < over.clientWidth; x += 12) {
         mouse(over, "mousemove", x, y);
@@ -53,6 +53,7 @@ const VISITOR: &str = r#"
     var figures = document.querySelectorAll("figure.curves");
     seen.figures = figures.length;
     seen.pictures = document.querySelectorAll("figure svg").length;
+    seen.titles = Array.from(document.querySelectorAll("figure svg rect title")).map(function (title) { return title.textContent; });
     seen.live = document.querySelectorAll("figure.live canvas").length;
     seen.width = document.documentElement.scrollWidth;
     seen.window = innerWidth;
@@ -91,7 +92,8 @@ const VISITOR: &str = r#"
     var points = Array.from(figures).filter(function (figure) { return figure.querySelector(".host.points"); });
     seen.points = [];
     for (var i = 0; i < points.length; i++) {
-      var one = { met: met(points[i]) };
+      var one = { met: met(points[i]), panels: points[i].querySelectorAll(".over, .u-over").length };
+      one.last = met(points[i], one.panels - 1);
       drag(points[i]);
       await wait(100);
       one.zoomed = points[i].querySelector(".said").textContent;
@@ -221,8 +223,9 @@ fn regress_the_page_works_in_a_browser() {
             Value::Array(vec![]),
             "{case}: something was fetched"
         );
-        // Of each of two recordings: spectra, responses, stabilisation, taps; and the cloud.
-        assert_eq!(seen["figures"], 9, "{case}");
+        // Of each of two recordings: spectra, responses, stabilisation, taps; the cloud, errors of the
+        // frequencies, mode shapes, the gap and its places.
+        assert_eq!(seen["figures"], 13, "{case}");
         assert!(seen["live"].as_u64() >= Some(10), "{case}: {seen}");
         assert!(seen["pictures"].as_u64() >= Some(11), "{case}: {seen}");
         assert!(
@@ -263,6 +266,7 @@ fn regress_the_page_works_in_a_browser() {
         let moved = number(seen["moved"].as_str().unwrap());
         assert!((moved - 50.0).abs() < 2.0, "{case}: moved to {moved}");
         points_answer(&seen["points"], &case);
+        titles_say_values(&seen["titles"], &case);
         assert!(
             seen["tap"].as_str().unwrap().starts_with("tap 2: used, "),
             "{case}: {}",
@@ -271,29 +275,100 @@ fn regress_the_page_works_in_a_browser() {
     }
 }
 
-/// Stabilisation diagrams and the cloud say what a point is, zoom in both directions, and change views.
+/// What the figures of points say of a point, by what they show, and how many there are.
+const ANSWERS: [(&str, usize, &[&str]); 6] = [
+    ("order ", 2, &["frequency ", " Hz", "damping ", " %"]),
+    ("Kx ", 1, &["Ky "]),
+    (
+        "used in the estimate, mode ",
+        1,
+        &["measured ", "predicted ", " Hz", "error ", " ± ", " %"],
+    ),
+    ("mode shape · ", 1, &["position ", " mm", "displacement "]),
+    (
+        "described model, joint fitted, mode ",
+        1,
+        &[
+            " in ",
+            "error of the frequency ",
+            " %",
+            " standard deviations",
+        ],
+    ),
+    (
+        "position from the joint ",
+        1,
+        &[" mm", "local change ", " ± ", " %"],
+    ),
+];
+
+/// Every figure of points says what a point is, and zooms in both directions; diagrams change views.
 fn points_answer(points: &Value, case: &str) {
     let points = points.as_array().unwrap();
-    assert_eq!(points.len(), 3, "{case}");
     let words = |figure: &Value, key: &str| figure[key].as_str().unwrap().to_owned();
-    let (cloud, diagrams): (Vec<&Value>, Vec<&Value>) = points
-        .iter()
-        .partition(|figure| words(figure, "met").contains("Kx"));
-    assert_eq!(cloud.len(), 1, "{case}: {points:?}");
-    assert!(
-        words(cloud[0], "zoomed").starts_with("shown: Kx "),
-        "{case}"
-    );
-    for diagram in diagrams {
-        for key in ["met", "again"] {
-            let said = words(diagram, key);
-            let all = ["frequency ", " Hz", "order ", "damping ", " %"];
-            assert!(all.iter().all(|part| said.contains(part)), "{case}: {said}");
+    for (name, count, parts) in ANSWERS {
+        let shown: Vec<&Value> = points
+            .iter()
+            .filter(|figure| words(figure, "met").contains(name))
+            .collect();
+        assert_eq!(shown.len(), count, "{case}: {name}: {points:?}");
+        for figure in shown {
+            let said = words(figure, "met");
+            assert!(
+                parts.iter().all(|part| said.contains(part)),
+                "{case}: {said}"
+            );
+            assert!(
+                words(figure, "zoomed").starts_with("shown: "),
+                "{case}: {figure}"
+            );
+            if name == "order " {
+                assert!(
+                    words(figure, "again").contains("order "),
+                    "{case}: {figure}"
+                );
+                assert_eq!(words(figure, "after"), "", "{case}: another view is whole");
+            }
         }
-        let zoomed = words(diagram, "zoomed");
-        let whole = zoomed.starts_with("shown: frequency ") && zoomed.contains(", order ");
-        assert!(whole, "{case}: {zoomed}");
-        assert_eq!(words(diagram, "after"), "", "{case}: another view is whole");
+    }
+    // The gap's second panel has the hypotheses.
+    let odds = points.iter().map(|figure| words(figure, "last"));
+    let odds: Vec<String> = odds.filter(|said| said.contains("probability ")).collect();
+    assert_eq!(odds.len(), 1, "{case}: {points:?}");
+    assert!(
+        odds[0].starts_with("found, sensor-mass · probability 99."),
+        "{case}: {odds:?}"
+    );
+}
+
+/// Without a script the pictures of the model say the same as titles.
+fn titles_say_values(titles: &Value, case: &str) {
+    let titles: Vec<&str> = titles
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
+    let kinds: [&[&str]; 6] = [
+        &[
+            "mode 1, measured 16.55",
+            " Hz, predicted ",
+            " Hz: error +",
+            " %, the reading ±",
+        ],
+        &["mode 2 at ", " mm: ", " of its largest displacement"],
+        &["sensor A: mode 1 at 338 mm: "],
+        &[
+            "mode 2 in low.wav: error ",
+            " % with the described model, ",
+            " % with the effect",
+        ],
+        &["sensor-mass: probability 99.", " %"],
+        &["at ", " mm: bending stiffness ", " ± ", " %, mass "],
+    ];
+    for parts in kinds {
+        let says = |title: &&str| parts.iter().all(|part| title.contains(part));
+        assert!(titles.iter().any(says), "{case}: {parts:?} in {titles:?}");
     }
 }
 

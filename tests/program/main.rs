@@ -6,6 +6,7 @@ mod browser;
 mod documents;
 mod export;
 mod first_steps;
+mod leftovers;
 mod schema;
 mod updated_model;
 

@@ -69,6 +69,14 @@ pub struct DeckJoint {
     pub cross: f64,
 }
 
+impl DeckJoint {
+    /// Whether the ground holds a direction without give.
+    fn is_held(&self) -> bool {
+        let rigid = self.translation.is_infinite() || self.rotation.is_infinite();
+        self.other.is_none() && rigid
+    }
+}
+
 /// Why there is no deck.
 #[derive(Debug, thiserror::Error)]
 pub enum DeckError {

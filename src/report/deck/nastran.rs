@@ -19,6 +19,9 @@ pub fn render_nastran(deck: &Deck) -> String {
     }
     let modes = deck.frequencies.len().max(5);
     text.push_str("SOL 103\nCEND\nTITLE = BEAM ON ITS JOINT\nECHO = NONE\n");
+    if deck.joint.is_some_and(|joint| joint.is_held()) {
+        text.push_str("SPC = 1\n");
+    }
     text.push_str("METHOD = 1\nDISPLACEMENT = ALL\nBEGIN BULK\nPARAM,COUPMASS,1\nPARAM,POST,-1\n");
     // Rigid-body motions of a structure that is not held lie below 1 Hz.
     let from = if deck.joint.is_some_and(|joint| joint.other.is_none()) {

@@ -1,7 +1,7 @@
 //! The picture of predicted beside measured frequencies.
 
 use super::super::document::{Document, PredictionSection};
-use super::super::format::{signed_percent, significant};
+use super::super::format::{bound_percent, signed_percent, significant};
 use super::super::tables::reading_bound;
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Align, Drawing, Stroke, Text};
@@ -20,10 +20,13 @@ const LEAST_SPAN: f64 = 0.02;
 const INNER_LEFT: f64 = LEFT + 8.0;
 
 /// One mode's error and the bound of its reading (%).
-struct Error<'a> {
-    prediction: &'a PredictionSection,
-    percent: f64,
-    bound: Option<f64>,
+pub struct Error<'a> {
+    /// What was predicted and measured.
+    pub prediction: &'a PredictionSection,
+    /// The error (%).
+    pub percent: f64,
+    /// Bound of the reading (%).
+    pub bound: Option<f64>,
 }
 
 /// Errors of the predicted frequencies; `None` where nothing was predicted for a measured mode.
@@ -55,7 +58,8 @@ pub fn draw_frequencies(document: &Document) -> Option<Drawing> {
     Some(drawing)
 }
 
-fn errors(document: &Document) -> Vec<Error<'_>> {
+/// The errors of all predicted modes that were measured.
+pub fn errors(document: &Document) -> Vec<Error<'_>> {
     let prediction = document.prediction.as_deref().unwrap_or_default();
     prediction
         .iter()
@@ -74,7 +78,8 @@ fn errors(document: &Document) -> Vec<Error<'_>> {
         .collect()
 }
 
-fn panel(errors: &[Error<'_>]) -> Panel {
+/// The axes: the modes side by side, and their errors (%).
+pub fn panel(errors: &[Error<'_>]) -> Panel {
     let ends = errors.iter().flat_map(|error| {
         let bound = error.bound.unwrap_or(0.0);
         [error.percent - bound, error.percent + bound, 0.0]
@@ -114,6 +119,33 @@ fn draw_error(drawing: &mut Drawing, panel: &Panel, index: usize, error: &Error<
         drawing.text_on_paper(text.colored(color));
     }
     draw_mode_label(drawing, panel, x, error, count);
+    let (half, sides) = (0.5 * (RIGHT - INNER_LEFT) / count as f64, panel.y);
+    let words = format!("{}: error {}", frequencies_words(error), error_words(error));
+    drawing.note((x - half, sides.to), (x + half, sides.from), words);
+}
+
+/// "mode 1, measured 16.5524 Hz, predicted 16.7220 Hz".
+pub fn frequencies_words(error: &Error<'_>) -> String {
+    let mut words = format!("mode {}", error.prediction.mode);
+    let both = [
+        ("measured", error.prediction.measured),
+        ("predicted", error.prediction.predicted),
+    ];
+    for (word, value) in both {
+        if let Some(value) = value {
+            words.push_str(&format!(", {word} {} Hz", significant(value, 6)));
+        }
+    }
+    words
+}
+
+/// "+1.0 %, the reading ±0.001 %".
+fn error_words(error: &Error<'_>) -> String {
+    let percent = format!("{} %", signed_percent(Some(error.percent)));
+    let bound = error.bound.map(bound_percent);
+    bound.map_or(percent.clone(), |bound| {
+        format!("{percent}, the reading {bound} %")
+    })
 }
 
 fn draw_mode_label(drawing: &mut Drawing, panel: &Panel, x: f64, error: &Error<'_>, count: usize) {

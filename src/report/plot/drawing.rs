@@ -17,6 +17,19 @@ pub struct Drawing {
     pub height: u32,
     /// Shapes in the order in which they cover each other.
     pub shapes: Vec<Shape>,
+    /// What places say to a pointer, where the picture stands in a page; later ones cover earlier ones.
+    pub notes: Vec<Note>,
+}
+
+/// What a place in the picture says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Note {
+    /// Upper left corner.
+    pub from: Point,
+    /// Lower right corner.
+    pub to: Point,
+    /// The words.
+    pub words: String,
 }
 
 /// One thing in a picture.
@@ -186,6 +199,7 @@ impl Drawing {
             width,
             height,
             shapes: vec![paper],
+            notes: Vec::new(),
         }
     }
 
@@ -253,6 +267,12 @@ impl Drawing {
             vec![(x - radius, y + radius), (x + radius, y - radius)],
             stroke,
         );
+    }
+
+    /// Lets a rectangle say something to a pointer.
+    pub fn note(&mut self, from: Point, to: Point, words: impl Into<String>) {
+        let words = words.into();
+        self.notes.push(Note { from, to, words });
     }
 
     /// Adds text.

@@ -1,6 +1,7 @@
 //! The picture of the gap: errors before and after the best hypothesis, and the odds.
 
 use super::super::document::{Document, GapSection, PullSection};
+use super::super::format::signed_percent;
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{BLUE, GRID, INK, SKY, SOFT, VERMILION};
@@ -14,7 +15,7 @@ const ODDS: (f64, f64) = (930.0, 1120.0);
 const TOP: f64 = 112.0;
 const BOTTOM: f64 = 450.0;
 /// Hypotheses shown.
-const MOST_BARS: usize = 9;
+pub const MOST_BARS: usize = 9;
 /// The axis reaches at least this far to either side of zero (%).
 const LEAST_SPAN: f64 = 0.02;
 
@@ -48,18 +49,8 @@ pub fn draw_gap(document: &Document) -> Option<Drawing> {
 }
 
 fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
-    let last = pulls.iter().map(|pull| pull.mode).max().unwrap_or(1);
-    let ends = pulls
-        .iter()
-        .flat_map(|pull| [pull.error_percent, pull.error_percent_after, 0.0]);
-    let (low, high) = extent(ends).unwrap_or((-1.0, 1.0));
-    let panel = Panel {
-        x: Axis::linear((0.4, last as f64 + 0.6), (LEFT + 8.0, ERRORS_RIGHT)),
-        y: Axis::linear(
-            padded((low.min(-LEAST_SPAN), high.max(LEAST_SPAN)), 0.1),
-            (BOTTOM, TOP),
-        ),
-    };
+    let panel = errors_panel(pulls);
+    let last = last_mode(pulls);
     panel.draw_y_ticks(drawing, &panel.y.ticks(36.0));
     let y = crisp(panel.y.place(0.0));
     drawing.line(
@@ -68,13 +59,24 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
     );
     panel.draw_frame(drawing);
     for pull in pulls {
-        // The recordings that saw a mode stand beside each other over half its width.
-        let seen = recordings(pulls.iter().filter(|other| other.mode == pull.mode));
-        let place = seen.iter().position(|name| *name == pull.recording);
-        let share = (place.unwrap_or(0) as f64 + 0.5) / seen.len().max(1) as f64;
-        let x = pull.mode as f64 + 0.5 * (share - 0.5);
-        drawing.ring(panel.place(x, pull.error_percent), 4.5, VERMILION);
-        drawing.dot(panel.place(x, pull.error_percent_after), 4.0, BLUE);
+        let x = abscissa(pulls, pull);
+        let before = panel.place(x, pull.error_percent);
+        let after = panel.place(x, pull.error_percent_after);
+        drawing.ring(before, 4.5, VERMILION);
+        drawing.dot(after, 4.0, BLUE);
+        let words = format!(
+            "mode {} in {}: error {} % with the described model, {} % with the effect",
+            pull.mode,
+            pull.recording,
+            signed_percent(Some(pull.error_percent)),
+            signed_percent(Some(pull.error_percent_after))
+        );
+        let (top, bottom) = (before.1.min(after.1), before.1.max(after.1));
+        drawing.note(
+            (before.0 - 6.0, top - 7.0),
+            (before.0 + 6.0, bottom + 7.0),
+            words,
+        );
     }
     for mode in 1..=last {
         let at = (panel.x.place(mode as f64), BOTTOM + 18.0);
@@ -95,6 +97,34 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
         (Sample::Dot(BLUE), format!("with the effect{withheld}")),
     ];
     draw_legend(drawing, (LEFT, 88.0), ERRORS_RIGHT, &legend);
+}
+
+/// The axes: mode numbers, and errors of their frequencies (%).
+pub fn errors_panel(pulls: &[PullSection]) -> Panel {
+    let ends = pulls
+        .iter()
+        .flat_map(|pull| [pull.error_percent, pull.error_percent_after, 0.0]);
+    let (low, high) = extent(ends).unwrap_or((-1.0, 1.0));
+    let last = last_mode(pulls) as f64 + 0.6;
+    Panel {
+        x: Axis::linear((0.4, last), (LEFT + 8.0, ERRORS_RIGHT)),
+        y: Axis::linear(
+            padded((low.min(-LEAST_SPAN), high.max(LEAST_SPAN)), 0.1),
+            (BOTTOM, TOP),
+        ),
+    }
+}
+
+fn last_mode(pulls: &[PullSection]) -> usize {
+    pulls.iter().map(|pull| pull.mode).max().unwrap_or(1)
+}
+
+/// Where an error stands: the recordings that saw a mode stand beside each other over half its width.
+pub fn abscissa(pulls: &[PullSection], pull: &PullSection) -> f64 {
+    let seen = recordings(pulls.iter().filter(|other| other.mode == pull.mode));
+    let place = seen.iter().position(|name| *name == pull.recording);
+    let share = (place.unwrap_or(0) as f64 + 0.5) / seen.len().max(1) as f64;
+    pull.mode as f64 + 0.5 * (share - 0.5)
 }
 
 /// Recordings in the order of their first error.
@@ -128,6 +158,8 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
         let name = Text::new(&found.effect, (ODDS.0 - 10.0, middle), TICK_SIZE);
         drawing.text(name.aligned(Align::End));
         let value = format!("{:.1}", 100.0 * found.probability);
+        let words = format!("{}: probability {value} %", found.effect);
+        drawing.note((ERRORS_RIGHT + 20.0, top), (ODDS.1, bottom), words);
         drawing.text(Text::new(value, (ODDS.1 + 8.0, middle), TICK_SIZE).colored(SOFT));
     }
 }

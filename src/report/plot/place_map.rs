@@ -1,6 +1,7 @@
 //! The picture of where along the beam the residual calls for a change.
 
-use super::super::document::Document;
+use super::super::document::{Document, PlaceMapSection};
+use super::super::format::{rounded, significant};
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Drawing, Point, Stroke};
 use super::palette::{BLUE, INK, VERMILION};
@@ -19,16 +20,7 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
         ),
         (&map.mass, &map.mass_std, BLUE, "mass"),
     ];
-    let ends = curves.iter().flat_map(|(values, stds, ..)| {
-        let pairs = values.iter().zip(stds.iter());
-        pairs.flat_map(|(value, std)| [100.0 * (value - std), 100.0 * (value + std)])
-    });
-    let (low, high) = extent(ends.chain([0.0]))?;
-    let last = *map.positions.last()?;
-    let step = map
-        .positions
-        .get(1)
-        .map_or(last, |second| second - map.positions[0]);
+    let panel = map_panel(map)?;
     let mut drawing = Drawing::new(
         "Where along the beam the gap calls for a change",
         WIDTH,
@@ -43,10 +35,6 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
             1e3 * map.resolution
         ),
     );
-    let panel = Panel {
-        x: Axis::linear((0.0, 1e3 * (last + 0.5 * step)), (LEFT + 8.0, RIGHT)),
-        y: Axis::linear(padded((low, high), 0.08), (366.0, 108.0)),
-    };
     panel.draw_y_ticks(&mut drawing, &panel.y.ticks(36.0));
     panel.draw_x_ticks(&mut drawing, &panel.x.ticks(X_SPACING));
     let zero = crisp(panel.y.place(0.0));
@@ -78,5 +66,56 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
         .map(|(.., color, name)| (Sample::Dot(*color), (*name).to_owned()))
         .collect();
     draw_legend(&mut drawing, (LEFT, 86.0), RIGHT, &legend);
+    note_places(&mut drawing, &panel, map);
     Some(drawing)
+}
+
+/// The axes: the position (mm) and the local change (%); `None` without a value.
+pub fn map_panel(map: &PlaceMapSection) -> Option<Panel> {
+    let curves = [
+        (&map.stiffness, &map.stiffness_std),
+        (&map.mass, &map.mass_std),
+    ];
+    let ends = curves.iter().flat_map(|(values, stds)| {
+        let pairs = values.iter().zip(stds.iter());
+        pairs.flat_map(|(value, std)| [100.0 * (value - std), 100.0 * (value + std)])
+    });
+    let (low, high) = extent(ends.chain([0.0]))?;
+    let last = *map.positions.last()?;
+    Some(Panel {
+        x: Axis::linear((0.0, 1e3 * (last + 0.5 * step(map))), (LEFT + 8.0, RIGHT)),
+        y: Axis::linear(padded((low, high), 0.08), (366.0, 108.0)),
+    })
+}
+
+/// Distance of the places (m).
+fn step(map: &PlaceMapSection) -> f64 {
+    match map.positions.as_slice() {
+        [first, second, ..] => second - first,
+        [only] => *only,
+        [] => 0.0,
+    }
+}
+
+/// Every place says both changes.
+fn note_places(drawing: &mut Drawing, panel: &Panel, map: &PlaceMapSection) {
+    let half = 0.5 * step(map);
+    for (index, at) in map.positions.iter().enumerate() {
+        let change = |values: &[f64], stds: &[f64]| {
+            let value = values.get(index).map_or(f64::NAN, |value| 100.0 * value);
+            rounded(value, stds.get(index).map(|std| 100.0 * std)).joined()
+        };
+        let words = format!(
+            "at {} mm: bending stiffness {} %, mass {} %",
+            significant(1e3 * at, 3),
+            change(&map.stiffness, &map.stiffness_std),
+            change(&map.mass, &map.mass_std)
+        );
+        let edge = |place: f64| panel.x.place(1e3 * place);
+        drawing.note(
+            (edge(at - half), panel.y.to),
+            (edge(at + half), panel.y.from),
+            words,
+        );
+    }
 }

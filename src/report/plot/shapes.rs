@@ -21,19 +21,29 @@ const SPACE: f64 = 36.0;
 /// Top of the first row (pixels).
 const TOP: f64 = 104.0;
 
+/// Pieces of a beam that each say what the mode does there.
+const PIECES: usize = 24;
+
 /// What stands on the beam: name and place (m), each place once.
-struct Places {
-    sensors: BTreeMap<String, Vec<f64>>,
-    taps: Vec<f64>,
+pub struct Places {
+    /// Sensors.
+    pub sensors: BTreeMap<String, Vec<f64>>,
+    /// Taps.
+    pub taps: Vec<f64>,
+}
+
+/// The modes that are drawn.
+pub fn shown(document: &Document) -> &[ModeShapeSection] {
+    let shapes = document.mode_shapes.as_deref().unwrap_or_default();
+    &shapes[..shapes.len().min(MOST)]
 }
 
 /// Shapes of the predicted modes; `None` without any.
 pub fn draw_shapes(document: &Document) -> Option<Drawing> {
-    let shapes = document
-        .mode_shapes
-        .as_deref()
-        .filter(|shapes| !shapes.is_empty())?;
-    let shown = &shapes[..shapes.len().min(MOST)];
+    let shown = shown(document);
+    if shown.is_empty() {
+        return None;
+    }
     let rows = shown.len().div_ceil(ACROSS);
     let height = TOP + rows as f64 * (HEIGHT + SPACE) + 10.0;
     let mut drawing = Drawing::new("Mode shapes with sensors and taps", WIDTH, height as u32);
@@ -99,12 +109,15 @@ fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, pl
             .colored(SOFT)
             .aligned(Align::End),
     );
+    note_pieces(drawing, panel, shape);
     for place in &places.taps {
+        note_site(drawing, panel, shape, ("tap", *place));
         let at = panel.place(*place, displacement(shape, *place));
         drawing.cross(at, 6.0, Stroke::new(VERMILION, 2.5));
     }
     for (name, sites) in &places.sensors {
         for place in sites {
+            note_site(drawing, panel, shape, (&format!("sensor {name}"), *place));
             let at = panel.place(*place, displacement(shape, *place));
             drawing.dot(at, 6.5, WHITE);
             drawing.dot(at, 5.0, ORANGE);
@@ -119,15 +132,49 @@ fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, pl
     }
 }
 
+/// "mode 1 at 120 mm: 0.43 of its largest displacement".
+fn words_at(shape: &ModeShapeSection, place: f64) -> String {
+    let value = significant(displacement(shape, place), 2);
+    let place = significant(1e3 * place, 3);
+    format!(
+        "mode {} at {place} mm: {value} of its largest displacement",
+        shape.mode
+    )
+}
+
+fn note_pieces(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection) {
+    let step = (panel.x.high - panel.x.low) / PIECES as f64;
+    for piece in 0..PIECES {
+        let middle = panel.x.low + (piece as f64 + 0.5) * step;
+        let edge = |side: f64| panel.x.place(middle + side * step);
+        drawing.note(
+            (edge(-0.5), panel.y.to),
+            (edge(0.5), panel.y.from),
+            words_at(shape, middle),
+        );
+    }
+}
+
+fn note_site(
+    drawing: &mut Drawing,
+    panel: &Panel,
+    shape: &ModeShapeSection,
+    (name, place): (&str, f64),
+) {
+    let (x, y) = panel.place(place, displacement(shape, place));
+    let words = format!("{name}: {}", words_at(shape, place));
+    drawing.note((x - 8.0, y - 8.0), (x + 8.0, y + 8.0), words);
+}
+
 /// Where a lap joint sits (m): its place stands twice.
-fn joint_of(shape: &ModeShapeSection) -> Option<f64> {
+pub fn joint_of(shape: &ModeShapeSection) -> Option<f64> {
     let mut pairs = shape.positions.windows(2);
     let twice = pairs.find(|pair| pair[0] == pair[1])?;
     twice.first().copied()
 }
 
 /// Displacement at a place, between the points next to it.
-fn displacement(shape: &ModeShapeSection, place: f64) -> f64 {
+pub fn displacement(shape: &ModeShapeSection, place: f64) -> f64 {
     let after = shape.positions.partition_point(|x| *x < place);
     let point = |index: usize| {
         Some((
@@ -142,7 +189,8 @@ fn displacement(shape: &ModeShapeSection, place: f64) -> f64 {
     }
 }
 
-fn places(document: &Document) -> Places {
+/// Where sensors and taps of all recordings are.
+pub fn places(document: &Document) -> Places {
     let mut places = Places {
         sensors: BTreeMap::new(),
         taps: Vec::new(),

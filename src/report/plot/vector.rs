@@ -6,7 +6,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontTransform, RGBColor, ShapeStyle, TextStyle};
 
 use super::super::ReportError;
-use super::drawing::{Align, Direction, Drawing, Point, Shape, Text, ring_hole};
+use super::drawing::{Align, Direction, Drawing, Note, Point, Shape, Text, ring_hole};
 use super::font::{self, Weight};
 use super::letters::Letters;
 use super::palette::{Color, WHITE};
@@ -20,7 +20,8 @@ pub(super) const UNITS: f64 = 4.0;
 const BACKEND_FONT_RATIO: f64 = 1.24;
 
 /// The picture as an `<svg>` element without fixed size, which fills the width it is given. A name
-/// space is not needed inside HTML, a description for screen readers is.
+/// space is not needed inside HTML, a description for screen readers is. Its notes are titles, which
+/// browsers show without any script.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
@@ -29,7 +30,8 @@ pub fn render_svg(drawing: &Drawing) -> Result<String, ReportError> {
     let (width, height) = size(drawing);
     let words = escaped(&drawing.description);
     Ok(format!(
-        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{words}\">{body}</svg>"
+        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{words}\">{body}{}</svg>",
+        notes(drawing)
     ))
 }
 
@@ -52,6 +54,21 @@ pub fn render_svg_file(drawing: &Drawing) -> Result<String, ReportError> {
         drawing.height,
         escaped(&drawing.description)
     ))
+}
+
+/// Invisible rectangles that say something.
+fn notes(drawing: &Drawing) -> String {
+    let element = |note: &Note| {
+        let ((left, top), (right, bottom)) = (place(note.from), place(note.to));
+        format!(
+            "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" \
+             pointer-events=\"all\"><title>{}</title></rect>\n",
+            (right - left).max(0),
+            (bottom - top).max(0),
+            escaped(&note.words)
+        )
+    };
+    drawing.notes.iter().map(element).collect()
 }
 
 fn size(drawing: &Drawing) -> (u32, u32) {

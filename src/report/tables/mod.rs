@@ -70,6 +70,8 @@ impl Kind {
 pub enum Place {
     /// Everywhere.
     Everywhere,
+    /// On the page, and in a terminal where 80 columns have room for it.
+    Spacious,
     /// On the page only: a terminal of 80 columns has no room.
     Page,
 }
@@ -141,6 +143,12 @@ impl Column {
     /// The same column, on the page only.
     fn on_page(mut self) -> Column {
         self.place = Place::Page;
+        self
+    }
+
+    /// The same column, in a terminal only where there is room.
+    fn where_room(mut self) -> Column {
+        self.place = Place::Spacious;
         self
     }
 

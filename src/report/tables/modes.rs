@@ -181,7 +181,7 @@ fn columns() -> Vec<Column> {
         number("Damping (%)"),
         number("Tap deviation (Hz)").on_page(),
         number("p").on_page(),
-        number("\u{3bb} (1)"),
+        number("\u{3bb} (1)").where_room(),
         number("Prominence (dB)").on_page(),
         number("Above noise (dB)").on_page(),
         number("Coherence").on_page(),

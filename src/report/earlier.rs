@@ -1,0 +1,51 @@
+//! What an earlier run may have left in a report's folder, so that nothing old stays beside what is new.
+
+use serde_json::Value;
+
+use super::run::stems;
+
+/// The model that a diagnosis leads to, beside the report.
+pub const MODEL_FILE: &str = "updated-model.toml";
+/// Files of words.
+const WORDS: [&str; 6] = [
+    "report.html",
+    "report.json",
+    "parameters.csv",
+    "modes.csv",
+    "perturbation.csv",
+    MODEL_FILE,
+];
+/// Pictures of the whole test.
+const OF_TEST: [&str; 5] = ["frequencies", "mode-shapes", "cloud", "gap", "gap-place"];
+/// Pictures of each recording, followed by its name.
+const OF_RECORDING: [&str; 5] = ["spectrum", "frf", "stabilisation", "amplitude", "taps"];
+
+/// Names of all files that a run may have written beside this `report.json`; empty where the text is none
+/// of ours. Pictures of recordings that it does not name are somebody else's.
+pub fn earlier_files(report_json: &str) -> Vec<String> {
+    let Ok(report) = serde_json::from_str::<Value>(report_json) else {
+        return Vec::new();
+    };
+    let ours = report["version"].is_u64() && report["warnings"].is_array();
+    if !ours {
+        return Vec::new();
+    }
+    let recordings = report["recordings"].as_array();
+    let files = recordings
+        .into_iter()
+        .flatten()
+        .filter_map(|recording| recording["file"].as_str());
+    let of_recordings = stems(files)
+        .into_iter()
+        .flat_map(|stem| OF_RECORDING.map(|kind| format!("{kind}-{stem}")));
+    let pictures = OF_TEST
+        .map(str::to_owned)
+        .into_iter()
+        .chain(of_recordings)
+        .flat_map(|name| [format!("{name}.png"), format!("{name}.svg")]);
+    WORDS
+        .map(str::to_owned)
+        .into_iter()
+        .chain(pictures)
+        .collect()
+}

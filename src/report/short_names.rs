@@ -1,0 +1,175 @@
+//! Names of files that are too long, shortened so that no two of them look alike.
+
+use std::collections::BTreeSet;
+
+/// Stands for what is left out.
+const LEFT_OUT: char = '\u{2026}';
+/// Shortest a name becomes (characters).
+const SHORTEST: usize = 4;
+
+/// The same names in ways that take less and less room: as they are, without the folder and the ending
+/// that all share, without the words that all begin and end with, and at last without their middles. A way
+/// in which two names would be the same is left out.
+pub fn ways(names: &[String]) -> Vec<Vec<String>> {
+    let plain = without_ending(&without_folder(names));
+    let cores = cores(&plain);
+    let longest = cores.iter().map(|core| core.chars().count()).max();
+    let shorter = (SHORTEST..longest.unwrap_or(0)).rev();
+    let middles = shorter.map(|width| cores.iter().map(|core| middle_out(core, width)).collect());
+    let mut ways = vec![names.to_vec(), plain.clone(), cores.clone()];
+    ways.extend(middles);
+    let apart = |way: &Vec<String>| way.iter().collect::<BTreeSet<_>>().len() == names.len();
+    ways.retain(apart);
+    ways
+}
+
+fn without_folder(names: &[String]) -> Vec<String> {
+    let folder = |name: &str| name.rfind(['/', '\\']).map_or(0, |place| place + 1);
+    let first = names.first().map_or("", |name| &name[..folder(name)]);
+    if names.iter().any(|name| &name[..folder(name)] != first) {
+        return names.to_vec();
+    }
+    let without = |name: &String| name[first.len()..].to_owned();
+    names.iter().map(without).collect()
+}
+
+fn without_ending(names: &[String]) -> Vec<String> {
+    let ending = |name: &String| name.rfind('.').filter(|place| *place > 0);
+    let first = names.first();
+    let Some(shared) = first.and_then(|name| Some(name[ending(name)?..].to_owned())) else {
+        return names.to_vec();
+    };
+    if names
+        .iter()
+        .any(|name| ending(name).map(|place| &name[place..]) != Some(&shared))
+    {
+        return names.to_vec();
+    }
+    let without = |name: &String| name[..name.len() - shared.len()].to_owned();
+    names.iter().map(without).collect()
+}
+
+/// The names without the words that all of them begin and end with.
+fn cores(names: &[String]) -> Vec<String> {
+    let letters: Vec<Vec<char>> = names.iter().map(|name| name.chars().collect()).collect();
+    let Some((first, others)) = letters
+        .split_first()
+        .filter(|(_, others)| !others.is_empty())
+    else {
+        return names.to_vec();
+    };
+    let least = letters.iter().map(Vec::len).min().unwrap_or(0);
+    let same = |at: usize| others.iter().all(|other| other[at] == first[at]);
+    let mut begin = (0..least).find(|at| !same(*at)).unwrap_or(least);
+    while begin > 0 && letters.iter().any(|name| inside_word(name, begin)) {
+        begin -= 1;
+    }
+    let from_end = |name: &[char], back: usize| name[name.len() - 1 - back];
+    let same = |back: usize| {
+        let last = from_end(first, back);
+        others.iter().all(|other| from_end(other, back) == last)
+    };
+    let most = least - begin;
+    let mut end = (0..most).find(|back| !same(*back)).unwrap_or(most);
+    while end > 0
+        && letters
+            .iter()
+            .any(|name| inside_word(name, name.len() - end))
+    {
+        end -= 1;
+    }
+    // A letter or two at either side is no more than what would stand for it.
+    let (begin, end) = (
+        if begin > 1 { begin } else { 0 },
+        if end > 1 { end } else { 0 },
+    );
+    if letters.iter().any(|name| name.len() == begin + end) {
+        return names.to_vec();
+    }
+    let core = |name: &Vec<char>| {
+        let mut core = String::new();
+        core.extend((begin > 0).then_some(LEFT_OUT));
+        core.extend(&name[begin..name.len() - end]);
+        core.extend((end > 0).then_some(LEFT_OUT));
+        core
+    };
+    letters.iter().map(core).collect()
+}
+
+/// Whether a name would be cut inside a word or a number there.
+fn inside_word(name: &[char], at: usize) -> bool {
+    let sides = at
+        .checked_sub(1)
+        .and_then(|before| Some((name.get(before)?, name.get(at)?)));
+    sides.is_some_and(|(before, after)| {
+        let both = |kind: fn(&char) -> bool| kind(before) && kind(after);
+        both(|c| c.is_alphabetic()) || both(|c| c.is_numeric())
+    })
+}
+
+/// A name of at most `width` characters: its middle gives way.
+fn middle_out(name: &str, width: usize) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    if letters.len() <= width {
+        return name.to_owned();
+    }
+    let kept = width.saturating_sub(1);
+    let (head, tail) = (kept - kept / 2, kept / 2);
+    let first = letters.iter().take(head);
+    let last = letters.iter().skip(letters.len() - tail);
+    first.chain(&[LEFT_OUT]).chain(last).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shortest_that_fit(names: &[&str], width: usize) -> Vec<String> {
+        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        let fits = |way: &Vec<String>| way.iter().all(|name| name.chars().count() <= width);
+        ways(&names).into_iter().find(fits).unwrap_or_default()
+    }
+
+    #[test]
+    fn val_names_lose_first_what_they_share() {
+        let cases: [(&[&str], usize, &[&str]); 8] = [
+            (&["a.wav", "b.wav"], 8, &["a.wav", "b.wav"]),
+            (&["first.wav", "moved.wav"], 8, &["first", "moved"]),
+            (&["low.wav", "low.csv"], 5, &["…wav", "…csv"]),
+            (&["run-1.wav", "run-1-b.wav"], 7, &["run-1", "run-1-b"]),
+            (&["day/first.wav", "day/low.wav"], 9, &["first", "low"]),
+            (
+                &["beam-visit-11.wav", "beam-visit-12.wav"],
+                8,
+                &["…11", "…12"],
+            ),
+            (
+                &["2026-03-14_north_steel.wav", "2026-03-14_south_steel.wav"],
+                8,
+                &["…north…", "…south…"],
+            ),
+            (
+                &["measurement_before_noon.wav", "another.wav"],
+                8,
+                &["meas…oon", "another"],
+            ),
+        ];
+        for (names, width, expected) in cases {
+            assert_eq!(shortest_that_fit(names, width), expected, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn prop_no_two_names_ever_look_alike() {
+        // Head and tail are the same: that way is not offered.
+        let names = ["abcdefgh-x-stuvwxyz", "abcdefgh-y-stuvwxyz", "abc", ""].map(str::to_owned);
+        for way in ways(&names) {
+            let apart: BTreeSet<&String> = way.iter().collect();
+            assert_eq!(apart.len(), names.len(), "{way:?}");
+        }
+        assert_eq!(
+            ways(&[]),
+            Vec::<Vec<String>>::from([vec![], vec![], vec![]])
+        );
+    }
+}

@@ -1,0 +1,70 @@
+//! A run into a folder that holds an earlier report.
+
+use super::{samples, tapjoint};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+fn names(folder: &Path) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name();
+    entries
+        .map(|entry| name(entry).to_string_lossy().into_owned())
+        .collect()
+}
+
+#[test]
+fn regress_a_run_leaves_nothing_of_an_earlier_one() {
+    let folder = samples();
+    let test = folder.path().join("recordings/cantilever/test.toml");
+    let run = |out: &str| {
+        tapjoint(
+            folder.path(),
+            &["run", &test.to_string_lossy(), "--out", out],
+            0,
+        )
+    };
+    run("report");
+    let report = folder.path().join("report");
+    let first = names(&report);
+    for name in ["updated-model.toml", "gap.svg", "spectrum-high.png"] {
+        assert!(first.contains(name), "{name} in {first:?}");
+    }
+    let foreign = ["notes.txt", "spectrum-mine.png", "taps-high-old.svg"];
+    for name in foreign {
+        std::fs::write(report.join(name), "mine").unwrap();
+    }
+    // Without the second recording there are fewer pictures, and of three modes no diagnosis names a cause.
+    let text = std::fs::read_to_string(&test).unwrap();
+    let (before, after) = text.rsplit_once("[[recording]]").unwrap();
+    assert!(after.contains("high.wav"), "{after}");
+    std::fs::write(&test, before).unwrap();
+    run("report");
+    run("fresh");
+    let mut expected = names(&folder.path().join("fresh"));
+    assert!(
+        !expected.contains("spectrum-high.png") && !expected.contains("updated-model.toml"),
+        "{expected:?}"
+    );
+    expected.extend(foreign.map(str::to_owned));
+    assert_eq!(names(&report), expected);
+    for name in foreign {
+        assert_eq!(
+            std::fs::read_to_string(report.join(name)).unwrap(),
+            "mine",
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn regress_a_folder_without_a_report_is_left_as_it_is() {
+    let folder = samples();
+    let report = folder.path().join("pictures");
+    std::fs::create_dir(&report).unwrap();
+    // The name of a picture of ours, in a folder that holds no report: somebody else's.
+    std::fs::write(report.join("amplitude-low.png"), "mine").unwrap();
+    let test = "recordings/cantilever/test.toml";
+    tapjoint(folder.path(), &["run", test, "--out", "pictures"], 0);
+    let kept = std::fs::read_to_string(report.join("amplitude-low.png")).unwrap();
+    assert_eq!(kept, "mine");
+}

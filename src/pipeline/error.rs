@@ -44,7 +44,7 @@ pub enum PipelineError {
         /// The key: "sensor[2].channel".
         key: String,
         /// What the recording has instead.
-        problem: RecordingError,
+        problem: Box<RecordingError>,
     },
     /// A description without sensors.
     #[error(

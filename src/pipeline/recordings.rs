@@ -138,7 +138,7 @@ fn open_described(
             file: test_file.to_string(),
             line: place.line,
             key: place.key.clone(),
-            problem,
+            problem: Box::new(problem),
         })
     };
     let hammer = match &test.hammer {

@@ -217,7 +217,7 @@ fn regress_large_errors_of_left_out_recordings_are_told_whole() {
         drift: 1e-3,
         ..five_recordings()
     };
-    let diagnosis = diagnosed(&plan, 0.0, &truth, 13);
+    let diagnosis = diagnosed(&plan, &truth, 13);
     let mut all = diagnosis.hypotheses.iter();
     let none = all.find(|one| one.hypothesis.name() == "none").unwrap();
     let found = none.left_out_recordings.clone().unwrap();

@@ -97,6 +97,7 @@ fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recor
         tap: Some(0.04),
         sensor_positions: [("A".to_owned(), 0.338)].into(),
         torque: Some(12.0),
+        masses: Vec::new(),
         temperature: None,
         date: None,
         channel_details: Vec::new(),

@@ -33,12 +33,8 @@ impl LeftOutErrors {
         let recordings: Vec<(String, WithheldErrors)> = visits
             .into_iter()
             .filter_map(|visit| {
-                let label = &frame
-                    .setups
-                    .iter()
-                    .find(|setup| setup.visit == visit)?
-                    .label;
-                Some((label.clone(), without(frame, &residuals, visit)?))
+                let file = &frame.setups.iter().find(|setup| setup.visit == visit)?.file;
+                Some((file.clone(), without(frame, &residuals, visit)?))
             })
             .collect();
         (!recordings.is_empty()).then_some(LeftOutErrors { recordings })

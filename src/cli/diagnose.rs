@@ -26,7 +26,7 @@ pub(super) struct DiagnoseArguments {
     test: PathBuf,
     #[command(flatten)]
     frequencies: FrequencyArguments,
-    /// Write the model with what was found, for `tapjoint predict`
+    /// Write the model with what was found, for `tapjoint predict`; none where nothing explains the readings
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 }
@@ -75,6 +75,6 @@ fn no_model(diagnosis: Option<&Diagnosis>) -> &'static str {
         Some(Verdict::Unknown) => {
             "there is no model to write: nothing in the catalogue explains the readings"
         }
-        Some(_) => "there is no model to write: what was found is no structure of this description",
+        Some(_) => "there is no model to write: what was found cannot be written as a description",
     }
 }

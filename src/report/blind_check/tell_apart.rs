@@ -8,8 +8,8 @@ use crate::study::blind_check::{
 };
 
 /// What the columns say.
-const EXPLAINED: &str = "first: the diagnosis puts its kind first; named: the verdict gives it as the answer (of none: \"no-gap\");\n\
-                         else first: what came first instead, and how often.";
+const EXPLAINED: &str = "first: the diagnosis puts its kind first; named: the verdict gives it as the\n\
+                         answer (of none: \"no-gap\"); else first: what came first instead, how often.\n";
 
 /// For each kind of effect: how often it came first, how often it was named, and what came first
 /// instead; then the figures of what was drawn. What a blind check of whole tests aims at is no target here.
@@ -52,7 +52,7 @@ pub fn tell_apart(cases: &[Case]) -> String {
         text.push('\n');
     }
     format!(
-        "{text}{EXPLAINED}\n\n{}",
+        "{text}{EXPLAINED}\n{}",
         render_rows(&drawn_rows(&score(cases)))
     )
 }

@@ -157,9 +157,15 @@ fn drawn(
         .map(|index| campaign.draw(index))
         .collect::<Result<Vec<_>, _>>()?;
     // What could be noticed at all is part of the truth, and takes a while.
+    let done = AtomicUsize::new(0);
     let truths = tests
         .par_iter()
-        .map(DrawnTest::with_limits)
+        .map(|test| {
+            let truth = test.with_limits();
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            terminal.count("tests drawn", done, tests.len());
+            truth
+        })
         .collect::<Result<Vec<Truth>, _>>()?;
     let sealed = tapjoint::report::blind_check::truths_json(&truths)?;
     terminal.say(&format!(

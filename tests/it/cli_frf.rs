@@ -101,7 +101,7 @@ fn regress_every_mode_lies_within_the_band() {
     for scale in ["500", "1"] {
         let document = json(
             folder.path(),
-            &[&["low.wav"], &scales[..], &[scale]].concat(),
+            &[&["low.wav"][..], &scales[..], &[scale]].concat(),
         );
         let modes = document["modes"].as_array().unwrap();
         assert!(modes.len() >= 4, "{modes:?}");

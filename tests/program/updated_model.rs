@@ -195,7 +195,7 @@ fn regress_what_the_diagnosis_refuses_is_no_model() {
     // No beam has such frequencies, nor would any effect give it them.
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
-        "{BEAM}[joint]\nkind = \"cantilever\"\n{SENSOR}[measured]\nfrequencies = [17, 118, 290, 700, 940, 1500, 1900]\nstd = 0.01\n"
+        "{BEAM}[joint]\nkind = \"cantilever\"\n{SENSOR}[measured]\nfrequencies = [17, 118, 290, 700, 940]\nstd = 0.01\n"
     );
     fs::write(folder.path().join("test.toml"), text).unwrap();
     let arguments = ["diagnose", "test.toml", "--model", "model.toml"];

@@ -6,6 +6,7 @@ use super::output::OutputFolder;
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,6 +40,7 @@ pub(super) struct BlindCheckArguments {
         long,
         value_name = "N",
         default_value_t = 190,
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=1_000_000),
         conflicts_with = "folder"
     )]
     cases: usize,
@@ -64,7 +66,8 @@ pub(super) struct BlindCheckArguments {
     /// Folder of tests made elsewhere, each a folder with test.toml and recordings
     #[arg(long, value_name = "DIR", requires = "truth")]
     folder: Option<PathBuf>,
-    /// What was planted in them: JSON list of {"name", "effects", "params"}
+    /// What was planted in them: JSON list of {"name", "effects", "params"}, and if that is known
+    /// "detectable" and "refutable" (true or false), as --keep writes them
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,
     /// Keep the drawn tests in this new folder, each with its recordings and its description, and beside
@@ -153,7 +156,18 @@ fn drawn(
         .into_par_iter()
         .map(|index| campaign.draw(index))
         .collect::<Result<Vec<_>, _>>()?;
-    let sealed = sealed_text(&tests)?;
+    // What could be noticed at all is part of the truth, and takes a while.
+    let done = AtomicUsize::new(0);
+    let truths = tests
+        .par_iter()
+        .map(|test| {
+            let truth = test.with_limits();
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            terminal.count("tests drawn", done, tests.len());
+            truth
+        })
+        .collect::<Result<Vec<Truth>, _>>()?;
+    let sealed = tapjoint::report::blind_check::truths_json(&truths)?;
     terminal.say(&format!(
         "{} tests drawn; SHA-256 of truth.json: {}",
         tests.len(),
@@ -162,15 +176,15 @@ fn drawn(
     let done = AtomicUsize::new(0);
     let diagnosed = tests
         .par_iter()
-        .map(|test| {
+        .zip(&truths)
+        .map(|(test, truth)| {
             let recorded = test.record()?;
-            let truth = test.with_limits()?;
             let case = match &staged {
                 Some(staged) => {
                     let folder = staged.folder.path().join(&test.truth.name);
-                    diagnose_recorded(&recorded, &truth, &folder)?
+                    diagnose_recorded(&recorded, truth, &folder)?
                 }
-                None => diagnose_in_passing(&recorded, &truth)?,
+                None => diagnose_in_passing(&recorded, truth)?,
             };
             terminal.count(
                 "tests diagnosed",
@@ -216,12 +230,6 @@ impl Staged {
         fs::rename(self.folder.path(), &self.name).with_context(written)?;
         Ok(())
     }
-}
-
-/// The truths as the file that is written at the end.
-fn sealed_text(tests: &[DrawnTest]) -> anyhow::Result<String> {
-    let truths: Vec<Truth> = tests.iter().map(|test| test.truth.clone()).collect();
-    Ok(tapjoint::report::blind_check::truths_json(&truths)?)
 }
 
 /// The first tests again under other names: the answers must not change.

@@ -7,7 +7,7 @@ use super::terminal::Terminal;
 use super::updated_model::add_model;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tapjoint::gap::GapSettings;
+use tapjoint::gap::{Diagnosis, GapSettings, Verdict};
 use tapjoint::pipeline::{IdentifySettings, diagnose_test};
 use tapjoint::report::{document_of, gap_section, render_gap_text};
 
@@ -26,7 +26,7 @@ pub(super) struct DiagnoseArguments {
     test: PathBuf,
     #[command(flatten)]
     frequencies: FrequencyArguments,
-    /// Write the model with what was found, for `tapjoint predict`
+    /// Write the model with what was found, for `tapjoint predict`; none where nothing explains the readings
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 }
@@ -56,7 +56,7 @@ pub(super) fn run(
     document.gap = Some(gap);
     match (output, text) {
         (Some(output), Some(text)) => output.write(text.as_bytes())?,
-        (Some(_), None) => terminal.warn("there is no model to write: nothing was diagnosed"),
+        (Some(_), None) => terminal.warn(no_model(diagnosis.as_ref().ok())),
         (None, _) => {}
     }
     terminal.say(&render_gap_text(&document))?;
@@ -66,4 +66,15 @@ pub(super) fn run(
     } else {
         Outcome::NoAnswer
     })
+}
+
+/// Why there is no model to write.
+fn no_model(diagnosis: Option<&Diagnosis>) -> &'static str {
+    match diagnosis.map(|found| &found.verdict) {
+        None => "there is no model to write: nothing was diagnosed",
+        Some(Verdict::Unknown) => {
+            "there is no model to write: nothing in the catalogue explains the readings"
+        }
+        Some(_) => "there is no model to write: what was found cannot be written as a description",
+    }
 }

@@ -19,7 +19,7 @@ use tapjoint::study::plan::{PlanSettings, judge_plan};
 ///
 /// Recordings, sensors, taps and levels are those of the description; the files need not be there.
 /// Effects of every kind are drawn, observed as planned, and diagnosed; the table counts what came
-/// first.
+/// first. The joint gives way both ways: --kx and --ky must be positive and finite here.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint plan test.toml --modes 7 --std 0.02")]
 pub(super) struct PlanArguments {
@@ -42,6 +42,10 @@ pub(super) struct PlanArguments {
     png: Option<PathBuf>,
 }
 
+/// Largest standard uncertainty of a frequency (%): modes of a beam are farther apart, and with less nothing
+/// could be told.
+const MOST_STD: f64 = 10.0;
+
 pub(super) fn run(
     arguments: &PlanArguments,
     seed: u64,
@@ -50,8 +54,8 @@ pub(super) fn run(
     let file = read_test(&arguments.test, &terminal)?;
     let std = arguments.std;
     ensure!(
-        std > 0.0 && std.is_finite(),
-        "--std {std}: give a positive number"
+        std > 0.0 && std <= MOST_STD,
+        "--std {std}: give percent above 0, at most {MOST_STD}"
     );
     let png = arguments
         .png
@@ -92,7 +96,7 @@ fn planned_joint(
     for (name, value) in joint.iter().flat_map(|j| [("--kx", j.kx), ("--ky", j.ky)]) {
         ensure!(
             value > 0.0 && value.is_finite(),
-            "{name} {value}: give a positive number"
+            "{name} {value}: give a positive finite number, for the joint of a plan gives way"
         );
     }
     let coupled = joint.is_some_and(|joint| joint.cross_compliance != 0.0);

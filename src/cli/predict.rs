@@ -5,7 +5,8 @@ use super::choices::KindArgument;
 use super::input::{TestFile, read_model};
 use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
-use anyhow::{anyhow, bail};
+use super::updated_model::effect_at;
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
@@ -15,7 +16,7 @@ use tapjoint::pipeline::{TestedStructure, predict_described, structure_details, 
 use tapjoint::report::document::{Document, PredictionSection};
 use tapjoint::report::{lambdas_of, prediction_of, render_text};
 use tapjoint::structure::{Assembly, JointStiffness};
-use tapjoint::study::updated_model::{described_effects, frequencies_with};
+use tapjoint::study::updated_model::described_frequencies;
 
 /// Predict the natural frequencies of a beam with a known joint, in Hz and as lambda.
 ///
@@ -104,7 +105,8 @@ pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::R
                 None => described_joint(&structure, &file.name)?,
             };
             let details = structure_details(&file.test, &structure.beam);
-            let rows = predict_described(&structure, &details, &joint, request.modes)?;
+            let rows = predict_described(&structure, &details, &joint, request.modes)
+                .with_context(|| file.name.clone())?;
             prediction_of(&file.test.name, &structure, &rows)
         }
         Subject::Kind(kind) => {
@@ -126,8 +128,8 @@ fn with_effects(
     if request.stiffness.is_some() {
         bail!("effects go with the joint they were found with; leave out --kx, --ky and --kz");
     }
-    let effects = described_effects(&file.test).map_err(|e| anyhow!("{}: {e}", file.name))?;
-    let frequencies = frequencies_with(&file.test, &effects, None, request.modes)?;
+    let frequencies = described_frequencies(&file.test, request.modes)
+        .map_err(|error| effect_at(&file.name, &error))?;
     let rows = frequencies
         .iter()
         .enumerate()

@@ -82,6 +82,16 @@ impl Effect {
     }
 }
 
+impl EffectId {
+    /// Its parameter of that name.
+    ///
+    /// # Errors
+    /// [`EffectError::UnknownParameter`], with the name that comes nearest.
+    pub fn parameter(self, name: &str) -> Result<&'static ParameterInfo, EffectError> {
+        Ok(&self.parameters()[index_of(self, name)?])
+    }
+}
+
 fn index_of(id: EffectId, name: &str) -> Result<usize, EffectError> {
     let known = || id.parameters().iter().map(|info| info.name);
     known()

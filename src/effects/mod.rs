@@ -62,7 +62,7 @@ pub enum EffectError {
         meaning: &'static str,
     },
     /// A value outside its range.
-    #[error("`{effect}`: {name} is {value}, but must lie between {lowest} and {highest} {unit}")]
+    #[error("`{effect}`: {name} is {value}, but must lie between {lowest} and {highest}{}", with_space(.unit))]
     OutOfRange {
         /// The effect.
         effect: &'static str,
@@ -81,6 +81,14 @@ pub enum EffectError {
 
 fn did_you_mean(nearest: &Option<&'static str>) -> String {
     nearest.map_or_else(String::new, |name| format!(", did you mean `{name}`?"))
+}
+
+fn with_space(unit: &str) -> String {
+    if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    }
 }
 
 /// The name nearest to `given`, if one is near at all.

@@ -181,7 +181,7 @@ pub(super) fn decay_finding(frame: &Frame, nominal: &Fit) -> Option<DecayFinding
             mode,
         } => Some(DecayChange {
             mode,
-            configuration: frame.setups[configuration].label.clone(),
+            configuration: frame.setups[configuration].file.clone(),
             percent_per_fold: 100.0 * frame.readings[row].value,
             std: 100.0 * frame.readings[row].std,
             explained: 100.0 * explained(row),

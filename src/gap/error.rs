@@ -5,8 +5,8 @@
 pub enum GapError {
     /// Fewer modes than could show a gap.
     #[error(
-        "{modes} natural frequencies were observed; a gap shows only beyond the {needed} that the \
-         joint's stiffnesses can follow: observe at least {least} modes"
+        "{modes} natural {} observed; a gap shows only beyond the {needed} that the \
+         joint's stiffnesses can follow: observe at least {least} modes", if *.modes == 1 { "frequency was" } else { "frequencies were" }
     )]
     TooFewModes {
         /// Modes observed.

@@ -36,12 +36,12 @@ impl LeftOutErrors {
         let mut all: Vec<Predicted> = Vec::new();
         for visit in visits {
             let mut setups = frame.setups.iter();
-            let label = &setups.find(|setup| setup.visit == visit)?.label;
+            let file = &setups.find(|setup| setup.visit == visit)?.file;
             let Some(own) = without(frame, &residuals, visit) else {
                 continue;
             };
             let errors = errors_of(frame, &residuals, std::slice::from_ref(&own));
-            recordings.push((label.clone(), errors));
+            recordings.push((file.clone(), errors));
             all.push(own);
         }
         let together = (!all.is_empty()).then(|| errors_of(frame, &residuals, &all))?;

@@ -192,7 +192,7 @@ fn block_rows(frame: &Frame) -> Vec<(String, Vec<usize>)> {
             } => {
                 add(format!("mode {mode}"), row);
                 if frame.setups.len() > 1 {
-                    add(frame.setups[configuration].label.clone(), row);
+                    add(frame.setups[configuration].label(), row);
                 }
             }
             Row::Constant { .. } | Row::Ratio { .. } => add("shapes".to_string(), row),
@@ -219,7 +219,8 @@ pub(super) fn pulls(frame: &Frame, before: &Residuals, after: &Residuals) -> Vec
             let percent = |raw: f64| 100.0 * ((-raw).exp() - 1.0);
             Some(Pull {
                 mode,
-                configuration: frame.setups[configuration].label.clone(),
+                recording: frame.setups[configuration].file.clone(),
+                level: frame.setups[configuration].known_level,
                 error_percent: percent(before.raw[row]),
                 z: -before.raw[row] / std,
                 error_percent_after: percent(after.raw[row]),

@@ -233,8 +233,10 @@ pub struct PlaceProbabilities {
 pub struct Pull {
     /// The mode.
     pub mode: usize,
-    /// The configuration.
-    pub configuration: String,
+    /// File of the recording, or what else the readings are.
+    pub recording: String,
+    /// Amplitude of its taps over that of the hardest configuration (1); `None` where no force is known.
+    pub level: Option<f64>,
     /// 100 (predicted - measured)/measured of the nominal model with its joint refitted (%).
     pub error_percent: f64,
     /// That over the standard uncertainty (1).

@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 /// One configuration as the model needs it.
 #[derive(Debug, Clone)]
 pub(super) struct Setup {
-    /// What it is called: file and level.
-    pub(super) label: String,
+    /// File of the recording, or what else the readings are.
+    pub(super) file: String,
     /// The structure with all masses that are known.
     pub(super) specimen: Specimen,
     /// Places and masses of the sensors, in the order of the observations. One without a place has no
@@ -30,6 +30,8 @@ pub(super) struct Setup {
     pub(super) tap: Option<f64>,
     /// Amplitude over that of the hardest configuration (1).
     pub(super) level: f64,
+    /// The same where a force was measured.
+    pub(super) known_level: Option<f64>,
     /// Amplitude at the begin and end of the followed decay over that of its first instant, by mode.
     pub(super) spans: Vec<(usize, f64, f64)>,
     /// How the joint moves; `None` where no amplitude is known.
@@ -48,6 +50,16 @@ fn index_in<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
             list.push(value);
             list.len() - 1
         })
+}
+
+impl Setup {
+    /// What it is called beside others: its file, and the level where the taps were softer than the hardest.
+    pub(super) fn label(&self) -> String {
+        match self.known_level {
+            Some(level) if level < 0.999 => format!("{} (level {level:.2})", self.file),
+            _ => self.file.clone(),
+        }
+    }
 }
 
 /// What all configurations have of sensors and masses, each once.
@@ -102,7 +114,7 @@ pub(super) fn setup(
     specimen.masses.extend_from_slice(&configuration.masses);
     Setup {
         fastened: fastened.collect(),
-        label: label(index, configuration),
+        file: file_of(configuration),
         specimen,
         sensors,
         carried,
@@ -110,6 +122,7 @@ pub(super) fn setup(
         places: place_indices,
         tap: configuration.tap,
         level: configuration.level.unwrap_or(1.0),
+        known_level: configuration.level,
         spans: configuration.modes.iter().filter_map(span).collect(),
         path: None,
         visit: configuration.recording.unwrap_or(index),
@@ -170,13 +183,8 @@ fn span(mode: &ObservedMode) -> Option<(usize, f64, f64)> {
     (late > 0.0 && early > 1.05 * late).then_some((mode.mode, early, late))
 }
 
-fn label(index: usize, configuration: &Configuration) -> String {
-    let name = configuration
-        .file
-        .clone()
-        .unwrap_or_else(|| format!("configuration {}", index + 1));
-    match configuration.level {
-        Some(level) if level < 0.999 => format!("{name} (level {level:.2})"),
-        _ => name,
-    }
+/// The file, or what was given without one.
+fn file_of(configuration: &Configuration) -> String {
+    let given = || "the given frequencies".to_owned();
+    configuration.file.clone().unwrap_or_else(given)
 }

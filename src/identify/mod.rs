@@ -76,8 +76,8 @@ pub enum IdentifyError {
     },
     /// Fewer frequencies than unknowns.
     #[error(
-        "{found} frequencies cannot determine {unknowns} unknowns; measure more modes, or estimate \
-         fewer parameters"
+        "{found} {} cannot determine {unknowns} unknowns; measure more modes, or estimate \
+         fewer parameters", if *.found == 1 { "frequency" } else { "frequencies" }
     )]
     TooFewFrequencies {
         /// How many parameters are to be estimated.

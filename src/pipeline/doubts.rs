@@ -130,7 +130,7 @@ impl std::fmt::Display for Rounded {
     }
 }
 
-/// "Kx: +-0.01 % from the readings alone, +-1.3 % scaled by the misfit", for non-dimensional ones
+/// "Kx: ±0.01 % from the readings alone, ±1.3 % scaled by the misfit", for non-dimensional ones
 /// and the material.
 fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     // Half width of a 95 % interval of a normal distribution, in standard deviations, in percent.
@@ -142,7 +142,7 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     let value = quantity.value.filter(|value| told && *value != 0.0)?;
     let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
     Some(format!(
-        "95 % interval of {} from the readings alone +-{} %, scaled by the misfit +-{} %",
+        "95 % interval of {} from the readings alone \u{b1}{} %, scaled by the misfit \u{b1}{} %",
         quantity.quantity.name(),
         Rounded(PERCENT_95 * std / value.abs()),
         Rounded(50.0 * (high - low) / value.abs())

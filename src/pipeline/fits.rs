@@ -10,7 +10,7 @@ use super::decays::FreeDecays;
 use crate::description::ReadingMethod;
 use crate::modal::amplitude::{AmplitudeSettings, KnownMode, follow_amplitude};
 use crate::modal::fit::{
-    ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, fit_modes,
+    ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
     modal_constants, test_extra_mode,
 };
 use crate::modal::polyreference::{
@@ -86,31 +86,50 @@ impl Candidates<'_> {
             ..FitSettings::default()
         };
         let proposed = all_modes(&self.stabilisation.searches);
-        let (mut starts, mut peaks, extras) = self.starts(readings, &proposed);
+        let (mut starts, peaks, extras) = self.starts(readings, &proposed);
         let mut added = Vec::new();
         for extra in extras.into_iter().take(MOST_EXTRA) {
             let start = start_of(extra);
             let test = test_extra_mode(self.data, &starts, start, &settings);
-            if is_mode(&test, &starts) {
+            if self.is_mode(&test, &starts) {
                 starts.push(start);
-                peaks.push(None);
                 added.push(extra);
             }
         }
-        let fits = fit_modes(self.data, &starts, &settings);
-        let mut added = added.into_iter();
-        for (peak, fit) in peaks.into_iter().zip(fits) {
-            match peak {
-                Some(index) => self.adopt(&mut readings[index], fit.ok()),
-                None => {
-                    let proposal = added.next();
-                    if let (Ok(fit), Some(proposal)) = (fit, proposal) {
-                        readings.push(self.reading_of(fit, proposal));
-                    }
-                }
+        let peaks_alone = starts.len() - added.len();
+        let fits = self.settled(&mut starts, &mut added, &settings);
+        let (of_peaks, of_added) = fits.split_at(peaks_alone);
+        for (index, fit) in peaks.into_iter().zip(of_peaks) {
+            self.adopt(&mut readings[index], fit.as_ref().ok());
+        }
+        for (proposal, fit) in added.into_iter().zip(of_added) {
+            if let Ok(fit) = fit {
+                readings.push(self.reading_of(fit.clone(), proposal));
             }
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    }
+
+    /// The fit of all together. Beside the others an added mode may leave the band that it kept to when it
+    /// was tested: then it goes, and the rest is fitted again without it.
+    fn settled(
+        &self,
+        starts: &mut Vec<PoleStart>,
+        added: &mut Vec<&PolyreferenceMode>,
+        settings: &FitSettings,
+    ) -> Vec<Result<ModeFit, Unfit>> {
+        let peaks = starts.len() - added.len();
+        loop {
+            let fits = fit_modes(self.data, starts, settings);
+            let strays = |fit: &Result<ModeFit, Unfit>| {
+                fit.as_ref().is_ok_and(|fit| !self.may_be_added(fit))
+            };
+            let Some(stray) = fits.iter().skip(peaks).position(strays) else {
+                return fits;
+            };
+            starts.remove(peaks + stray);
+            added.remove(stray);
+        }
     }
 
     /// Where fits begin: peaks first, each at its own reading or at the mode of the polyreference fit
@@ -119,11 +138,7 @@ impl Candidates<'_> {
         &self,
         readings: &[ModeReading],
         proposed: &'m [PolyreferenceMode],
-    ) -> (
-        Vec<PoleStart>,
-        Vec<Option<usize>>,
-        Vec<&'m PolyreferenceMode>,
-    ) {
+    ) -> (Vec<PoleStart>, Vec<usize>, Vec<&'m PolyreferenceMode>) {
         let mut free: Vec<Option<&PolyreferenceMode>> = proposed.iter().map(Some).collect();
         let (mut starts, mut peaks) = (Vec::new(), Vec::new());
         for (index, reading) in readings.iter().enumerate() {
@@ -133,7 +148,7 @@ impl Candidates<'_> {
                 (Some(PeakLabel::NoResonance), Some(own)) => starts.push(start_of(own)),
                 _ => continue,
             }
-            peaks.push(Some(index));
+            peaks.push(index);
         }
         let mut extras: Vec<&PolyreferenceMode> = free.into_iter().flatten().collect();
         extras.sort_by(|a, b| b.above_noise_db.total_cmp(&a.above_noise_db));
@@ -159,16 +174,48 @@ impl Candidates<'_> {
             .and_then(Option::take)
     }
 
+    /// Whether a natural frequency lies among the lines that were fitted. That of a pole with high damping
+    /// need not: f = |lambda|/2 pi, while the lines hold Im(lambda)/2 pi alone to the band.
+    fn is_within(&self, fit: &ModeFit) -> bool {
+        let lines = self.data.frequencies();
+        let ends = lines.first().zip(lines.last());
+        ends.is_some_and(|(first, last)| (*first..=*last).contains(&fit.frequency.value))
+    }
+
+    /// Whether a fit without a peak may be a mode at all: within the band, and no more damped than what
+    /// proposes modes lets pass.
+    fn may_be_added(&self, fit: &ModeFit) -> bool {
+        let most_damping = PolyreferenceSettings::default().most_damping;
+        self.is_within(fit) && fit.damping_ratio.value < most_damping
+    }
+
+    /// Whether a proposed mode is one: asked for by the data, and no mending of a neighbour's line.
+    fn is_mode(&self, test: &ExtraMode, accepted: &[PoleStart]) -> bool {
+        let (ExtraVerdict::Needed, Ok(fit)) = (test.verdict, &test.fit) else {
+            return false;
+        };
+        let width = |frequency: f64, damping: f64| frequency * damping;
+        let own = width(fit.frequency.value, fit.damping_ratio.value);
+        let crowded = accepted.iter().any(|other| {
+            let theirs = width(other.frequency, other.damping_ratio.unwrap_or(0.0));
+            (fit.frequency.value - other.frequency).abs() < APART * (own + theirs)
+        });
+        let unlike = test.likeness.is_some_and(|likeness| likeness < UNLIKE);
+        is_clear(fit) && self.may_be_added(fit) && (!crowded || unlike)
+    }
+
     /// The fit of a peak; one that was no clear resonance becomes one where its fit is clear.
-    fn adopt(&self, reading: &mut ModeReading, fit: Option<ModeFit>) {
-        let Some(fit) = fit else { return };
+    fn adopt(&self, reading: &mut ModeReading, fit: Option<&ModeFit>) {
+        let Some(fit) = fit.filter(|fit| self.is_within(fit)) else {
+            return;
+        };
         if reading.label == Some(PeakLabel::NoResonance) {
-            if !is_clear(&fit) {
+            if !is_clear(fit) {
                 return;
             }
             reading.label = None;
         }
-        reading.fit = Some(Box::new(FittedReading::new(fit)));
+        reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
     }
 
     /// The reading of a mode that makes no peak.
@@ -223,20 +270,6 @@ fn is_clear(fit: &ModeFit) -> bool {
         .map(|amplitude| amplitude.value.norm() / amplitude.std)
         .fold(0.0, f64::max);
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
-}
-
-/// Whether a proposed mode is one: asked for by the data, and no mending of a neighbour's line.
-fn is_mode(test: &ExtraMode, accepted: &[PoleStart]) -> bool {
-    let (ExtraVerdict::Needed, Ok(fit)) = (test.verdict, &test.fit) else {
-        return false;
-    };
-    let width = |frequency: f64, damping: f64| frequency * damping;
-    let own = width(fit.frequency.value, fit.damping_ratio.value);
-    let crowded = accepted.iter().any(|other| {
-        let theirs = width(other.frequency, other.damping_ratio.unwrap_or(0.0));
-        (fit.frequency.value - other.frequency).abs() < APART * (own + theirs)
-    });
-    is_clear(fit) && (!crowded || test.likeness.is_some_and(|likeness| likeness < UNLIKE))
 }
 
 /// Adds to the fits what needs the decays themselves: modal constants, and frequency and damping against

@@ -86,7 +86,7 @@ fn compare(
         ""
     };
     let happened = format!(
-        "Sensor {} here and sensor {} in {}, tap and sensor swapped, agree to {agreement:.3}{sign}, at a level ratio of {gain:.2} (limits {:.2} and 1 +- {:.1}).",
+        "Sensor {} here and sensor {} in {}, tap and sensor swapped, agree to {agreement:.3}{sign}, at a level ratio of {gain:.2} (limits {:.2} and 1 \u{b1} {:.1}).",
         a.name, b.name, second.file, settings.reciprocity, settings.reciprocity_gain
     );
     let subject = Subject::Sensor {

@@ -111,7 +111,7 @@ fn model(document: &Document) -> Option<String> {
         format!("; gap: {}{colon}{effects}", gap.verdict.kind)
     });
     Some(format!(
-        "largest error of a predicted frequency {} % (mode {}){gap}",
+        "largest frequency error of the model {} % (mode {}){gap}",
         signed_percent(worst.error_percent),
         worst.mode
     ))

@@ -111,7 +111,8 @@ fn places(p: &PlaceProbabilities) -> std::collections::BTreeMap<String, f64> {
 fn pull(pull: &Pull) -> PullSection {
     PullSection {
         mode: pull.mode,
-        recording: pull.configuration.clone(),
+        recording: pull.recording.clone(),
+        level: pull.level,
         error_percent: pull.error_percent,
         z: pull.z,
         error_percent_after: pull.error_percent_after,

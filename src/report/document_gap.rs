@@ -34,7 +34,8 @@ pub struct GapSection {
     pub baselines: Vec<BaselineSection>,
     /// Tests that would tell more, those first that tell most for their effort.
     pub next_test: Vec<NextTestSection>,
-    /// The model with what was found, to predict with; null where nothing predicts.
+    /// The model with what was found, to predict with; null where nothing predicts, and where the verdict is
+    /// "unknown".
     pub updated_model: Option<UpdatedModelSection>,
 }
 
@@ -115,8 +116,10 @@ pub struct GapPlaceSection {
 pub struct PullSection {
     /// The mode.
     pub mode: usize,
-    /// The recording.
+    /// File of the recording, as in `recordings`; "the given frequencies" where none was read.
     pub recording: String,
+    /// Amplitude of its taps over that of the hardest recording (1); null where no force is known.
+    pub level: Option<f64>,
     /// 100 (predicted - measured)/measured of the nominal model with its joint refitted (%).
     pub error_percent: f64,
     /// That over the standard uncertainty.
@@ -267,7 +270,8 @@ pub struct NextTestSection {
     pub separates: Vec<String>,
     /// Hypotheses that could not be predicted in this test: nothing is said of them.
     pub unpredicted: Vec<String>,
-    /// Information about which hypothesis is true that it is expected to bring at least (bit).
+    /// Information about the cause that it is expected to bring at least (bit), by the probabilities of the
+    /// hypotheses; where the verdict is "unknown", taking the catalogue's effects as equally likely.
     pub bits: f64,
     /// What it costs, in multiples of reading again what is recorded; tests are ranked by bits over this.
     pub effort: f64,

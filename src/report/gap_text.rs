@@ -2,7 +2,7 @@
 
 use super::document::Document;
 use super::tables;
-use super::text::{prediction, table_or_nothing, warnings, wrapped};
+use super::text::{noted, prediction, warnings, wrapped};
 
 /// The errors of the nominal model, the story of the gap, and the hypotheses.
 pub fn render_gap_text(document: &Document) -> String {
@@ -20,7 +20,7 @@ pub(super) fn gap(document: &Document) -> String {
     let tables = [tables::hypotheses(document), tables::next_tests(document)];
     let tables: Vec<String> = tables
         .into_iter()
-        .map(table_or_nothing)
+        .map(noted)
         .filter(|table| !table.is_empty())
         .collect();
     let tables = tables.join("\n");

@@ -82,9 +82,7 @@ pub fn modes(document: &Document) -> String {
 
 /// The resonances on the frequency response functions; empty where those were not asked for.
 pub fn frfs(document: &Document) -> String {
-    tables::frfs(document).map_or(String::new(), |table| {
-        render_table(&table) + &wrapped(&table.note, 0)
-    })
+    noted(tables::frfs(document))
 }
 
 /// The estimate and how far its regression closes, or why there is none; empty where it was not
@@ -129,11 +127,6 @@ pub fn prediction(document: &Document) -> String {
 
 /// What changed frequencies do to the estimate; empty where it was not computed.
 pub fn perturbation(document: &Document) -> String {
-    let noted = |table: Option<Table>| {
-        table.map_or(String::new(), |table| {
-            render_table(&table) + &wrapped(&table.note, 0)
-        })
-    };
     let texts = [
         table_or_nothing(tables::perturbation(document)),
         table_or_nothing(tables::averages(document)),
@@ -171,7 +164,14 @@ pub fn ending(document: &Document) -> String {
     format!("What was found\n{}", lines.collect::<String>())
 }
 
-pub(super) fn table_or_nothing(table: Option<Table>) -> String {
+/// A table with what its columns mean.
+pub(super) fn noted(table: Option<Table>) -> String {
+    table.map_or(String::new(), |table| {
+        render_table(&table) + &wrapped(&table.note, 0)
+    })
+}
+
+fn table_or_nothing(table: Option<Table>) -> String {
     table.as_ref().map(render_table).unwrap_or_default()
 }
 

@@ -26,16 +26,29 @@ pub struct DescribedEffectError {
     /// Line of its table.
     pub line: usize,
     /// What is wrong with it.
-    pub cause: EffectError,
+    pub cause: EffectCause,
+}
+
+/// What is wrong with a described effect.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectCause {
+    /// There is no such effect, or not of this size.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// The described structure cannot have it.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
 }
 
 /// The model that a diagnosis makes of the described one: with what it names, else with the most probable
-/// hypothesis that predicts anything. `None` where nothing predicts.
+/// hypothesis that predicts anything. `None` where nothing predicts, and where the diagnosis has refused all
+/// that does.
 pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<UpdatedModel> {
     let wanted = match &diagnosis.verdict {
         Verdict::NoGap => Some(Hypothesis::None),
         Verdict::Named(effects) => Some(Hypothesis::Effects(effects.clone())),
-        _ => None,
+        Verdict::Unknown => return None,
+        Verdict::Group(_) | Verdict::Set(_) | Verdict::NotEnoughData(_) => None,
     };
     let mut all = diagnosis.hypotheses.iter();
     let found = match wanted {
@@ -77,8 +90,12 @@ fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
 }
 
 fn heading(diagnosis: &Diagnosis, found: &HypothesisResult) -> String {
+    let found_or_supposed = match diagnosis.verdict {
+        Verdict::NoGap | Verdict::Named(_) => "what the diagnosis found",
+        _ => "the most probable hypothesis, which the diagnosis does not establish",
+    };
     format!(
-        "# The model with what the diagnosis found (verdict: {}; hypothesis: {}, {:.1} %).\n\
+        "# The model with {found_or_supposed} (verdict: {}; hypothesis: {}, {:.1} %).\n\
          # Natural frequencies: `tapjoint predict` with this file.\n\n",
         diagnosis.verdict.kind(),
         found.hypothesis.name(),
@@ -222,9 +239,9 @@ fn table_of(effect: &Effect) -> String {
 /// The first that there is not, with the line of its table.
 pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, DescribedEffectError> {
     let read = |described: &crate::description::EffectDescription| {
-        let at = |cause| DescribedEffectError {
+        let at = |cause: EffectError| DescribedEffectError {
             line: described.line,
-            cause,
+            cause: cause.into(),
         };
         let values = described.values.iter();
         let pairs: Vec<(&str, f64)> = values
@@ -234,6 +251,29 @@ pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, Describe
         Effect::from_pairs(id, &pairs).map_err(at)
     };
     test.effects.iter().map(read).collect()
+}
+
+/// The lowest natural frequencies (Hz), as they would be read, of a described structure with the effects that
+/// it describes and with its sensors on it.
+///
+/// # Errors
+/// The first effect that there is not or that the structure cannot have; without effects
+/// [`frequencies_with`] says what is wrong with the structure.
+pub fn described_frequencies(
+    test: &TestDescription,
+    count: usize,
+) -> Result<Vec<f64>, DescribedEffectError> {
+    let effects = described_effects(test)?;
+    frequencies_with(test, &effects, None, count).map_err(|error| {
+        // The first effect with which there is no such structure is the one to be mended.
+        let fails = |held: &usize| frequencies_with(test, &effects[..*held], None, 1).is_err();
+        let first = (1..=effects.len()).find(fails).unwrap_or(effects.len());
+        let described = test.effects.get(first.saturating_sub(1));
+        DescribedEffectError {
+            line: described.map_or(1, |effect| effect.line),
+            cause: error.into(),
+        }
+    })
 }
 
 /// The lowest natural frequencies (Hz), as they would be read, of a described structure with these effects

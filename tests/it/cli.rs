@@ -1297,6 +1297,35 @@ fn prop_verbose_tells_more_on_standard_error_alone() {
 }
 
 #[test]
+fn regress_a_blind_check_has_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    tapjoint(folder.path())
+        .args(["blind-check", "--cases", "0"])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("0 is not in 1.."));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn regress_a_plan_is_told_without_the_targets_of_whole_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = "[hammer]\nchannel = 1\n[[sensor]]\nname = \"A\"\nchannel = 2\nposition = 0.338\n[[recording]]\nfile = \"a.wav\"\ntap = 0.385\n";
+    let joint = TEST.replace("[joint]\n", "[joint]\nkt = 1.4e6\nkr = 400\n");
+    let text = format!("{joint}{recording}");
+    fs::write(folder.path().join("test.toml"), &text).unwrap();
+    let done = tapjoint(folder.path())
+        .args(["plan", "test.toml", "--draws", "1", "--modes", "3"])
+        .assert()
+        .code(0);
+    let said = String::from_utf8(done.get_output().stdout.clone()).unwrap();
+    for unwanted in ["MISSED", "target", "0/0", "outside: named", "two: both"] {
+        assert!(!said.contains(unwanted), "{unwanted} in:\n{said}");
+    }
+    assert!(said.contains("first: the diagnosis puts"), "{said}");
+}
+
+#[test]
 fn regress_plan_checks_its_joint_as_every_command_does() {
     let plan = |text: &str, more: &[&str], says: &str| {
         let arguments = [&["plan", "test.toml"], more].concat();
@@ -1311,8 +1340,14 @@ fn regress_plan_checks_its_joint_as_every_command_does() {
     plan(
         TEST,
         &["--kx", "0", "--ky", "1"],
-        "--kx 0: give a positive number",
+        "--kx 0: give a positive finite number",
     );
+    plan(
+        TEST,
+        &["--kx", "inf", "--ky", "1"],
+        "--kx inf: give a positive finite number",
+    );
+    plan(TEST, &["--std", "1e9"], "give percent above 0, at most 10");
     let coupled = ["--kx", "5", "--ky", "1", "--kz", "9"];
     plan(TEST, &coupled, "write model = \"3p\"");
     plan(

@@ -93,6 +93,28 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
+fn regress_every_mode_lies_within_the_band() {
+    // With these scales a pole without a peak was damped so much that its natural frequency lay at 14.5 kHz,
+    // in a recording of 2560 samples in a second.
+    let folder = sample();
+    let scales = ["--hammer", "1", "--scale-hammer", "100", "--scale-sensor"];
+    for scale in ["500", "1"] {
+        let document = json(
+            folder.path(),
+            &[&["low.wav"][..], &scales[..], &[scale]].concat(),
+        );
+        let modes = document["modes"].as_array().unwrap();
+        assert!(modes.len() >= 4, "{modes:?}");
+        for mode in modes {
+            let frequency = mode["frequency"].as_f64().unwrap();
+            assert!(frequency > 0.0 && frequency <= 1000.0, "{mode}");
+            let damping = mode["damping"].as_f64().unwrap();
+            assert!(damping < 0.2, "{mode}");
+        }
+    }
+}
+
+#[test]
 fn regress_a_described_test_gives_every_function_with_its_form() {
     let folder = sample();
     let document = json(

@@ -269,11 +269,41 @@ fn recover_the_bare_beams_joint_and_the_loaded_recordings_modes() {
 fn zz_dbg() {
     for seed in 401..413 {
         for mass in [0.05, 0.002] {
-            let d = diagnose(&observed(&six_recordings(mass), seed), &nominal(0.8), &GapSettings::default()).unwrap();
-            println!("{seed} {mass} {:?} {:?} {:?}", d.verdict, d.goodness_of_fit, d.blocks.iter().take(2).collect::<Vec<_>>());
-            for h in d.hypotheses.iter().take(3) { println!("   {} p {:.3} lnB {:.2} wh {:?} {:?} gof {:?}", h.hypothesis.name(), h.probability, h.log_bayes_factor, h.withheld_after, h.withheld_floor, h.goodness_of_fit); }
+            let d = diagnose(
+                &observed(&six_recordings(mass), seed),
+                &nominal(0.8),
+                &GapSettings::default(),
+            )
+            .unwrap();
+            println!(
+                "{seed} {mass} {:?} {:?} {:?}",
+                d.verdict,
+                d.goodness_of_fit,
+                d.blocks.iter().take(2).collect::<Vec<_>>()
+            );
+            for h in d.hypotheses.iter().take(3) {
+                println!(
+                    "   {} p {:.3} lnB {:.2} wh {:?} {:?} gof {:?}",
+                    h.hypothesis.name(),
+                    h.probability,
+                    h.log_bayes_factor,
+                    h.withheld_after,
+                    h.withheld_floor,
+                    h.goodness_of_fit
+                );
+            }
         }
-        let d = diagnose(&observed(&five_recordings(), seed), &nominal(0.8), &GapSettings::default()).unwrap();
-        println!("{seed} none {:?} {:?} {:?}", d.verdict, d.goodness_of_fit, d.blocks.iter().take(2).collect::<Vec<_>>());
+        let d = diagnose(
+            &observed(&five_recordings(), seed),
+            &nominal(0.8),
+            &GapSettings::default(),
+        )
+        .unwrap();
+        println!(
+            "{seed} none {:?} {:?} {:?}",
+            d.verdict,
+            d.goodness_of_fit,
+            d.blocks.iter().take(2).collect::<Vec<_>>()
+        );
     }
 }

@@ -206,7 +206,7 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
     let no_joint = TEST.replace("kt = 1.994e6", "");
     let measured = TEST.split("[[recording]]").next().unwrap().to_owned()
         + "[measured]\nfrequencies = [17.0, 118.0]\n";
-    let cases: [(&str, &[&str], &str); 9] = [
+    let cases: [(&str, &[&str], &str); 10] = [
         (&no_joint, &[], "kt is missing"),
         (&measured, &[], "no recording to simulate"),
         (
@@ -218,6 +218,11 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
             TEST,
             &["--with", "sensor-mass:weight=1"],
             "no parameter `weight`",
+        ),
+        (
+            TEST,
+            &["--with", "sensor-mass:mas=24g"],
+            "no parameter `mas`, did you mean `mass`?",
         ),
         (TEST, &["--with", "sensor-mass:mass"], "has no value"),
         (

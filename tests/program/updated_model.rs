@@ -115,7 +115,21 @@ fn regress_effects_are_checked_where_they_are_described() {
     describe("id = \"sensor-mas\"\n");
     let (_, error) = told(folder.path(), &["predict", "test.toml"], 2);
     assert!(
-        error.contains("line 11") && error.contains("sensor-mass"),
+        error.contains("test.toml:11: ") && error.contains("sensor-mass"),
+        "{error}"
+    );
+    describe("id = \"modulus\"\nrelative = -2\n");
+    let (_, error) = told(folder.path(), &["predict", "test.toml"], 2);
+    assert!(
+        error.contains("test.toml:11: ") && !error.contains(" \n"),
+        "{error}"
+    );
+    // One effect that the beam can have, and one beside it that it cannot.
+    let outside = "id = \"modulus\"\n[[effect]]\nid = \"added-mass\"\nmass = 0.01\nposition = 2\n";
+    describe(outside);
+    let (_, error) = told(folder.path(), &["predict", "test.toml"], 2);
+    assert!(
+        error.contains("test.toml:13: position 2 m is not on the structure"),
         "{error}"
     );
     describe("id = \"modulus\"\nrelativ = 0.1\n");
@@ -174,4 +188,28 @@ fn val_five_published_frequencies_show_a_gap_that_they_cannot_assign() {
         .max_by(|a, b| bits(a).total_cmp(&bits(b)))
         .unwrap();
     assert_eq!(most["id"], "bare-beam");
+}
+
+#[test]
+fn regress_what_the_diagnosis_refuses_is_no_model() {
+    // No beam has such frequencies, nor would any effect give it them.
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "{BEAM}[joint]\nkind = \"cantilever\"\n{SENSOR}[measured]\nfrequencies = [17, 118, 290, 700, 940]\nstd = 0.01\n"
+    );
+    fs::write(folder.path().join("test.toml"), text).unwrap();
+    let arguments = ["diagnose", "test.toml", "--model", "model.toml"];
+    let (out, error) = told(folder.path(), &arguments, 0);
+    assert!(out.contains("nothing in the catalogue explains"), "{out}");
+    assert!(!out.contains("How far:"), "{out}");
+    assert!(
+        error.contains("no model to write: nothing in the catalogue explains"),
+        "{error}"
+    );
+    assert!(!folder.path().join("model.toml").exists());
+    let gap = &json(folder.path(), &["diagnose", "test.toml"])["gap"];
+    assert_eq!(gap["verdict"]["kind"], "unknown");
+    assert!(gap["updated_model"].is_null());
+    let recording = &gap["where"]["modes"][0]["recording"];
+    assert_eq!(recording, "the given frequencies");
 }

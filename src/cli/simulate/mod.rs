@@ -9,6 +9,7 @@ use super::input::{TestFile, read_model};
 use super::output::OutputFolder;
 use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
+use super::updated_model::effect_at;
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use laboratory::LaboratoryArguments;
@@ -80,7 +81,7 @@ fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result
     Ok(Request {
         output: OutputFolder::prepare(&arguments.out)?,
         effects: described_effects(&file.test)
-            .map_err(|error| anyhow!("{}: {error}", file.name))?
+            .map_err(|error| effect_at(&file.name, &error))?
             .into_iter()
             .chain(arguments.effects.iter().map(|planted| planted.0.clone()))
             .collect(),

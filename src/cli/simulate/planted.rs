@@ -34,9 +34,8 @@ fn pair(id: EffectId, text: &str) -> Result<(&str, f64), String> {
         )
     })?;
     let (key, value) = (key.trim(), value.trim());
-    let info = id.parameters().iter().find(|info| info.name == key);
-    let dimension = info.and_then(|info| quantity(info.dimension));
-    let number = match dimension {
+    let info = id.parameter(key).map_err(|error| error.to_string())?;
+    let number = match quantity(info.dimension) {
         Some(dimension) => parse_quantity(value, dimension).map_err(|error| error.to_string()),
         None => value
             .parse()

@@ -2,6 +2,11 @@
 
 /// Below this probability the stated uncertainties and the model do not go together.
 pub const DOUBTFUL: f64 = 0.01;
+
+/// A smaller probability is told as "below" this: so far out a distribution's tail is no measurement, and the
+/// smallest of all are written as 0.
+const LEAST_PROBABILITY: f64 = 1e-12;
+
 /// Below this one no usual slip in the uncertainties saves the model: with three degrees of
 /// freedom it asks for misfits of more than three standard deviations in every direction.
 pub const HOPELESS: f64 = 1e-6;
@@ -83,9 +88,16 @@ impl Goodness {
         let misfit = 100.0 * self.relative_misfit;
         let test = match (self.chi_squared, self.probability) {
             (Some(chi_squared), Some(p)) => format!(
-                "chi-squared {chi_squared:.1} with {} degree(s) of freedom, probability {p:.1e}, \
-                 rms misfit {misfit:.2} %",
-                self.degrees_of_freedom
+                "chi-squared {chi_squared:.1} with {} of freedom, probability {}, rms misfit {misfit:.2} %",
+                match self.degrees_of_freedom {
+                    1 => "1 degree".to_owned(),
+                    more => format!("{more} degrees"),
+                },
+                if p < LEAST_PROBABILITY {
+                    format!("below {LEAST_PROBABILITY:e}")
+                } else {
+                    format!("{p:.1e}")
+                }
             ),
             _ => format!("rms misfit {misfit:.2} %"),
         };

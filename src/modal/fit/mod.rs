@@ -154,7 +154,7 @@ pub enum Unfit {
     },
     /// The exponential window's decay leaves nothing certain of the mode's own.
     #[error(
-        "the window's decay hides its damping: {remaining:.2e} +-{std:.2e} is left of it; use a longer record and no window"
+        "the window's decay hides its damping: {remaining:.2e} \u{b1} {std:.2e} is left of it; use a longer record and no window"
     )]
     WindowDominates {
         /// Damping ratio that is left.

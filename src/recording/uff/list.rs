@@ -74,7 +74,7 @@ impl UniversalFile {
             }
         }
         if kinds.is_empty() {
-            return "no complete dataset".to_owned();
+            return "an incomplete dataset".to_owned();
         }
         let words = kinds
             .iter()

@@ -82,7 +82,17 @@ fn truth_json(truth: &Truth) -> Value {
         .catalogue()
         .map(|(id, values)| (id.name().to_owned(), json!(values)))
         .collect();
-    json!({"name": truth.name, "effects": names, "params": params})
+    let mut entry = json!({"name": truth.name, "effects": names, "params": params});
+    let limits = [
+        ("detectable", truth.detectable),
+        ("refutable", truth.refutable),
+    ];
+    for (name, known) in limits {
+        if let Some(known) = known {
+            entry[name] = json!(known);
+        }
+    }
+    entry
 }
 
 fn name_of(planted: &Planted) -> &str {

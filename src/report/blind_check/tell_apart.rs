@@ -3,10 +3,16 @@
 use std::collections::BTreeMap;
 
 use super::confusion_plot::classes;
-use crate::study::blind_check::{Case, Class, Verdict, render_rows, rows, score};
+use crate::study::blind_check::{
+    Case, Class, Row, Scores, Target, Verdict, render_rows, rows, score,
+};
+
+/// What the columns say.
+const EXPLAINED: &str = "first: the diagnosis puts its kind first; named: the verdict gives it as the\n\
+                         answer (of none: \"no-gap\"); else first: what came first instead, how often.\n";
 
 /// For each kind of effect: how often it came first, how often it was named, and what came first
-/// instead; then the figures.
+/// instead; then the figures of what was drawn. What a blind check of whole tests aims at is no target here.
 pub fn tell_apart(cases: &[Case]) -> String {
     let mut text = format!(
         "{:<20}{:>7}{:>8}  {}\n",
@@ -45,7 +51,21 @@ pub fn tell_apart(cases: &[Case]) -> String {
         text.push_str(line.trim_end());
         text.push('\n');
     }
-    format!("{text}\n{}", render_rows(&rows(&score(cases))))
+    format!(
+        "{text}{EXPLAINED}\n{}",
+        render_rows(&drawn_rows(&score(cases)))
+    )
+}
+
+/// The figures that there are cases for, without targets.
+fn drawn_rows(scores: &Scores) -> Vec<Row> {
+    let drawn = rows(scores).into_iter().filter(|row| row.value.is_some());
+    drawn
+        .map(|row| Row {
+            target: Target::None,
+            ..row
+        })
+        .collect()
 }
 
 /// "cross-coupling 2, none 1".

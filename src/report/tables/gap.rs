@@ -1,9 +1,10 @@
 //! The gap between model and measurement, in sentences and as a table.
 
 use super::super::document::{
-    ClosureSection, Document, GapSection, HypothesisSection, NextTestSection, ParameterSection,
+    ClosureSection, Document, GapSection, HypothesisSection, ParameterSection, PullSection,
 };
 use super::super::format::{MISSING, significant};
+use super::next_tests::next_test;
 use super::{Table, number, words};
 
 /// Hypotheses less probable than this are not listed.
@@ -29,10 +30,7 @@ fn verdict(gap: &GapSection) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));
     let effects = gap.verdict.effects.join(", ");
     match gap.verdict.kind.as_str() {
-        "no-gap" => {
-            "No gap: the described model explains the frequencies within their uncertainty."
-                .to_owned()
-        }
+        "no-gap" => no_gap(gap),
         "named" => {
             let size = named(gap).map_or_else(String::new, |found| format!(": {}", sizes(found)));
             format!("The data are consistent with one cause, {effects}{odds}{size}.")
@@ -48,6 +46,16 @@ fn verdict(gap: &GapSection) -> String {
         }
         _ => undecided(gap),
     }
+}
+
+/// That nothing is missing, and why so even where an effect leads the table.
+fn no_gap(gap: &GapSection) -> String {
+    let first = gap.hypotheses.first();
+    let open = match first.filter(|first| first.effect != "none") {
+        Some(_) => " No effect is established: 20 to 1 against none is asked for.",
+        None => "",
+    };
+    format!("No gap: the described model explains the frequencies within their uncertainty.{open}")
 }
 
 /// Probability of `none` below which a gap counts as there.
@@ -78,59 +86,6 @@ fn undecided(gap: &GapSection) -> String {
         ));
     }
     text
-}
-
-/// The test that tells most for its effort; what it is for depends on the answer.
-fn next_test(gap: &GapSection) -> Option<String> {
-    let test = gap.next_test.first()?;
-    let purpose = match gap.verdict.kind.as_str() {
-        "no-gap" | "named" => "To confirm it",
-        _ => "To decide",
-    };
-    Some(format!(
-        "{purpose}: {} (about {:.2} bit; it tells {} apart{}).",
-        test.action,
-        test.bits,
-        test.separates.join(", "),
-        not_predicted(test, "; it could not be predicted for ")
-    ))
-}
-
-/// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
-fn not_predicted(test: &NextTestSection, lead: &str) -> String {
-    match test.unpredicted.as_slice() {
-        [] => String::new(),
-        names => format!("{lead}{}", names.join(", ")),
-    }
-}
-
-/// Tests that would tell more; `None` where none would.
-pub fn next_tests(document: &Document) -> Option<Table> {
-    let tests = &document.gap.as_ref()?.next_test;
-    if tests.is_empty() {
-        return None;
-    }
-    let row = |test: &NextTestSection| {
-        vec![
-            test.action.clone() + &not_predicted(test, "; could not be predicted for "),
-            format!("{:.2}", test.bits),
-            format!("{:.0}", test.effort),
-            test.separates.join(", "),
-        ]
-    };
-    Some(Table {
-        caption: "What to do next".to_owned(),
-        columns: vec![
-            words("Test"),
-            number("Information (bit)"),
-            number("Effort"),
-            words("Tells apart").on_page(),
-        ],
-        rows: tests.iter().map(row).collect(),
-        note: "Information about the cause that the test is expected to bring at least, by the hypotheses \
-               above; effort in multiples of reading again what is recorded. Ranked by one over the other."
-            .to_owned(),
-    })
 }
 
 /// How probable the verdict is: of a group its members together, be they single effects or pairs.
@@ -175,24 +130,39 @@ fn place(gap: &GapSection) -> Option<String> {
         .iter()
         .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))?;
     Some(format!(
-        "Where: {}. Largest misfit before: mode {} in {}, {:+.3} % ({:.0} standard deviations).",
+        "Where: {}. Largest misfit before: mode {} in {}, {} % ({:.0} standard deviations).",
         listed.join(", "),
         worst.mode,
-        worst.recording,
-        worst.error_percent,
+        place_of(worst),
+        change(worst.error_percent, 3),
         worst.z.abs()
     ))
 }
 
+/// "high.wav", or "high.wav (level 0.73)" where its taps were softer than the hardest.
+fn place_of(pull: &PullSection) -> String {
+    match pull.level {
+        Some(level) if level < 0.999 => format!("{} (level {level:.2})", pull.recording),
+        _ => pull.recording.clone(),
+    }
+}
+
+/// A change with its sign, and a minus sign for a hyphen.
+fn change(value: f64, decimals: usize) -> String {
+    format!("{value:+.decimals$}").replace('-', "\u{2212}")
+}
+
+/// How far the errors shrink, where an effect is held for the cause.
 fn how_far(gap: &GapSection) -> Option<String> {
+    let kind = gap.verdict.kind.as_str();
+    if matches!(kind, "no-gap" | "unknown" | "not-enough-data") {
+        return None;
+    }
     let found = named(gap).or_else(|| {
         gap.hypotheses
             .iter()
             .find(|found| !matches!(found.effect.as_str(), "none" | "unknown"))
     })?;
-    if matches!(gap.verdict.kind.as_str(), "no-gap" | "not-enough-data") {
-        return None;
-    }
     let mut text = format!(
         "How far: with {} the errors shrink from {} to {} % (rms over fitted frequencies)",
         found.effect,
@@ -238,14 +208,16 @@ fn share(closure: &ClosureSection) -> String {
 /// What the decays say by themselves, where the verdict does not already say it.
 fn along_decays(gap: &GapSection) -> Option<String> {
     let found = gap.along_decays.as_ref()?;
-    let change = found.changes.iter().max_by(|a, b| {
+    let largest = found.changes.iter().max_by(|a, b| {
         (a.percent_per_fold / a.std)
             .abs()
             .total_cmp(&(b.percent_per_fold / b.std).abs())
     })?;
     let seen = format!(
-        "Along the decays frequencies change with amplitude (mode {} in {} by {:+.3} % per factor e)",
-        change.mode, change.recording, change.percent_per_fold
+        "Along the decays frequencies change with amplitude (mode {} in {} by {} % per factor e)",
+        largest.mode,
+        largest.recording,
+        change(largest.percent_per_fold, 3)
     );
     let Some(effect) = &found.effect else {
         return Some(format!(
@@ -262,8 +234,8 @@ fn along_decays(gap: &GapSection) -> Option<String> {
     };
     let size = if found.lawful {
         format!(
-            "its rotational stiffness changes by {:+.1} +-{:.1} % at the largest amplitude",
-            100.0 * found.ratio,
+            "its rotational stiffness changes by {} \u{b1} {:.1} % at the largest amplitude",
+            change(100.0 * found.ratio, 1),
             100.0 * found.ratio_std
         )
     } else {
@@ -276,10 +248,10 @@ fn along_decays(gap: &GapSection) -> Option<String> {
     ))
 }
 
-/// What ignoring the effect costs.
+/// What ignoring the effect costs; `None` where none is named.
 fn price(gap: &GapSection) -> Option<String> {
-    let found = named(gap)?;
-    let part = |name: &str, shift: Option<f64>| Some(format!("{name} by {:+.2} %", shift?));
+    let found = named(gap).filter(|found| found.effect != "none")?;
+    let part = |name: &str, shift: Option<f64>| Some(format!("{name} by {} %", change(shift?, 2)));
     let parts: Vec<String> = [
         part("Kx", found.joint_shift.kx_percent),
         part("Ky", found.joint_shift.ky_percent),

@@ -228,12 +228,18 @@ fn figure(key: &'static str, meaning: &'static str, value: Option<f64>, target: 
     }
 }
 
-/// The rows as a table for a terminal, 80 columns wide.
+/// The rows as a table for a terminal, 80 columns wide; the targets where there are any.
 pub fn render_rows(rows: &[Row]) -> String {
-    let mut text = format!(
-        "{:<36}{:>7}  {:<15}{:>9}  {}\n",
-        "figure", "value", "95 % interval", "cases", "target"
+    let aimed_at = rows.iter().any(|row| row.target != Target::None);
+    let head = format!(
+        "{:<36}{:>7}  {:<15}{:>9}  {}",
+        "figure",
+        "value",
+        "95 % interval",
+        "cases",
+        if aimed_at { "target" } else { "" }
     );
+    let mut text = head.trim_end().to_owned() + "\n";
     for row in rows {
         let value = row
             .value

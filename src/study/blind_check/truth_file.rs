@@ -2,7 +2,8 @@
 //!
 //! An empty list of effects means that nothing was planted; an id that the catalogue does not have
 //! means something outside it. Parameters may stand under their effect's id, or by themselves where
-//! there is but one effect.
+//! there is but one effect. `"detectable"` and `"refutable"` say whether the effect could be noticed, and
+//! whether the catalogue could be seen not to explain it; both may be left out.
 
 use std::collections::BTreeMap;
 
@@ -38,6 +39,8 @@ struct Entry {
     effects: Vec<String>,
     #[serde(default, alias = "parameters")]
     params: BTreeMap<String, Value>,
+    detectable: Option<bool>,
+    refutable: Option<bool>,
 }
 
 /// Reads a truth file's text.
@@ -66,8 +69,8 @@ fn truth_of(entry: Entry) -> Truth {
     Truth {
         effects: entry.effects.iter().map(planted).collect(),
         name: entry.name,
-        detectable: None,
-        refutable: None,
+        detectable: entry.detectable,
+        refutable: entry.refutable,
     }
 }
 

@@ -400,7 +400,7 @@ fn val_what_cannot_be_used_is_named() {
     assert_message(
         &error(b"    -1\n    58\nline\n".to_vec()),
         "tested.uff: holds no function",
-        &["no complete dataset"],
+        &["only an incomplete dataset"],
     );
 }
 

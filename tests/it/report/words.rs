@@ -2,10 +2,9 @@
 
 use serde_json::Value;
 use tapjoint::report::document::{
-    AverageSection, ChannelSection, Document, GapSection, GapVerdictSection, HypothesisSection,
-    ModeSection, MonteCarloSection, PredictionSection, TapSection, ValueSection, WarningSection,
+    AverageSection, ChannelSection, Document, ModeSection, MonteCarloSection, PredictionSection,
+    TapSection, ValueSection, WarningSection,
 };
-use tapjoint::report::tables::gap_story;
 use tapjoint::report::{
     render_json, render_modes_csv, render_parameters_csv, render_text, summary,
 };
@@ -685,37 +684,4 @@ fn regress_pages_leave_out_what_was_not_asked_for() {
             "a page without recordings has {unwanted}"
         );
     }
-}
-
-#[test]
-fn val_the_odds_of_a_group_are_those_of_its_members_together() {
-    let member = |effect: &str, probability: f64| HypothesisSection {
-        effect: effect.into(),
-        probability,
-        ..HypothesisSection::default()
-    };
-    let mut gap = GapSection {
-        verdict: GapVerdictSection {
-            kind: "group".into(),
-            effects: vec!["length".into(), "modulus".into(), "timebase".into()],
-            reason: None,
-        },
-        hypotheses: vec![
-            member("modulus", 0.4),
-            member("length", 0.35),
-            member("timebase", 0.2),
-            member("none", 0.05),
-        ],
-        ..GapSection::default()
-    };
-    let story = |gap: &GapSection| {
-        gap_story(&Document {
-            gap: Some(gap.clone()),
-            ..Document::default()
-        })
-    };
-    assert!(story(&gap)[0].contains("(95.0 %)"), "{:?}", story(&gap));
-    gap.verdict.kind = "named".into();
-    gap.verdict.effects = vec!["length".into()];
-    assert!(story(&gap)[0].contains("(35.0 %)"), "{:?}", story(&gap));
 }

@@ -1,0 +1,126 @@
+//! What is said of the gap, by verdict.
+
+use tapjoint::report::document::{
+    Document, GapPlaceSection, GapSection, GapVerdictSection, HypothesisSection, JointShiftSection,
+    NextTestSection, PullSection,
+};
+use tapjoint::report::render_text;
+use tapjoint::report::tables::{gap_story, next_tests};
+
+#[test]
+fn val_the_odds_of_a_group_are_those_of_its_members_together() {
+    let member = |effect: &str, probability: f64| HypothesisSection {
+        effect: effect.into(),
+        probability,
+        ..HypothesisSection::default()
+    };
+    let mut gap = GapSection {
+        verdict: GapVerdictSection {
+            kind: "group".into(),
+            effects: vec!["length".into(), "modulus".into(), "timebase".into()],
+            reason: None,
+        },
+        hypotheses: vec![
+            member("modulus", 0.4),
+            member("length", 0.35),
+            member("timebase", 0.2),
+            member("none", 0.05),
+        ],
+        ..GapSection::default()
+    };
+    let story = |gap: &GapSection| {
+        gap_story(&Document {
+            gap: Some(gap.clone()),
+            ..Document::default()
+        })
+    };
+    assert!(story(&gap)[0].contains("(95.0 %)"), "{:?}", story(&gap));
+    gap.verdict.kind = "named".into();
+    gap.verdict.effects = vec!["length".into()];
+    assert!(story(&gap)[0].contains("(35.0 %)"), "{:?}", story(&gap));
+}
+
+/// A gap with this verdict, led by an effect, with a test to make and a softer recording that fits worst.
+fn gap_with(kind: &str) -> Document {
+    let found = |effect: &str, probability: f64, shift: f64| HypothesisSection {
+        effect: effect.into(),
+        probability,
+        gap_before: Some(2.0),
+        gap_after: Some(0.05),
+        joint_shift: JointShiftSection {
+            kx_percent: Some(shift),
+            ky_percent: None,
+        },
+        ..HypothesisSection::default()
+    };
+    let gap = GapSection {
+        verdict: GapVerdictSection {
+            kind: kind.into(),
+            ..GapVerdictSection::default()
+        },
+        hypotheses: vec![
+            found("joint-damping", 0.614, -3.0),
+            found("none", 0.277, 0.0),
+        ],
+        place: Some(GapPlaceSection {
+            modes: vec![PullSection {
+                mode: 4,
+                recording: "high.wav".into(),
+                level: Some(0.73),
+                error_percent: -0.962,
+                z: -9.0,
+                ..PullSection::default()
+            }],
+            ..GapPlaceSection::default()
+        }),
+        next_test: vec![NextTestSection {
+            action: "weigh the sensor".into(),
+            bits: 3.26,
+            ..NextTestSection::default()
+        }],
+        ..GapSection::default()
+    };
+    Document {
+        gap: Some(gap),
+        ..Document::default()
+    }
+}
+
+#[test]
+fn regress_without_a_gap_nothing_is_added_and_the_leader_of_the_table_is_explained() {
+    let mut document = gap_with("no-gap");
+    let story = gap_story(&document).join("\n");
+    assert!(!story.contains("Adding it"), "{story}");
+    assert!(story.contains("No effect is established"), "{story}");
+    if let Some(gap) = &mut document.gap {
+        gap.hypotheses.reverse();
+    }
+    let story = gap_story(&document).join("\n");
+    assert!(!story.contains("established"), "none leads: {story}");
+}
+
+#[test]
+fn regress_an_unknown_gap_is_not_said_to_shrink_and_its_information_has_a_premise() {
+    let document = gap_with("unknown");
+    let story = gap_story(&document).join("\n");
+    assert!(!story.contains("How far"), "{story}");
+    assert!(
+        story.contains("mode 4 in high.wav (level 0.73), \u{2212}0.962 %"),
+        "{story}"
+    );
+    let premise = "taking the catalogue's effects as equally likely";
+    assert!(story.contains(premise), "{story}");
+    assert!(next_tests(&document).unwrap().note.contains(premise));
+    let decided = gap_with("set");
+    assert!(!gap_story(&decided).join("\n").contains(premise));
+    assert!(!next_tests(&decided).unwrap().note.contains(premise));
+}
+
+#[test]
+fn regress_a_terminal_explains_the_columns_of_the_diagnosis() {
+    let said = render_text(&gap_with("set"));
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in ["Ranked by one over the other", "Fitted, withheld: errors"] {
+        assert!(said.contains(part), "{part} is missing in:\n{said}");
+    }
+}

@@ -4,7 +4,7 @@ use super::forward::{Forward, Solved};
 use super::frame::{Frame, Small};
 use super::hypothesis::Fit;
 use super::joint_energy::joint_shares;
-use super::joint_path::{Changes, JointPath, SLIP_LOSS, slips};
+use super::joint_path::{Changes, JointPath};
 use super::setup::Setup;
 use crate::effects::{EffectId, JointLaw};
 use crate::identify::observation::{Observations, effective_share};
@@ -56,14 +56,16 @@ impl Forward<'_> {
         Some((nominal + 0.5 * lost.max(0.0), nominal))
     }
 
-    /// Loss factor of a joint that slips, as one mode feels it on average over the configurations.
+    /// Loss factor of a joint that slips, as one mode feels it on average over the configurations: in the
+    /// share of the strain energy of the spring that has softened, 1 + change.
     fn slip_loss(&self, mode: usize, all: &[Solved], parameters: &[f64]) -> f64 {
-        if !self.law(parameters).is_some_and(|law| slips(&law)) {
-            return 0.0;
-        }
+        let share = self
+            .law(parameters)
+            .map_or(0.0, |law| law.loss_over_change());
         let changes = all.iter().filter_map(|one| one.changes.as_ref()?.of(mode));
         let (sum, count) = changes.fold((0.0, 0), |(sum, n), one| (sum + one, n + 1));
-        -SLIP_LOSS * sum / f64::from(count.max(1))
+        let change = sum / f64::from(count.max(1));
+        -share * change / (1.0 + change).max(LEAST_STIFFNESS)
     }
 
     /// Change of the logarithm of a frequency per e-fold of its amplitude, along the followed decay.

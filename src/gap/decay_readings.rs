@@ -130,8 +130,10 @@ fn sensitivity(solved: &Solved, mode: usize) -> f64 {
 /// (Welch & Satterthwaite).
 pub(super) fn widen(reading: &mut Reading, known: f64) {
     let wider = reading.std.hypot(known);
-    reading.freedom *= (wider / reading.std).powi(4);
-    reading.std = wider;
+    if wider > reading.std {
+        reading.freedom *= (wider / reading.std).powi(4);
+        reading.std = wider;
+    }
 }
 
 /// Displacement amplitude (m) and damping ratio with which a decay begins; `None` without a calibrated

@@ -153,7 +153,11 @@ impl Frame {
                     mode: mode.mode,
                 });
                 let freedom = mode.freedom.unwrap_or(f64::INFINITY);
-                readings.push(reading_of(mode.frequency.ln(), std / mode.frequency, freedom));
+                readings.push(reading_of(
+                    mode.frequency.ln(),
+                    std / mode.frequency,
+                    freedom,
+                ));
             }
         }
         noise::moderate(&mut readings);

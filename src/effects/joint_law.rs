@@ -63,10 +63,9 @@ impl JointLaw {
     ///
     /// Elastic: (A^2 + 2 sum B^2)^{p/2}, exact for the cubic spring, where another motion counts twice
     /// (R = (p + 2)/2 of a small motion beside a large one); within 6 % for powers from 1/2 on.
-    /// Micro-slip: (A + sum w B)^p. A faster motion shakes the sliders loose and counts more than its
-    /// size; a slower one counts fully where the mode only modulates its speed, and hardly where the mode
-    /// turns the velocity about. The weights are fitted to sliders in parallel under two to four
-    /// motions at once, which they follow to a fifth of the change.
+    /// Micro-slip: (A + (sum (w B)^{3/2})^{2/3})^p. Several others seldom reach their crests together, and
+    /// nobody reaches less than the root of the squares; the power 3/2 lies between. Against sliders in
+    /// parallel that follow two to five motions the change comes out with a scatter of 4 to 12 %.
     pub fn change_among(&self, own: ModeMotion, others: impl Iterator<Item = ModeMotion>) -> f64 {
         let p = self.exponent;
         let size = match self.kind() {
@@ -75,19 +74,39 @@ impl JointLaw {
                 (own.amplitude.powi(2) + 2.0 * squares).sqrt()
             }
             JointLawKind::MicroSlip => {
-                let part = |other: ModeMotion| other.amplitude * self.slip_weight(own, other);
-                own.amplitude + others.map(part).sum::<f64>()
+                let limits = self.slip_limits();
+                let part = |other: ModeMotion| other.amplitude * slip_weight(limits, own, other);
+                let sum: f64 = others.map(|other| part(other).powf(1.5)).sum();
+                own.amplitude + sum.powf(2.0 / 3.0)
             }
         };
         self.ratio * size.powf(p)
     }
 
-    fn slip_weight(&self, own: ModeMotion, other: ModeMotion) -> f64 {
-        if other.omega > own.omega {
-            return 1.4 / self.exponent.sqrt();
+    /// Weights of a slower and a faster motion that is much larger than the own one.
+    ///
+    /// With D the describing function, one motion alone changes the stiffness by c D A^p. A faster one of
+    /// amplitude B lets every slider slip that is weaker than B, and the slow motion finds c (p + 1) B^p. On
+    /// a slower one the own motion rides along the loop's branches, whose slope lacks
+    /// c (p + 1) (x/2)^p at a distance x from the turning point; its mean over the cycle is
+    /// c (p + 1) B^p times that of sin^{2p}.
+    fn slip_limits(&self) -> [f64; 2] {
+        let p = self.exponent;
+        let alone = self.describing_function();
+        let mean = gamma(p + 0.5) / (PI.sqrt() * gamma(p + 1.0));
+        [mean, 1.0].map(|share| ((p + 1.0) * share / alone).powf(p.recip()))
+    }
+
+    /// Loss factor over the change of the stiffness (1): 4 p/(pi (p + 2) D), D being the describing function;
+    /// 0 for a conservative spring. Of one mode by itself exact for small changes; among others, which
+    /// share in the sliders' slip, the median of the loss is 1.07 times as much, and half of all lie
+    /// between 0.85 and 1.17 times.
+    pub fn loss_over_change(&self) -> f64 {
+        let p = self.exponent;
+        match self.kind() {
+            JointLawKind::Elastic => 0.0,
+            JointLawKind::MicroSlip => 4.0 * p / (PI * (p + 2.0) * self.describing_function()),
         }
-        let faster = own.amplitude * own.omega / (other.amplitude * other.omega).max(1e-300);
-        0.15 + 0.75 / (1.0 + faster)
     }
 
     /// c (rad^-p) of the law `M = k0 theta (1 + c |theta|^p)` on first loading, for a hardest tap's
@@ -149,5 +168,17 @@ impl JointLaw {
         } else {
             loss / (2.0 * PI * energy)
         }
+    }
+}
+
+/// Weight of another motion's amplitude in what a mode feels of sliders, between 0 and its limit: what
+/// counts is which of the two velocities turns about. Steepness and place of the transition follow sliders
+/// in parallel under two motions (velocities 0.01 to 100 to one).
+fn slip_weight([slower, faster]: [f64; 2], own: ModeMotion, other: ModeMotion) -> f64 {
+    let velocities = own.amplitude * own.omega / (other.amplitude * other.omega).max(1e-300);
+    if other.omega > own.omega {
+        faster / (1.0 + 1.9 * velocities)
+    } else {
+        slower / (1.0 + 0.3 * velocities.powf(1.5))
     }
 }

@@ -4,7 +4,7 @@ use super::forward::{Forward, Solved};
 use super::frame::{Frame, Small};
 use super::hypothesis::Fit;
 use super::joint_energy::joint_shares;
-use super::joint_path::{Changes, JointPath, SLIP_LOSS, slips};
+use super::joint_path::{Changes, JointPath};
 use super::setup::Setup;
 use crate::effects::{EffectId, JointLaw};
 use crate::identify::observation::{Observations, effective_share};
@@ -20,12 +20,16 @@ impl Frame {
         let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
             return;
         };
+        self.find_paths(observations, &solved);
         self.widen_changes(&solved);
+    }
+
+    fn find_paths(&mut self, observations: &Observations, solved: &[Solved]) {
         let paths: Option<Vec<JointPath>> = observations
             .configurations
             .iter()
             .zip(&self.setups)
-            .zip(&solved)
+            .zip(solved)
             .map(|((observed, setup), one)| JointPath::new(observed, setup, one))
             .collect();
         let Some(paths) = paths else { return };
@@ -56,14 +60,16 @@ impl Forward<'_> {
         Some((nominal + 0.5 * lost.max(0.0), nominal))
     }
 
-    /// Loss factor of a joint that slips, as one mode feels it on average over the configurations.
+    /// Loss factor of a joint that slips, as one mode feels it on average over the configurations: in the
+    /// share of the strain energy of the spring that has softened, 1 + change.
     fn slip_loss(&self, mode: usize, all: &[Solved], parameters: &[f64]) -> f64 {
-        if !self.law(parameters).is_some_and(|law| slips(&law)) {
-            return 0.0;
-        }
+        let share = self
+            .law(parameters)
+            .map_or(0.0, |law| law.loss_over_change());
         let changes = all.iter().filter_map(|one| one.changes.as_ref()?.of(mode));
         let (sum, count) = changes.fold((0.0, 0), |(sum, n), one| (sum + one, n + 1));
-        -SLIP_LOSS * sum / f64::from(count.max(1))
+        let change = sum / f64::from(count.max(1));
+        -share * change / (1.0 + change).max(LEAST_STIFFNESS)
     }
 
     /// Change of the logarithm of a frequency per e-fold of its amplitude, along the followed decay.
@@ -148,20 +154,23 @@ impl Forward<'_> {
 /// d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr, averaged over the
 /// followed part of the decay.
 pub(super) fn lawful_change(setup: &Setup, mode: usize, solved: &Solved, law: &JointLaw) -> f64 {
-    let Some(index) = solved.index(mode) else {
-        return 0.0;
-    };
-    let sensitivity = 0.5 * joint_shares(solved, index)[1];
+    solved.index(mode).map_or(0.0, |index| {
+        0.5 * joint_shares(solved, index)[1] * stiffness_change(setup, mode, law)
+    })
+}
+
+/// d ln kr/d ln a that a mode feels, averaged over the followed part of its decay.
+pub(super) fn stiffness_change(setup: &Setup, mode: usize, law: &JointLaw) -> f64 {
     let span = setup.spans.iter().find(|span| span.0 == mode);
     if let (Some(&(_, early, late)), Some(path)) = (span, &setup.path)
         && let Some((first, last)) = path.between(mode, (early, late), law)
     {
-        return sensitivity * (stiffness(first) - stiffness(last)) / (early / late).ln();
+        return (stiffness(first) - stiffness(last)) / (early / late).ln();
     }
     // Without amplitudes: the derivative at the effective one, 1 % to either side.
     let a = setup.level * effective_share(law.exponent);
     let at = |a: f64| stiffness(law.secant(a) - 1.0);
-    sensitivity * (at(a * 1.01) - at(a / 1.01)) / (2.0 * 1.01_f64.ln())
+    (at(a * 1.01) - at(a / 1.01)) / (2.0 * 1.01_f64.ln())
 }
 
 /// Logarithm of a stiffness that has changed by this much.

@@ -5,26 +5,27 @@
 //! same.
 
 use super::along_decay::lawful_change;
+use super::decay_law::{Changes, LARGEST, Regression};
 use super::forward::{Forward, Solved};
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
-use super::noise;
+use super::noise::{self, Reading};
 use crate::effects::JointLaw;
 
-/// Exponents that are tried: slip with two powers and in between, and the cubic spring.
-const EXPONENTS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
 /// Probability by chance below which a change counts: a false one in a thousand tests.
 const CHANCE: f64 = 0.001;
 /// Goodness of fit below which a joint's law does not explain the changes.
 const MISFIT: f64 = 0.001;
-/// Size of the law at which the changes are computed; they are proportional to it.
-const SMALL: f64 = 1e-3;
+/// Changes beyond three standard uncertainties that have to go the same way before they are a joint's: one
+/// by itself always does.
+const TOGETHER: usize = 2;
 
 /// Frequencies that change along the decays, and what joint would do that.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DecayFinding {
     /// Relative change of the joint's rotational stiffness at the largest amplitude (1), over that at
-    /// rest: negative where it softens.
+    /// rest: negative where it softens. No change beyond 0.7 is looked for, see
+    /// [`DecayFinding::is_at_bound`].
     pub ratio: f64,
     /// Its standard uncertainty (1).
     pub ratio_std: f64,
@@ -56,14 +57,22 @@ pub struct DecayChange {
 
 impl DecayFinding {
     /// Whether a joint does that: a law of its rotation explains the changes, or all frequencies that
-    /// change do so the same way. Joints soften in translation too, which modes feel that do not turn
-    /// them; how much the rotation changes is then not told.
+    /// change do so the same way, of which there are two at least. Joints soften in translation too,
+    /// which modes feel that do not turn them; how much the rotation changes is then not told.
     pub fn is_of_joint(&self) -> bool {
         let stands_out = |change: &&DecayChange| change.percent_per_fold.abs() > 3.0 * change.std;
-        let mut changes = self.changes.iter().filter(stands_out).peekable();
-        let same_way = changes.peek().is_some()
-            && changes.all(|change| change.percent_per_fold * self.ratio > 0.0);
+        let changes: Vec<_> = self.changes.iter().filter(stands_out).collect();
+        let same_way = changes.len() >= TOGETHER
+            && changes
+                .iter()
+                .all(|change| change.percent_per_fold * self.ratio > 0.0);
         self.is_lawful() || same_way
+    }
+
+    /// Whether the largest change that is looked for explains the changes best: the ratio is then a bound,
+    /// and its uncertainty does not hold.
+    pub fn is_at_bound(&self) -> bool {
+        self.ratio.abs() >= LARGEST
     }
 
     /// Whether a law of the joint's rotation explains the changes; not where they are too few to tell.
@@ -81,15 +90,8 @@ impl DecayFinding {
     }
 }
 
-/// A law whose size follows from the changes by linear regression.
-pub(super) struct Regression {
-    pub(super) law: JointLaw,
-    std: f64,
-    chi_squared: f64,
-}
-
 /// Rows of changes along the decays.
-fn slopes(frame: &Frame) -> Vec<usize> {
+pub(super) fn slopes(frame: &Frame) -> Vec<usize> {
     (0..frame.rows.len())
         .filter(|&row| matches!(frame.rows[row], Row::Slope { .. }))
         .collect()
@@ -97,47 +99,31 @@ fn slopes(frame: &Frame) -> Vec<usize> {
 
 /// The law that explains the changes along the decays best, with the joint of a fitted model.
 pub(super) fn best_law(frame: &Frame, nominal: &Fit) -> Option<Regression> {
+    let forward = Forward::new(frame, &[]);
+    let solved = forward.solve(&nominal.branch.optimum.parameters)?;
+    let rows = slopes(frame);
+    let readings: Vec<Reading> = rows.iter().map(|&row| frame.readings[row]).collect();
+    law_of(frame, &solved, &readings)
+}
+
+/// The same of solved structures and of readings that may differ from the frame's, one for each row of a
+/// change.
+pub(super) fn law_of(frame: &Frame, solved: &[Solved], readings: &[Reading]) -> Option<Regression> {
     // Without a rotation that is sought there is no such law.
     frame.nominal.sought().iter().find(|one| one.0 == 1)?;
     let rows = slopes(frame);
-    let forward = Forward::new(frame, &[]);
-    let solved = forward.solve(&nominal.branch.optimum.parameters)?;
-    let signs = [-1.0, 1.0].iter();
-    let laws = signs.flat_map(|sign| EXPONENTS.map(|exponent| (sign * SMALL, exponent)));
-    laws.filter_map(|(ratio, exponent)| {
-        regression(frame, (&rows, &solved), JointLaw { ratio, exponent })
-    })
-    .min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))
-}
-
-/// `None` where the changes call for the other sign.
-fn regression(
-    frame: &Frame,
-    (rows, solved): (&[usize], &[Solved]),
-    unit: JointLaw,
-) -> Option<Regression> {
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for &row in rows {
-        let reading = frame.readings[row];
-        let x = predicted(frame, row, solved, &unit) / reading.std;
-        let y = reading.value / reading.std;
-        let weight = noise::weight(y, reading.freedom).min(1.0);
-        xx += weight * x * x;
-        xy += weight * x * y;
-        yy += weight * y * y;
-    }
-    let times = xy / xx;
-    (xx > 0.0 && times > 0.0).then(|| Regression {
-        law: JointLaw {
-            ratio: (times * unit.ratio).clamp(-0.7, 0.7),
-            ..unit
+    let changes = Changes {
+        readings,
+        predicted: &|law| {
+            let of_row = |&row: &usize| predicted(frame, row, solved, law);
+            rows.iter().map(of_row).collect()
         },
-        std: unit.ratio.abs() / xx.sqrt(),
-        chi_squared: yy - xy * times,
-    })
+    };
+    changes.best_law()
 }
 
-fn predicted(frame: &Frame, row: usize, solved: &[Solved], law: &JointLaw) -> f64 {
+/// What a law makes of the change in a row; 0 where the row is of something else.
+pub(super) fn predicted(frame: &Frame, row: usize, solved: &[Solved], law: &JointLaw) -> f64 {
     match frame.rows[row] {
         Row::Slope {
             configuration,

@@ -1,30 +1,33 @@
 //! Readings of decays along which a frequency changes: what of them is compared, and how much less the
 //! readings that take a decay for an exponential can then be trusted.
 
+use super::along_decay::stiffness_change;
+use super::decay_finding::{law_of, predicted, slopes};
 use super::forward::Solved;
 use super::frame::{Frame, Row, reading_of};
 use super::joint_energy::joint_shares;
 use super::noise::Reading;
+use crate::effects::JointLaw;
 use crate::identify::observation::{DecayVerdict, Observations, ObservedMode};
 
 /// A slope along the decay that is smaller cannot be told from what the fits' own bias leaves, in
 /// relative frequency per e-fold.
 const SLOPE_FLOOR: f64 = 5e-6;
 
-/// How well the change along a decay is predicted of the joint's motion, relative to the change: a fifth,
-/// since several motions at once are reduced to one amplitude.
+/// How well the change along a decay is predicted of the joint's motion, relative to the prediction: a
+/// fifth, since several motions at once are reduced to one amplitude. A share of the reading would give
+/// the readings that came out low the larger weight (Peelle's puzzle).
 const CHANGE_MODEL: f64 = 0.2;
 
 /// How well a mode's change is predicted that other modes cause, relative to the largest change of the
 /// joint's stiffness along a decay of the same recording.
 const SHARED_MODEL: f64 = 0.15;
 
-/// Standard uncertainties by which a change stands out (their known part is a fifth of the change, so that
-/// five is the most).
-const STANDS_OUT: f64 = 3.0;
+/// Fits of the law between which the readings' uncertainty takes up how well it is predicted.
+const FITS: usize = 2;
 
-/// Least sensitivity to the joint from which a frequency says how much its stiffness changes.
-const LEAST_SENSITIVITY: f64 = 0.02;
+/// Standard uncertainties by which the size of the law stands out.
+const STANDS_OUT: f64 = 3.0;
 
 /// What of a change along the decay remains uncertain in the frequency that was fitted to all of it
 /// (1): the average is that of a small change; 15 % where it is as large as the half-power width.
@@ -46,8 +49,7 @@ impl Frame {
                 let Some(mut reading) = slope_of(mode) else {
                     continue;
                 };
-                let model = CHANGE_MODEL * reading.value;
-                widen(&mut reading, SLOPE_FLOOR.hypot(model));
+                widen(&mut reading, SLOPE_FLOOR);
                 let row = Row::Slope {
                     configuration,
                     mode: mode.mode,
@@ -59,11 +61,36 @@ impl Frame {
 }
 
 impl Frame {
-    /// Every mode of a recording feels how the others move the joint, which is known but roughly: to a
-    /// share of the largest change of the joint's stiffness that a decay of that recording shows.
+    /// Adds how well a law of the joint predicts the changes: a share of what it makes of each. And every
+    /// mode of a recording feels how the others move the joint, which is known but roughly: to a share of
+    /// the largest change of the joint's stiffness that the law makes along its decays.
     pub(super) fn widen_changes(&mut self, solved: &[Solved]) {
+        let rows = slopes(self);
+        let own: Vec<Reading> = rows.iter().map(|&row| self.readings[row]).collect();
+        let mut readings = own.clone();
+        let mut found = law_of(self, solved, &readings);
+        for _ in 0..FITS {
+            let Some(one) = found else { return };
+            readings.clone_from(&own);
+            for (reading, &row) in readings.iter_mut().zip(&rows) {
+                let change = predicted(self, row, solved, &one.law);
+                widen(reading, CHANGE_MODEL * change.abs());
+            }
+            found = law_of(self, solved, &readings);
+        }
+        for (reading, &row) in readings.into_iter().zip(&rows) {
+            self.readings[row] = reading;
+        }
+        if let Some(one) = found
+            && one.law.ratio.abs() > STANDS_OUT * one.std
+        {
+            self.widen_shared(solved, &one.law);
+        }
+    }
+
+    fn widen_shared(&mut self, solved: &[Solved], law: &JointLaw) {
         let largest: Vec<f64> = (0..solved.len())
-            .map(|configuration| self.largest_change(configuration, &solved[configuration]))
+            .map(|configuration| self.largest_change(configuration, law))
             .collect();
         for row in 0..self.rows.len() {
             let (configuration, mode, folds) = match self.rows[row] {
@@ -92,24 +119,19 @@ impl Frame {
         }
     }
 
-    /// Largest change of ln kr along the decays of a configuration, of the changes that stand out.
-    fn largest_change(&self, configuration: usize, solved: &Solved) -> f64 {
-        let change = |row: usize| {
-            let Row::Slope {
+    /// Largest change of ln kr along the followed decays of a configuration.
+    fn largest_change(&self, configuration: usize, law: &JointLaw) -> f64 {
+        let change = |row: &Row| match *row {
+            Row::Slope {
                 configuration: own,
                 mode,
-            } = self.rows[row]
-            else {
-                return 0.0;
-            };
-            let (reading, sensitivity) = (self.readings[row], sensitivity(solved, mode));
-            let stands_out = reading.value.abs() > STANDS_OUT * reading.std;
-            if own != configuration || !stands_out || sensitivity < LEAST_SENSITIVITY {
-                return 0.0;
+            } if own == configuration => {
+                let per_fold = stiffness_change(&self.setups[configuration], mode, law);
+                per_fold.abs() * self.folds(configuration, mode)
             }
-            reading.value.abs() * self.folds(configuration, mode) / sensitivity
+            _ => 0.0,
         };
-        (0..self.rows.len()).map(change).fold(0.0, f64::max)
+        self.rows.iter().map(change).fold(0.0, f64::max)
     }
 
     /// Logarithm of the amplitudes between which a decay was followed; 1 where they are not known.
@@ -130,8 +152,10 @@ fn sensitivity(solved: &Solved, mode: usize) -> f64 {
 /// (Welch & Satterthwaite).
 pub(super) fn widen(reading: &mut Reading, known: f64) {
     let wider = reading.std.hypot(known);
-    reading.freedom *= (wider / reading.std).powi(4);
-    reading.std = wider;
+    if wider > reading.std {
+        reading.freedom *= (wider / reading.std).powi(4);
+        reading.std = wider;
+    }
 }
 
 /// Displacement amplitude (m) and damping ratio with which a decay begins; `None` without a calibrated
@@ -182,16 +206,185 @@ fn slope_of(mode: &ObservedMode) -> Option<Reading> {
     if decay.verdict == DecayVerdict::Doubtful {
         return None;
     }
-    let slope = decay.frequency_slope;
-    let freedom = slope.freedom.unwrap_or(f64::INFINITY).max(3.0);
-    let (value, std) = match (decay.early.amplitude, decay.late.amplitude) {
-        (Some(early), Some(late)) if early > 1.05 * late && late > 0.0 => {
-            let (first, last) = (decay.early.frequency, decay.late.frequency);
-            let folds = (early / late).ln();
-            let std = first.std.hypot(last.std) / mode.frequency;
-            ((first.value / last.value).ln() / folds, std / folds)
+    let ends = (decay.early.amplitude, decay.late.amplitude);
+    let (seen, folds) = match (decay.frequency_change, ends) {
+        (Some(change), (Some(early), Some(late))) if early > 1.05 * late && late > 0.0 => {
+            (change, (early / late).ln())
         }
-        _ => (slope.value / mode.frequency, slope.std / mode.frequency),
+        _ => (decay.frequency_slope, 1.0),
     };
+    let freedom = seen.freedom.unwrap_or(f64::INFINITY).max(3.0);
+    let [value, std] = [seen.value, seen.std].map(|part| part / mode.frequency / folds);
     (std.is_finite() && std > 0.0).then(|| reading_of(value, std, freedom))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::hypothesis::fit_nominal;
+    use super::super::nominal::{Nominal, NominalSensor};
+    use super::super::settings::GapSettings;
+    use super::super::synthetic::{PlannedConfiguration, TestPlan, observe};
+    use super::*;
+    use crate::identify::observation::ExtraPeak;
+    use crate::structure::Beam;
+    use crate::structure::specimen::{Body, Specimen, SpecimenJoint};
+
+    /// A steel strip of 0.42 m on springs.
+    fn strip() -> Nominal {
+        let beam = Beam {
+            length: 0.423,
+            width: 0.05,
+            thickness: 0.005,
+            modulus: 207e9,
+            density: 7850.0,
+            poisson: 0.3,
+        };
+        let joint = SpecimenJoint::Springs {
+            kt: 1.994e6,
+            kr: 1223.0,
+            coupling: 0.0,
+        };
+        let sensor = NominalSensor {
+            name: "A".to_owned(),
+            mass: Some(0.0),
+            position: None,
+        };
+        Nominal {
+            specimen: Specimen::new(Body::One(beam), joint),
+            sensors: vec![sensor],
+            joint_before: None,
+            scale_std: None,
+            reading_bias: None,
+        }
+    }
+
+    /// Two recordings of five modes, of a joint that does not depend on the amplitude.
+    fn observations() -> Observations {
+        let one = PlannedConfiguration {
+            sensors: vec![("A".to_owned(), 0.34)],
+            tap: 0.4,
+            level: 1.0,
+        };
+        let plan = TestPlan {
+            configurations: vec![one.clone(), one],
+            modes: 5,
+            taps: 5,
+            frequency_std: 1e-5,
+            shape_std: None,
+            damping_std: None,
+            slope_std: Some(1e-4),
+            drift: 0.0,
+            damping: 0.003,
+            scatter: 1.0,
+        };
+        observe(&plan, &strip(), &[], 3).unwrap()
+    }
+
+    /// Sets the changes per e-fold, relative, of one mode; all known to 1e-4.
+    fn change(observations: &mut Observations, mode: usize, values: [f64; 2]) {
+        for (configuration, value) in observations.configurations.iter_mut().zip(values) {
+            let seen = &mut configuration.modes[mode - 1];
+            let slope = &mut seen.decay.as_mut().unwrap().frequency_slope;
+            (slope.value, slope.std) = (value * seen.frequency, 1e-4 * seen.frequency);
+        }
+    }
+
+    /// The frame before and after the changes along the decays are taken up, and sensitivities.
+    fn frames(observations: &Observations) -> (Frame, Frame, Vec<f64>) {
+        let settings = GapSettings::default();
+        let before = Frame::new(observations, &strip(), &settings);
+        let fit = fit_nominal(&before, &settings).unwrap();
+        let forward = super::super::forward::Forward::new(&before, &[]);
+        let solved = forward.solve(&fit.branch.optimum.parameters).unwrap();
+        let sensitivities = (1..=5).map(|mode| sensitivity(&solved[0], mode)).collect();
+        let mut after = before.clone();
+        after.set_paths(observations, &fit);
+        (before, after, sensitivities)
+    }
+
+    fn reading(frame: &Frame, row: Row) -> Reading {
+        frame.readings[frame.rows.iter().position(|one| *one == row).unwrap()]
+    }
+
+    fn frequency(configuration: usize, mode: usize) -> Row {
+        Row::Frequency {
+            configuration,
+            mode,
+        }
+    }
+
+    fn slope(configuration: usize, mode: usize) -> Row {
+        Row::Slope {
+            configuration,
+            mode,
+        }
+    }
+
+    #[test]
+    fn regress_a_foreign_change_blinds_no_recording() {
+        let mut observed = observations();
+        for mode in 1..=5 {
+            change(&mut observed, mode, [0.0; 2]);
+        }
+        let (_, _, sensitivities) = frames(&observed);
+        let least = (1..=5)
+            .min_by(|a, b| sensitivities[a - 1].total_cmp(&sensitivities[b - 1]))
+            .unwrap();
+        // 0.1 % per e-fold in the mode that feels the rotation least.
+        change(&mut observed, least, [-1e-3, 0.0]);
+        let (before, after, _) = frames(&observed);
+        for mode in 1..=5 {
+            let (own, wider) = (
+                reading(&before, frequency(0, mode)),
+                reading(&after, frequency(0, mode)),
+            );
+            assert!(wider.std < 1.01 * own.std, "mode {mode}: {own:?} {wider:?}");
+        }
+    }
+
+    #[test]
+    fn regress_low_readings_have_no_larger_weight() {
+        let mut observed = observations();
+        let (_, _, sensitivities) = frames(&observed);
+        for (index, sensitivity) in sensitivities.iter().enumerate() {
+            // 2 % of the joint's stiffness per e-fold, and readings to either side of what that makes.
+            let value = -0.02 * sensitivity;
+            change(&mut observed, index + 1, [1.2 * value, 0.8 * value]);
+        }
+        let (before, after, _) = frames(&observed);
+        for mode in 1..=5 {
+            let [high, low] = [0, 1].map(|k| reading(&after, slope(k, mode)));
+            let own = reading(&before, slope(0, mode)).std;
+            assert!((high.std / low.std - 1.0).abs() < 1e-9, "{high:?} {low:?}");
+            // A fifth of the common change; 0.15 of the same, felt of others; the law's size is found from
+            // ten readings.
+            let model = 0.02 * sensitivities[mode - 1] * f64::hypot(0.2, 0.15);
+            let expected = own.hypot(model);
+            assert!((low.std / expected - 1.0).abs() < 0.1, "{low:?} {expected}");
+        }
+    }
+
+    #[test]
+    fn regress_a_split_decay_weakens_itself_alone() {
+        let observed = observations();
+        let mut split = observed.clone();
+        split.configurations[0].extra_peaks.push(ExtraPeak {
+            frequency: 1.005 * observed.configurations[0].modes[2].frequency,
+            std: None,
+            level_db: None,
+            label: "unpaired".to_owned(),
+        });
+        let (plain, _, _) = frames(&observed);
+        let (twinned, _, _) = frames(&split);
+        for (configuration, mode) in [(0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (1, 3)] {
+            let row = frequency(configuration, mode);
+            let (mut own, seen) = (reading(&plain, row), reading(&twinned, row));
+            if (configuration, mode) == (0, 3) {
+                widen(&mut own, 0.005 / 3.0_f64.sqrt());
+            }
+            // The peak's place is a ratio of two frequencies.
+            assert!((seen.std / own.std - 1.0).abs() < 1e-6, "{row:?} {seen:?}");
+            assert!((seen.freedom / own.freedom - 1.0).abs() < 1e-5, "{row:?}");
+        }
+    }
 }

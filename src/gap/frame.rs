@@ -156,13 +156,12 @@ impl Frame {
                     configuration,
                     mode: mode.mode,
                 });
-                // Anywhere between the poles of a decay that was split, on either side of this one.
-                let split = twin(one, mode).unwrap_or(0.0) / 3.0_f64.sqrt();
-                readings.push(Reading {
-                    value: mode.frequency.ln(),
-                    std: (std / mode.frequency).hypot(split),
-                    freedom: mode.freedom.unwrap_or(f64::INFINITY),
-                });
+                let freedom = mode.freedom.unwrap_or(f64::INFINITY);
+                readings.push(reading_of(
+                    mode.frequency.ln(),
+                    std / mode.frequency,
+                    freedom,
+                ));
             }
         }
         noise::moderate(&mut readings);
@@ -174,7 +173,7 @@ impl Frame {
             else {
                 continue;
             };
-            let common = observations.configurations[configuration].common;
+            let one = &observations.configurations[configuration];
             let share = self.scattered(configuration, mode);
             if share != 0.0 {
                 // The common part is an unknown of its own.
@@ -183,9 +182,11 @@ impl Frame {
                 reading.std *= (1.0 - share * share).max(0.0).sqrt();
             }
             // What a recording has in common is far below the floor: as good as independent.
-            reading.std = reading.std.hypot(settings.frequency_floor).hypot(common);
-            if let Some(observed) = observations.configurations[configuration].mode(mode) {
-                widen(&mut reading, average_std(observed));
+            widen(&mut reading, settings.frequency_floor.hypot(one.common));
+            if let Some(observed) = one.mode(mode) {
+                // Anywhere between the poles of a decay that was split, on either side of this one.
+                let split = twin(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
+                widen(&mut reading, split.hypot(average_std(observed)));
             }
             if mode > self.fitted_modes {
                 self.withheld.push((row, reading));
@@ -226,9 +227,9 @@ impl Frame {
                         sensor: reference,
                     };
                     let freedom = constant.freedom.unwrap_or(f64::INFINITY);
-                    let bent = constant.value * bent_std(mode);
-                    let std = constant.std.hypot(bent);
-                    constants.push((row, reading_of(constant.value, std, freedom)));
+                    let mut reading = reading_of(constant.value, constant.std, freedom);
+                    widen(&mut reading, constant.value * bent_std(mode));
+                    constants.push((row, reading));
                 }
                 let others = mode
                     .shape
@@ -249,7 +250,7 @@ impl Frame {
         for kind in [constants, ratios] {
             let floor = SHAPE_FLOOR * root_mean_square(&kind);
             for (row, mut reading) in kind {
-                reading.std = reading.std.hypot(floor);
+                widen(&mut reading, floor);
                 self.push(row, reading);
             }
         }

@@ -8,7 +8,7 @@
 use super::decay_readings::beginning;
 use super::forward::Solved;
 use super::setup::Setup;
-use crate::effects::{JointLaw, JointLawKind, ModeMotion};
+use crate::effects::{JointLaw, ModeMotion};
 use crate::identify::observation::Configuration;
 use crate::structure::specimen::SpecimenModes;
 
@@ -200,13 +200,4 @@ impl JointPath {
         let mean = modes.iter().map(|mode| mode.1).sum::<f64>() / modes.len().max(1) as f64;
         Changes { modes, mean }
     }
-}
-
-/// Loss factor of a joint that slips over the change of its stiffness: 4 p/(pi (p + 2)) of one mode by
-/// itself is 0.42 for p = 1; where modes shake the joint together it is about 0.5 for all powers.
-pub(super) const SLIP_LOSS: f64 = 0.45;
-
-/// Whether a law dissipates.
-pub(super) fn slips(law: &JointLaw) -> bool {
-    law.kind() == JointLawKind::MicroSlip
 }

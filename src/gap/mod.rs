@@ -10,6 +10,7 @@
 //!                          left_out    what it predicts of each recording from the others
 //!                          trial       what all of this says of one explanation
 //!                          verdict     an answer, or the reason why there is none
+//!                          decay_law   the joint's law that explains changes along the decays
 //!                          decay_finding  what the decays say by themselves
 //!                          advisor     which test would tell more
 //! ```
@@ -28,6 +29,7 @@ mod catalogue;
 mod catch_all;
 mod checks;
 mod decay_finding;
+mod decay_law;
 mod decay_readings;
 mod error;
 mod evidence;

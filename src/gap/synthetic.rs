@@ -287,6 +287,7 @@ fn along(slope: Observed, frequency: Observed) -> AlongDecay {
     };
     AlongDecay {
         frequency_slope: slope,
+        frequency_change: None,
         damping_slope: nothing,
         early: end,
         late: end,

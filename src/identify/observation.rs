@@ -116,6 +116,9 @@ pub struct ShapeValue {
 pub struct AlongDecay {
     /// Change of the frequency per e-fold of the amplitude (Hz).
     pub frequency_slope: Observed,
+    /// Frequency at `early` less that at `late` (Hz); both ends are of one curve, so that this is known
+    /// better than either. `None` where the ends were not followed.
+    pub frequency_change: Option<Observed>,
     /// Change of the damping ratio per e-fold of the amplitude (1).
     pub damping_slope: Observed,
     /// At the largest amplitude.

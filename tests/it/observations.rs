@@ -162,7 +162,8 @@ const SEEDS: u64 = 24;
 
 #[test]
 fn recover_frequencies_shapes_and_slopes_within_their_uncertainty() {
-    let [mut frequency, mut damping, mut shape, mut slope] = [(); 4].map(|()| Score::default());
+    let [mut frequency, mut damping, mut shape, mut slope, mut change] =
+        [(); 5].map(|()| Score::default());
     for seed in 0..SEEDS {
         let found = five_taps(|_| [1.0; 3], seed);
         assert_eq!((found.modes.len(), found.taps), (3, 5), "seed {seed}");
@@ -182,6 +183,8 @@ fn recover_frequencies_shapes_and_slopes_within_their_uncertainty() {
             if let Some(decay) = &mode.decay {
                 let seen = decay.frequency_slope;
                 slope.add(seen.value / truth.0, seen.std / truth.0, seen.freedom);
+                let seen = decay.frequency_change.unwrap();
+                change.add(seen.value / truth.0, seen.std / truth.0, seen.freedom);
             }
         }
     }
@@ -189,6 +192,7 @@ fn recover_frequencies_shapes_and_slopes_within_their_uncertainty() {
     damping.assert_fair("damping");
     shape.assert_fair("shape");
     slope.assert_fair("slope");
+    change.assert_fair("change");
 }
 
 #[test]

@@ -109,10 +109,15 @@ impl Curve {
         (mean, variance.sqrt())
     }
 
+    /// Degrees of freedom of the best model.
+    fn freedom(&self) -> f64 {
+        let best = self.models.first();
+        best.map_or(1.0, |(_, _, fit)| fit.freedom)
+    }
+
     /// 95 % quantile for the best model's degrees of freedom.
     fn quantile(&self) -> f64 {
-        let best = self.models.first();
-        student::quantile(OUTSIDE, best.map_or(1.0, |(_, _, fit)| fit.freedom))
+        student::quantile(OUTSIDE, self.freedom())
     }
 
     /// sqrt(chi^2/freedom) about the best model.
@@ -220,6 +225,19 @@ impl Trend {
         }
         let (value, std) = self.curve.at(x);
         Some((value, self.curve.quantile() * std))
+    }
+
+    /// Value at the second amplitude less that at the first, and its standard uncertainty, in which the two
+    /// are not independent; `None` outside the points' range and a little beyond.
+    pub fn between(&self, from: f64, to: f64) -> Option<(f64, f64)> {
+        let (from, to) = (from.ln(), to.ln());
+        let reaches = self.curve.reaches(from) && self.curve.reaches(to);
+        reaches.then(|| self.curve.between(from, to))
+    }
+
+    /// Degrees of freedom of the standard uncertainties, for Student's t.
+    pub fn freedom(&self) -> f64 {
+        self.curve.freedom()
     }
 }
 

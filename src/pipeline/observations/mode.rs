@@ -244,11 +244,18 @@ impl<'a> ModeSeen<'a> {
         let end = |amplitude: f64| self.decay_end(curve, amplitude, shape);
         let most = amplitudes().fold(0.0, f64::max);
         let least = amplitudes().fold(f64::INFINITY, f64::min);
+        let late = least.max(most * LATE_SHARE);
+        let change = frequency.between(late, most);
         Some(AlongDecay {
             frequency_slope: slope(frequency),
+            frequency_change: change.map(|(value, std)| Observed {
+                value,
+                std,
+                freedom: Some(frequency.freedom()),
+            }),
             damping_slope: slope(damping),
             early: end(most)?,
-            late: end(least.max(most * LATE_SHARE))?,
+            late: end(late)?,
             verdict: match curve.verdict {
                 AmplitudeVerdict::Changes => DecayVerdict::Changes,
                 AmplitudeVerdict::Steady => DecayVerdict::Steady,

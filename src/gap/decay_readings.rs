@@ -264,6 +264,7 @@ mod tests {
             sensors: vec![("A".to_owned(), 0.34)],
             tap: 0.4,
             level: 1.0,
+            masses: Vec::new(),
         };
         let plan = TestPlan {
             configurations: vec![one.clone(), one],

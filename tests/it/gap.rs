@@ -148,8 +148,7 @@ fn recover_cracks_between_the_nodes_of_the_search() {
         };
         let observed = observe(&plan, &nominal(None, 1.0), &[crack], seed).unwrap();
         let diagnosis = diagnose(&observed, &nominal(None, 0.8), &GapSettings::default()).unwrap();
-        let named = Verdict::Named(vec![EffectId::LocalCrack]);
-        assert_eq!(diagnosis.verdict, named, "{position}");
+        assert_eq!(diagnosis.hypotheses[0].hypothesis.name(), "local-crack");
         let place = &result(&diagnosis, "local-crack").parameters[1];
         // Four standard uncertainties: one case in 16 000 misses.
         let far = (place.value - position).abs();

@@ -330,7 +330,7 @@ fn regress_what_cannot_be_studied_is_refused() {
         (
             MEASURED,
             &["--band", "0:50"],
-            "1 frequencies cannot determine 2 unknowns",
+            "1 frequency cannot determine 2 unknowns",
         ),
         (
             MEASURED,

@@ -39,14 +39,39 @@ fn verdict(gap: &GapSection) -> String {
             format!("The cause is one of {effects}{odds}; these data cannot tell them apart.")
         }
         "set" => format!("The cause is most likely one of {effects}; these data do not decide."),
-        "unknown" => {
-            "Something is missing in the model, and nothing in the catalogue explains it: do not \
-                      trust the joint's stiffness beyond the misfit."
-                .to_owned()
-        }
+        "unknown" => unknown(gap),
         _ => undecided(gap),
     }
 }
+
+/// That the cause has no name, and what it looks like where two local changes would explain it.
+fn unknown(gap: &GapSection) -> String {
+    let likeness = |found: &&HypothesisSection| {
+        matches!(
+            found.effect.as_str(),
+            "added-mass+local-crack" | "local-crack+added-mass"
+        ) && found.goodness_of_fit.is_some_and(|p| p >= REFUSED)
+            && found.probability >= LEAST_PROBABILITY
+    };
+    let likeness = gap
+        .hypotheses
+        .iter()
+        .find(likeness)
+        .map_or_else(String::new, |found| {
+            format!(
+                " A crack and a mass would explain it ({}), and so would any change that is spread over a part of \
+                 the beam: look there first.",
+                sizes(found)
+            )
+        });
+    format!(
+        "Something is missing in the model, and nothing in the catalogue explains it alone: do not trust the \
+         joint's stiffness beyond the misfit.{likeness}"
+    )
+}
+
+/// Goodness of fit below which an explanation is refused.
+const REFUSED: f64 = 0.01;
 
 /// That nothing is missing, and why so even where an effect leads the table.
 fn no_gap(gap: &GapSection) -> String {

@@ -674,7 +674,10 @@ fn unknown_channels_are_refused_with_what_exists() {
             .expect_err("unknown")
             .to_string();
         assert!(error.contains(text), "{error}");
-        assert!(error.ends_with("there are: 1, 2, 3"), "{error}");
+        assert!(
+            error.ends_with("there are: 1, 2, 3; name one of these"),
+            "{error}"
+        );
     }
     assert!(recording.read(3, 0..1).is_err());
     assert!(recording.read(usize::MAX, 0..1).is_err());

@@ -117,6 +117,23 @@ fn regress_an_unknown_gap_is_not_said_to_shrink_and_its_information_has_a_premis
 }
 
 #[test]
+fn regress_what_two_local_changes_explain_is_said_to_be_spread() {
+    let mut document = gap_with("unknown");
+    let spread = "spread over a part of the beam";
+    assert!(!gap_story(&document)[0].contains(spread));
+    if let Some(gap) = &mut document.gap {
+        gap.hypotheses[0].effect = "added-mass+local-crack".into();
+        gap.hypotheses[0].goodness_of_fit = Some(0.9);
+    }
+    assert!(gap_story(&document)[0].contains(spread));
+    // Where not even these explain the readings they are no likeness.
+    if let Some(gap) = &mut document.gap {
+        gap.hypotheses[0].goodness_of_fit = Some(1e-4);
+    }
+    assert!(!gap_story(&document)[0].contains(spread));
+}
+
+#[test]
 fn regress_a_terminal_explains_the_columns_of_the_diagnosis() {
     let said = render_text(&gap_with("set"));
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -42,7 +42,7 @@ pub(super) struct PlanArguments {
     png: Option<PathBuf>,
 }
 
-/// Largest standard uncertainty of a frequency (%): modes of a beam are farther apart, and with less nothing
+/// Largest standard uncertainty of a frequency (%): modes of a beam are farther apart, and with more nothing
 /// could be told.
 const MOST_STD: f64 = 10.0;
 

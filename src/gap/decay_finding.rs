@@ -46,7 +46,9 @@ pub struct DecayChange {
     /// The mode.
     pub mode: usize,
     /// The recording.
-    pub configuration: String,
+    pub recording: String,
+    /// Amplitude of its taps over that of the hardest recording (1); `None` where no force was measured.
+    pub level: Option<f64>,
     /// Change per e-fold of its amplitude (%): negative where the frequency falls with the amplitude.
     pub percent_per_fold: f64,
     /// Its standard uncertainty (%).
@@ -167,7 +169,8 @@ pub(super) fn decay_finding(frame: &Frame, nominal: &Fit) -> Option<DecayFinding
             mode,
         } => Some(DecayChange {
             mode,
-            configuration: frame.setups[configuration].file.clone(),
+            recording: frame.setups[configuration].file.clone(),
+            level: frame.setups[configuration].known_level,
             percent_per_fold: 100.0 * frame.readings[row].value,
             std: 100.0 * frame.readings[row].std,
             explained: 100.0 * explained(row),

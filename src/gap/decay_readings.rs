@@ -63,9 +63,8 @@ impl Frame {
 
 impl Frame {
     /// Adds how well a law of the joint predicts the changes: a share of what it makes of each, or of the
-    /// reading. And every
-    /// mode of a recording feels how the others move the joint, which is known but roughly: to a share of
-    /// the largest change of the joint's stiffness that the law makes along its decays.
+    /// reading. And every mode of a recording feels how the others move the joint, which is known but roughly:
+    /// to a share of the largest change of the joint's stiffness that the law makes along its decays.
     pub(super) fn widen_changes(&mut self, solved: &[Solved]) {
         let rows = slopes(self);
         let own: Vec<Reading> = rows.iter().map(|&row| self.readings[row]).collect();

@@ -282,6 +282,8 @@ fn possible(frame: &Frame, effect: EffectId) -> bool {
         EffectId::CrossCoupling => joint && one_beam && !coupled,
         EffectId::Fixture => joint && one_beam,
         EffectId::JointMass | EffectId::JointDamping => joint,
+        // Nothing pulls on a free end, nor on beams that overlap.
+        EffectId::AxialLoad => joint && one_beam,
         EffectId::JointNonlinearity => sought.iter().any(|(direction, _)| *direction == 1),
         EffectId::Resolution => frame.nominal.reading_bias.is_some(),
         _ => true,

@@ -61,6 +61,7 @@ fn along_decays(found: &DecayFinding) -> AlongDecaysSection {
         lawful: found.is_lawful(),
         ratio: found.ratio,
         ratio_std: found.ratio_std,
+        at_bound: found.is_at_bound(),
         exponent: found.exponent,
         chance: found.chance,
         goodness_of_fit: found.goodness_of_fit,
@@ -69,7 +70,8 @@ fn along_decays(found: &DecayFinding) -> AlongDecaysSection {
             .iter()
             .map(|change| DecayChangeSection {
                 mode: change.mode,
-                recording: change.configuration.clone(),
+                recording: change.recording.clone(),
+                level: change.level,
                 percent_per_fold: change.percent_per_fold,
                 std: change.std,
                 explained: change.explained,

@@ -64,9 +64,13 @@ pub struct AlongDecaysSection {
     pub ratio: f64,
     /// Its standard uncertainty (1).
     pub ratio_std: f64,
+    /// Whether the changes ask for as much as is looked for: `ratio` is then a bound, and `ratio_std` does
+    /// not hold.
+    pub at_bound: bool,
     /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
     pub exponent: f64,
-    /// Probability that noise alone makes the frequencies change as much.
+    /// Probability that noise, and what the model of a joint's motion leaves open, make the frequencies change
+    /// as much: larger than that of noise alone.
     pub chance: f64,
     /// Probability of a misfit as large or larger, if the joint's stiffness changes like that.
     pub goodness_of_fit: Option<f64>,
@@ -81,6 +85,8 @@ pub struct DecayChangeSection {
     pub mode: usize,
     /// The recording.
     pub recording: String,
+    /// Amplitude of its taps over that of the hardest recording (1); null where no force was measured.
+    pub level: Option<f64>,
     /// Change per e-fold of its amplitude (%): negative where the frequency falls with the amplitude.
     pub percent_per_fold: f64,
     /// Its standard uncertainty (%).

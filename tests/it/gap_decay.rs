@@ -195,7 +195,8 @@ proptest! {
 fn finding(percents: &[f64]) -> DecayFinding {
     let change = |(index, percent): (usize, &f64)| DecayChange {
         mode: index + 1,
-        configuration: "tap.wav".to_owned(),
+        recording: "tap.wav".to_owned(),
+        level: None,
         percent_per_fold: *percent,
         std: 0.1 * percent.abs(),
         explained: 0.0,
@@ -328,7 +329,7 @@ fn val_sliders_feel_a_second_motion_as_the_law_says() {
 }
 
 #[test]
-fn val_sliders_feel_several_motions_to_a_fifth() {
+fn val_sliders_feel_several_motions() {
     let sets: [&[(f64, f64)]; 4] = [
         &[(1.0, 2.0), (0.6, 7.0), (0.5, 19.0)],
         &[(0.4, 2.0), (1.0, 9.0), (0.3, 31.0)],
@@ -345,7 +346,7 @@ fn val_sliders_feel_several_motions_to_a_fifth() {
                 count += 1.0;
                 // A small motion among stronger ones strays by 22 % for the power 3/2.
                 assert!(
-                    (0.7..1.2).contains(&ratio),
+                    (0.75..1.2).contains(&ratio),
                     "{exponent} {motions:?} {own}: {ratio}"
                 );
             }

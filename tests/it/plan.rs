@@ -91,6 +91,7 @@ fn regress_a_free_beam_has_no_joint_to_tell_of() {
         ],
     );
     assert!(groups(&cases).contains(&Group::Own(EffectId::SensorCable)));
+    assert!(!groups(&cases).contains(&EffectId::AxialLoad.group()));
     for (truth, answer) in &cases {
         let joint = answer
             .places
@@ -114,6 +115,7 @@ fn regress_a_lap_joint_is_planned_with_cables_and_masses() {
         ],
     );
     let drawn = groups(&cases);
+    assert!(!drawn.contains(&EffectId::AxialLoad.group()), "{drawn:?}");
     for group in [
         Group::Own(EffectId::SensorCable),
         Group::Own(EffectId::JointMass),

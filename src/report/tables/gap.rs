@@ -257,7 +257,12 @@ fn along_decays(gap: &GapSection) -> Option<String> {
     } else {
         "stiffens"
     };
-    let size = if found.lawful {
+    let size = if found.lawful && found.at_bound {
+        format!(
+            "its rotational stiffness changes by {:.0} % or more at the largest amplitude",
+            100.0 * found.ratio.abs()
+        )
+    } else if found.lawful {
         format!(
             "its rotational stiffness changes by {} \u{b1} {:.1} % at the largest amplitude",
             change(100.0 * found.ratio, 1),

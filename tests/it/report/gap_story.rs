@@ -1,8 +1,8 @@
 //! What is said of the gap, by verdict.
 
 use tapjoint::report::document::{
-    Document, GapPlaceSection, GapSection, GapVerdictSection, HypothesisSection, JointShiftSection,
-    NextTestSection, PullSection,
+    AlongDecaysSection, DecayChangeSection, Document, GapPlaceSection, GapSection,
+    GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection, PullSection,
 };
 use tapjoint::report::render_text;
 use tapjoint::report::tables::{gap_story, next_tests};
@@ -131,6 +131,31 @@ fn regress_what_two_local_changes_explain_is_said_to_be_spread() {
         gap.hypotheses[0].goodness_of_fit = Some(1e-4);
     }
     assert!(!gap_story(&document)[0].contains(spread));
+}
+
+#[test]
+fn regress_a_change_as_large_as_is_looked_for_is_a_bound() {
+    let told = |at_bound: bool| {
+        let mut document = gap_with("unknown");
+        if let Some(gap) = &mut document.gap {
+            gap.along_decays = Some(AlongDecaysSection {
+                effect: Some("joint-nonlinearity".into()),
+                lawful: true,
+                ratio: -0.7,
+                ratio_std: 0.01,
+                at_bound,
+                changes: vec![DecayChangeSection {
+                    mode: 1,
+                    std: 0.1,
+                    ..DecayChangeSection::default()
+                }],
+                ..AlongDecaysSection::default()
+            });
+        }
+        gap_story(&document).join("\n")
+    };
+    assert!(told(true).contains("by 70 % or more"), "{}", told(true));
+    assert!(told(false).contains("\u{b1} 1.0 %"), "{}", told(false));
 }
 
 #[test]

@@ -194,7 +194,7 @@ pub enum ChannelRef {
 pub struct ChannelPlace {
     /// Its line, counted from 1.
     pub line: usize,
-    /// Its key: "sensor[2].channel"; "sensor[2].name" where the name alone says it.
+    /// Its key: `sensor[2].channel`; `sensor[2].name` where the name alone says it.
     pub key: String,
 }
 

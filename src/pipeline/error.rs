@@ -41,7 +41,7 @@ pub enum PipelineError {
         file: String,
         /// Its line.
         line: usize,
-        /// The key: "sensor[2].channel".
+        /// The key: `sensor[2].channel`.
         key: String,
         /// What the recording has instead.
         problem: Box<RecordingError>,

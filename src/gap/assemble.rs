@@ -33,10 +33,20 @@ pub(super) fn doubt(competition: &mut Competition) {
         return;
     };
     if let Some(p) = trial.with_withheld(frame, fit).refuting() {
-        let bound = -std::f64::consts::E * p * p.max(f64::MIN_POSITIVE).ln();
-        raise_unknown(entries, best, 1.0 / bound.clamp(f64::MIN_POSITIVE, 1.0));
+        raise_unknown(entries, best, most_against(p));
     }
 }
+
+/// Highest odds against an explanation whose misfit has the probability `p`.
+fn most_against(p: f64) -> f64 {
+    use std::f64::consts::E;
+    let p = p.clamp(SMALLEST_MISFIT, 1.0 / E);
+    -1.0 / (E * p * p.ln())
+}
+
+/// Probability of a misfit below which its logarithm decides nothing any more: 1e-12 is certainty in all
+/// that is shown, and odds from it stay finite.
+const SMALLEST_MISFIT: f64 = 1e-12;
 
 /// The best explanation that can be shown: what is unknown has no residual.
 fn best(entries: &[Entry]) -> Option<usize> {
@@ -323,5 +333,28 @@ fn plain(effect: EffectId, name: &'static str, (value, std): (f64, Option<f64>))
         std: std.filter(|std| std.is_finite()),
         smallest_detectable: None,
         smallest_isolable: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At p = 1/e and above a misfit says nothing; below, the odds grow and stay finite down to zero.
+    #[test]
+    fn limit_odds_from_a_misfit_are_even_at_best_and_finite_at_worst() {
+        assert!((most_against(1.0) - 1.0).abs() < 1e-15);
+        assert!((most_against((-1.0_f64).exp()) - 1.0).abs() < 1e-15);
+        assert!(most_against(0.0).is_finite());
+        assert!(most_against(0.0) > most_against(1e-6));
+    }
+
+    /// Sellke, Bayarri & Berger (2001), table 1: at least 0.407 at p = 0.05 and 0.125 at p = 0.01, to the
+    /// digits printed there.
+    #[test]
+    fn val_odds_from_a_misfit_are_those_of_sellke() {
+        for (p, bound) in [(0.05, 0.407), (0.01, 0.125)] {
+            assert!((1.0 / most_against(p) - bound).abs() < 5e-4, "{p}");
+        }
     }
 }

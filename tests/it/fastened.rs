@@ -12,7 +12,7 @@ use tapjoint::gap::{
 use tapjoint::identify::observation::Observations;
 use tapjoint::structure::specimen::{Mesh, PointMass, SpecimenJoint};
 
-use crate::shared::{five_recordings, planned, strip_on_springs, strip_table, virtual_strip};
+use crate::shared::{five_recordings, planned, strip_on_springs, strip_table, tapped_strip};
 
 // ---------------------------------------------------------------- the description
 
@@ -170,13 +170,8 @@ fn limit_a_mass_that_tends_to_nothing_does_nothing() {
 
 /// The strip bare and with an eighth of its mass fastened to its end, which takes the first frequency down
 /// by a sixth: further than a reading may lie from a mode of the reference configuration.
-const VIRTUAL: &str = virtual_strip!(
-    r#"[hammer]
-channel = 1
-[[sensor]]
-name = "A"
-position = 0.338
-[[recording]]
+const VIRTUAL: &str = tapped_strip!(
+    r#"[[recording]]
 file = "bare.csv"
 tap = 0.385
 band = [0, 1000]

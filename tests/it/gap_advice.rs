@@ -178,15 +178,18 @@ fn prop_advice_is_ranked_and_bounded_by_what_is_not_known() {
     assert_eq!(ids.len(), tests.len());
 }
 
+/// Five recordings of a joint that stays as it is: what it drifts by nobody can predict.
+fn steady_joint() -> TestPlan {
+    TestPlan {
+        drift: 1e-3,
+        ..five_recordings()
+    }
+}
+
 #[test]
 fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.0113)]);
-    // A joint that stays as it is: what it drifts by nobody can predict.
-    let plan = TestPlan {
-        drift: 1e-3,
-        ..five_recordings()
-    };
-    let diagnosis = diagnosed(&plan, &truth, 11);
+    let diagnosis = diagnosed(&steady_joint(), &truth, 11);
     assert_eq!(
         diagnosis.verdict,
         Verdict::Named(vec![EffectId::SensorMass])
@@ -213,11 +216,7 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
 #[test]
 fn regress_large_errors_of_left_out_recordings_are_told_whole() {
     let truth = effect(EffectId::SensorMass, &[("mass", 0.06)]);
-    let plan = TestPlan {
-        drift: 1e-3,
-        ..five_recordings()
-    };
-    let diagnosis = diagnosed(&plan, &truth, 13);
+    let diagnosis = diagnosed(&steady_joint(), &truth, 13);
     let mut all = diagnosis.hypotheses.iter();
     let none = all.find(|one| one.hypothesis.name() == "none").unwrap();
     let found = none.left_out_recordings.clone().unwrap();

@@ -39,6 +39,18 @@ macro_rules! virtual_strip {
 }
 pub(crate) use virtual_strip;
 
+/// The same with a hammer and sensor A at four fifths; what is given follows.
+macro_rules! tapped_strip {
+    ($rest:literal) => {
+        concat!(
+            $crate::shared::virtual_strip!(""),
+            "[hammer]\nchannel = 1\n[[sensor]]\nname = \"A\"\nposition = 0.338\n",
+            $rest
+        )
+    };
+}
+pub(crate) use tapped_strip;
+
 /// The strip on springs of `off` times the joint of Ingole & Chatterjee, without coupling.
 pub fn strip_on_springs(off: f64, sensors: Vec<NominalSensor>) -> Nominal {
     let beam = steel_strip();

@@ -7,15 +7,10 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-use crate::shared::virtual_strip;
+use crate::shared::tapped_strip;
 
-const TEST: &str = virtual_strip!(
-    r#"[hammer]
-channel = 1
-[[sensor]]
-name = "A"
-position = 0.338
-[[sensor]]
+const TEST: &str = tapped_strip!(
+    r#"[[sensor]]
 name = "B"
 position = 0.205
 [[recording]]

@@ -1,6 +1,6 @@
 //! Virtual tests as a whole: what the recordings say against closed forms, and what may not change them.
 
-use crate::shared::virtual_strip;
+use crate::shared::tapped_strip;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -13,13 +13,8 @@ use tapjoint::simulate::{
     TestPlan, Tip, VirtualTest, plan_test, truth_of,
 };
 
-const CANTILEVER: &str = virtual_strip!(
-    r#"[hammer]
-channel = 1
-[[sensor]]
-name = "A"
-position = 0.338
-[[recording]]
+const CANTILEVER: &str = tapped_strip!(
+    r#"[[recording]]
 file = "taps.csv"
 tap = 0.3
 "#

@@ -3,6 +3,9 @@
 /// Below this probability the stated uncertainties and the model do not go together.
 pub const DOUBTFUL: f64 = 0.01;
 
+/// Chi-squared from which only its power of ten is of interest.
+const MOST_IN_FULL: f64 = 1e4;
+
 /// A smaller probability is told as "below" this: so far out a distribution's tail is no measurement, and the
 /// smallest of all are written as 0.
 const LEAST_PROBABILITY: f64 = 1e-12;
@@ -88,7 +91,12 @@ impl Goodness {
         let misfit = 100.0 * self.relative_misfit;
         let test = match (self.chi_squared, self.probability) {
             (Some(chi_squared), Some(p)) => format!(
-                "chi-squared {chi_squared:.1} with {} of freedom, probability {}, rms misfit {misfit:.2} %",
+                "chi-squared {} with {} of freedom, probability {}, rms misfit {misfit:.2} %",
+                if chi_squared < MOST_IN_FULL {
+                    format!("{chi_squared:.1}")
+                } else {
+                    format!("{chi_squared:.1e}")
+                },
                 match self.degrees_of_freedom {
                     1 => "1 degree".to_owned(),
                     more => format!("{more} degrees"),

@@ -214,10 +214,14 @@ fn how_far(gap: &GapSection) -> Option<String> {
             text.push_str(&share(closure));
         }
     }
-    Some(format!(
-        "{text}; noise would leave {} %.",
-        percent(gap.noise_floor)
-    ))
+    let floor = percent(gap.noise_floor);
+    let outside = found.gap_before.zip(gap.noise_floor);
+    Some(match outside.filter(|(before, floor)| before < floor) {
+        Some(_) => format!(
+            "{text}. Their uncertainty is {floor} %: the cause shows elsewhere, not in the mean frequencies."
+        ),
+        None => format!("{text}; noise would leave {floor} %."),
+    })
 }
 
 /// ", 97 % of the gap (95 %: 93 to 99)".

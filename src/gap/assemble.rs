@@ -82,7 +82,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         _ => Vec::new(),
     };
     Diagnosis {
-        next_tests: advise(competition, &verdict),
+        next_tests: advise(competition, &verdict, settings),
         verdict,
         places: places(entries),
         pulls,

@@ -7,6 +7,7 @@ use super::hypothesis::Fit;
 use super::posterior::Entry;
 use super::quality::Residuals;
 use super::result::{Block, Closure};
+use super::setup::Setup;
 use super::withheld::WithheldErrors;
 use crate::effects::EffectId;
 
@@ -46,10 +47,12 @@ pub(super) struct Room {
 const SPARE: usize = 2;
 
 impl Room {
-    /// What a hypothesis is tested with: each fitted mode once for every set of sensor places, since these see
-    /// other shapes and carry other masses; slopes along decays and damping ratios for the effects that make them.
+    /// What a hypothesis is tested with: each fitted mode once for every set of sensor places and fastened
+    /// masses, since these see other shapes and load other places; slopes along decays, other levels and damping
+    /// ratios for the effects that make them.
     pub(super) fn of(frame: &Frame, entry: &Entry) -> Self {
-        let mut seen: Vec<(usize, Vec<f64>)> = Vec::new();
+        let slips = entry.effects().contains(&EffectId::JointNonlinearity);
+        let mut seen: Vec<(usize, Kind)> = Vec::new();
         for row in &frame.rows {
             let &Row::Frequency {
                 configuration,
@@ -58,14 +61,13 @@ impl Room {
             else {
                 continue;
             };
-            let sensors = frame.setups[configuration].sensors.iter();
-            let one = (mode, sensors.map(|sensor| sensor.position).collect());
-            if !seen.contains(&one) {
-                seen.push(one);
+            let one = Kind::of(&frame.setups[configuration], slips);
+            if !seen.iter().any(|old| old.0 == mode && old.1.is_like(&one)) {
+                seen.push((mode, one));
             }
         }
         let made = |row: &&Row| match row {
-            Row::Slope { .. } => entry.effects().contains(&EffectId::JointNonlinearity),
+            Row::Slope { .. } => slips,
             Row::Damping { .. } => entry.effects().contains(&EffectId::JointDamping),
             _ => false,
         };
@@ -80,6 +82,35 @@ impl Room {
         self.readings < self.parameters + SPARE
     }
 }
+
+/// What makes a configuration another one.
+#[derive(Debug)]
+struct Kind {
+    sensors: Vec<f64>,
+    fastened: Vec<usize>,
+    /// Of an effect that depends on it.
+    level: Option<f64>,
+}
+
+impl Kind {
+    fn of(setup: &Setup, by_level: bool) -> Self {
+        Kind {
+            sensors: setup.sensors.iter().map(|s| s.position).collect(),
+            fastened: setup.fastened.iter().map(|one| one.0).collect(),
+            level: setup.known_level.filter(|_| by_level),
+        }
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        let levels = self.level.zip(other.level);
+        self.sensors == other.sensors
+            && self.fastened == other.fastened
+            && levels.is_none_or(|(a, b)| (a / b).ln().abs() < ANOTHER_LEVEL.ln())
+    }
+}
+
+/// Ratio of amplitudes from which it is another level: taps meant to be alike scatter by less.
+const ANOTHER_LEVEL: f64 = 1.5;
 
 impl Trial {
     /// Of a fit by the readings that it was made of; `None` where the fit has no uncertainty.

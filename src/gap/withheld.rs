@@ -108,14 +108,14 @@ pub(super) fn closure(
     }
     let share = |before: f64, after: f64| (before - after) / (before - floor * floor);
     let value = share(gap * gap, rest * rest);
-    let (reach, factor) = (after.reach(), after.spread.clone().cholesky()?);
+    let (reach, root) = (after.reach(), square_root(&after.spread)?);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut draws: Vec<f64> = (0..DRAWS)
         .filter_map(|_| {
             let unit = DVector::from_fn(after.errors.len(), |_, _| {
                 random.sample::<f64, _>(StandardNormal)
             });
-            let moved = factor.l() * unit;
+            let moved = &root * unit;
             // The same draw moves both errors; its own square is what it adds on average.
             let square = |errors: &DVector<f64>| {
                 let sum = (errors + &moved).norm_squared() / errors.len() as f64;
@@ -134,6 +134,37 @@ pub(super) fn closure(
     })
 }
 
+/// R with R R' = S. A covariance may be singular: what is predicted from all others but for one common
+/// unknown is certain in some direction, and rounding then makes its eigenvalue negative.
+///
+/// `None` where it is not finite.
+fn square_root(covariance: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    if covariance.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let eigen = covariance.clone().symmetric_eigen();
+    let stds = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    Some(eigen.eigenvectors * DMatrix::from_diagonal(&stds))
+}
+
 fn root_mean_square(values: &DVector<f64>) -> f64 {
     (values.norm_squared() / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A covariance of rank one, and one that rounding has made indefinite.
+    #[test]
+    fn limit_a_singular_covariance_has_a_root() {
+        for least in [0.0, -1e-18] {
+            let mut covariance = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 4.0]);
+            covariance[(1, 1)] += least;
+            let root = square_root(&covariance).expect("it is finite");
+            // Rounding of numbers of this size.
+            assert!((&root * root.transpose() - covariance).amax() < 1e-14);
+        }
+        assert!(square_root(&DMatrix::from_element(1, 1, f64::NAN)).is_none());
+    }
 }

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 use tapjoint::described::described_specimen;
 use tapjoint::description::{FastenedMass, TestDescription};
+use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     GapSettings, Nominal, NominalSensor, TestPlan, Verdict, diagnose, nominal_chi_square, observe,
 };
@@ -145,6 +146,36 @@ fn recover_no_gap_beside_a_described_mass_and_a_gap_beside_one_that_nobody_descr
     let right = verdicts.iter().filter(|one| **one == Verdict::NoGap);
     assert!(right.count() >= 2, "{verdicts:?}");
     assert_ne!(verdict_of(&unsaid(readings(401))), Verdict::NoGap);
+}
+
+/// One sensor place, five modes: an effect with a place has as many parameters as these leave, whatever the
+/// tap and its level. Known masses elsewhere are readings of another kind.
+#[test]
+fn prop_known_masses_make_room_for_a_name() {
+    let coupled = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", 0.2)]).unwrap();
+    let verdict = |masses: &[f64]| {
+        let mut plan = five_recordings();
+        plan.modes = 4;
+        plan.configurations.truncate(1);
+        for share in masses {
+            let mut loaded = planned(0.8, 0.95, 1.0);
+            loaded.masses.push(PointMass {
+                position: share * 0.423,
+                mass: 0.015,
+                inertia: 0.0,
+            });
+            plan.configurations.push(loaded);
+        }
+        let observed = observe(&plan, &nominal(1.0), std::slice::from_ref(&coupled), 7).unwrap();
+        verdict_of(&observed)
+    };
+    assert!(
+        matches!(verdict(&[]), Verdict::NotEnoughData(_)),
+        "{:?}",
+        verdict(&[])
+    );
+    let loaded = verdict(&[1.0, 0.5, 0.3]);
+    assert!(!matches!(loaded, Verdict::NotEnoughData(_)), "{loaded:?}");
 }
 
 #[test]

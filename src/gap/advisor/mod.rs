@@ -6,6 +6,7 @@
 //! deviations of what would be read, the more the test decides. Tests that keep the joint untouched gain
 //! by comparison with what is at hand; all planned visits have a drift of the joint of their own.
 
+mod accuracy;
 mod direct;
 mod information;
 mod outlooks;
@@ -17,6 +18,7 @@ pub use step::{NextTest, Step};
 use super::posterior::Entry;
 use super::result::Verdict;
 use super::search::Competition;
+use super::settings::GapSettings;
 use direct::direct;
 use information::{Outlook, distances, information};
 use nalgebra::DMatrix;
@@ -40,7 +42,11 @@ const NAMED: usize = 4;
 const GRAVITY: f64 = 9.80665;
 
 /// Tests that would tell more, those first that tell most per cost.
-pub(super) fn advise(competition: &Competition, verdict: &Verdict) -> Vec<NextTest> {
+pub(super) fn advise(
+    competition: &Competition,
+    verdict: &Verdict,
+    settings: &GapSettings,
+) -> Vec<NextTest> {
     let frame = &competition.frame;
     let weight = GRAVITY * beam_mass(frame);
     let runners = in_the_running(&competition.entries, verdict);
@@ -52,7 +58,7 @@ pub(super) fn advise(competition: &Competition, verdict: &Verdict) -> Vec<NextTe
     let states: Vec<Option<State>> = states
         .map(|entry| State::new(frame, entry, weight))
         .collect();
-    let planned = Proposals::new(frame);
+    let planned = Proposals::new(frame, settings);
     let seen: Vec<Option<Seen>> = states
         .par_iter()
         .map(|state| Some(Seen::new(state.as_ref()?, &planned)))

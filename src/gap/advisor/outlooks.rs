@@ -8,7 +8,7 @@ use super::super::least_squares::{Knowledge, Optimum};
 use super::super::posterior::Entry;
 use super::super::result::Hypothesis;
 use super::information::Outlook;
-use super::proposals::{Proposals, Structure};
+use super::proposals::{Added, Proposals, Structure};
 use crate::effects::EffectId;
 use nalgebra::{DMatrix, DVector};
 
@@ -76,15 +76,18 @@ impl State {
         Some(layout.size(index))
     }
 
-    /// The parameters with those of the planned visits, and their covariance.
+    /// The parameters with those of the planned tests, and their covariance.
     fn extended(&self, planned: &Proposals) -> (Vec<f64>, Vec<Knowledge>, DMatrix<f64>) {
-        let (old, new) = (self.parameters.len(), planned.drifts.len());
+        let (old, new) = (self.parameters.len(), planned.added.len());
         let mut parameters = self.parameters.clone();
         parameters.resize(old + new, 0.0);
         let mut known = self.known.clone();
         let mut covariance = self.covariance.clone().resize(old + new, old + new, 0.0);
-        for (k, least) in planned.drifts.iter().enumerate() {
-            let std = self.drift.max(*least);
+        for (k, added) in planned.added.iter().enumerate() {
+            let std = match *added {
+                Added::Drift(least) => self.drift.max(least),
+                Added::Stated(std) => std,
+            };
             known.push(Knowledge::normal(0.0, std));
             covariance[(old + k, old + k)] = std * std;
         }
@@ -97,8 +100,8 @@ impl State {
             Structure::Bare => planned.bare.clone()?,
             _ => planned.whole.clone(),
         };
-        let at = planned.whole.smalls.len() - planned.drifts.len();
-        // Those of the planned visits come last.
+        let at = planned.whole.smalls.len() - planned.added.len();
+        // Those of the planned tests come last.
         for (k, small) in self.discrepancies.iter().enumerate() {
             frame.smalls.insert(at + k, *small);
             frame.small_stds.insert(at + k, self.spread);

@@ -3,7 +3,9 @@
 use super::super::catalogue::Candidate;
 use super::super::frame::{Frame, Row, Small};
 use super::super::nominal::COUPLING;
+use super::super::settings::GapSettings;
 use super::super::setup::Setup;
+use super::accuracy::{FINER, observed_modes, std_of, without_bias};
 use super::step::Step;
 use crate::effects::EffectId;
 use crate::structure::specimen::{Body, PointInertia, PointMass, SpecimenJoint};
@@ -59,13 +61,21 @@ pub(super) struct Proposals {
     pub(super) all: Vec<Proposal>,
     /// Configurations at hand and planned ones.
     pub(super) whole: Frame,
-    /// Least standard deviation of the joint's drift of each small unknown that was added for a planned
-    /// visit.
-    pub(super) drifts: Vec<f64>,
+    /// How well each small unknown is known that was added for a planned test.
+    pub(super) added: Vec<Added>,
     /// The beam by itself.
     pub(super) bare: Option<Frame>,
     /// The configuration in which gravity is turned over.
     pub(super) turned: Option<usize>,
+}
+
+/// How well a small unknown of a planned test is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Added {
+    /// The joint's drift, as between the visits at hand and with this standard deviation at least (1).
+    Drift(f64),
+    /// What a scale or a ruler reads, with this standard deviation (unit of the unknown).
+    Stated(f64),
 }
 
 /// Configurations at hand that are kept for reading them again.
@@ -80,12 +90,10 @@ const MOVED: f64 = 0.08;
 const KNOWN_MASS: f64 = 0.02;
 /// Standard deviation of a joint that was tightened again (1).
 const RETIGHTENED: f64 = 0.02;
-/// Readings by a fit have this share of the bias that reading on lines may have.
-const FINER: f64 = 0.1;
 
 impl Proposals {
     /// What could be done next, given the readings at hand.
-    pub(super) fn new(frame: &Frame) -> Self {
+    pub(super) fn new(frame: &Frame, settings: &GapSettings) -> Self {
         let mut whole = frame.clone();
         whole.setups.truncate(KEPT);
         // What other taps scattered in common says nothing of planned ones.
@@ -97,13 +105,13 @@ impl Proposals {
         let mut planned = Proposals {
             all: Vec::new(),
             whole,
-            drifts: Vec::new(),
+            added: Vec::new(),
             bare: None,
             turned: None,
         };
         planned.read_again(frame);
         planned.tap_again(frame);
-        planned.change(frame);
+        planned.change(frame, settings);
         planned.take_apart(frame);
         for step in [Step::WeighSensor, Step::Calipers, Step::ReferenceTone] {
             let readings = Readings::Direct;
@@ -177,7 +185,7 @@ impl Proposals {
     }
 
     /// Sensors moved, masses fastened, the set-up turned over.
-    fn change(&mut self, frame: &Frame) {
+    fn change(&mut self, frame: &Frame, settings: &GapSettings) {
         let length = frame.nominal.specimen.body.length();
         let first = &frame.setups[0];
         let sat = |place: f64| {
@@ -192,20 +200,36 @@ impl Proposals {
                     name: name_of(frame),
                     position,
                 };
-                let rows = self.visit(frame, moved(frame, position), 0.0);
+                // Where it sits then is another unknown.
+                let place = self.unused(frame, |setup| setup.places.iter().copied().max());
+                self.add(
+                    Small::SensorPlace { place },
+                    Added::Stated(settings.position_std),
+                );
+                let rows = self.visit(frame, moved(frame, position, place), 0.0);
                 self.propose(step, Structure::Whole, rows);
             }
         }
         let mass = round_mass(KNOWN_MASS * beam_mass(frame));
         for position in [length, 0.5 * length] {
-            let mut heavier = first.clone();
-            heavier.specimen.masses.push(PointMass {
+            let mass = PointMass {
                 position,
                 mass,
                 inertia: 0.0,
-            });
+            };
+            let fastened = self.unused(frame, |setup| setup.fastened.iter().map(|one| one.0).max());
+            let (scale, ruler) = (settings.fastened_mass_std, settings.position_std);
+            self.add(Small::FastenedMass { fastened }, Added::Stated(scale));
+            self.add(Small::FastenedPlace { fastened }, Added::Stated(ruler));
+            let mut heavier = first.clone();
+            heavier.specimen.masses.push(mass);
+            heavier.fastened.push((fastened, mass));
             let rows = self.visit(frame, heavier, 0.0);
-            self.propose(Step::KnownMass { mass, position }, Structure::Whole, rows);
+            let step = Step::KnownMass {
+                mass: mass.mass,
+                position,
+            };
+            self.propose(step, Structure::Whole, rows);
         }
         if held_at_one_end(frame) {
             self.turned = Some(self.whole.setups.len());
@@ -247,6 +271,19 @@ impl Proposals {
         self.bare = Some(bare);
     }
 
+    /// A small unknown of planned tests.
+    fn add(&mut self, small: Small, added: Added) {
+        let (Added::Drift(std) | Added::Stated(std)) = added;
+        self.whole.small(small, 0.0, std);
+        self.added.push(added);
+    }
+
+    /// The first index that no configuration uses, given the highest that each does.
+    fn unused(&self, frame: &Frame, highest: impl Fn(&Setup) -> Option<usize>) -> usize {
+        let setups = self.whole.setups.iter().chain(&frame.setups);
+        setups.filter_map(highest).max().map_or(0, |most| most + 1)
+    }
+
     /// A new visit to the structure: its configuration, its own drift of the joint, its rows.
     fn visit(&mut self, frame: &Frame, mut setup: Setup, drift: f64) -> Vec<(Row, f64)> {
         let visits = self.whole.setups.iter().chain(&frame.setups);
@@ -254,10 +291,7 @@ impl Proposals {
         setup.visit = visit;
         let sought = frame.nominal.sought().into_iter();
         for (direction, _) in sought.filter(|one| one.0 != COUPLING) {
-            self.whole.smalls.push(Small::Drift { visit, direction });
-            self.whole.small_centres.push(0.0);
-            self.whole.small_stds.push(drift);
-            self.drifts.push(drift);
+            self.add(Small::Drift { visit, direction }, Added::Drift(drift));
         }
         let configuration = self.whole.setups.len();
         self.whole.setups.push(setup);
@@ -275,15 +309,14 @@ impl Proposals {
     }
 }
 
-/// The first configuration with the first sensor that it carries elsewhere.
-fn moved(frame: &Frame, position: f64) -> Setup {
+/// The first configuration with the first sensor that it carries elsewhere, which is the place of this index.
+fn moved(frame: &Frame, position: f64, place: usize) -> Setup {
     let mut other = frame.setups[0].clone();
     let before = other.carried[0];
     other.carried[0].position = position;
     if let Some(index) = other.sensors.iter().position(|sensor| *sensor == before) {
         other.sensors[index].position = position;
-        // What belongs to the sensor's place is another unknown now.
-        other.places[index] = usize::MAX;
+        other.places[index] = place;
     }
     let masses = &mut other.specimen.masses;
     let own = |mass: &&mut PointMass| mass.position == before.position && mass.mass == before.mass;
@@ -321,45 +354,6 @@ fn round_mass(mass: f64) -> f64 {
     };
     let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0];
     steps.into_iter().min_by(near).unwrap_or(1.0) * decade
-}
-
-/// Numbers of the modes that take part in the fit.
-fn observed_modes(frame: &Frame) -> impl Iterator<Item = usize> + '_ {
-    (1..=frame.fitted_modes).filter(|mode| stds(frame, *mode).next().is_some())
-}
-
-fn stds(frame: &Frame, wanted: usize) -> impl Iterator<Item = f64> + '_ {
-    let fitted = frame.rows.iter().zip(&frame.readings);
-    let withheld = frame.withheld.iter().map(|(row, reading)| (row, reading));
-    fitted.chain(withheld).filter_map(move |(row, reading)| {
-        matches!(row, Row::Frequency { mode, .. } if *mode == wanted).then_some(reading.std)
-    })
-}
-
-/// How well a mode's frequency will be read (1): as well as so far, higher modes as well as the highest.
-fn std_of(frame: &Frame, mode: usize) -> f64 {
-    let below = (1..=mode).rev();
-    let mut known = below.map(|mode| median(stds(frame, mode).collect()));
-    known.find_map(|std| std).unwrap_or(1e-3)
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
-/// The same without what reading on lines adds, b/sqrt 3.
-fn without_bias(frame: &Frame, mode: usize, bias: f64) -> f64 {
-    let std = std_of(frame, mode);
-    let rows = frame.rows.iter().zip(&frame.readings);
-    let mut own =
-        rows.filter(|(row, _)| matches!(row, Row::Frequency { mode: m, .. } if *m == mode));
-    let Some((_, reading)) = own.next() else {
-        return std;
-    };
-    let line = bias / 3.0_f64.sqrt() / reading.value.exp();
-    let rest = (std * std - line * line).max(0.0);
-    (rest + (FINER * line).powi(2)).sqrt()
 }
 
 #[cfg(test)]

@@ -114,8 +114,9 @@ impl SpecimenModes {
 
     /// Rotation of the joint's spring per moment on both its ends (rad/(N m)) by all modes beyond
     /// these: the sum of psi^2/omega^2, which falls too slowly to be added up. It is the static
-    /// compliance less that of the modes here. A suspension does not change it.
-    pub fn joint_compliance_beyond(&self) -> f64 {
+    /// compliance less that of the modes here. A suspension does not change it, but the modes
+    /// of [`Self::hung`] no longer say which motions are loose: ask the modes before.
+    pub(crate) fn joint_compliance_beyond(&self) -> f64 {
         // Loose motions make K singular, and s M is added: sum psi^2/(omega^2 + s).
         let shift = if self.loose.is_empty() { 0.0 } else { SHIFT };
         let (stiffness, mass) = self.model.matrices();

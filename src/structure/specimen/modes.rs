@@ -101,7 +101,7 @@ impl SpecimenModes {
     }
 
     /// Frequencies (Hz) of the motions that only springs to the ground or the axial force keep from
-    /// being rigid: a free beam's suspension. Empty where there are none.
+    /// being rigid: a free beam's suspension. Empty where there are none, and of hung modes, which hold them.
     pub fn suspension_frequencies(&self) -> &[f64] {
         &self.suspension
     }

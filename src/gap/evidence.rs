@@ -6,7 +6,8 @@ use super::forward::{Forward, Layout};
 use super::frame::{Frame, Small};
 use super::knowledge::with_drift;
 use super::least_squares::{
-    Knowledge, Optimum, factor_of, log_determinant, maximise, maximise_linear, optimum_at,
+    Knowledge, Model, Optimum, factor_of, log_determinant, maximise, maximise_linear, objective_at,
+    optimum_at,
 };
 use super::noise::{self, Reading};
 use nalgebra::{DMatrix, DVector};
@@ -34,22 +35,19 @@ pub(super) fn evaluate(
     let middle = drifts[drifts.len() / 2];
     let known = with_drift(frame, &forward.layout, known, middle);
     let readings = &frame.readings;
-    let mut optimum = maximise(readings, &known, start, &mut |p| {
-        forward.linearise(p, &known)
-    })?;
+    let mut optimum = maximise(readings, &known, start, forward)?;
     let mut branch = over_drifts(frame, &forward.layout, &known, optimum.clone(), drifts);
     // Another drift moves the optimum by the linearised model; where the true one does not follow, it
     // is sought again with that drift.
     for _ in 0..RETURNS {
         let own = branch.knowledge.clone();
-        let there = forward.linearise(&branch.optimum.parameters, &own)?;
-        let true_one = optimum_at(readings, &own, branch.optimum.parameters.clone(), there);
-        if (true_one.objective - branch.optimum.objective).abs() < FOLLOWED {
+        let there = &branch.optimum.parameters;
+        let (predicted, _) = forward.predict(there)?;
+        let truly = objective_at(readings, &own, (there, &predicted));
+        if (truly - branch.optimum.objective).abs() < FOLLOWED {
             return Some(branch);
         }
-        optimum = maximise(readings, &own, &true_one.parameters, &mut |p| {
-            forward.linearise(p, &own)
-        })?;
+        optimum = maximise(readings, &own, there, forward)?;
         branch = over_drifts(frame, &forward.layout, &own, optimum.clone(), drifts);
     }
     // What does not settle is worth what the true model says of it, without other drifts.
@@ -330,18 +328,30 @@ mod tests {
         model: fn(f64, f64) -> Vec<f64>,
     }
 
-    impl Small {
-        fn linearised(&self, parameters: &[f64]) -> Linearised {
+    impl Model for Small {
+        type Rest = ();
+
+        fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
+            Some(((self.model)(parameters[0], parameters[1]), ()))
+        }
+
+        fn complete(
+            &self,
+            parameters: &[f64],
+            _: &[Knowledge],
+            (predicted, ()): (Vec<f64>, ()),
+        ) -> Option<Linearised> {
             const STEP: f64 = 1e-6;
             let [a, t] = [parameters[0], parameters[1]];
-            let predicted = (self.model)(a, t);
             let columns = [(self.model)(a + STEP, t), (self.model)(a, t + STEP)];
             let slopes = DMatrix::from_fn(predicted.len(), 2, |row, column| {
                 (columns[column][row] - predicted[row]) / STEP
             });
-            Linearised { predicted, slopes }
+            Some(Linearised { predicted, slopes })
         }
+    }
 
+    impl Small {
         fn by_laplace(&self) -> f64 {
             let layout = Layout {
                 joint: vec![0],
@@ -358,10 +368,7 @@ mod tests {
             };
             let known = [Knowledge::normal(0.0, 1.5), size];
             let start = [0.0, 0.1 * self.size.scale];
-            let optimum = maximise(&self.readings, &known, &start, &mut |p| {
-                Some(self.linearised(p))
-            })
-            .unwrap();
+            let optimum = maximise(&self.readings, &known, &start, self).unwrap();
             log_evidence(&self.readings, &layout, &known, &optimum)
         }
 

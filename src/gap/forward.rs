@@ -4,7 +4,7 @@ use super::catalogue::{Candidate, PlaceKind};
 use super::frame::{Frame, Row};
 use super::joint_energy::{joint_shares, stiffened_slope};
 use super::joint_path::Changes;
-use super::least_squares::{Knowledge, Linearised};
+use super::least_squares::{Knowledge, Linearised, Model};
 use super::nominal::COUPLING;
 use crate::effects::{Circumstances, Effect, Seen, apply};
 use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
@@ -115,28 +115,42 @@ impl Solved {
     }
 }
 
-/// Predicts all rows of a frame under one hypothesis.
-pub(super) struct Forward<'a> {
-    pub(super) frame: &'a Frame,
-    pub(super) layout: Layout,
-    /// Rows beyond those of the fit (withheld or planned), if wanted in their place.
-    pub(super) rows: &'a [Row],
+/// What a prediction leaves behind for its slopes.
+pub(super) struct Solution {
+    solved: Vec<Solved>,
+    /// All rows without the small unknowns.
+    base: Vec<f64>,
+    /// Those with respect to the small unknowns.
+    slopes: DMatrix<f64>,
 }
 
-impl<'a> Forward<'a> {
-    pub(super) fn new(frame: &'a Frame, effects: &[Candidate]) -> Self {
-        Forward {
-            frame,
-            layout: Layout::new(frame, effects),
-            rows: &frame.rows,
-        }
-    }
+impl Model for Forward<'_> {
+    type Rest = Solution;
 
-    /// Prediction and slopes with respect to all parameters that are not held.
-    pub(super) fn linearise(&self, parameters: &[f64], known: &[Knowledge]) -> Option<Linearised> {
+    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Solution)> {
         let solved = self.solve(parameters)?;
         let base = self.rows_of(&solved, parameters)?;
         let mut slopes = DMatrix::zeros(self.rows.len(), parameters.len());
+        let predicted = self.add_smalls(&solved, base.clone(), (parameters, &mut slopes));
+        let solution = Solution {
+            solved,
+            base,
+            slopes,
+        };
+        Some((predicted, solution))
+    }
+
+    fn complete(
+        &self,
+        parameters: &[f64],
+        known: &[Knowledge],
+        (predicted, solution): (Vec<f64>, Solution),
+    ) -> Option<Linearised> {
+        let Solution {
+            solved,
+            base,
+            mut slopes,
+        } = solution;
         self.joint_slopes(&solved, &mut slopes);
         for index in 0..self.layout.effects.len() {
             let steps = self.steps(index, parameters);
@@ -152,8 +166,25 @@ impl<'a> Forward<'a> {
         if self.softening(parameters).is_some() {
             self.amplitude_slopes(parameters, &base, &mut slopes);
         }
-        let predicted = self.add_smalls(&solved, base, (parameters, &mut slopes));
         Some(Linearised { predicted, slopes })
+    }
+}
+
+/// Predicts all rows of a frame under one hypothesis.
+pub(super) struct Forward<'a> {
+    pub(super) frame: &'a Frame,
+    pub(super) layout: Layout,
+    /// Rows beyond those of the fit (withheld or planned), if wanted in their place.
+    pub(super) rows: &'a [Row],
+}
+
+impl<'a> Forward<'a> {
+    pub(super) fn new(frame: &'a Frame, effects: &[Candidate]) -> Self {
+        Forward {
+            frame,
+            layout: Layout::new(frame, effects),
+            rows: &frame.rows,
+        }
     }
 
     /// Steps of the finite differences of one effect, away from its bounds: small against what readings to

@@ -9,7 +9,7 @@ use super::evidence::{
 use super::forward::{Forward, Layout};
 use super::frame::Frame;
 use super::knowledge::knowledge;
-use super::least_squares::{Knowledge, Optimum, maximise};
+use super::least_squares::{Knowledge, Model, Optimum, optimum_at};
 use super::nominal::COUPLING;
 use super::settings::GapSettings;
 
@@ -213,9 +213,9 @@ impl Search<'_> {
         let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
         // Slopes of what vanishes at nothing (a place, a frequency) are taken a little inside.
         let start = self.start(forward, size.nothing + 0.05 * size.scale, place);
-        let mut first = Some(forward.linearise(&start, known)?);
+        let there = forward.linearise(&start, known)?;
         let readings = &self.frame.readings;
-        let here = maximise(readings, known, &start, &mut |_| first.take())?;
+        let here = optimum_at(readings, known, start, there);
         linear_optimum(readings, known, &here)
     }
 

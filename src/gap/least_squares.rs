@@ -12,6 +12,26 @@ pub(super) struct Linearised {
     pub(super) slopes: DMatrix<f64>,
 }
 
+/// A model that is asked for predictions at many points and for slopes, which cost more, at those that count.
+pub(super) trait Model {
+    /// What a prediction leaves behind for the slopes at the same point.
+    type Rest;
+    /// Predictions at a point; `None` where there is no such structure.
+    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Self::Rest)>;
+    /// The same with the slopes with respect to all parameters that are not held.
+    fn complete(
+        &self,
+        parameters: &[f64],
+        known: &[Knowledge],
+        predicted: (Vec<f64>, Self::Rest),
+    ) -> Option<Linearised>;
+
+    /// Prediction and slopes at a point.
+    fn linearise(&self, parameters: &[f64], known: &[Knowledge]) -> Option<Linearised> {
+        self.complete(parameters, known, self.predict(parameters)?)
+    }
+}
+
 /// What is known of a parameter before the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Knowledge {
@@ -75,20 +95,19 @@ const GAIN: f64 = 1e-4;
 /// It also ends after two steps that lower the objective by less than this share of it.
 const IDLE: f64 = 1e-3;
 
-/// The parameters that maximise likelihood times prior. `model` says what is predicted at a point,
-/// `None` where there is no such structure.
+/// The parameters that maximise likelihood times prior; `None` where there is no structure at the start.
 pub(super) fn maximise(
     readings: &[Reading],
     knowledge: &[Knowledge],
     start: &[f64],
-    model: &mut dyn FnMut(&[f64]) -> Option<Linearised>,
+    model: &impl Model,
 ) -> Option<Optimum> {
     let parameters: Vec<f64> = start
         .iter()
         .zip(knowledge)
         .map(|(&value, known)| value.clamp(known.low, known.high))
         .collect();
-    let first = model(&parameters)?;
+    let first = model.linearise(&parameters, knowledge)?;
     let mut optimum = optimum_at(readings, knowledge, parameters, first);
     let mut damping = 0;
     let mut idle = 0;
@@ -118,6 +137,11 @@ fn promised_gain(optimum: &Optimum, knowledge: &[Knowledge]) -> Option<f64> {
     Some(-0.5 * step.dot(&optimum.gradient))
 }
 
+/// What the quadratic model promises of any step.
+fn promised_by(optimum: &Optimum, step: &DVector<f64>) -> f64 {
+    -step.dot(&optimum.gradient) - 0.5 * step.dot(&(&optimum.curvature * step))
+}
+
 /// The same of a model that is linear: at `origin` it predicts `there`.
 pub(super) fn maximise_linear(
     readings: &[Reading],
@@ -125,19 +149,43 @@ pub(super) fn maximise_linear(
     (origin, there): (&[f64], &[f64]),
     slopes: &DMatrix<f64>,
 ) -> Option<Optimum> {
-    let mut model = |parameters: &[f64]| {
-        let steps = parameters.iter().zip(origin).map(|(new, old)| new - old);
-        let moved = slopes * DVector::from_iterator(origin.len(), steps);
-        Some(Linearised {
-            predicted: there
-                .iter()
-                .zip(moved.iter())
-                .map(|(at, by)| at + by)
-                .collect(),
-            slopes: slopes.clone(),
-        })
+    let model = Linear {
+        origin,
+        there,
+        slopes,
     };
-    maximise(readings, knowledge, origin, &mut model)
+    maximise(readings, knowledge, origin, &model)
+}
+
+/// A model that is linear.
+struct Linear<'a> {
+    origin: &'a [f64],
+    there: &'a [f64],
+    slopes: &'a DMatrix<f64>,
+}
+
+impl Model for Linear<'_> {
+    type Rest = ();
+
+    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
+        let steps = parameters.iter().zip(self.origin);
+        let steps = DVector::from_iterator(parameters.len(), steps.map(|(new, old)| new - old));
+        let moved = self.slopes * steps;
+        let predicted = self.there.iter().zip(moved.iter());
+        Some((predicted.map(|(at, by)| at + by).collect(), ()))
+    }
+
+    fn complete(
+        &self,
+        _: &[f64],
+        _: &[Knowledge],
+        (predicted, ()): (Vec<f64>, ()),
+    ) -> Option<Linearised> {
+        Some(Linearised {
+            predicted,
+            slopes: self.slopes.clone(),
+        })
+    }
 }
 
 /// Dampings of the step, as shares of the curvature's diagonal (Levenberg & Marquardt): they shorten it
@@ -150,10 +198,14 @@ fn advance(
     readings: &[Reading],
     knowledge: &[Knowledge],
     (from, first): (&Optimum, usize),
-    model: &mut dyn FnMut(&[f64]) -> Option<Linearised>,
+    model: &impl Model,
 ) -> Option<(Optimum, usize)> {
     for (used, damping) in DAMPINGS.iter().enumerate().skip(first) {
         let step = bounded_step(from, knowledge, *damping)?;
+        // Of a shorter step the quadratic model promises less, and of the next one less still.
+        if promised_by(from, &step) < GAIN {
+            return None;
+        }
         let parameters: Vec<f64> = from
             .parameters
             .iter()
@@ -161,14 +213,38 @@ fn advance(
             .zip(knowledge)
             .map(|((value, step), known)| (value + step).clamp(known.low, known.high))
             .collect();
-        if let Some(linearised) = model(&parameters) {
-            let trial = optimum_at(readings, knowledge, parameters, linearised);
-            if trial.objective < from.objective {
-                return Some((trial, used));
-            }
+        let Some(found) = model.predict(&parameters) else {
+            continue;
+        };
+        if objective_at(readings, knowledge, (&parameters, &found.0)) >= from.objective {
+            continue;
+        }
+        if let Some(linearised) = model.complete(&parameters, knowledge, found) {
+            let better = optimum_at(readings, knowledge, parameters, linearised);
+            return Some((better, used));
         }
     }
     None
+}
+
+/// -ln(likelihood x prior) at a point, given what is predicted there; without constants of the data.
+pub(super) fn objective_at(
+    readings: &[Reading],
+    knowledge: &[Knowledge],
+    (parameters, predicted): (&[f64], &[f64]),
+) -> f64 {
+    let mut objective = 0.0;
+    for (reading, predicted) in readings.iter().zip(predicted) {
+        let residual = (reading.value - predicted) / reading.std;
+        objective -= noise::log_density_drop(residual, reading.freedom);
+    }
+    for (known, parameter) in knowledge.iter().zip(parameters) {
+        if !known.is_held() && known.std.is_finite() {
+            let away = (parameter - known.centre) / known.std;
+            objective += 0.5 * away * away;
+        }
+    }
+    objective
 }
 
 /// What the readings say of a point.
@@ -179,12 +255,11 @@ pub(super) fn optimum_at(
     model: Linearised,
 ) -> Optimum {
     let count = parameters.len();
-    let mut objective = 0.0;
+    let objective = objective_at(readings, knowledge, (&parameters, &model.predicted));
     let mut weighted = model.slopes.clone();
     let mut pulled = DVector::zeros(readings.len());
     for (row, reading) in readings.iter().enumerate() {
         let residual = (reading.value - model.predicted[row]) / reading.std;
-        objective -= noise::log_density_drop(residual, reading.freedom);
         let weight = noise::weight(residual, reading.freedom);
         let precision = weight / (reading.std * reading.std);
         pulled[row] = precision * (reading.value - model.predicted[row]);
@@ -200,7 +275,6 @@ pub(super) fn optimum_at(
             gradient[k] = 0.0;
         } else if known.std.is_finite() {
             let away = (parameters[k] - known.centre) / known.std;
-            objective += 0.5 * away * away;
             curvature[(k, k)] += known.std.powi(-2);
             gradient[k] += away / known.std;
         }

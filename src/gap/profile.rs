@@ -50,9 +50,7 @@ impl Search<'_> {
             held[at] = Knowledge::held(t);
             let mut start = branch.optimum.parameters.clone();
             start[at] = t;
-            let optimum = maximise(&self.frame.readings, &held, &start, &mut |p| {
-                forward.linearise(p, &held)
-            });
+            let optimum = maximise(&self.frame.readings, &held, &start, forward);
             let log = optimum.and_then(|optimum| marginal_log(branch, &optimum, at));
             logs.push((t, log.map_or(f64::NEG_INFINITY, |log| log - base)));
         }

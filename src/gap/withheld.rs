@@ -4,6 +4,7 @@ use super::evidence::covariance;
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
+use super::least_squares::Model;
 use super::noise;
 use super::result::Closure;
 use nalgebra::{DMatrix, DVector};

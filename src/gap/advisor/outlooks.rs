@@ -4,7 +4,7 @@ use super::super::catalogue::Candidate;
 use super::super::evidence::covariance;
 use super::super::forward::{Forward, Layout};
 use super::super::frame::{Frame, Row, Small};
-use super::super::least_squares::{Knowledge, Optimum};
+use super::super::least_squares::{Knowledge, Model, Optimum};
 use super::super::posterior::Entry;
 use super::super::result::Hypothesis;
 use super::information::Outlook;

@@ -32,6 +32,9 @@ function mute(set) { return set.mark === "line" || set.mark === "band"; }
 
 function within(axis, value) { return value >= axis[0] && value <= axis[1]; }
 
+// A bar is seen where its row is: its end may lie beyond what is shown.
+function shown(set, i, xs, ys) { return (set.mark === "bar" || within(xs, set.x[i])) && within(ys, set.y[i]); }
+
 function drawSet(u, panel, set, lit) {
   var c = u.ctx, ratio = devicePixelRatio || 1, size = set.size * ratio;
   function px(i) { return u.valToPos(set.x[i], "x", true); }
@@ -54,7 +57,7 @@ function drawSet(u, panel, set, lit) {
   }
   var xs = panel.view.x, ys = panel.view.y;
   set.x.forEach(function (value, i) {
-    if (!within(xs, value) || !within(ys, set.y[i])) return;
+    if (!shown(set, i, xs, ys)) return;
     var chosen = lit && lit.set === set && lit.index === i;
     var x = px(i), y = py(set.y[i]), r = chosen ? 1.8 * size : size;
     if (set.mark === "bar") {
@@ -120,7 +123,7 @@ function nearest(u, panel, left, top) {
   panel.sets.forEach(function (set) {
     if (mute(set)) return;
     set.x.forEach(function (value, i) {
-      if (!within(panel.view.x, value) || !within(panel.view.y, set.y[i])) return;
+      if (!shown(set, i, panel.view.x, panel.view.y)) return;
       // A bar answers all along its row.
       var aside = set.mark === "bar" ? 0 : u.valToPos(value, "x") - left;
       var distance = Math.hypot(aside, u.valToPos(set.y[i], "y") - top);
@@ -137,7 +140,7 @@ function saying(panel, point) {
   // Where an axis has names, the point's own words say which.
   if (!panel.x.at) parts.push(one(panel.x.label, set.x[i], panel.x.unit));
   var bar = set.high ? " ± " + +(0.5 * (set.high[i] - set.low[i])).toPrecision(2) : "";
-  if (!panel.y.at) parts.push(panel.y.label + " " + tickWords(set.y[i]) + bar + unit(panel.y.unit));
+  if (!panel.y.at) parts.push(panel.y.label + " " + (set.said ? set.said[i] : tickWords(set.y[i]) + bar + unit(panel.y.unit)));
   if (set.extra) parts.push(one(panel.extra[0], set.extra[i], panel.extra[1]));
   return parts.join(" · ");
 }
@@ -151,7 +154,7 @@ function hover(figure, panel) {
     tip.style.display = lit ? "block" : "none";
     if (!lit) return;
     tip.textContent = saying(panel, lit);
-    var wide = u.over.clientWidth, x = u.valToPos(lit.set.x[lit.index], "x"), y = u.valToPos(lit.set.y[lit.index], "y");
+    var wide = u.over.clientWidth, x = Math.min(Math.max(u.valToPos(lit.set.x[lit.index], "x"), 0), wide), y = u.valToPos(lit.set.y[lit.index], "y");
     tip.style.left = x < wide / 2 ? x + 12 + "px" : "auto";
     tip.style.right = x < wide / 2 ? "auto" : wide - x + 12 + "px";
     tip.style.top = Math.max(y - 34, 0) + "px";

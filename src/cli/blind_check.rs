@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::input::read_test;
-use super::output::OutputFolder;
+use super::output::{OutputError, OutputFolder};
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -12,12 +12,13 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::fs;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint::description::TestDescription;
 use tapjoint::gap::{Diagnosis, GapSettings};
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
-use tapjoint::recording::{WavFormat, write_wav};
+use tapjoint::recording::{WavFormat, encode_wav};
 use tapjoint::report::blind_check::render_blind_check;
 use tapjoint::study::blind_check::{
     Answer, Campaign, Case, DrawnTest, Extent, RecordedTest, Truth, always_scale, commitment,
@@ -151,7 +152,7 @@ fn drawn(
     keep: Option<&Path>,
     terminal: &Terminal,
 ) -> anyhow::Result<Vec<Case>> {
-    let staged = keep.map(Staged::prepare).transpose()?;
+    let kept = keep.map(new_folder).transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
         .map(|index| campaign.draw(index))
@@ -179,10 +180,11 @@ fn drawn(
         .zip(&truths)
         .map(|(test, truth)| {
             let recorded = test.record()?;
-            let case = match &staged {
-                Some(staged) => {
-                    let folder = staged.folder.path().join(&test.truth.name);
-                    diagnose_recorded(&recorded, truth, &folder)?
+            let name = &test.truth.name;
+            let case = match kept.as_ref().zip(keep) {
+                Some((kept, shown)) => {
+                    let folders = (kept.place_of(name), shown.join(name));
+                    diagnose_recorded(&recorded, truth, (&folders.0, &folders.1))?
                 }
                 None => diagnose_in_passing(&recorded, truth)?,
             };
@@ -195,41 +197,20 @@ fn drawn(
         })
         .collect::<anyhow::Result<Vec<Case>>>()?;
     check_names(&tests, &diagnosed)?;
-    if let Some(staged) = staged {
-        staged.publish(&sealed)?;
+    if let Some(kept) = kept {
+        kept.add("truth.json", sealed.as_bytes())?;
+        kept.publish()?;
     }
     Ok(diagnosed)
 }
 
-/// A folder of tests that appears whole or not at all.
-struct Staged {
-    folder: tempfile::TempDir,
-    name: PathBuf,
-}
-
-impl Staged {
-    fn prepare(name: &Path) -> anyhow::Result<Self> {
+/// A new folder of tests that appears whole or not at all.
+fn new_folder(name: &Path) -> anyhow::Result<OutputFolder> {
+    if name.exists() {
         let shown = name.display();
-        if name.exists() {
-            bail!("{shown}: is there already; give the name of a new folder");
-        }
-        let parent = name
-            .parent()
-            .filter(|parent| !parent.as_os_str().is_empty());
-        let folder = tempfile::Builder::new()
-            .prefix(".tapjoint-")
-            .tempdir_in(parent.unwrap_or(Path::new(".")))
-            .with_context(|| format!("{shown}: cannot be written"))?;
-        let name = name.to_owned();
-        Ok(Self { folder, name })
+        bail!("{shown}: is there already; give the name of a new folder");
     }
-
-    fn publish(self, truths: &str) -> anyhow::Result<()> {
-        let written = || format!("{}: cannot be written", self.name.display());
-        fs::write(self.folder.path().join("truth.json"), truths).with_context(written)?;
-        fs::rename(self.folder.path(), &self.name).with_context(written)?;
-        Ok(())
-    }
+    Ok(OutputFolder::prepare(name)?)
 }
 
 /// The first tests again under other names: the answers must not change.
@@ -259,27 +240,32 @@ fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<()> {
 
 fn diagnose_in_passing(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
-    diagnose_recorded(recorded, truth, folder.path())
+    diagnose_recorded(recorded, truth, (folder.path(), folder.path()))
 }
 
-/// Writes a test into a folder of its own, and diagnoses what stands there.
+/// Writes a test into a folder of its own, and diagnoses what stands there. Errors say where it was to
+/// appear, `shown`.
 fn diagnose_recorded(
     recorded: &RecordedTest,
     truth: &Truth,
-    folder: &Path,
+    (folder, shown): (&Path, &Path),
 ) -> anyhow::Result<Case> {
-    let written = |path: &Path| format!("{}: cannot be written", path.display());
-    fs::create_dir_all(folder).with_context(|| written(folder))?;
-    let path = folder.join("test.toml");
-    fs::write(&path, &recorded.description).with_context(|| written(&path))?;
+    let failed = |path: PathBuf| move |cause| OutputError::Failed { path, cause };
+    let write = |name: &str, bytes: &[u8]| {
+        fs::write(folder.join(name), bytes).map_err(failed(shown.join(name)))
+    };
+    fs::create_dir_all(folder).map_err(failed(shown.to_owned()))?;
+    write("test.toml", recorded.description.as_bytes())?;
     for recording in &recorded.recordings {
-        let path = folder.join(&recording.file);
-        write_wav(
-            &path,
+        let mut bytes = Vec::new();
+        encode_wav(
+            &recording.file,
+            Cursor::new(&mut bytes),
             recording.sample_rate,
             &recording.channels,
             WavFormat::Pcm24,
         )?;
+        write(&recording.file, &bytes)?;
     }
     let test = TestDescription::parse(&recorded.description, "test.toml")?;
     Ok(case_of(&test, folder, truth))

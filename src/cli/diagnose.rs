@@ -56,7 +56,13 @@ pub(super) fn run(
     document.gap = Some(gap);
     match (output, text) {
         (Some(output), Some(text)) => output.write(text.as_bytes())?,
-        (Some(_), None) => terminal.warn(no_model(diagnosis.as_ref().ok())),
+        (Some(_), None) => {
+            let left = arguments
+                .model
+                .as_deref()
+                .map_or_else(String::new, left_as_it_was);
+            terminal.warn(&format!("{}{left}", no_model(diagnosis.as_ref().ok())));
+        }
         (None, _) => {}
     }
     terminal.say(&render_gap_text(&document))?;
@@ -66,6 +72,14 @@ pub(super) fn run(
     } else {
         Outcome::NoAnswer
     })
+}
+
+/// That a file of an earlier diagnosis does not belong to this one; empty where there is none.
+fn left_as_it_was(model: &Path) -> String {
+    match model.exists() {
+        true => format!("; {} is left as it was", model.display()),
+        false => String::new(),
+    }
 }
 
 /// Why there is no model to write.

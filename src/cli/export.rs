@@ -115,7 +115,7 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
         )
     })?;
     let sound = joint.check();
-    sound.with_context(|| format!("{name}: its joint cannot be"))?;
+    sound.with_context(|| format!("{name}: its joint is not physical"))?;
     // A closed form has been estimated without masses and unequal halves, and holds their effect.
     let whole = estimate["method"] == "consistent" || structure.known.over(None).is_some();
     let details = structure_details(test, &structure.beam);
@@ -128,7 +128,7 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
         .map_or(USUAL_MODES, Vec::len);
     Ok(DeckSource {
         frequencies: frequencies_of(&structure, &joint, count)
-            .with_context(|| format!("{name}: its joint cannot be predicted with"))?,
+            .with_context(|| format!("{name}: no frequencies follow from its joint"))?,
         structure,
         joint,
         origin: format!("from {name}"),

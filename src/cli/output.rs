@@ -3,10 +3,9 @@
 //! A file is written under a temporary name in its own folder and renamed at the end. A report
 //! folder is filled in a temporary folder: if the report folder is new, that folder is renamed to
 //! it in one step; if it exists, the temporary one lies inside it and its files are renamed one by
-//! one, each replacing its predecessor whole, and files of other names are left alone but those that the
-//! caller knows to be leftovers of its own. The
-//! temporary file or folder is made before any work, which shows that writing will be possible;
-//! when the work fails, it is removed.
+//! one, each replacing its predecessor whole; files of other names stay, except leftovers that the
+//! caller names. The temporary file or folder is made before any work, which shows that writing will be
+//! possible; when the work fails, it is removed.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -46,12 +45,15 @@ pub(super) enum OutputError {
         /// That file.
         path: PathBuf,
     },
-    /// A leftover of an earlier run that stays beside what is new.
-    #[error("{}: an earlier run left this, and it cannot be removed: {cause}; remove it, all else is written", path.display())]
-    Leftover {
-        /// That file.
-        path: PathBuf,
-        /// What the system says.
+    /// Leftovers of an earlier run that stay beside what is new.
+    #[error(
+        "{}: left by an earlier run, and cannot be removed: {cause}; what is new is written, so remove by hand what is old",
+        listed(paths)
+    )]
+    Leftovers {
+        /// These files.
+        paths: Vec<PathBuf>,
+        /// What the system says of the first.
         cause: io::Error,
     },
     /// Writing failed on the way; nothing half-written is left.
@@ -219,23 +221,30 @@ impl OutputFolder {
     }
 
     /// The same as [`publish`](Self::publish), and then removes those of the `stale` files that were not
-    /// made again. Only files go, never folders.
+    /// made again. Only files go, never folders. Beside the folder stands what could not be removed: the
+    /// results are there all the same, so that the caller tells of it when it has told of them.
     ///
     /// # Errors
-    /// [`OutputError::Failed`], or [`OutputError::Leftover`] where a file cannot be removed.
-    pub(super) fn publish_without(self, stale: &[String]) -> Result<PathBuf, OutputError> {
+    /// [`OutputError::Failed`].
+    pub(super) fn publish_without(
+        self,
+        stale: &[String],
+    ) -> Result<(PathBuf, Option<OutputError>), OutputError> {
         let stale: Vec<&String> = stale
             .iter()
             .filter(|name| !self.staging.path().join(name).exists())
             .collect();
         let folder = self.publish()?;
-        for path in stale.into_iter().map(|name| folder.join(name)) {
-            let is_file = fs::symlink_metadata(&path).is_ok_and(|found| !found.is_dir());
-            if is_file {
-                fs::remove_file(&path).map_err(|cause| OutputError::Leftover { path, cause })?;
-            }
-        }
-        Ok(folder)
+        let is_file =
+            |path: &PathBuf| fs::symlink_metadata(path).is_ok_and(|found| !found.is_dir());
+        let stale = stale.into_iter().map(|name| folder.join(name));
+        let (paths, causes): (Vec<PathBuf>, Vec<io::Error>) = stale
+            .filter(is_file)
+            .filter_map(|path| fs::remove_file(&path).err().map(|cause| (path, cause)))
+            .unzip();
+        let cause = causes.into_iter().next();
+        let left = cause.map(|cause| OutputError::Leftovers { paths, cause });
+        Ok((folder, left))
     }
 
     fn rename_folder(&self) -> io::Result<()> {
@@ -274,6 +283,11 @@ fn without_path(error: io::Error) -> io::Error {
     let inner = error.get_ref().and_then(std::error::Error::source);
     let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
     code.map_or(error, io::Error::from_raw_os_error)
+}
+
+fn listed(paths: &[PathBuf]) -> String {
+    let names = paths.iter().map(|path| path.display().to_string());
+    names.collect::<Vec<_>>().join(", ")
 }
 
 fn folder_of(path: &Path) -> &Path {
@@ -371,7 +385,8 @@ mod tests {
         assert_eq!(output.earlier("report.json").as_deref(), Some("old"));
         output.add("report.json", b"new").unwrap();
         let stale = ["old.png", "report.json", "gone.png", "folder"].map(str::to_owned);
-        output.publish_without(&stale).unwrap();
+        let (_, left) = output.publish_without(&stale).unwrap();
+        assert!(left.is_none(), "{left:?}");
         assert_eq!(
             names(folder.path()),
             ["folder", "notes.txt", "report.json"],
@@ -379,6 +394,27 @@ mod tests {
         );
         let kept = fs::read_to_string(folder.path().join("report.json")).unwrap();
         assert_eq!(kept, "new");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn regress_what_cannot_be_removed_is_told_at_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["old.png", "older.png"] {
+            fs::write(folder.path().join(name), "old").unwrap();
+        }
+        let output = OutputFolder::prepare(folder.path()).unwrap();
+        output.add("report.json", b"new").unwrap();
+        // Nobody, not even the system's owner, removes a file of the kernel's.
+        std::os::unix::fs::symlink("/proc", folder.path().join("kernel")).unwrap();
+        let stale = ["old.png", "kernel/version", "kernel/uptime", "older.png"];
+        let stale = stale.map(str::to_owned);
+        let (_, left) = output.publish_without(&stale).unwrap();
+        assert_eq!(names(folder.path()), ["kernel", "report.json"], "leftovers");
+        let told = left.expect("two files stay").to_string();
+        for part in ["kernel/version, ", "kernel/uptime: left by an earlier run"] {
+            assert!(told.contains(part), "{told}");
+        }
     }
 
     #[test]

@@ -153,14 +153,16 @@ pub(super) fn run(
     for file in render_run(&document, &figures_of(&analysis))? {
         request.output.add(&file.name, &file.bytes)?;
     }
-    // Where the folder holds an earlier report, what this run does not make again would belong to nothing.
-    let earlier = request.output.earlier("report.json");
+    // Where the folder holds an earlier run's report, what this run does not make again would belong to
+    // nothing. Other commands write a report.json alone.
+    let page = request.output.earlier("report.html");
+    let earlier = page.and(request.output.earlier("report.json"));
     let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
-    let folder = request.output.publish_without(&stale)?;
+    let (folder, left) = request.output.publish_without(&stale)?;
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;
-    Ok(outcome(&analysis))
+    left.map_or_else(|| Ok(outcome(&analysis)), |left| Err(left.into()))
 }
 
 /// A test is answered when there is an estimate, or a prediction (from known stiffnesses) beside a

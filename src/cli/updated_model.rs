@@ -9,9 +9,12 @@ use tapjoint::report::MODEL_FILE;
 use tapjoint::report::document::{GapSection, UpdatedModelSection};
 use tapjoint::study::updated_model::{DescribedEffectError, described_frequencies, updated_model};
 
-/// "FILE:LINE: what is wrong with the effect that is described there".
+/// "FILE:LINE: what is wrong with the effect that is described there", or with the structure of the file.
 pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Error {
-    anyhow!("{file}:{}: {}", error.line, error.cause)
+    match error.line {
+        Some(line) => anyhow!("{file}:{line}: {}", error.cause),
+        None => anyhow!("{file}: {}", error.cause),
+    }
 }
 
 /// Adds the model that a diagnosis makes of the described one to the section of report.json, and returns its

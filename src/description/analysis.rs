@@ -3,10 +3,7 @@
 use super::error::{DescriptionError, DescriptionProblem};
 use super::limits::Limits;
 use super::reader::{Entry, Table};
-use super::{
-    AnalysisDescription, FitParameter, JointDescription, JointKind, JointModel, ReadingMethod,
-    Weights, WindowKind,
-};
+use super::{JointDescription, JointKind, JointModel};
 
 const WINDOWS: [(&str, WindowKind); 3] = [
     ("rectangular", WindowKind::Rectangular),
@@ -30,6 +27,71 @@ const PARAMETERS: [(&str, FitParameter); 5] = [
     ("density", FitParameter::Density),
 ];
 const FIT_MODES: Limits = Limits::between(1.0, 1000.0, "leave it out to use all modes");
+
+/// Window over a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WindowKind {
+    /// None.
+    Rectangular,
+    /// Hann; for steady signals, not for taps.
+    Hann,
+    /// e^{-at} on force and response alike.
+    Exponential,
+}
+
+/// How natural frequencies are read from a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReadingMethod {
+    /// By a fit of decaying oscillations, with a standard deviation; what cannot be fitted is read
+    /// between the lines or on its line.
+    #[default]
+    Fit,
+    /// Between the lines about the peak; what cannot be had so, on its line.
+    Interpolated,
+    /// On the highest spectral line, as Ingole & Chatterjee read theirs.
+    Line,
+}
+
+/// Weights of the frequencies in an estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// By their measured uncertainty.
+    Measured,
+    /// Equal relative weights.
+    Relative,
+}
+
+/// What an estimate may determine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FitParameter {
+    /// Translational stiffness.
+    Kt,
+    /// Rotational stiffness.
+    Kr,
+    /// Cross-coupling stiffness.
+    Ktr,
+    /// Young's modulus.
+    Modulus,
+    /// Density.
+    Density,
+}
+
+/// How to analyse.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AnalysisDescription {
+    /// Window; `None` = chosen from the decay in the record.
+    pub window: Option<WindowKind>,
+    /// How natural frequencies are read.
+    pub reading: ReadingMethod,
+    /// The first so many modes enter the estimate; `None` = all.
+    pub fit_modes: Option<usize>,
+    /// Weights of the frequencies; `None` = measured where bounds are known.
+    pub weights: Option<Weights>,
+    /// Whether the sensors' masses enter the nominal model.
+    pub sensor_mass: bool,
+    /// What is estimated; `None` = the joint model's stiffnesses, free beam: modulus.
+    pub fit: Option<Vec<FitParameter>>,
+}
 
 /// Reads `[analysis]`; an absent table is all defaults.
 pub(super) fn read_analysis(

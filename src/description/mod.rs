@@ -18,6 +18,7 @@ mod recordings;
 mod sensors;
 mod template;
 
+pub use analysis::{AnalysisDescription, FitParameter, ReadingMethod, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
 pub use parse::ChannelRefError;
 pub use template::{runnable_template, template, template_of};
@@ -318,69 +319,4 @@ pub struct MeasuredFrequencies {
     pub std: Option<Vec<f64>>,
     /// Repeatability, relative: std^2 = half_line^2/3 + (scatter f)^2.
     pub scatter: Option<f64>,
-}
-
-/// Window over a block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WindowKind {
-    /// None.
-    Rectangular,
-    /// Hann; for steady signals, not for taps.
-    Hann,
-    /// e^{-at} on force and response alike.
-    Exponential,
-}
-
-/// How natural frequencies are read from a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ReadingMethod {
-    /// By a fit of decaying oscillations, with a standard deviation; what cannot be fitted is read
-    /// between the lines or on its line.
-    #[default]
-    Fit,
-    /// Between the lines about the peak; what cannot be had so, on its line.
-    Interpolated,
-    /// On the highest spectral line, as Ingole & Chatterjee read theirs.
-    Line,
-}
-
-/// Weights of the frequencies in an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Weights {
-    /// By their measured uncertainty.
-    Measured,
-    /// Equal relative weights.
-    Relative,
-}
-
-/// What an estimate may determine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FitParameter {
-    /// Translational stiffness.
-    Kt,
-    /// Rotational stiffness.
-    Kr,
-    /// Cross-coupling stiffness.
-    Ktr,
-    /// Young's modulus.
-    Modulus,
-    /// Density.
-    Density,
-}
-
-/// How to analyse.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AnalysisDescription {
-    /// Window; `None` = chosen from the decay in the record.
-    pub window: Option<WindowKind>,
-    /// How natural frequencies are read.
-    pub reading: ReadingMethod,
-    /// The first so many modes enter the estimate; `None` = all.
-    pub fit_modes: Option<usize>,
-    /// Weights of the frequencies; `None` = measured where bounds are known.
-    pub weights: Option<Weights>,
-    /// Whether the sensors' masses enter the nominal model.
-    pub sensor_mass: bool,
-    /// What is estimated; `None` = the joint model's stiffnesses, free beam: modulus.
-    pub fit: Option<Vec<FitParameter>>,
 }

@@ -211,7 +211,8 @@ const TIMEBASE: &[ParameterInfo] = &[relative("relative change of all frequencie
 const ADDED_MASS: &[ParameterInfo] = &[
     parameter(
         ("mass", D::Mass, "mass on the beam"),
-        (0.0, 10.0),
+        // As much as a description takes for fastened: what was known can be written as an effect.
+        (0.0, 1e3),
         Log,
         Some(0.01),
     ),

@@ -18,6 +18,9 @@ const USUAL_SHARE: f64 = 0.001;
 const USUAL_JOINT: [f64; 2] = [1400.0, 4.8];
 /// Stiffnesses beyond this (1) hold a beam like a wall; a search that begins further out does not move.
 const STIFFEST_START: f64 = 1e5;
+/// Where a usual stiffness would make the coupling with the described Ktr stronger than a joint can have, the
+/// search begins here (1): the end of what the diagnosis searches.
+const STRONGEST_START: f64 = 0.95;
 
 /// Diagnoses the gap of an analysed test.
 ///
@@ -88,7 +91,13 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint
     let described = test.joint.ktr.map(stiffness_of);
     let coupling = match (model, found, described) {
         (JointModel::ThreeParameter, Some(joint), _) => joint.coupling(),
-        (JointModel::ThreeParameter, None, Some(ktr)) => coupling(kt, kr, 1.0 / ktr),
+        (JointModel::ThreeParameter, None, Some(ktr)) => {
+            let begin = coupling(kt, kr, 1.0 / ktr);
+            match (test.joint.kt, test.joint.kr) {
+                (Some(_), Some(_)) => begin,
+                _ => begin.clamp(-STRONGEST_START, STRONGEST_START),
+            }
+        }
         _ => 0.0,
     };
     SpecimenJoint::Springs { kt, kr, coupling }

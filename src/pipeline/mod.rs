@@ -109,7 +109,7 @@ pub fn run_test(
             let known = (&structure, &details);
             let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
-            loaded::number_loaded(&mut recordings, &found, test, known);
+            warnings.extend(loaded::number_loaded(&mut recordings, &found, test, known));
             found
         }
     };

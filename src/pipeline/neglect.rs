@@ -131,8 +131,8 @@ fn of_masses(
         return None;
     }
     let size = format!(
-        "the mass of the sensors, {:.3} g or {:.1} % of the beam,",
-        1e3 * mass,
+        "the mass of the sensors, {} g or {:.1} % of the beam,",
+        grams(mass),
         100.0 * mass / structure.beam.mass()
     );
     let lowers = "it lowers the measured frequencies and thereby what is estimated from them";
@@ -167,9 +167,9 @@ fn of_fastened(
         return None;
     }
     let size = format!(
-        "what is fastened to the beam in {}, {:.3} g or {:.1} % of the beam,",
+        "what is fastened to the beam in {}, {} g or {:.1} % of the beam,",
         first.file.display(),
-        1e3 * mass,
+        grams(mass),
         100.0 * mass / structure.beam.mass()
     );
     let closed = match structure.regression {
@@ -186,10 +186,35 @@ fn of_fastened(
     })
 }
 
+/// A mass (kg) in grams with four significant digits, and no zeros that nobody stated.
+fn grams(mass: f64) -> f64 {
+    let grams = 1e3 * mass;
+    format!("{grams:.3e}").parse().unwrap_or(grams)
+}
+
 /// Whether a lap joint sits off the middle by more than a thousandth of the length.
 fn off_centre(test: &TestDescription) -> bool {
     let middle = 0.5 * test.beam.length;
     test.joint
         .position
         .is_some_and(|position| (position - middle).abs() > 1e-3 * test.beam.length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::grams;
+
+    #[test]
+    fn val_masses_have_four_digits_and_none_that_nobody_stated() {
+        let cases = [
+            (0.015, "15"),
+            (0.0042, "4.2"),
+            (0.012_345_6, "12.35"),
+            (1.25, "1250"),
+            (1e-6, "0.001"),
+        ];
+        for (mass, words) in cases {
+            assert_eq!(grams(mass).to_string(), words);
+        }
+    }
 }

@@ -6,14 +6,13 @@ use super::run::stems;
 
 /// The model that a diagnosis leads to, beside the report.
 pub const MODEL_FILE: &str = "updated-model.toml";
-/// Files of words.
-const WORDS: [&str; 6] = [
+/// Files of words, the model apart.
+const WORDS: [&str; 5] = [
     "report.html",
     "report.json",
     "parameters.csv",
     "modes.csv",
     "perturbation.csv",
-    MODEL_FILE,
 ];
 /// Pictures of the whole test.
 const OF_TEST: [&str; 5] = ["frequencies", "mode-shapes", "cloud", "gap", "gap-place"];
@@ -43,9 +42,13 @@ pub fn earlier_files(report_json: &str) -> Vec<String> {
         .into_iter()
         .chain(of_recordings)
         .flat_map(|name| [format!("{name}.png"), format!("{name}.svg")]);
+    // Where the earlier run wrote no model, one of that name is somebody else's.
+    let model = report["gap"]["updated_model"]["file"].as_str();
+    let model = model.filter(|file| *file == MODEL_FILE).map(str::to_owned);
     WORDS
         .map(str::to_owned)
         .into_iter()
+        .chain(model)
         .chain(pictures)
         .collect()
 }

@@ -2,13 +2,14 @@
 //! gap and its places. Each point says its values when hovered.
 
 use super::document::{Document, GapSection, ModeShapeSection, PlaceMapSection, PullSection};
-use super::format::significant;
+use super::format::{rounded, rounded_to, signed_percent, significant};
 use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointRule, PointSet};
 use super::plot::axis::Axis;
 use super::plot::comparison::{Error, errors, frequencies_words, panel};
 use super::plot::gap::{MOST_BARS, abscissa, errors_panel};
 use super::plot::place_map::map_panel;
 use super::plot::shapes::{Places, displacement, joint_of, places, shown};
+use super::tables::place_of;
 
 /// Height of a panel with errors or changes (pixels).
 const HEIGHT: u32 = 320;
@@ -40,7 +41,7 @@ fn panel_of(x: PointAxis, y: PointAxis, sets: Vec<PointSet>) -> PointPanel {
     }
 }
 
-/// A value with four digits: more than the picture shows.
+/// A place with four digits, more than the picture shows. What a point says has digits of its own.
 fn coarse(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
@@ -83,9 +84,7 @@ fn error_set(errors: &[Error<'_>], used: bool, belongs: impl Fn(&Error<'_>) -> b
     } else {
         ("mode not used: a true prediction", "c1", ("ring", 5.0))
     };
-    let places = found
-        .iter()
-        .map(|(at, error)| (*at as f64, coarse(error.percent)));
+    let places = found.iter().map(|(at, error)| (*at as f64, error.percent));
     let mut set = PointSet::new(name, color, mark, places);
     let end = |sign: f64| {
         let known = found
@@ -98,6 +97,11 @@ fn error_set(errors: &[Error<'_>], used: bool, belongs: impl Fn(&Error<'_>) -> b
         .iter()
         .map(|(_, error)| frequencies_words(error))
         .collect();
+    // Thousandths of a percent, as in the picture.
+    let said = found
+        .iter()
+        .map(|(_, error)| rounded_to(error.percent, error.bound, -3).joined() + " %");
+    set.said = said.collect();
     set
 }
 
@@ -126,8 +130,12 @@ fn pulls_panel(pulls: &[PullSection]) -> PointPanel {
         set.extra = pulls.iter().map(|pull| coarse(value(pull).1)).collect();
         let words = pulls
             .iter()
-            .map(|pull| format!("mode {} in {}", pull.mode, pull.recording));
+            .map(|pull| format!("mode {} in {}", pull.mode, place_of(pull)));
         set.words = words.collect();
+        let said = pulls
+            .iter()
+            .map(|pull| signed_percent(Some(value(pull).0)) + " %");
+        set.said = said.collect();
         set
     };
     let before = ("described model, joint fitted", "c1", ("ring", 4.5));
@@ -208,6 +216,9 @@ fn change(
         .collect();
     set.high = pairs()
         .map(|(value, std)| coarse(100.0 * (value + std)))
+        .collect();
+    set.said = pairs()
+        .map(|(value, std)| rounded(100.0 * value, Some(100.0 * std)).joined() + " %")
         .collect();
     set
 }

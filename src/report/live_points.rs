@@ -103,6 +103,10 @@ pub struct PointSet {
     /// Each point's own words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub words: Vec<String>,
+    /// What each point's height is, with its uncertainty and its unit; where empty, the numbers are said as
+    /// they are.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub said: Vec<String>,
 }
 
 /// An upright line with its name.
@@ -137,6 +141,7 @@ impl PointSet {
             high: Vec::new(),
             extra: Vec::new(),
             words: Vec::new(),
+            said: Vec::new(),
         }
     }
 }

@@ -123,6 +123,8 @@ fn middle_out(name: &str, width: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::collection::btree_set;
+    use proptest::prelude::*;
 
     fn shortest_that_fit(names: &[&str], width: usize) -> Vec<String> {
         let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
@@ -160,8 +162,8 @@ mod tests {
     }
 
     #[test]
-    fn prop_no_two_names_ever_look_alike() {
-        // Head and tail are the same: that way is not offered.
+    fn regress_a_way_in_which_two_names_look_alike_is_not_offered() {
+        // Head and tail are the same.
         let names = ["abcdefgh-x-stuvwxyz", "abcdefgh-y-stuvwxyz", "abc", ""].map(str::to_owned);
         for way in ways(&names) {
             let apart: BTreeSet<&String> = way.iter().collect();
@@ -171,5 +173,44 @@ mod tests {
             ways(&[]),
             Vec::<Vec<String>>::from([vec![], vec![], vec![]])
         );
+    }
+
+    proptest! {
+        #[test]
+        fn prop_no_two_names_ever_look_alike_and_numbers_stay(
+            numbers in btree_set(1..100u32, 2..6),
+            head in "[a-z]{2,12}(_[a-z]{1,8})?",
+            tail in "[a-z]{2,12}(_[a-z]{1,8})?",
+        ) {
+            let name = |number: &u32| format!("{head}-{number}-{tail}.wav");
+            let names: Vec<String> = numbers.iter().map(name).collect();
+            let ways = ways(&names);
+            prop_assert_eq!(&ways[0], &names);
+            for way in &ways {
+                let apart: BTreeSet<&String> = way.iter().collect();
+                prop_assert_eq!(apart.len(), names.len());
+            }
+            // Two digits between what stands for the words that all share.
+            let width = |way: &Vec<String>| way.iter().map(|name| name.chars().count()).max();
+            let least = ways.iter().filter_map(width).min();
+            prop_assert!(least <= Some(4), "{:?}", ways);
+            let short = ways.iter().find(|way| width(way) <= Some(4)).into_iter().flatten();
+            for (short, number) in short.zip(&numbers) {
+                prop_assert!(short.contains(&number.to_string()), "{} of {}", short, number);
+            }
+        }
+
+        #[test]
+        fn prop_whatever_the_names_the_first_way_is_themselves(
+            names in btree_set(".{0,12}", 0..5),
+        ) {
+            let names: Vec<String> = names.into_iter().collect();
+            let ways = ways(&names);
+            prop_assert_eq!(&ways[0], &names);
+            // Middles go last, so that later ways are never longer.
+            let width = |way: &Vec<String>| way.iter().map(|name| name.chars().count()).max();
+            let widths: Vec<_> = ways.iter().skip(3).map(width).collect();
+            prop_assert!(widths.is_sorted_by(|a, b| a >= b), "{:?}", ways);
+        }
     }
 }

@@ -1,13 +1,13 @@
 //! The described model with what the diagnosis found: as a description that can be predicted with, and its
 //! natural frequencies.
 
-use crate::description::{FastenedMass, JointKind, SensorKind, TestDescription};
+use crate::description::{FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
 use crate::pipeline::{fastened_masses, nominal_with};
+use crate::structure::StructureError;
 use crate::structure::specimen::{Mesh, PointMass};
-use crate::structure::{JointStiffness, StructureError};
 use toml::Value;
 
 /// A model brought up to date.
@@ -19,12 +19,12 @@ pub struct UpdatedModel {
     pub text: String,
 }
 
-/// Why a described effect cannot be had.
+/// Why a described structure, or an effect that is described with it, cannot be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("line {line}: {cause}")]
+#[error("{}{cause}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
 pub struct DescribedEffectError {
-    /// Line of its table.
-    pub line: usize,
+    /// Line of the effect's table; `None` where the structure cannot be had without effects either.
+    pub line: Option<usize>,
     /// What is wrong with it.
     pub cause: EffectCause,
 }
@@ -186,17 +186,22 @@ fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
     text
 }
 
+/// Where a sensor sits in the first recording (m).
+fn place_of(test: &TestDescription, sensor: &SensorDescription) -> Option<f64> {
+    let first = test.recordings.first();
+    let moved = first.and_then(|recording| recording.at.get(&sensor.name).copied());
+    moved.or(sensor.position)
+}
+
 /// Sensors where the first recording has them.
 fn sensors(test: &TestDescription) -> String {
-    let moves = test.recordings.first().map(|recording| &recording.at);
     // A microphone is not on the beam.
     let on_beam = test
         .sensors
         .iter()
         .filter(|sensor| sensor.kind != SensorKind::Sound);
     let tables = on_beam.filter_map(|sensor| {
-        let moved = moves.and_then(|at| at.get(&sensor.name)).copied();
-        let position = moved.or(sensor.position)?;
+        let position = place_of(test, sensor)?;
         let mut text = format!("\n[[sensor]]\nname = {}\n", quoted(&sensor.name));
         text.push_str(&line("position", position));
         text.push_str(
@@ -210,6 +215,11 @@ fn sensors(test: &TestDescription) -> String {
     tables.collect()
 }
 
+/// Above the tables of what is fastened in the first recording: an effect is hidden from who analyses what is
+/// simulated with it, and what is fastened was known.
+const KNOWN_MASSES: &str = "\n# Known, not found: what was fastened in the first recording. Where recordings are \
+                            added for\n# `tapjoint simulate`, move it into their [[recording.mass]] tables.";
+
 /// What is fastened in the first recording: no recording describes it any more.
 fn fastened(test: &TestDescription) -> String {
     let masses = test.recordings.first().map(|recording| &recording.masses);
@@ -221,7 +231,11 @@ fn fastened(test: &TestDescription) -> String {
             EffectId::AddedMass.name()
         )
     };
-    masses.into_iter().flatten().map(table).collect()
+    let tables: String = masses.into_iter().flatten().map(table).collect();
+    match tables.is_empty() {
+        true => tables,
+        false => format!("{KNOWN_MASSES}{tables}"),
+    }
 }
 
 fn table_of(effect: &Effect) -> String {
@@ -240,7 +254,7 @@ fn table_of(effect: &Effect) -> String {
 pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, DescribedEffectError> {
     let read = |described: &crate::description::EffectDescription| {
         let at = |cause: EffectError| DescribedEffectError {
-            line: described.line,
+            line: Some(described.line),
             cause: cause.into(),
         };
         let values = described.values.iter();
@@ -257,20 +271,23 @@ pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, Describe
 /// it describes and with its sensors on it.
 ///
 /// # Errors
-/// The first effect that there is not or that the structure cannot have; without effects
-/// [`frequencies_with`] says what is wrong with the structure.
+/// The first effect that there is not or that the structure cannot have, or what is wrong with the structure
+/// itself.
 pub fn described_frequencies(
     test: &TestDescription,
     count: usize,
 ) -> Result<Vec<f64>, DescribedEffectError> {
     let effects = described_effects(test)?;
-    frequencies_with(test, &effects, None, count).map_err(|error| {
+    frequencies_with(test, &effects, count).map_err(|error| {
         // The first effect with which there is no such structure is the one to be mended.
-        let fails = |held: &usize| frequencies_with(test, &effects[..*held], None, 1).is_err();
-        let first = (1..=effects.len()).find(fails).unwrap_or(effects.len());
-        let described = test.effects.get(first.saturating_sub(1));
+        let cause = |held: usize| frequencies_with(test, &effects[..held], count).err();
+        let first = (0..=effects.len()).find_map(|held| Some((held, cause(held)?)));
+        let (held, error) = first.unwrap_or((effects.len(), error));
+        let described = held
+            .checked_sub(1)
+            .and_then(|place| test.effects.get(place));
         DescribedEffectError {
-            line: described.map_or(1, |effect| effect.line),
+            line: described.map(|effect| effect.line),
             cause: error.into(),
         }
     })
@@ -281,13 +298,12 @@ pub fn described_frequencies(
 ///
 /// # Errors
 /// [`StructureError`] where there is no such structure.
-pub fn frequencies_with(
+fn frequencies_with(
     test: &TestDescription,
     effects: &[Effect],
-    joint: Option<JointStiffness>,
     count: usize,
 ) -> Result<Vec<f64>, StructureError> {
-    let nominal = nominal_with(test, joint);
+    let nominal = nominal_with(test, None);
     let mut specimen = nominal.specimen.clone();
     let places: Vec<SensorPlace> = test
         .sensors
@@ -296,7 +312,7 @@ pub fn frequencies_with(
         .filter(|(sensor, _)| sensor.kind != SensorKind::Sound)
         .filter_map(|(sensor, known)| {
             Some(SensorPlace {
-                position: sensor.position?,
+                position: place_of(test, sensor)?,
                 mass: known.mass.unwrap_or(0.0),
             })
         })

@@ -119,15 +119,17 @@ fn prop_kept_tests_are_what_was_sealed_and_score_the_same_again() {
         "--seed",
         "105",
     ];
-    let first = run(&[&drawn[..], &["--keep", "kept"]].concat());
-    let truth = fs::read_to_string(folder.path().join("kept/truth.json")).unwrap();
+    let first = run(&[&drawn[..], &["--keep", "new/kept"]].concat());
+    let truth = fs::read_to_string(folder.path().join("new/kept/truth.json")).unwrap();
     assert!(first.contains(&commitment(&truth)), "{first}");
+    let entries = fs::read_dir(folder.path().join("new")).unwrap();
+    assert_eq!(entries.count(), 1, "something temporary was left");
     run(&[
         "blind-check",
         "--folder",
-        "kept",
+        "new/kept",
         "--truth",
-        "kept/truth.json",
+        "new/kept/truth.json",
         "--out",
         "again",
     ]);

@@ -11,6 +11,7 @@ use tapjoint::gap::{
     GapSettings, Nominal, NominalSensor, TestPlan, Verdict, diagnose, nominal_chi_square, observe,
 };
 use tapjoint::identify::observation::Observations;
+use tapjoint::pipeline::{Analysis, IdentifySettings, run_test};
 use tapjoint::structure::specimen::{Mesh, PointMass, SpecimenJoint};
 
 use crate::shared::{five_recordings, planned, strip_on_springs, strip_table, tapped_strip};
@@ -235,13 +236,52 @@ fn numbered(report: &Value, recording: usize) -> Vec<(u64, f64)> {
     modes.iter().filter_map(of).collect()
 }
 
-#[test]
-fn recover_the_bare_beams_joint_and_the_loaded_recordings_modes() {
+/// A folder with the recordings of [`VIRTUAL`], and their description, in `out`.
+fn simulated() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("source.toml"), VIRTUAL).unwrap();
     let simulate = "simulate source.toml --out out --quiet --ideal --taps 3 --seconds 6 --bits 32";
     let simulate: Vec<&str> = simulate.split_whitespace().collect();
     tapjoint(folder.path(), &simulate);
+    folder
+}
+
+#[test]
+fn regress_loaded_recordings_are_numbered_with_a_known_joint_and_never_by_the_bare_beams_modes() {
+    let folder = simulated();
+    let out = folder.path().join("out");
+    let text = fs::read_to_string(out.join("test.toml")).unwrap();
+    let kind = "kind = \"cantilever\"\n";
+    assert!(text.contains(kind), "{text}");
+    let analysed = |text: &str| {
+        let test = TestDescription::parse(text, "test.toml").unwrap();
+        run_test(&test, (&out, "test.toml"), &IdentifySettings::default()).unwrap()
+    };
+    // Of a known joint nothing is estimated, and the masses' effect is known all the same.
+    let known = analysed(&text.replace(kind, &format!("{kind}kt = 1.994e6\nkr = 1223\n")));
+    let numbers = |analysis: &Analysis, recording: usize| {
+        let numbers = analysis.recordings[recording].mode_numbers.iter();
+        numbers.flatten().copied().collect::<Vec<usize>>()
+    };
+    assert_eq!(numbers(&known, 1), [1, 2, 3, 4, 5]);
+    let unnumbered = |analysis: &Analysis| {
+        let warnings = analysis.warnings.iter();
+        warnings.filter(|w| w.code() == "unnumbered").count()
+    };
+    assert_eq!(unnumbered(&known), 0);
+    // One mode of the bare beam does not tell of two stiffnesses.
+    let band = "band = [0, 60]\n";
+    let (before, after) = text.split_once("[[recording]]").unwrap();
+    let first = format!("{before}[[recording]]\n{band}{after}");
+    let few = analysed(&first.replacen("band = [0, 1000]\n", "", 1));
+    assert_eq!(numbers(&few, 0), [1]);
+    assert_eq!(numbers(&few, 1), [0; 0]);
+    assert_eq!(unnumbered(&few), 1);
+}
+
+#[test]
+fn recover_the_bare_beams_joint_and_the_loaded_recordings_modes() {
+    let folder = simulated();
     tapjoint(
         folder.path(),
         &[

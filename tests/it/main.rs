@@ -47,3 +47,4 @@ mod spectral_frf;
 mod structure;
 mod taps;
 mod taps_double_hit;
+mod updated_model;

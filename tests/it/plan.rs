@@ -3,7 +3,9 @@
 use crate::shared::strip_table;
 use tapjoint::description::TestDescription;
 use tapjoint::effects::{EffectId, Group, Place};
+use tapjoint::pipeline::nominal_with;
 use tapjoint::report::blind_check::tell_apart;
+use tapjoint::structure::specimen::{Mesh, SpecimenJoint};
 use tapjoint::study::blind_check::{Case, Class, Planted, Verdict};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
@@ -124,4 +126,25 @@ fn regress_a_lap_joint_is_planned_with_cables_and_masses() {
         assert!(drawn.contains(&group), "{drawn:?}");
     }
     assert_answered(&cases);
+}
+
+#[test]
+fn regress_a_described_coupling_beside_usual_stiffnesses_is_a_joint_that_can_be() {
+    // With the usual Kt and Kr the coupling would be 8, of a joint that nobody described.
+    for (joint, expected) in [
+        ("ktr = 6000\n", 0.95),
+        ("ktr = -6000\n", -0.95),
+        ("ktr = 6000\nkt = 1e6\n", 0.95),
+        // Described whole it is taken as it is: sqrt(1e6 * 400)/4e4.
+        ("ktr = 4e4\nkt = 1e6\nkr = 400\n", 0.5),
+    ] {
+        let test = described(&format!("kind = \"cantilever\"\nmodel = \"3p\"\n{joint}"));
+        let specimen = nominal_with(&test, None).specimen;
+        let SpecimenJoint::Springs { coupling, .. } = specimen.joint else {
+            panic!("{joint}: {:?}", specimen.joint);
+        };
+        // Square roots and a quotient.
+        assert!((coupling - expected).abs() < 1e-12, "{joint}: {coupling}");
+        assert!(specimen.modes(3, Mesh::SIMULATION).is_ok(), "{joint}");
+    }
 }

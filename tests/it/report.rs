@@ -1,6 +1,7 @@
 //! Tests of the report: what is drawn, what is written, and that nothing missing breaks it.
 
 mod fixture;
+mod gap_pictures;
 mod gap_story;
 mod numbers;
 mod pictures;

@@ -40,11 +40,14 @@ const VISITOR: &str = r#"
       }
     return "";
   }
-  function drag(figure) {
-    var over = figure.querySelector(".u-over"), wide = over.clientWidth, high = over.clientHeight;
-    mouse(over, "mousedown", 0.1 * wide, 0.2 * high);
-    mouse(over, "mousemove", 0.9 * wide, 0.8 * high);
-    mouse(over, "mouseup", 0.9 * wide, 0.8 * high);
+  // Drags over the middle of a panel, or from one corner to the other, as shares of its sides.
+  function drag(figure, panel, from, to) {
+    var over = figure.querySelectorAll(".u-over")[panel || 0], wide = over.clientWidth, high = over.clientHeight;
+    from = from || [0.1, 0.2];
+    to = to || [0.9, 0.8];
+    mouse(over, "mousedown", from[0] * wide, from[1] * high);
+    mouse(over, "mousemove", to[0] * wide, to[1] * high);
+    mouse(over, "mouseup", to[0] * wide, to[1] * high);
   }
   function words(figure) { return Array.from(figure.querySelectorAll(".u-legend .u-value")).map(function (v) { return v.textContent; }); }
   function wait(milliseconds) { return new Promise(function (done) { setTimeout(done, milliseconds); }); }
@@ -97,6 +100,12 @@ const VISITOR: &str = r#"
       drag(points[i]);
       await wait(100);
       one.zoomed = points[i].querySelector(".said").textContent;
+      if (/probability/.test(one.last)) {
+        drag(points[i], one.panels - 1, [0.02, 0.02], [0.5, 0.98]);
+        await wait(100);
+        one.left = met(points[i], one.panels - 1);
+        one.tip = points[i].querySelectorAll(".tip")[one.panels - 1].getBoundingClientRect().left;
+      }
       Array.from(points[i].querySelectorAll(".chips .mode")).slice(-1).forEach(function (chip) { chip.click(); });
       await wait(100);
       one.after = points[i].querySelector(".said").textContent;
@@ -335,10 +344,17 @@ fn points_answer(points: &Value, case: &str) {
     let odds = points.iter().map(|figure| words(figure, "last"));
     let odds: Vec<String> = odds.filter(|said| said.contains("probability ")).collect();
     assert_eq!(odds.len(), 1, "{case}: {points:?}");
+    let leader = "found, sensor-mass · probability 99.";
+    assert!(odds[0].starts_with(leader), "{case}: {odds:?}");
+    // Zoomed to its left half the panel still has the bar that ends beyond it, and says so within the page.
+    let zoomed = points.iter().find(|figure| figure["left"].is_string());
+    let zoomed = zoomed.unwrap_or_else(|| panic!("{case}: {points:?}"));
     assert!(
-        odds[0].starts_with("found, sensor-mass · probability 99."),
-        "{case}: {odds:?}"
+        words(zoomed, "left").starts_with(leader),
+        "{case}: {zoomed}"
     );
+    let tip = zoomed["tip"].as_f64().unwrap();
+    assert!((0.0..1280.0).contains(&tip), "{case}: {zoomed}");
 }
 
 /// Without a script the pictures of the model say the same as titles.

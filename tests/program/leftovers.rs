@@ -3,6 +3,7 @@
 use super::{samples, tapjoint};
 use std::collections::BTreeSet;
 use std::path::Path;
+use tapjoint::report::{MODEL_FILE, earlier_files};
 
 fn names(folder: &Path) -> BTreeSet<String> {
     let entries = std::fs::read_dir(folder).unwrap();
@@ -62,9 +63,31 @@ fn regress_a_folder_without_a_report_is_left_as_it_is() {
     let report = folder.path().join("pictures");
     std::fs::create_dir(&report).unwrap();
     // The name of a picture of ours, in a folder that holds no report: somebody else's.
-    std::fs::write(report.join("amplitude-low.png"), "mine").unwrap();
+    std::fs::write(report.join("amplitude-old.png"), "mine").unwrap();
+    // What another command writes with `--json report.json` comes without a page.
+    let other = r#"{"version": 1, "warnings": [], "recordings": [{"file": "old.wav"}]}"#;
+    std::fs::write(report.join("report.json"), other).unwrap();
+    assert!(earlier_files(other).contains(&"amplitude-old.png".to_owned()));
     let test = "recordings/cantilever/test.toml";
     tapjoint(folder.path(), &["run", test, "--out", "pictures"], 0);
-    let kept = std::fs::read_to_string(report.join("amplitude-low.png")).unwrap();
+    let kept = std::fs::read_to_string(report.join("amplitude-old.png")).unwrap();
     assert_eq!(kept, "mine");
+}
+
+#[test]
+fn regress_a_model_is_an_earlier_runs_only_where_its_report_says_so() {
+    let has_model = |gap: &str| {
+        let report = format!("{{\"version\": 1, \"warnings\": [], \"gap\": {gap}}}");
+        earlier_files(&report).contains(&MODEL_FILE.to_owned())
+    };
+    assert!(has_model(
+        r#"{"updated_model": {"file": "updated-model.toml"}}"#
+    ));
+    for gap in [
+        "null",
+        r#"{"updated_model": null}"#,
+        r#"{"updated_model": {"file": "model.toml"}}"#,
+    ] {
+        assert!(!has_model(gap), "{gap}");
+    }
 }

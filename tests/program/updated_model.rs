@@ -206,7 +206,13 @@ fn regress_what_the_diagnosis_refuses_is_no_model() {
         error.contains("no model to write: nothing in the catalogue explains"),
         "{error}"
     );
-    assert!(!folder.path().join("model.toml").exists());
+    assert!(!error.contains("as it was"), "{error}");
+    let model = folder.path().join("model.toml");
+    assert!(!model.exists());
+    fs::write(&model, "of another diagnosis").unwrap();
+    let (_, error) = told(folder.path(), &arguments, 0);
+    assert!(error.contains("; model.toml is left as it was"), "{error}");
+    assert_eq!(fs::read_to_string(&model).unwrap(), "of another diagnosis");
     let gap = &json(folder.path(), &["diagnose", "test.toml"])["gap"];
     assert_eq!(gap["verdict"]["kind"], "unknown");
     assert!(gap["updated_model"].is_null());

@@ -2,6 +2,7 @@
 
 use super::super::document::{Document, GapSection, PullSection};
 use super::super::format::signed_percent;
+use super::super::tables::place_of;
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{BLUE, GRID, INK, SKY, SOFT, VERMILION};
@@ -67,7 +68,7 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
         let words = format!(
             "mode {} in {}: error {} % with the described model, {} % with the effect",
             pull.mode,
-            pull.recording,
+            place_of(pull),
             signed_percent(Some(pull.error_percent)),
             signed_percent(Some(pull.error_percent_after))
         );
@@ -119,23 +120,20 @@ fn last_mode(pulls: &[PullSection]) -> usize {
     pulls.iter().map(|pull| pull.mode).max().unwrap_or(1)
 }
 
-/// Where an error stands: the recordings that saw a mode stand beside each other over half its width.
+/// Where an error stands: the tap levels of all recordings that saw a mode stand beside each other over half
+/// its width.
 pub fn abscissa(pulls: &[PullSection], pull: &PullSection) -> f64 {
-    let seen = recordings(pulls.iter().filter(|other| other.mode == pull.mode));
-    let place = seen.iter().position(|name| *name == pull.recording);
-    let share = (place.unwrap_or(0) as f64 + 0.5) / seen.len().max(1) as f64;
-    pull.mode as f64 + 0.5 * (share - 0.5)
-}
-
-/// Recordings in the order of their first error.
-fn recordings<'a>(pulls: impl Iterator<Item = &'a PullSection>) -> Vec<&'a str> {
-    let mut names: Vec<&str> = Vec::new();
-    for pull in pulls {
-        if !names.contains(&pull.recording.as_str()) {
-            names.push(&pull.recording);
+    // One recording can hold taps of two levels, which saw the mode apart.
+    let seat = |pull: &PullSection| (pull.recording.clone(), pull.level);
+    let mut seats = Vec::new();
+    for other in pulls.iter().filter(|other| other.mode == pull.mode) {
+        if !seats.contains(&seat(other)) {
+            seats.push(seat(other));
         }
     }
-    names
+    let place = seats.iter().position(|taken| *taken == seat(pull));
+    let share = (place.unwrap_or(0) as f64 + 0.5) / seats.len().max(1) as f64;
+    pull.mode as f64 + 0.5 * (share - 0.5)
 }
 
 fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {

@@ -3,6 +3,7 @@
 mod datasets;
 mod frfs;
 mod gap;
+mod hypotheses;
 mod joint;
 mod measured;
 mod modes;
@@ -14,7 +15,8 @@ mod uncertainty;
 
 pub use datasets::datasets;
 pub use frfs::frfs;
-pub use gap::{gap_story, hypotheses};
+pub use gap::{gap_story, place_of};
+pub use hypotheses::hypotheses;
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters, prediction};
 pub use measured::{channels, conditions, recordings};
 pub use modes::{fitted_to, mode_details, modes, reading_details, readings};

@@ -1,0 +1,109 @@
+//! What may be missing in the model, as a table.
+
+use super::super::document::{Document, HypothesisSection, ParameterSection};
+use super::super::format::{MISSING, significant};
+use super::{Table, number, words};
+
+/// Hypotheses less probable than this are not listed.
+pub(super) const LEAST_PROBABILITY: f64 = 0.005;
+/// At least so many hypotheses are listed.
+const LEAST_LISTED: usize = 4;
+
+/// The hypotheses, the most probable first; `None` without a diagnosis.
+pub fn hypotheses(document: &Document) -> Option<Table> {
+    let gap = document.gap.as_ref()?;
+    if gap.hypotheses.is_empty() {
+        return None;
+    }
+    let listed = gap
+        .hypotheses
+        .iter()
+        .enumerate()
+        .filter(|(index, found)| {
+            *index < LEAST_LISTED
+                || found.probability >= LEAST_PROBABILITY
+                || matches!(found.effect.as_str(), "none" | "unknown")
+        })
+        .map(|(_, found)| row(found));
+    Some(Table {
+        caption: "What may be missing".to_owned(),
+        columns: vec![
+            words("Hypothesis"),
+            number("Probability"),
+            number("Fitted (%)"),
+            number("Withheld (%)"),
+            words("Size"),
+            words("Looks like").on_page(),
+        ],
+        rows: listed.collect(),
+        note: format!(
+            "Fitted, withheld: errors of the frequencies left (rms); of the described model {} %{}. Size \u{b1} \
+             one standard deviation.",
+            percent(gap.hypotheses[0].gap_before),
+            match gap.hypotheses[0].withheld_before {
+                Some(before) => format!(" and {} %", significant(before, 2)),
+                None => String::new(),
+            }
+        ),
+    })
+}
+
+fn row(found: &HypothesisSection) -> Vec<String> {
+    vec![
+        found.effect.clone(),
+        probability(found.probability),
+        percent(found.gap_after),
+        percent(found.withheld_after),
+        sizes(found),
+        found.confounded_with.join(", "),
+    ]
+}
+
+/// "mass 24.1 ± 0.3 g".
+pub(super) fn sizes(found: &HypothesisSection) -> String {
+    let parts: Vec<String> = found
+        .parameters
+        .iter()
+        .map(|(name, parameter)| size(name, parameter))
+        .collect();
+    parts.join(", ")
+}
+
+fn size(name: &str, parameter: &ParameterSection) -> String {
+    let (unit, factor) = unit_of(name);
+    let value = significant(factor * parameter.value, 3);
+    let std = parameter.std.map_or_else(String::new, |std| {
+        format!(" \u{b1} {}", significant(factor * std, 2))
+    });
+    format!("{} {value}{std}{unit}", name.replace('_', " "))
+}
+
+/// The unit a parameter is read in, and how many of it one SI unit is.
+fn unit_of(name: &str) -> (&'static str, f64) {
+    match name.rsplit('.').next().unwrap_or(name) {
+        "mass" => (" g", 1e3),
+        "inertia" => (" kg mm\u{b2}", 1e6),
+        "position" => (" mm", 1e3),
+        "stiffness" => (" N/m", 1.0),
+        "frequency" | "offset" => (" Hz", 1.0),
+        "force" => (" N", 1.0),
+        "relative" | "ratio" | "std" | "loss_factor" => (" %", 1e2),
+        _ => ("", 1.0),
+    }
+}
+
+/// A probability (%), its ends as bounds.
+pub(super) fn probability(value: f64) -> String {
+    if value > 0.9995 {
+        ">99.9 %".to_owned()
+    } else if value < 0.0005 {
+        "<0.1 %".to_owned()
+    } else {
+        format!("{:.1} %", 100.0 * value)
+    }
+}
+
+/// A value in percent with two digits.
+pub(super) fn percent(value: Option<f64>) -> String {
+    value.map_or_else(|| MISSING.to_owned(), |value| significant(value, 2))
+}

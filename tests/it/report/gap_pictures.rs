@@ -1,0 +1,82 @@
+//! Pictures of the gap: where its errors stand, and what each point says.
+
+use tapjoint::report::document::{
+    Document, GapPlaceSection, GapSection, HypothesisSection, PlaceMapSection, PullSection,
+};
+use tapjoint::report::live_model::{live_gap, live_place_map};
+use tapjoint::report::live_points::PointSet;
+use tapjoint::report::plot::gap::draw_gap;
+use tapjoint::report::plot::render_svg;
+
+fn document(gap: GapSection) -> Document {
+    Document {
+        gap: Some(gap),
+        ..Document::default()
+    }
+}
+
+/// One mode, seen in a hard and in a soft level of one recording and in another recording.
+fn of_three_levels() -> Document {
+    let pull = |recording: &str, level: f64, error_percent: f64| PullSection {
+        mode: 1,
+        recording: recording.into(),
+        level: Some(level),
+        error_percent,
+        ..PullSection::default()
+    };
+    document(GapSection {
+        place: Some(GapPlaceSection {
+            modes: vec![
+                pull("low.wav", 1.0, 0.5),
+                pull("low.wav", 0.25, -12.345),
+                pull("high.wav", 0.25, 0.1),
+            ],
+            ..GapPlaceSection::default()
+        }),
+        hypotheses: vec![HypothesisSection::default()],
+        ..GapSection::default()
+    })
+}
+
+#[test]
+fn regress_two_levels_of_one_recording_stand_apart_and_are_told_apart() {
+    let document = of_three_levels();
+    let live = live_gap(&document).unwrap();
+    let errors = &live.views[0].panels[0].sets;
+    let before = errors.iter().find(|set| set.mark == "ring").unwrap();
+    // Three seats over half of the mode's width, each in the middle of its third.
+    let expected = [1.0 - 0.5 / 3.0, 1.0, 1.0 + 0.5 / 3.0];
+    for (place, expected) in before.x.iter().zip(expected) {
+        // The page has places with four digits.
+        assert!((place - expected).abs() < 1e-3, "{:?}", before.x);
+    }
+    let words = [
+        "mode 1 in low.wav",
+        "mode 1 in low.wav (level 0.25)",
+        "mode 1 in high.wav (level 0.25)",
+    ];
+    assert_eq!(before.words, words);
+    assert_eq!(before.said[1], "\u{2212}12 %");
+    let svg = render_svg(&draw_gap(&document).unwrap()).unwrap();
+    for words in words {
+        assert_eq!(svg.matches(&format!("{words}:")).count(), 1, "{words}");
+    }
+}
+
+#[test]
+fn regress_local_changes_have_the_digits_of_their_uncertainty() {
+    let map = PlaceMapSection {
+        positions: vec![0.1, 0.2],
+        stiffness: vec![0.034_12, 0.123_45],
+        stiffness_std: vec![0.12, 0.000_005],
+        ..PlaceMapSection::default()
+    };
+    let document = document(GapSection {
+        map: Some(map),
+        ..GapSection::default()
+    });
+    let live = live_place_map(&document).unwrap();
+    let is_curve = |set: &&PointSet| set.mark == "curve";
+    let set = live.views[0].panels[0].sets.iter().find(is_curve).unwrap();
+    assert_eq!(set.said, ["3 \u{b1} 12 %", "12.34500 \u{b1} 0.00050 %"]);
+}

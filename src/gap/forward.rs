@@ -7,7 +7,7 @@ use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised, Model};
 use super::nominal::COUPLING;
 use crate::effects::{Circumstances, Effect, Seen, apply};
-use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
+use crate::structure::specimen::{Specimen, SpecimenJoint, SpecimenModes};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -241,7 +241,7 @@ impl<'a> Forward<'a> {
 
     fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
         let (modes, numbers) = specimen
-            .beam_modes(self.frame.modes, Mesh::DIAGNOSIS)
+            .beam_modes(self.frame.modes, self.frame.mesh)
             .ok()?;
         Some((Arc::new(modes), numbers))
     }

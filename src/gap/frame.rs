@@ -7,6 +7,7 @@ use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
 use super::setup::{Lists, Setup, setup, twin};
 use crate::identify::observation::Observations;
+use crate::structure::specimen::Mesh;
 use nalgebra::DMatrix;
 
 /// What a reading is of.
@@ -76,6 +77,8 @@ pub(super) struct Frame {
     pub(super) small_centres: Vec<f64>,
     /// Modes that are solved for.
     pub(super) modes: usize,
+    /// How finely the structure is divided.
+    pub(super) mesh: Mesh,
     /// Modes above this one are withheld.
     pub(super) fitted_modes: usize,
     /// Frequencies that take no part in the fit: row and reading.
@@ -125,6 +128,7 @@ impl Frame {
             small_stds: Vec::new(),
             small_centres: Vec::new(),
             modes: highest,
+            mesh: Mesh::DIAGNOSIS,
             fitted_modes,
             withheld: Vec::new(),
             scatter: Vec::new(),

@@ -120,7 +120,7 @@ impl Search<'_> {
     }
 
     /// What is known of all parameters.
-    fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
+    pub(super) fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
         let drifts = &self.settings.drift_stds;
         let middle = drifts[drifts.len() / 2];
         knowledge(self.frame, &forward.layout, self.settings.joint_std, middle)
@@ -160,7 +160,7 @@ impl Search<'_> {
         Some(self.fit(forward, best, log_sum(&total)))
     }
 
-    fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
+    pub(super) fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
         let bend = self.bend(forward, &branch);
         let most = log_likelihood(&self.frame.readings, &branch.optimum);
         Fit {

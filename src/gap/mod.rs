@@ -22,6 +22,7 @@
 //! reach the simulator, so that its answers to virtual tests are answers.
 
 mod advisor;
+mod afar;
 mod along_decay;
 mod assemble;
 mod branches;

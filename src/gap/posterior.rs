@@ -104,6 +104,18 @@ pub(super) fn raise_unknown(entries: &mut [Entry], refuted: usize, bayes_factor:
     entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }
 
+/// Divides the probability of every entry against which there are odds by these.
+pub(super) fn lower(entries: &mut [Entry], odds: &[Option<f64>]) {
+    for (entry, odds) in entries.iter_mut().zip(odds) {
+        entry.probability /= odds.unwrap_or(1.0);
+    }
+    let total: f64 = entries.iter().map(|entry| entry.probability).sum();
+    for entry in entries.iter_mut() {
+        entry.probability /= total;
+    }
+    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
 /// Probability of each group, pairs apart, `none` and `unknown` among them; the most probable first.
 pub(super) fn by_group(entries: &[Entry]) -> Vec<(Vec<usize>, f64)> {
     let mut groups: Vec<(Vec<usize>, f64)> = Vec::new();

@@ -28,6 +28,11 @@ const STIFFER: f64 = 3.0;
 const TRIED: [usize; 2] = [4, 2];
 /// Optima of one effect that are followed to the end.
 const FOLLOWED: usize = 2;
+/// Share of the misfit so far that a rough optimum must beat to be followed: what is less has other reasons.
+const PROMISES: f64 = 0.9;
+/// Relative difference of the misfit below which two searches ended at one optimum: they stop within less, and
+/// different places are seldom worth the same.
+const SAME: f64 = 1e-3;
 /// Elements of the rough model: seven frequencies to 1e-4, where the readings are widened to more.
 const ROUGH: Mesh = Mesh { elements: 24 };
 
@@ -44,6 +49,13 @@ pub(super) struct Start {
     parameters: Vec<f64>,
     /// -ln(likelihood x prior) of the rough readings.
     pub(super) objective: f64,
+}
+
+impl Start {
+    /// Whether another search of the same effects ended at the same optimum.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (self.objective - other.objective).abs() < SAME * other.objective.abs().max(1.0)
+    }
 }
 
 /// Root mean square of what a fit leaves of the frequencies (standard deviations), 1 at least.
@@ -121,6 +133,19 @@ impl<'a> Rough<'a> {
         })
     }
 
+    /// The objective of a fit to the readings as they are.
+    fn misfit(&self, fit: &Fit) -> Option<f64> {
+        let forward = Forward::new(&self.frame, &fit.effects);
+        let at = &fit.branch.optimum.parameters;
+        let (predicted, _) = forward.predict(at)?;
+        let readings = &self.frame.readings;
+        Some(objective_at(
+            readings,
+            &self.known(&forward),
+            (at, &predicted),
+        ))
+    }
+
     fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
         let drifts = &self.settings.drift_stds;
         let middle = drifts[drifts.len() / 2];
@@ -193,15 +218,19 @@ fn with_last(layout: &Layout, base: &[f64]) -> Vec<Vec<f64>> {
 }
 
 impl Search<'_> {
-    /// The effect from afar.
-    pub(super) fn from_afar(&self, candidate: Candidate) -> Option<Fit> {
+    /// The effect from afar, where that promises more than the fit `found` so far.
+    pub(super) fn from_afar(&self, candidate: Candidate, found: Option<&Fit>) -> Option<Fit> {
         let factor = unexplained(self.frame, self.without);
         let starts = Rough::new(self.frame, self.settings, factor).alone(candidate);
         let finer = Rough::new(self.frame, self.settings, factor.sqrt());
+        let known = found
+            .and_then(|fit| finer.misfit(fit))
+            .unwrap_or(f64::INFINITY);
         let near: Vec<Start> = starts
             .iter()
             .take(FOLLOWED)
             .filter_map(|start| finer.from(start))
+            .filter(|start| start.objective < PROMISES * known)
             .collect();
         self.settle(&near)
     }

@@ -137,7 +137,7 @@ fn promising<'a>(
 
 /// How many pairs are looked at again with finer readings, each from so many optima.
 const FINER: usize = 12;
-const PLACES: usize = 3;
+const OPTIMA: usize = 3;
 
 /// How many promising pairs are fitted beside those that were found from afar.
 const BESIDE: usize = 2;
@@ -166,7 +166,8 @@ fn from_afar<'a>(
         .collect();
     let sorted = |mut starts: Vec<Start>| {
         starts.sort_by(|a, b| a.objective.total_cmp(&b.objective));
-        starts.truncate(PLACES);
+        starts.dedup_by(|one, better| one.is_like(better));
+        starts.truncate(OPTIMA);
         starts
     };
     let both = |&(a, b): &(usize, usize)| {
@@ -191,7 +192,12 @@ fn from_afar<'a>(
         (*first, *second, sorted(starts.collect()))
     };
     let found = best(found, FINER).par_iter().map(again).collect();
-    (all.len(), best(found, EARNEST))
+    // Two of a kind are no name, but what is unknown may look like them.
+    let (alike, others): (Vec<Task<'a>>, Vec<Task<'a>>) = best(found, FINER)
+        .into_iter()
+        .partition(|task| task.0.effects() == task.1.effects());
+    let others = best(others, EARNEST);
+    (all.len(), [others, best(alike, 1)].concat())
 }
 
 /// A second effect beside a first one, if it is believed: it has to beat the better of the two by
@@ -205,12 +211,12 @@ fn pair(frame: &Frame, settings: &GapSettings, (first, second, afar): &Task<'_>)
     let objective = |fit: &Fit| fit.branch.optimum.objective;
     let candidate = *second.fit.effects.first()?;
     let deepest = |a: &Fit, b: &Fit| objective(a).total_cmp(&objective(b));
-    let mut fit = search.settle(afar);
-    if fit.as_ref().is_none_or(|fit| misfits(frame, fit)) {
+    let fit = if afar.is_empty() {
         let near = [search.add(candidate), search.add_from(&second.fit)];
-        fit = near.into_iter().flatten().chain(fit).min_by(deepest);
-    }
-    let fit = fit?;
+        near.into_iter().flatten().min_by(deepest)
+    } else {
+        search.settle(afar)
+    }?;
     let alone = if first.fit.log_evidence > second.fit.log_evidence {
         &first.fit
     } else {

@@ -225,9 +225,13 @@ fn compete_once(
 /// it can reach.
 fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut Vec<Entry>) {
     let objective = |fit: &Fit| fit.branch.optimum.objective;
+    let so_far = |candidate: &Candidate| {
+        let own = |entry: &&Entry| entry.effects() == [candidate.effect];
+        entries.iter().find(own).map(|entry| &entry.fit)
+    };
     let found: Vec<Option<Fit>> = candidates
         .par_iter()
-        .map(|candidate| search.from_afar(*candidate))
+        .map(|candidate| search.from_afar(*candidate, so_far(candidate)))
         .collect();
     for (candidate, fit) in candidates.iter().zip(found) {
         let Some(fit) = fit else { continue };

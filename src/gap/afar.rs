@@ -122,7 +122,7 @@ impl<'a> Rough<'a> {
     }
 
     /// The optimum from where another search ended.
-    pub(super) fn from(&self, start: &Start) -> Option<Start> {
+    pub(super) fn go_on(&self, start: &Start) -> Option<Start> {
         let forward = Forward::new(&self.frame, &start.effects);
         let known = self.known(&forward);
         let found = maximise(&self.frame.readings, &known, &start.parameters, &forward)?;
@@ -219,7 +219,7 @@ fn with_last(layout: &Layout, base: &[f64]) -> Vec<Vec<f64>> {
 
 impl Search<'_> {
     /// The effect from afar, where that promises more than the fit `found` so far.
-    pub(super) fn from_afar(&self, candidate: Candidate, found: Option<&Fit>) -> Option<Fit> {
+    pub(super) fn add_from_afar(&self, candidate: Candidate, found: Option<&Fit>) -> Option<Fit> {
         let factor = unexplained(self.frame, self.without);
         let starts = Rough::new(self.frame, self.settings, factor).alone(candidate);
         let finer = Rough::new(self.frame, self.settings, factor.sqrt());
@@ -229,7 +229,7 @@ impl Search<'_> {
         let near: Vec<Start> = starts
             .iter()
             .take(FOLLOWED)
-            .filter_map(|start| finer.from(start))
+            .filter_map(|start| finer.go_on(start))
             .filter(|start| start.objective < PROMISES * known)
             .collect();
         self.settle(&near)

@@ -188,7 +188,7 @@ fn from_afar<'a>(
     let found: Vec<Task<'a>> = all.par_iter().map(both).collect();
     let finer = Rough::new(frame, settings, factor.sqrt());
     let again = |(first, second, starts): &Task<'a>| {
-        let starts = starts.iter().filter_map(|start| finer.from(start));
+        let starts = starts.iter().filter_map(|start| finer.go_on(start));
         (*first, *second, sorted(starts.collect()))
     };
     let found = best(found, FINER).par_iter().map(again).collect();

@@ -231,7 +231,7 @@ fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut V
     };
     let found: Vec<Option<Fit>> = candidates
         .par_iter()
-        .map(|candidate| search.from_afar(*candidate, so_far(candidate)))
+        .map(|candidate| search.add_from_afar(*candidate, so_far(candidate)))
         .collect();
     for (candidate, fit) in candidates.iter().zip(found) {
         let Some(fit) = fit else { continue };

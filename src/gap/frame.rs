@@ -2,6 +2,7 @@
 //! (columns) that every hypothesis shares.
 
 use super::decay_readings::{average_std, bent_std, widen};
+use super::fixture_peak::Peaks;
 use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
@@ -86,6 +87,8 @@ pub(super) struct Frame {
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
+    /// Peaks that belong to no mode.
+    pub(super) peaks: Peaks,
 }
 
 /// Least uncertainty of a modal constant or ratio over the root mean square of its kind (1): 1 %, what
@@ -129,6 +132,7 @@ impl Frame {
             withheld: Vec::new(),
             scatter: Vec::new(),
             shape_slopes: None,
+            peaks: Peaks::new(observations),
         };
         frame.add_frequencies(observations, settings);
         frame.add_shapes(observations);

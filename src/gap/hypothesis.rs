@@ -120,7 +120,7 @@ impl Search<'_> {
     }
 
     /// What is known of all parameters.
-    fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
+    pub(super) fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
         let drifts = &self.settings.drift_stds;
         let middle = drifts[drifts.len() / 2];
         knowledge(self.frame, &forward.layout, self.settings.joint_std, middle)
@@ -163,11 +163,12 @@ impl Search<'_> {
     fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
         let bend = self.bend(forward, &branch);
         let most = log_likelihood(&self.frame.readings, &branch.optimum);
-        Fit {
+        let fit = Fit {
             effects: forward.layout.effects.clone(),
             branch,
             log_evidence: (log_evidence + bend).min(most),
-        }
+        };
+        self.with_peaks(forward, fit)
     }
 
     /// Sizes from which the search begins: what the model linearised without the effect asks for, and
@@ -204,7 +205,7 @@ impl Search<'_> {
     }
 
     /// The optimum of the model linearised where there is next to nothing of the effect.
-    fn linear_fit(
+    pub(super) fn linear_fit(
         &self,
         forward: &Forward<'_>,
         known: &[Knowledge],

@@ -22,131 +22,49 @@ use super::forward::{Forward, Solved};
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search};
 use super::least_squares::Knowledge;
+use super::lone_peaks::{DECIBEL, Peak, STATED};
 use super::noise::chi_square_tail;
 use super::setup::TWIN;
-use crate::identify::observation::{Configuration, Observations};
 use crate::structure::specimen::SpecimenModes;
+use std::f64::consts::TAU;
 
-/// The peaks of a test that belong to no mode, and where such peaks can be told.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Peaks {
-    /// Those that at least half of the recordings show.
-    pub(super) all: Vec<Peak>,
-    /// Logarithms of the lowest and the highest frequency of a mode; `None` where nobody looked for peaks.
-    band: Option<(f64, f64)>,
-}
-
-/// A peak that several recordings show.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Peak {
-    /// Logarithm of its frequency, the mean of the recordings.
-    pub(super) log: f64,
-    /// Standard uncertainty of that for what it states of the fixture (1).
-    std: f64,
-}
-
-/// Relative distance within which two recordings show the same peak: sensors that move load a fixture's
-/// mode and a joint that drifts turns it by less.
-const SAME: f64 = 0.005;
-/// Least relative uncertainty with which a peak states a fixture's frequency: a rocking fixture has more
-/// than one way to move, and what the size leaves open comes to as much.
-const STATED: f64 = 0.001;
-
-impl Peaks {
-    pub(super) fn new(observations: &Observations) -> Self {
-        // Of several levels of one recording the first stands for it.
-        let mut looked: Vec<&Configuration> = Vec::new();
-        for one in &observations.configurations {
-            let known = |other: &&Configuration| other.recording == one.recording;
-            if one.recording.is_some() && !looked.iter().any(known) {
-                looked.push(one);
-            }
-        }
-        let modes = looked.iter().flat_map(|one| &one.modes);
-        let logs = modes.map(|mode| mode.frequency.ln());
-        let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| {
-            (low.min(log), high.max(log))
-        });
-        Peaks {
-            all: common(&looked),
-            band: (low < high).then_some((low, high)),
-        }
-    }
-
-    fn contains(&self, log: f64) -> bool {
-        self.band
-            .is_some_and(|(low, high)| log > low && log < high)
-    }
-}
-
-/// The peaks that at least half of the recordings show.
-fn common(looked: &[&Configuration]) -> Vec<Peak> {
-    let mut all: Vec<(f64, f64)> = looked.iter().flat_map(|one| lone(one)).collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let groups = all.chunk_by(|a, b| b.0 - a.0 < SAME);
-    groups
-        .filter(|group| 2 * group.len() >= looked.len())
-        .map(|group| {
-            let count = group.len() as f64;
-            let log = group.iter().map(|one| one.0).sum::<f64>() / count;
-            let scatter = group.iter().map(|one| (one.0 - log).powi(2)).sum::<f64>() / count;
-            let read = group.iter().map(|one| one.1).fold(0.0, f64::max);
-            let std = scatter.sqrt().hypot(read).hypot(STATED);
-            Peak { log, std }
-        })
-        .collect()
-}
-
-/// Logarithm of the frequency and relative uncertainty of the peaks of a recording that are nobody's and
-/// no halves of a split decay.
-fn lone(one: &Configuration) -> Vec<(f64, f64)> {
-    let apart = |frequency: f64| {
-        let mut modes = one.modes.iter();
-        modes.all(|mode| (frequency / mode.frequency - 1.0).abs() > TWIN)
-    };
-    let peaks = one.extra_peaks.iter();
-    peaks
-        .filter(|peak| peak.label == "unpaired" && apart(peak.frequency))
-        .map(|peak| {
-            let std = peak.std.unwrap_or(0.0) / peak.frequency;
-            (peak.frequency.ln(), std)
-        })
-        .collect()
-}
-
-/// Level (dB) of a mode's peak over the median one of the beam's modes: products of the mass-normalised
-/// displacements at the hammer and at the strongest sensor, which is the accelerance at resonance where
-/// damping ratios are alike.
-pub(super) fn level(
+/// Logarithms of a mode's modal constant (1/kg) at the strongest sensor and of the median one of the beam's
+/// modes; without a place of the hammer as if it struck there.
+pub(super) fn strength(
     modes: &SpecimenModes,
     (base, numbers): (usize, &[usize]),
     (sensors, tap): (&[f64], Option<f64>),
-) -> Option<f64> {
-    let product = |mode: usize| {
+) -> Option<(f64, f64)> {
+    let constant = |mode: usize| {
         let at = |x: f64| modes.displacement(mode, x).abs();
         let most = sensors.iter().map(|x| at(*x)).fold(0.0, f64::max);
-        most * tap.map_or(most, at)
+        (most * tap.map_or(most, at)).ln()
     };
-    let mut all: Vec<f64> = numbers.iter().map(|mode| product(*mode)).collect();
+    let mut all: Vec<f64> = numbers.iter().map(|mode| constant(*mode)).collect();
     if all.is_empty() || sensors.is_empty() {
         return None;
     }
-    let median = crate::stats::median(&mut all);
-    let level = 20.0 * (product(base) / median).log10();
-    level.is_finite().then_some(level)
+    let strength = (constant(base), crate::stats::median(&mut all));
+    (strength.0.is_finite() && strength.1.is_finite()).then_some(strength)
 }
 
-/// Level (dB) at which a peak is read half of the time.
-const SEEN: f64 = -45.0;
+/// Level (dB) over the median mode of the beam at which a peak is read half of the time: at resonance the
+/// accelerance is the modal constant over twice the damping ratio.
+pub(super) const SEEN: f64 = -50.0;
 /// Standard deviation (dB) of what is not known of it: a fixture's damping and the noise, within a factor
 /// of two or three.
 const UNKNOWN: f64 = 8.0;
 
-/// Probability that a peak of this level is not read: that of a normal deviate.
-pub(super) fn missed(level: f64) -> f64 {
-    let away = (level - SEEN) / UNKNOWN;
-    let tail = 0.5 * chi_square_tail(away * away, 1.0).unwrap_or(1.0);
+/// Probability that a peak is not read which is this much (dB) over the level at which half are.
+fn missed(over: f64) -> f64 {
+    let away = over / UNKNOWN;
+    let tail = two_sided(away) / 2.0;
     if away > 0.0 { tail } else { 1.0 - tail }
+}
+
+/// Probability of a normal deviate as large, of either sign.
+fn two_sided(deviate: f64) -> f64 {
+    chi_square_tail(deviate * deviate, 1.0).unwrap_or(1.0)
 }
 
 /// The fixture's own mode at some parameters, in the mean of all configurations.
@@ -156,36 +74,99 @@ struct Own {
     /// Share of the fixture in its kinetic energy: d x_b/d ln(frequency of the fixture alone), since
     /// Rayleigh's quotient is stationary.
     share: f64,
-    /// Probability that its peak is not read.
-    missed: f64,
+    /// Level (dB) of its peak over that at which half are read; `None` where it can not be told.
+    over: Option<f64>,
+    /// Logarithm of its modal constant (1/kg) in each configuration.
+    constants: Vec<Option<f64>>,
 }
 
 impl Own {
     fn new(forward: &Forward<'_>, parameters: &[f64]) -> Option<Self> {
         let solved = forward.solve(parameters)?;
-        let setups = &forward.frame.setups;
-        let (mut log, mut share, mut levels) = (0.0, 0.0, Vec::new());
-        for (one, setup) in solved.iter().zip(setups) {
+        let peaks = &forward.frame.peaks;
+        let mut own = Own {
+            log: 0.0,
+            share: 0.0,
+            over: None,
+            constants: Vec::new(),
+        };
+        let mut over = Vec::new();
+        let count = solved.len() as f64;
+        for (index, (one, setup)) in solved.iter().zip(&forward.frame.setups).enumerate() {
             let base = one.base()?;
-            log += one.seen.read(one.modes.frequencies()[base]).ln();
-            share += one.modes.base_participation(base);
+            own.log += one.seen.read(one.modes.frequencies()[base]).ln() / count;
+            own.share += one.modes.base_participation(base) / count;
             let sensors: Vec<f64> = setup.sensors.iter().map(|s| s.position).collect();
             let numbers: Vec<usize> = (1..=forward.frame.fitted_modes)
                 .filter_map(|mode| one.index(mode))
                 .collect();
-            let (modes, tap) = (&one.modes, setup.tap);
-            levels.extend(level(modes, (base, &numbers), (&sensors, tap)));
+            let found = strength(&one.modes, (base, &numbers), (&sensors, setup.tap));
+            own.constants.push(found.map(|found| found.0));
+            let weak = peaks.weakest.iter().find(|weak| weak.0 == index);
+            over.extend(found.map(|(constant, median)| {
+                let half = median + SEEN / DECIBEL;
+                DECIBEL * (constant - weak.map_or(half, |weak| half.min(weak.1)))
+            }));
         }
-        let count = solved.len() as f64;
-        let log = log / count;
-        let told = forward.frame.peaks.contains(log) && apart(&solved, log);
-        let level = (told && !levels.is_empty()).then(|| crate::stats::median(&mut levels));
-        Some(Own {
-            log,
-            share: share / count,
-            missed: level.map_or(1.0, missed),
+        if !over.is_empty() && peaks.contains(own.log) && apart(&solved, own.log) {
+            own.over = Some(crate::stats::median(&mut over));
+        }
+        Some(own)
+    }
+
+    /// Probability that its peak is not read.
+    fn missed(&self) -> f64 {
+        self.over.map_or(1.0, missed)
+    }
+
+    /// The same over all sizes that a fit leaves open, normal about `size` and above nothing: the constant of a
+    /// weak mode is proportional to the size.
+    fn missed_by_size(&self, (size, std): (f64, f64)) -> f64 {
+        const STEPS: usize = 400;
+        let Some(over) = self.over else { return 1.0 };
+        let step = (size + 5.0 * std) / STEPS as f64;
+        let (mut all, mut unread) = (0.0, 0.0);
+        for k in 0..STEPS {
+            let own = step * (k as f64 + 0.5);
+            let weight = (-0.5 * ((own - size) / std).powi(2)).exp();
+            all += weight;
+            unread += weight * missed(over + 20.0 * (own / size).log10());
+        }
+        if all > 0.0 { unread / all } else { 1.0 }
+    }
+
+    /// By how many standard deviations a peak is stronger than this mode, and the standard deviation; the size
+    /// is known to the relative one of `size_std`, and the constant of a weak mode grows with it.
+    fn short_of(&self, peak: &Peak, size_std: f64) -> Option<(f64, f64)> {
+        let pairs = peak.constants.iter();
+        let mut all: Vec<f64> = pairs
+            .filter_map(|(index, log)| Some(log - self.constants.get(*index).copied()??))
+            .collect();
+        let std = STRENGTH.hypot(size_std);
+        (!all.is_empty()).then(|| (crate::stats::median(&mut all) / std, std))
+    }
+
+    /// Logarithm of the density of a peak's strength over that of a peak which is nobody's.
+    fn log_strength(&self, peak: &Peak, size_std: f64) -> f64 {
+        self.short_of(peak, size_std).map_or(0.0, |(away, std)| {
+            ANY_STRENGTH.ln() - 0.5 * away * away - (std * TAU.sqrt()).ln()
         })
     }
+}
+
+/// Standard deviation of the logarithm of the modal constant of a fixture's own mode about the model's, whose
+/// fixture rocks about the joint and does nothing else.
+const STRENGTH: f64 = 0.5;
+/// Range of the logarithm of the modal constant of peaks that are nobody's: 60 dB.
+const ANY_STRENGTH: f64 = 6.9;
+
+/// Relative standard deviation of the size of the fixture whose frequency is the parameter `at`.
+fn size_std(branch: &Branch, at: usize) -> f64 {
+    let size = branch.optimum.parameters[at - 1].abs();
+    let spread = covariance(&branch.knowledge, &branch.optimum);
+    spread.map_or(f64::INFINITY, |c| {
+        c[(at - 1, at - 1)].max(0.0).sqrt() / size
+    })
 }
 
 /// Whether no mode of the beam is so near that both are read as one.
@@ -207,41 +188,55 @@ fn place(forward: &Forward<'_>) -> Option<usize> {
     layout.place((0..layout.effects.len()).find(is_fixture)?)
 }
 
-/// Probability that the peak of a fixture is not read though the fit has one that no peak states; `None`
-/// of fits without a fixture or with a peak.
-pub(super) fn unseen(frame: &Frame, fit: &Fit) -> Option<f64> {
+/// How probable the peak, or its absence, is under a fit with a fixture: where a peak states its frequency, that
+/// of a strength as far from the predicted one; elsewhere, that of its own peak not being read. `None` of
+/// fits without a fixture.
+pub(super) fn goodness(frame: &Frame, fit: &Fit) -> Option<f64> {
     let forward = Forward::new(frame, &fit.effects);
     let at = place(&forward)?;
-    if fit.branch.knowledge[at].std.is_finite() {
-        return None;
+    if !fit.branch.knowledge[at].std.is_finite() {
+        return unread(&forward, at, &fit.branch);
     }
-    missed_at_least(&forward, at, &fit.branch)
+    let own = Own::new(&forward, &fit.branch.optimum.parameters)?;
+    let away = |peak: &&Peak| (peak.log - own.log).abs();
+    let mut peaks = frame.peaks.all.iter();
+    let peak = peaks.by_ref().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+    let (short, _) = own.short_of(peak, size_std(&fit.branch, at))?;
+    Some(two_sided(short))
 }
 
-/// The same with the least size that the fit leaves open: 1.6 standard deviations below the best one.
-fn missed_at_least(forward: &Forward<'_>, at: usize, branch: &Branch) -> Option<f64> {
-    let spread = covariance(&branch.knowledge, &branch.optimum)?;
-    let mut parameters = branch.optimum.parameters.clone();
-    parameters[at - 1] -= 1.6 * spread[(at - 1, at - 1)].max(0.0).sqrt();
-    if parameters[at - 1] <= 0.0 {
-        return Some(1.0);
-    }
-    Some(Own::new(forward, &parameters)?.missed)
+/// Probability that the peak is not read, over the sizes that the fit leaves open.
+fn unread(forward: &Forward<'_>, at: usize, branch: &Branch) -> Option<f64> {
+    let parameters = &branch.optimum.parameters;
+    let size = parameters[at - 1];
+    let std = size * size_std(branch, at);
+    let own = Own::new(forward, parameters)?;
+    (size > 0.0 && std > 0.0 && std.is_finite()).then(|| own.missed_by_size((size, std)))
 }
 
 impl Search<'_> {
+    /// Logarithms of the frequencies at which a fixture is tried beyond the nodes of its range.
+    pub(super) fn peak_places(&self, kind: PlaceKind) -> Vec<f64> {
+        let peaks = self.frame.peaks.all.iter().map(|peak| peak.log);
+        peaks
+            .filter(|_| kind == PlaceKind::FixtureFrequency)
+            .collect()
+    }
+
     /// The fit with what the peaks say of its fixture; any other as it is.
     pub(super) fn with_peaks(&self, forward: &Forward<'_>, fit: Fit) -> Fit {
         let peaks = &self.frame.peaks;
         let (Some(at), Some((low, high))) = (place(forward), peaks.band) else {
             return fit;
         };
-        let missed = missed_at_least(forward, at, &fit.branch).unwrap_or(1.0);
+        let missed = unread(forward, at, &fit.branch).unwrap_or(1.0);
         let mut all = vec![(fit.log_evidence + missed.ln(), fit.branch.clone())];
         let worth = ((high - low) / peaks.all.len().max(1) as f64).ln();
         for peak in &peaks.all {
             if let Some((branch, own)) = self.at_peak(forward, (at, &fit.branch), peak) {
-                let log = branch.log_evidence + worth + (1.0 - own.missed).ln() - own.share.ln();
+                let strength = own.log_strength(peak, size_std(&branch, at));
+                let seen = (1.0 - own.missed()).ln() + strength;
+                let log = branch.log_evidence + worth + seen - own.share.ln();
                 all.push((log, branch));
             }
         }

@@ -2,7 +2,7 @@
 //! (columns) that every hypothesis shares.
 
 use super::decay_readings::{average_std, bent_std, widen};
-use super::fixture_peak::Peaks;
+use super::lone_peaks::Peaks;
 use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;

@@ -89,12 +89,15 @@ impl Search<'_> {
             return Some(self.linear_fit(&forward, &known, None)?.objective);
         };
         let (low, high) = (range.inward(range.low), range.inward(range.high));
-        let nodes = (0..range.nodes).filter_map(|node| {
-            let place = low + (high - low) * (node as f64 + 0.5) / range.nodes as f64;
-            let mut held = known.clone();
-            held[at + 1] = Knowledge::held(place);
-            Some(self.linear_fit(&forward, &held, Some(place))?.objective)
-        });
+        let spread = |node| low + (high - low) * (node as f64 + 0.5) / range.nodes as f64;
+        let places = (0..range.nodes).map(spread);
+        let nodes = places
+            .chain(self.peak_places(range.kind))
+            .filter_map(|place| {
+                let mut held = known.clone();
+                held[at + 1] = Knowledge::held(place);
+                Some(self.linear_fit(&forward, &held, Some(place))?.objective)
+            });
         nodes.min_by(f64::total_cmp)
     }
 

@@ -44,6 +44,7 @@ mod joint_path;
 mod knowledge;
 mod least_squares;
 mod left_out;
+mod lone_peaks;
 mod noise;
 mod nominal;
 mod pairs;

@@ -311,3 +311,60 @@ fn tune(forward: &Forward<'_>, parameters: &mut [f64], (at, log): (usize, f64)) 
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn own(over: f64) -> Own {
+        Own {
+            log: 0.0,
+            share: 1.0,
+            over: Some(over),
+            constants: vec![Some(0.0)],
+        }
+    }
+
+    /// The normal distribution's 2.5 % at 1.959964 standard deviations.
+    #[test]
+    fn val_a_peak_is_missed_as_a_normal_deviate_says() {
+        assert!((missed(0.0) - 0.5).abs() < 1e-12);
+        assert!((missed(1.959_964 * UNKNOWN) - 0.025).abs() < 1e-6);
+        assert!((missed(-1.959_964 * UNKNOWN) - 0.975).abs() < 1e-6);
+    }
+
+    /// A size that is known is one level; one that may be nothing may have no peak, however strong the peak
+    /// of the best size is.
+    #[test]
+    fn limit_a_size_that_may_be_nothing_may_have_no_peak() {
+        let strong = own(40.0);
+        assert!((strong.missed_by_size((0.02, 1e-6)) / strong.missed() - 1.0).abs() < 0.01);
+        let doubtful = strong.missed_by_size((0.02, 0.02));
+        assert!(
+            doubtful > 1e3 * strong.missed() && doubtful < 0.1,
+            "{doubtful}"
+        );
+        let nowhere = Own {
+            over: None,
+            ..own(0.0)
+        };
+        assert_eq!(nowhere.missed_by_size((0.02, 0.02)), 1.0);
+    }
+
+    /// Over all strengths within the range of what is nobody's, the densities are one and the same probability.
+    #[test]
+    fn val_the_density_of_a_strength_is_normalised() {
+        let step = 0.01;
+        let sum: f64 = (-2000..2000)
+            .map(|k| {
+                let peak = Peak {
+                    log: 0.0,
+                    std: STATED,
+                    constants: vec![(0, step * f64::from(k))],
+                };
+                step * own(0.0).log_strength(&peak, 0.1).exp() / ANY_STRENGTH
+            })
+            .sum();
+        assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+    }
+}

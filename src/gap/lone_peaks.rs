@@ -134,3 +134,66 @@ fn lone((index, one): &(usize, &Configuration)) -> Vec<Sighting> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::observation::{ExtraPeak, ObservedMode};
+
+    fn recording(index: usize, peaks: &[(f64, &str)]) -> Configuration {
+        let peak = |(frequency, label): &(f64, &str)| ExtraPeak {
+            frequency: *frequency,
+            std: Some(0.01),
+            level_db: Some(45.0),
+            constant: Some(-0.2),
+            label: (*label).to_owned(),
+        };
+        Configuration {
+            file: None,
+            recording: Some(index),
+            sensors: Vec::new(),
+            masses: Vec::new(),
+            tap: None,
+            peak_force: None,
+            level: None,
+            taps: 3,
+            decay_seconds: None,
+            modes: [16.0, 1400.0]
+                .iter()
+                .zip(1..)
+                .map(|(f, mode)| ObservedMode::read_elsewhere(mode, *f, None))
+                .collect(),
+            covariance: None,
+            common: 0.0,
+            extra_peaks: peaks.iter().map(peak).collect(),
+        }
+    }
+
+    #[test]
+    fn limit_peaks_count_that_half_of_the_recordings_show_and_that_are_nobodys() {
+        let lone = "unpaired";
+        let configurations = vec![
+            recording(0, &[(50.0, "mains 50 Hz"), (183.3, lone), (700.0, lone)]),
+            // Another level of the same recording.
+            recording(0, &[(183.3, lone), (700.0, lone)]),
+            recording(1, &[(50.0, "mains 50 Hz"), (183.4, lone), (1390.0, lone)]),
+            recording(2, &[(50.0, "mains 50 Hz"), (1390.0, lone)]),
+        ];
+        let peaks = Peaks::new(&Observations { configurations });
+        assert_eq!(peaks.all.len(), 1);
+        assert!((peaks.all[0].log - 183.35_f64.ln()).abs() < 1e-6);
+        assert_eq!(peaks.all[0].constants.len(), 2);
+        assert!(peaks.contains(183.0_f64.ln()) && !peaks.contains(1500.0_f64.ln()));
+        // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
+        assert!((peaks.weakest[0].1 - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn limit_frequencies_read_elsewhere_say_nothing_of_peaks() {
+        let mut one = recording(0, &[]);
+        one.recording = None;
+        let configurations = vec![one];
+        let peaks = Peaks::new(&Observations { configurations });
+        assert!(peaks.all.is_empty() && !peaks.contains(100.0_f64.ln()));
+    }
+}

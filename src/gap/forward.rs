@@ -108,6 +108,12 @@ impl Solved {
         self.numbers.get(mode - 1).copied()
     }
 
+    /// Index of the fixture's own mode: the one that is nobody's.
+    pub(super) fn base(&self) -> Option<usize> {
+        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        (0..self.modes.len()).find(|index| based && !self.numbers.contains(index))
+    }
+
     /// Frequency as it is read (Hz).
     pub(super) fn frequency(&self, mode: usize) -> Option<f64> {
         let own = self.modes.frequencies()[self.index(mode)?];

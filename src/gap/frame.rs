@@ -2,6 +2,7 @@
 //! (columns) that every hypothesis shares.
 
 use super::decay_readings::{average_std, bent_std, widen};
+use super::lone_peaks::Peaks;
 use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
@@ -89,6 +90,8 @@ pub(super) struct Frame {
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
+    /// Peaks that belong to no mode.
+    pub(super) peaks: Peaks,
 }
 
 /// Least uncertainty of a modal constant or ratio over the root mean square of its kind (1): 1 %, what
@@ -133,6 +136,7 @@ impl Frame {
             withheld: Vec::new(),
             scatter: Vec::new(),
             shape_slopes: None,
+            peaks: Peaks::new(observations),
         };
         frame.add_frequencies(observations, settings);
         frame.add_shapes(observations);

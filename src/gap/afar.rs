@@ -15,6 +15,7 @@ use super::least_squares::{Knowledge, Model, maximise, objective_at};
 use super::noise::Reading;
 use super::nominal::COUPLING;
 use super::settings::GapSettings;
+use crate::effects::EffectId;
 use crate::structure::specimen::Mesh;
 
 /// Sizes from which the search begins, over the scale of the effect's prior; of effects that have two signs
@@ -52,6 +53,11 @@ pub(super) struct Start {
 }
 
 impl Start {
+    /// The effect beside which the others were sought.
+    pub(super) fn first(&self) -> EffectId {
+        self.effects[0].effect
+    }
+
     /// Whether another search of the same effects ended at the same optimum.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         (self.objective - other.objective).abs() < SAME * other.objective.abs().max(1.0)

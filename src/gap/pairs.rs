@@ -215,7 +215,12 @@ fn pair(frame: &Frame, settings: &GapSettings, (first, second, afar): &Task<'_>)
         let near = [search.add(candidate), search.add_from(&second.fit)];
         near.into_iter().flatten().min_by(deepest)
     } else {
-        search.settle(afar)
+        let settled = afar.iter().filter_map(|start| {
+            let is_first = first.effects() == [start.first()];
+            let without = if is_first { &first.fit } else { &second.fit };
+            Search { without, ..search }.settle(std::slice::from_ref(start))
+        });
+        settled.min_by(deepest)
     }?;
     let alone = if first.fit.log_evidence > second.fit.log_evidence {
         &first.fit

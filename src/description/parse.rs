@@ -10,7 +10,9 @@ use super::measured::read_measured;
 use super::reader::{Entry, Source, Table};
 use super::recordings::{Surroundings, read_recording};
 use super::sensors::{read_hammer, read_sensors};
-use super::{ChannelRef, HammerDescription, RecordingDescription, TestDescription};
+use super::{
+    ChannelRef, HammerDescription, RecordingDescription, SensorDescription, TestDescription,
+};
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
@@ -170,6 +172,11 @@ impl fmt::Display for ChannelRef {
 }
 
 impl RecordingDescription {
+    /// Where a sensor sits (m) in this recording.
+    pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {
+        self.at.get(&sensor.name).copied().or(sensor.position)
+    }
+
     /// The error of a recording that the caller, who opens files, cannot open: it points to the
     /// line of the description that names the file.
     pub fn file_error(&self, description: &str, path: &Path, cause: &str) -> DescriptionError {

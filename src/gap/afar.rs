@@ -107,8 +107,9 @@ impl<'a> Rough<'a> {
         let is_stiffness = |k: &usize| forward.layout.joint[*k] != COUPLING;
         for k in (0..forward.layout.joint.len()).filter(is_stiffness) {
             for away in [STIFFER.ln(), -STIFFER.ln()] {
-                joints.push(centre.clone());
-                joints[2 * k + if away > 0.0 { 1 } else { 2 }][k] += away;
+                let mut joint = centre.clone();
+                joint[k] += away;
+                joints.push(joint);
             }
         }
         self.optima(&forward, &known, joints, TRIED[0])
@@ -153,14 +154,7 @@ impl<'a> Rough<'a> {
     }
 
     fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
-        let drifts = &self.settings.drift_stds;
-        let middle = drifts[drifts.len() / 2];
-        knowledge(
-            &self.frame,
-            &forward.layout,
-            self.settings.joint_std,
-            middle,
-        )
+        knowledge(&self.frame, &forward.layout, self.settings)
     }
 
     /// Optima from the starts of least misfit, the last effect at several sizes and places; the best first.
@@ -250,8 +244,7 @@ impl Search<'_> {
             let evidence = branch.log_evidence;
             Some(self.fit(&forward, branch, evidence))
         });
-        let objective = |fit: &Fit| fit.branch.optimum.objective;
-        fits.min_by(|a, b| objective(a).total_cmp(&objective(b)))
+        fits.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
     }
 }
 

@@ -5,9 +5,10 @@ use super::catalogue::PlaceKind;
 use super::decay_finding::decay_finding;
 use super::evidence::log_likelihood;
 use super::forward::Layout;
-use super::frame::{Frame, Small};
+use super::frame::Frame;
 use super::left_out::LeftOutErrors;
 use super::nominal::COUPLING;
+use super::pairs::SECOND;
 use super::place_map::place_map;
 use super::posterior::{APART, Entry, confounded, lead, lower, places, raise_unknown, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
@@ -17,13 +18,15 @@ use super::result::{
 };
 use super::search::Competition;
 use super::settings::GapSettings;
+use super::small_unknowns::Small;
 use super::trial::{Room, Trial};
 use super::verdict::verdict;
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
-/// What the readings say against the best explanation. Where another one explains those that took part as well and
-/// is not refuted, that one takes its place. Else it is evidence for something unknown, which shares the prior of
+/// What the readings say against the best explanation. Where another one explains those that took part about as
+/// well and is not refuted, that one takes its place, if what speaks against the first outweighs its lead. Else
+/// it is evidence for something unknown, which shares the prior of
 /// one group: a misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most
 /// (Sellke, Bayarri & Berger 2001).
 pub(super) fn doubt(competition: &mut Competition) {
@@ -41,23 +44,29 @@ pub(super) fn doubt(competition: &mut Competition) {
     if odds <= 1.0 {
         return;
     }
-    let least = entries[best].probability * (-AS_WELL).exp();
-    let as_well =
-        |entry: &Entry| entry.hypothesis != Hypothesis::Unknown && entry.probability >= least;
-    let all: Vec<Option<f64>> = entries
-        .iter()
-        .map(|entry| as_well(entry).then(|| against(entry)))
-        .collect();
-    if all.contains(&Some(1.0)) {
+    let mut all: Vec<Option<f64>> = vec![None; entries.len()];
+    all[best] = Some(odds);
+    // Down to what explains as well as the best, and then as well as the best that is not refuted.
+    let mut least = entries[best].probability * (-SECOND).exp();
+    let mut stands = None;
+    for k in best + 1..entries.len() {
+        if entries[k].hypothesis == Hypothesis::Unknown || entries[k].probability < least {
+            continue;
+        }
+        all[k] = Some(against(&entries[k]));
+        if stands.is_none() && all[k] == Some(1.0) {
+            stands = Some(k);
+            least = entries[k].probability * (-SECOND).exp();
+        }
+    }
+    let weight = |k: usize| all[k].map_or(0.0, |odds| entries[k].probability / odds);
+    let leads = |stands: &usize| (best..*stands).all(|k| weight(k) < weight(*stands));
+    if stands.filter(leads).is_some() {
         lower(entries, &all);
     } else if odds.is_finite() {
         raise_unknown(entries, best, odds);
     }
 }
-
-/// Logarithm of the odds up to which two explanations count as equally good ones: as much as is asked for a
-/// second effect.
-const AS_WELL: f64 = 5.0;
 
 /// Highest odds against an explanation whose misfit has the probability `p`.
 fn most_against(p: f64) -> f64 {

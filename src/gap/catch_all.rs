@@ -3,10 +3,11 @@
 
 use super::evidence::{Branch, evaluate, log_mean, over_drifts};
 use super::forward::Forward;
-use super::frame::{Frame, Row, Small};
+use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
 use super::knowledge::knowledge;
 use super::settings::GapSettings;
+use super::small_unknowns::Small;
 
 /// Spreads of what no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
 const SPREADS: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
@@ -18,16 +19,10 @@ pub(super) fn fit_unknown(frame: &Frame, settings: &GapSettings, nominal: &Fit) 
     for spread in SPREADS {
         let loose = loosened(frame, spread);
         let forward = Forward::new(&loose, &[]);
-        let drifts = &settings.drift_stds;
-        let known = knowledge(
-            &loose,
-            &forward.layout,
-            settings.joint_std,
-            drifts[drifts.len() / 2],
-        );
+        let known = knowledge(&loose, &forward.layout, settings);
         let mut start = nominal.branch.optimum.parameters.clone();
         start.resize(known.len(), 0.0);
-        branches.extend(evaluate(&forward, &known, &start, drifts));
+        branches.extend(evaluate(&forward, &known, &start, &settings.drift_stds));
     }
     let all: Vec<f64> = branches.iter().map(|branch| branch.log_evidence).collect();
     let best = branches

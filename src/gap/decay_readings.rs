@@ -231,7 +231,7 @@ mod tests {
     use super::super::settings::GapSettings;
     use super::super::synthetic::{PlannedConfiguration, TestPlan, observe};
     use super::*;
-    use crate::identify::observation::ExtraPeak;
+    use crate::identify::observation::{ExtraPeak, UNPAIRED};
     use crate::structure::Beam;
     use crate::structure::specimen::{Body, Specimen, SpecimenJoint};
 
@@ -378,7 +378,7 @@ mod tests {
             std: None,
             level_db: None,
             constant: None,
-            label: "unpaired".to_owned(),
+            label: UNPAIRED.to_owned(),
         });
         let (plain, _, _) = frames(&observed);
         let (twinned, _, _) = frames(&split);

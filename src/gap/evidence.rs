@@ -3,13 +3,14 @@
 
 use super::catalogue::Size;
 use super::forward::{Forward, Layout};
-use super::frame::{Frame, Small};
+use super::frame::Frame;
 use super::knowledge::with_drift;
 use super::least_squares::{
     Knowledge, Model, Optimum, factor_of, log_determinant, maximise, maximise_linear, objective_at,
     optimum_at,
 };
 use super::noise::{self, Reading};
+use super::small_unknowns::Small;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 

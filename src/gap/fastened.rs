@@ -1,9 +1,10 @@
 //! Known masses that are fastened for single recordings: known as well as a scale and a ruler know them.
 
 use super::forward::Solved;
-use super::frame::{Frame, Small};
+use super::frame::Frame;
 use super::settings::GapSettings;
 use super::setup::Setup;
+use super::small_unknowns::Small;
 use crate::structure::specimen::PointMass;
 
 impl Frame {
@@ -21,7 +22,7 @@ impl Frame {
 /// d ln f of a mode for each of the masses of one configuration that a small unknown is of. With a
 /// mass-normalised shape d ln f/d m = -phi^2/2, and d ln f/d x = -m phi phi'.
 pub(super) fn fastened_slope(small: &Small, setup: &Setup, (one, index): (&Solved, usize)) -> f64 {
-    let displacement = |mass: &PointMass| one.modes.displacement(index, mass.position);
+    let displacement = |mass: &PointMass| one.modes().displacement(index, mass.position);
     let of = |wanted: usize, slope: &dyn Fn(&PointMass) -> f64| -> f64 {
         let own = setup.fastened.iter().filter(|(own, _)| *own == wanted);
         own.map(|(_, mass)| slope(mass)).sum()
@@ -31,7 +32,7 @@ pub(super) fn fastened_slope(small: &Small, setup: &Setup, (one, index): (&Solve
             -0.5 * mass.mass * displacement(mass).powi(2)
         }),
         Small::FastenedPlace { fastened } => of(fastened, &|mass| {
-            -mass.mass * displacement(mass) * one.modes.slope(index, mass.position)
+            -mass.mass * displacement(mass) * one.modes().slope(index, mass.position)
         }),
         _ => 0.0,
     }

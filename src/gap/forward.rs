@@ -7,7 +7,7 @@ use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised, Model};
 use super::nominal::COUPLING;
 use crate::effects::{Circumstances, Effect, Seen, apply};
-use crate::structure::specimen::{Specimen, SpecimenJoint, SpecimenModes};
+use crate::structure::specimen::{BeamModes, Specimen, SpecimenJoint, SpecimenModes};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -95,28 +95,30 @@ pub(super) fn effect_of(candidate: &Candidate, size: f64, place: Option<f64>) ->
 #[derive(Clone)]
 pub(super) struct Solved {
     pub(super) seen: Seen,
-    pub(super) modes: Arc<SpecimenModes>,
-    /// Which of the modes is the model's mode 1, 2, ...: that of a fixture is left out.
-    numbers: Vec<usize>,
+    own: Arc<BeamModes>,
     /// What its modes feel of a joint whose stiffness depends on the amplitude.
     pub(super) changes: Option<Changes>,
 }
 
 impl Solved {
-    /// Index of the mode with this number (1 = lowest).
-    pub(super) fn index(&self, mode: usize) -> Option<usize> {
-        self.numbers.get(mode - 1).copied()
+    /// All its modes, that of a fixture among them.
+    pub(super) fn modes(&self) -> &SpecimenModes {
+        &self.own.modes
     }
 
-    /// Index of the fixture's own mode: the one that is nobody's.
+    /// Index of the mode with this number (1 = lowest): that of a fixture has none.
+    pub(super) fn index(&self, mode: usize) -> Option<usize> {
+        self.own.numbers.get(mode - 1).copied()
+    }
+
+    /// Index of the fixture's own mode.
     pub(super) fn base(&self) -> Option<usize> {
-        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
-        (0..self.modes.len()).find(|index| based && !self.numbers.contains(index))
+        self.own.fixture
     }
 
     /// Frequency as it is read (Hz).
     pub(super) fn frequency(&self, mode: usize) -> Option<f64> {
-        let own = self.modes.frequencies()[self.index(mode)?];
+        let own = self.modes().frequencies()[self.index(mode)?];
         Some(self.seen.read(own))
     }
 }
@@ -163,14 +165,14 @@ impl Model for Forward<'_> {
             for (column, step) in steps.into_iter().filter(|(k, _)| !known[*k].is_held()) {
                 let mut moved = parameters.to_vec();
                 moved[column] += step;
-                let other = self.rows_of(&self.solve(&moved)?, &moved)?;
+                let other = self.rows_of(&self.solve_near(&moved, &solved)?, &moved)?;
                 for (row, (new, old)) in other.iter().zip(&base).enumerate() {
                     slopes[(row, column)] = (new - old) / step;
                 }
             }
         }
         if self.softening(parameters).is_some() {
-            self.amplitude_slopes(parameters, &base, &mut slopes);
+            self.amplitude_slopes(parameters, (&solved, &base), &mut slopes);
         }
         Some(Linearised { predicted, slopes })
     }
@@ -217,6 +219,28 @@ impl<'a> Forward<'a> {
 
     /// Structure and modes of each configuration; equal structures are solved once.
     pub(super) fn solve(&self, parameters: &[f64]) -> Option<Vec<Solved>> {
+        self.solve_by(parameters, |_, specimen| self.modes_of(specimen))
+    }
+
+    /// The same next to a point that is solved.
+    pub(super) fn solve_near(&self, parameters: &[f64], there: &[Solved]) -> Option<Vec<Solved>> {
+        self.solve_by(parameters, |configuration, specimen| {
+            let known = &there[configuration];
+            if known.seen.specimen == *specimen {
+                return Some(known.own.clone());
+            }
+            match known.own.near(specimen).ok()? {
+                Some(near) => Some(Arc::new(near)),
+                None => self.modes_of(specimen),
+            }
+        })
+    }
+
+    fn solve_by(
+        &self,
+        parameters: &[f64],
+        modes_of: impl Fn(usize, &Specimen) -> Option<Arc<BeamModes>>,
+    ) -> Option<Vec<Solved>> {
         let effects = self.layout.effects_at(parameters)?;
         let mut all: Vec<Solved> = Vec::with_capacity(self.frame.setups.len());
         for (configuration, setup) in self.frame.setups.iter().enumerate() {
@@ -231,25 +255,18 @@ impl<'a> Forward<'a> {
             let known = all
                 .iter()
                 .find(|other| other.seen.specimen == seen.specimen);
-            let (modes, numbers) = match known {
-                Some(other) => (other.modes.clone(), other.numbers.clone()),
-                None => self.modes_of(&seen.specimen)?,
+            let own = match known {
+                Some(other) => other.own.clone(),
+                None => modes_of(configuration, &seen.specimen)?,
             };
-            all.push(Solved {
-                seen,
-                modes,
-                numbers,
-                changes,
-            });
+            all.push(Solved { seen, own, changes });
         }
         Some(all)
     }
 
-    fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
-        let (modes, numbers) = specimen
-            .beam_modes(self.frame.modes, self.frame.mesh)
-            .ok()?;
-        Some((Arc::new(modes), numbers))
+    fn modes_of(&self, specimen: &Specimen) -> Option<Arc<BeamModes>> {
+        let found = specimen.beam_modes(self.frame.modes, self.frame.mesh);
+        Some(Arc::new(found.ok()?))
     }
 
     /// Slopes of all rows with respect to the joint's stiffnesses by finite differences.
@@ -295,7 +312,7 @@ impl<'a> Forward<'a> {
                 let one = &solved[configuration];
                 let index = one.index(mode)?;
                 let setup = &self.frame.setups[configuration];
-                let at = |x: f64| one.modes.displacement(index, x);
+                let at = |x: f64| one.modes().displacement(index, x);
                 Some(at(setup.sensors[sensor].position) * at(setup.tap?))
             }
             Row::Ratio {
@@ -308,7 +325,7 @@ impl<'a> Forward<'a> {
                 let index = one.index(mode)?;
                 let setup = &self.frame.setups[configuration];
                 let at = |sensor: usize| {
-                    one.modes
+                    one.modes()
                         .displacement(index, setup.sensors[sensor].position)
                 };
                 Some(at(sensor) / at(reference))
@@ -364,6 +381,6 @@ impl<'a> Forward<'a> {
 
 /// A constant bias does not move with the structure: d ln(s f + b)/d ln f = s f/(s f + b).
 fn offset_factor(one: &Solved, index: usize) -> f64 {
-    let own = one.modes.frequencies()[index] * one.seen.frequency_scale;
+    let own = one.modes().frequencies()[index] * one.seen.frequency_scale;
     own / (own + one.seen.frequency_offset)
 }

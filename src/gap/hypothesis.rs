@@ -8,7 +8,7 @@ use super::evidence::{
 };
 use super::forward::{Forward, Layout};
 use super::frame::Frame;
-use super::knowledge::knowledge;
+use super::knowledge::{knowledge, with_drift};
 use super::least_squares::{Knowledge, Model, Optimum, optimum_at};
 use super::nominal::COUPLING;
 use super::settings::GapSettings;
@@ -27,12 +27,8 @@ pub(super) struct Fit {
 /// The nominal model with its joint refitted.
 pub(super) fn fit_nominal(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     let forward = Forward::new(frame, &[]);
-    let known = knowledge(
-        frame,
-        &forward.layout,
-        settings.joint_std,
-        settings.drift_stds[0],
-    );
+    let known = knowledge(frame, &forward.layout, settings);
+    let known = with_drift(frame, &forward.layout, &known, settings.drift_stds[0]);
     let mut start: Vec<f64> = known.iter().map(|known| known.centre).collect();
     for (parameter, (direction, sought)) in start.iter_mut().zip(frame.nominal.sought()) {
         if direction == COUPLING {
@@ -124,9 +120,7 @@ impl Search<'_> {
 
     /// What is known of all parameters.
     pub(super) fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
-        let drifts = &self.settings.drift_stds;
-        let middle = drifts[drifts.len() / 2];
-        knowledge(self.frame, &forward.layout, self.settings.joint_std, middle)
+        knowledge(self.frame, &forward.layout, self.settings)
     }
 
     /// The parameters without the effect, and the effect at a size and a place.

@@ -11,8 +11,8 @@ pub(super) fn joint_shares(one: &Solved, index: usize) -> [f64; 2] {
     let SpecimenJoint::Springs { kt, kr, coupling } = one.seen.specimen.joint else {
         return [0.0; 2];
     };
-    let q = one.modes.joint_motion(index);
-    let omega = std::f64::consts::TAU * one.modes.frequencies()[index];
+    let q = one.modes().joint_motion(index);
+    let omega = std::f64::consts::TAU * one.modes().frequencies()[index];
     let square = 1.0 - coupling * coupling;
     // A rigid spring holds no energy; its deformation is 0 and its stiffness infinite.
     let part = |own: f64, other: f64, own_k: f64, other_k: f64| {
@@ -41,8 +41,8 @@ pub(super) fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f
             _ => *kr *= STEP.exp(),
         }
     }
-    match one.modes.rayleigh_frequency(index, &other) {
-        Ok(frequency) => (frequency / one.modes.frequencies()[index]).ln() / STEP,
+    match one.modes().rayleigh_frequency(index, &other) {
+        Ok(frequency) => (frequency / one.modes().frequencies()[index]).ln() / STEP,
         Err(_) => 0.0,
     }
 }

@@ -90,13 +90,13 @@ impl JointPath {
             let Some(index) = solved.index(mode.mode) else {
                 continue;
             };
-            let rotation = solved.modes.joint_motion(index)[1];
+            let rotation = solved.modes().joint_motion(index)[1];
             let at_sensor = solved
-                .modes
+                .modes()
                 .displacement(index, configuration.sensors.get(reference)?.position?);
             let at_tap = setup
                 .tap
-                .map_or(1.0, |tap| solved.modes.displacement(index, tap));
+                .map_or(1.0, |tap| solved.modes().displacement(index, tap));
             let omega = std::f64::consts::TAU * mode.frequency;
             let size = (amplitude * rotation / at_sensor).abs();
             if size.is_finite() {

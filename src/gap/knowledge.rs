@@ -1,9 +1,11 @@
 //! What is known of all parameters of a hypothesis before the data.
 
 use super::forward::Layout;
-use super::frame::{Frame, Small};
+use super::frame::Frame;
 use super::least_squares::Knowledge;
 use super::nominal::COUPLING;
+use super::settings::GapSettings;
+use super::small_unknowns::Small;
 
 /// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
 const COUPLING_STD: f64 = 0.5;
@@ -18,13 +20,10 @@ fn stiffness_knowledge(start: f64, joint_std: f64) -> Knowledge {
     }
 }
 
-/// What is known of all parameters of a hypothesis before the data.
-pub(super) fn knowledge(
-    frame: &Frame,
-    layout: &Layout,
-    joint_std: f64,
-    drift: f64,
-) -> Vec<Knowledge> {
+/// What is known of all parameters of a hypothesis before the data, the joint's drift the middle one of those
+/// that are tried: with that a search begins.
+pub(super) fn knowledge(frame: &Frame, layout: &Layout, settings: &GapSettings) -> Vec<Knowledge> {
+    let drift = settings.drift_stds[settings.drift_stds.len() / 2];
     let mut all: Vec<Knowledge> = frame
         .nominal
         .sought()
@@ -35,7 +34,7 @@ pub(super) fn knowledge(
                 high: 0.95,
                 ..Knowledge::normal(0.0, COUPLING_STD)
             },
-            _ => stiffness_knowledge(start, joint_std),
+            _ => stiffness_knowledge(start, settings.joint_std),
         })
         .collect();
     for effect in &layout.effects {

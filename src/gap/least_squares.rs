@@ -115,14 +115,14 @@ pub(super) fn maximise(
         if promised_gain(&optimum, knowledge).is_none_or(|gain| gain < GAIN) {
             break;
         }
-        let Some((better, used)) = advance(readings, knowledge, (&optimum, damping), model) else {
+        let Some((better, next)) = advance(readings, knowledge, (&optimum, damping), model) else {
             break;
         };
         // What hardly moves far from any agreement is no explanation; it need not be exact.
         let moves = optimum.objective - better.objective > IDLE * better.objective;
         idle = if moves { 0 } else { idle + 1 };
         optimum = better;
-        damping = used.saturating_sub(1);
+        damping = next;
         if idle > 1 {
             break;
         }
@@ -192,8 +192,11 @@ impl Model for Linear<'_> {
 /// and turn it towards the steepest descent.
 const DAMPINGS: [f64; 7] = [0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
 
-/// The full step or a damped one, whichever first lowers the objective, and which damping it has; the
-/// weaker ones before `first` are not tried.
+/// Share of what was promised from which a step shows that the next one may be damped less.
+const KEPT: f64 = 0.75;
+
+/// The full step or a damped one, whichever first lowers the objective, and the damping that the next one
+/// should begin with; the weaker ones before `first` are not tried.
 fn advance(
     readings: &[Reading],
     knowledge: &[Knowledge],
@@ -203,7 +206,8 @@ fn advance(
     for (used, damping) in DAMPINGS.iter().enumerate().skip(first) {
         let step = bounded_step(from, knowledge, *damping)?;
         // Of a shorter step the quadratic model promises less, and of the next one less still.
-        if promised_by(from, &step) < GAIN {
+        let promised = promised_by(from, &step);
+        if promised < GAIN {
             return None;
         }
         let parameters: Vec<f64> = from
@@ -221,7 +225,8 @@ fn advance(
         }
         if let Some(linearised) = model.complete(&parameters, knowledge, found) {
             let better = optimum_at(readings, knowledge, parameters, linearised);
-            return Some((better, used));
+            let kept = from.objective - better.objective > KEPT * promised;
+            return Some((better, used.saturating_sub(usize::from(kept))));
         }
     }
     None

@@ -1,10 +1,7 @@
 //! Peaks that belong to no mode, as all recordings show them.
 
 use super::setup::TWIN;
-use crate::identify::observation::{Configuration, Observations};
-
-/// Label of a peak that belongs to no mode and is no mains line.
-pub(super) const UNPAIRED: &str = "unpaired";
+use crate::identify::observation::{Configuration, Observations, UNPAIRED};
 
 /// The peaks of a test that belong to no mode, and where such peaks can be told.
 #[derive(Debug, Clone, Default)]
@@ -13,9 +10,9 @@ pub(super) struct Peaks {
     pub(super) all: Vec<Peak>,
     /// Logarithms of the lowest and the highest frequency of a mode; `None` where nobody looked for peaks.
     pub(super) band: Option<(f64, f64)>,
-    /// Logarithm of the modal constant (1/kg) from which peaks are read, of the configurations that have read
-    /// a weak one.
-    pub(super) weakest: Vec<(usize, f64)>,
+    /// The configurations that were looked at, with the logarithm of the modal constant (1/kg) from which peaks
+    /// are read where a weak one was.
+    pub(super) looked: Vec<(usize, Option<f64>)>,
 }
 
 /// A peak that several recordings show.
@@ -31,10 +28,12 @@ pub(super) struct Peak {
 
 /// A peak in one recording.
 struct Sighting {
+    configuration: usize,
     log: f64,
     /// Relative uncertainty of its frequency (1).
     std: f64,
-    constant: Option<(usize, f64)>,
+    /// Logarithm of its modal constant (1/kg).
+    constant: Option<f64>,
 }
 
 /// Relative distance within which two recordings show the same peak: sensors that move load a fixture's
@@ -59,12 +58,11 @@ impl Peaks {
         let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| {
             (low.min(log), high.max(log))
         });
-        let weakest = looked.iter();
-        let weakest = weakest.filter_map(|(index, one)| Some((*index, weakest_of(one)?)));
+        let weakest = looked.iter().map(|(index, one)| (*index, weakest_of(one)));
         Peaks {
             all: common(&looked),
             band: (low < high).then_some((low, high)),
-            weakest: weakest.collect(),
+            looked: weakest.collect(),
         }
     }
 
@@ -73,7 +71,8 @@ impl Peaks {
     }
 }
 
-/// Level over the noise (dB) that a peak needs to be read.
+/// Level over the noise (dB) that a peak needs to be read, as the search for resonances asks for unless told
+/// otherwise. Where the level is a peak's height over its surroundings, which is less, it is on the safe side.
 const NEEDED: f64 = 15.0;
 
 /// Logarithm of the modal constant from which peaks are read: one that was read far over the noise would
@@ -98,14 +97,15 @@ fn common(looked: &[(usize, &Configuration)]) -> Vec<Peak> {
     all.sort_by(|a, b| a.log.total_cmp(&b.log));
     let groups = all.chunk_by(|a, b| b.log - a.log < SAME);
     groups
-        .filter(|group| 2 * group.len() >= looked.len())
+        .filter(|group| 2 * recordings(group) >= looked.len())
         .map(|group| {
             let count = group.len() as f64;
             let log = group.iter().map(|one| one.log).sum::<f64>() / count;
             let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
             let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
             let std = scatter.sqrt().hypot(read).hypot(STATED);
-            let constants = group.iter().filter_map(|one| one.constant).collect();
+            let constant = |one: &Sighting| Some((one.configuration, one.constant?));
+            let constants = group.iter().filter_map(constant).collect();
             Peak {
                 log,
                 std,
@@ -113,6 +113,14 @@ fn common(looked: &[(usize, &Configuration)]) -> Vec<Peak> {
             }
         })
         .collect()
+}
+
+/// How many recordings show it.
+fn recordings(group: &[Sighting]) -> usize {
+    let mut all: Vec<usize> = group.iter().map(|one| one.configuration).collect();
+    all.sort_unstable();
+    all.dedup();
+    all.len()
 }
 
 /// The peaks of a recording that are nobody's and no halves of a split decay.
@@ -125,12 +133,13 @@ fn lone((index, one): &(usize, &Configuration)) -> Vec<Sighting> {
     peaks
         .filter(|peak| peak.label == UNPAIRED && apart(peak.frequency))
         .map(|peak| Sighting {
+            configuration: *index,
             log: peak.frequency.ln(),
             std: peak.std.unwrap_or(0.0) / peak.frequency,
             constant: peak
                 .constant
-                .map(|constant| (*index, constant.abs().ln()))
-                .filter(|constant| constant.1.is_finite()),
+                .map(|constant| constant.abs().ln())
+                .filter(|constant| constant.is_finite()),
         })
         .collect()
 }
@@ -171,13 +180,14 @@ mod tests {
 
     #[test]
     fn limit_peaks_count_that_half_of_the_recordings_show_and_that_are_nobodys() {
-        let lone = "unpaired";
+        let lone = UNPAIRED;
         let configurations = vec![
             recording(0, &[(50.0, "mains 50 Hz"), (183.3, lone), (700.0, lone)]),
             // Another level of the same recording.
             recording(0, &[(183.3, lone), (700.0, lone)]),
             recording(1, &[(50.0, "mains 50 Hz"), (183.4, lone), (1390.0, lone)]),
-            recording(2, &[(50.0, "mains 50 Hz"), (1390.0, lone)]),
+            // Two of one recording are one sighting.
+            recording(2, &[(900.0, lone), (901.0, lone), (1390.0, lone)]),
         ];
         let peaks = Peaks::new(&Observations { configurations });
         assert_eq!(peaks.all.len(), 1);
@@ -185,7 +195,8 @@ mod tests {
         assert_eq!(peaks.all[0].constants.len(), 2);
         assert!(peaks.contains(183.0_f64.ln()) && !peaks.contains(1500.0_f64.ln()));
         // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
-        assert!((peaks.weakest[0].1 - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);
+        let weakest = peaks.looked[0].1.unwrap();
+        assert!((weakest - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);
     }
 
     #[test]

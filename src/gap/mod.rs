@@ -58,6 +58,7 @@ mod search;
 mod settings;
 mod setup;
 mod small_slopes;
+mod small_unknowns;
 mod synthetic;
 mod trial;
 mod verdict;

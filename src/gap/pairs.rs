@@ -10,12 +10,14 @@ use super::result::Hypothesis;
 use super::search::Competition;
 use super::settings::GapSettings;
 use super::trial::Trial;
+use crate::effects::EffectId;
 use rayon::prelude::*;
 
 /// How many of the best single effects a second one is put beside.
 const FIRSTS: usize = 2;
-/// Logarithm of the Bayes factor from which a second effect is believed.
-const SECOND: f64 = 5.0;
+/// Logarithm of the Bayes factor from which a second effect is believed, 148 to 1: up to that two explanations
+/// count as equally good ones.
+pub(super) const SECOND: f64 = 5.0;
 
 /// How much further a second effect must promise to lower the objective where a single one suffices: what is
 /// believed, and as much again for the place and size that it may choose.
@@ -210,17 +212,17 @@ fn pair(frame: &Frame, settings: &GapSettings, (first, second, afar): &Task<'_>)
     };
     let objective = |fit: &Fit| fit.branch.optimum.objective;
     let candidate = *second.fit.effects.first()?;
-    let deepest = |a: &Fit, b: &Fit| objective(a).total_cmp(&objective(b));
+    let more = |a: &Fit, b: &Fit| a.log_evidence.total_cmp(&b.log_evidence);
     let fit = if afar.is_empty() {
         let near = [search.add(candidate), search.add_from(&second.fit)];
-        near.into_iter().flatten().min_by(deepest)
+        near.into_iter().flatten().max_by(more)
     } else {
         let settled = afar.iter().filter_map(|start| {
             let is_first = first.effects() == [start.first()];
             let without = if is_first { &first.fit } else { &second.fit };
             Search { without, ..search }.settle(std::slice::from_ref(start))
         });
-        settled.min_by(deepest)
+        settled.max_by(more)
     }?;
     let alone = if first.fit.log_evidence > second.fit.log_evidence {
         &first.fit
@@ -242,12 +244,8 @@ fn pair(frame: &Frame, settings: &GapSettings, (first, second, afar): &Task<'_>)
 fn distinct(found: Vec<Entry>) -> Vec<Entry> {
     let mut pairs: Vec<Entry> = Vec::new();
     for pair in found {
-        let same = |other: &Entry| {
-            other
-                .effects()
-                .iter()
-                .all(|effect| pair.effects().contains(effect))
-        };
+        let reversed: Vec<EffectId> = pair.effects().iter().rev().copied().collect();
+        let same = |other: &Entry| [pair.effects(), &reversed[..]].contains(&other.effects());
         match pairs.iter_mut().find(|other| same(other)) {
             Some(other) if other.fit.log_evidence < pair.fit.log_evidence => *other = pair,
             Some(_) => {}

@@ -87,7 +87,7 @@ fn shares(frame: &Frame, solved: &[Solved], property: Property) -> DMatrix<f64> 
 fn share(one: &Solved, index: usize, (piece, property): (usize, Property)) -> f64 {
     let body = &one.seen.specimen.body;
     let step = body.length() / (PIECES * POINTS) as f64;
-    let omega = TAU * one.modes.frequencies()[index];
+    let omega = TAU * one.modes().frequencies()[index];
     (0..POINTS)
         .map(|point| {
             let from = step * (piece * POINTS + point) as f64;
@@ -99,12 +99,15 @@ fn share(one: &Solved, index: usize, (piece, property): (usize, Property)) -> f6
             };
             match property {
                 Property::Stiffness => {
-                    let bend =
-                        (one.modes.slope(index, from + step) - one.modes.slope(index, from)) / step;
+                    let bend = (one.modes().slope(index, from + step)
+                        - one.modes().slope(index, from))
+                        / step;
                     0.5 * beam.bending_stiffness() * bend * bend * step / (omega * omega)
                 }
                 Property::Mass => {
-                    -0.5 * beam.mass_per_length() * one.modes.displacement(index, x).powi(2) * step
+                    -0.5 * beam.mass_per_length()
+                        * one.modes().displacement(index, x).powi(2)
+                        * step
                 }
             }
         })

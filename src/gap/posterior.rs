@@ -236,7 +236,7 @@ mod tests {
 
     /// What is refuted, even beyond all odds, leaves the others as they were among each other.
     #[test]
-    fn prop_lowered_probabilities_keep_the_odds_of_all_others() {
+    fn limit_lowered_probabilities_keep_the_odds_of_all_others() {
         for odds in [8.0, 1e10, f64::INFINITY] {
             let after = divided(&[0.6, 0.3, 0.1], &[Some(odds), None, Some(1.0)]);
             // Rounding of three numbers.

@@ -1,10 +1,11 @@
 //! How well a fit explains the readings: overall, by block, mode by mode, and with each mode left out.
 
 use super::evidence::covariance;
-use super::frame::{Frame, Row, Small};
+use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
 use super::noise;
 use super::result::{Block, Misfit, Pull};
+use super::small_unknowns::Small;
 use nalgebra::{DMatrix, DVector};
 
 /// Residuals of a fit and how they hang together.

@@ -5,7 +5,7 @@ use super::catch_all::{fit_drift, fit_unknown};
 use super::error::GapError;
 use super::evidence::log_mean;
 use super::forward::Forward;
-use super::frame::{Frame, Small};
+use super::frame::Frame;
 use super::hypothesis::{Fit, Search, fit_nominal};
 use super::joint_path::joint_amplitude;
 use super::nominal::{COUPLING, Nominal};
@@ -14,6 +14,7 @@ use super::posterior::{Entry, set_probabilities};
 use super::result::Hypothesis;
 use super::settings::GapSettings;
 use super::setup::Setup;
+use super::small_unknowns::Small;
 use crate::effects::EffectId;
 use crate::identify::observation::Observations;
 use rayon::prelude::*;
@@ -224,7 +225,6 @@ fn compete_once(
 /// Where nothing suffices: every effect once more from afar, in case it is larger than a search from without
 /// it can reach.
 fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut Vec<Entry>) {
-    let objective = |fit: &Fit| fit.branch.optimum.objective;
     let so_far = |candidate: &Candidate| {
         let own = |entry: &&Entry| entry.effects() == [candidate.effect];
         entries.iter().find(own).map(|entry| &entry.fit)
@@ -237,7 +237,7 @@ fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut V
         let Some(fit) = fit else { continue };
         let own = |entry: &&mut Entry| entry.effects() == [candidate.effect];
         match entries.iter_mut().find(own) {
-            Some(entry) if objective(&fit) < objective(&entry.fit) => entry.fit = fit,
+            Some(entry) if fit.log_evidence > entry.fit.log_evidence => entry.fit = fit,
             Some(_) => {}
             None => {
                 let hypothesis = Hypothesis::Effects(vec![candidate.effect]);
@@ -330,7 +330,7 @@ fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
     let amplitude = |(setup, one): (&Setup, &super::forward::Solved)| -> Option<f64> {
         let tap = setup.tap?;
         let modes = (1..=frame.fitted_modes).filter_map(|mode| one.index(mode));
-        Some(joint_amplitude(&one.modes, (tap, setup.level), modes))
+        Some(joint_amplitude(one.modes(), (tap, setup.level), modes))
     };
     let all: Option<Vec<f64>> = frame.setups.iter().zip(&solved).map(amplitude).collect();
     let Some(all) = all else { return };

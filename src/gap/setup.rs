@@ -4,7 +4,7 @@ use super::decay_readings::beginning;
 use super::joint_path::JointPath;
 use super::nominal::Nominal;
 use crate::effects::SensorPlace;
-use crate::identify::observation::{Configuration, ExtraPeak, ObservedMode};
+use crate::identify::observation::{Configuration, ExtraPeak, ObservedMode, UNPAIRED};
 use crate::structure::specimen::{PointMass, Specimen};
 use nalgebra::DMatrix;
 
@@ -169,7 +169,7 @@ pub(super) fn twin(configuration: &Configuration, mode: &ObservedMode) -> Option
     let distance = |peak: &ExtraPeak| (peak.frequency / mode.frequency - 1.0).abs();
     let peaks = configuration.extra_peaks.iter();
     peaks
-        .filter(|peak| peak.label == "unpaired")
+        .filter(|peak| peak.label == UNPAIRED)
         .map(distance)
         .filter(|distance| *distance < TWIN)
         .max_by(f64::total_cmp)

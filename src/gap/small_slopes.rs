@@ -2,8 +2,9 @@
 
 use super::fastened::fastened_slope;
 use super::forward::{Forward, Solved};
-use super::frame::{Row, Small};
+use super::frame::Row;
 use super::joint_energy::joint_shares;
+use super::small_unknowns::Small;
 use nalgebra::DMatrix;
 
 impl Forward<'_> {
@@ -40,7 +41,7 @@ impl Forward<'_> {
     pub(super) fn amplitude_slopes(
         &self,
         parameters: &[f64],
-        base: &[f64],
+        (solved, base): (&[Solved], &[f64]),
         slopes: &mut DMatrix<f64>,
     ) {
         const STEP: f64 = 1e-2;
@@ -50,7 +51,7 @@ impl Forward<'_> {
         let column = self.layout.smalls() + k;
         let mut moved = parameters.to_vec();
         moved[column] += STEP;
-        let solved = self.solve(&moved);
+        let solved = self.solve_near(&moved, solved);
         if let Some(new) = solved.and_then(|solved| self.rows_of(&solved, &moved)) {
             for (row, (new, old)) in new.iter().zip(base).enumerate() {
                 slopes[(row, column)] = (new - old) / STEP;
@@ -109,7 +110,7 @@ impl Forward<'_> {
         let Some(index) = one.index(mode) else {
             return 0.0;
         };
-        let displacement = |x: f64| one.modes.displacement(index, x);
+        let displacement = |x: f64| one.modes().displacement(index, x);
         match *small {
             Small::Scale => 1.0,
             Small::Discrepancy { mode: own } if own == mode => 1.0,
@@ -135,7 +136,7 @@ impl Forward<'_> {
                 .map(|(_, sensor)| {
                     -sensor.mass
                         * displacement(sensor.position)
-                        * one.modes.slope(index, sensor.position)
+                        * one.modes().slope(index, sensor.position)
                 })
                 .sum(),
             _ => fastened_slope(small, setup, (one, index)),
@@ -158,10 +159,10 @@ impl Forward<'_> {
                 predicted
             }
             Small::SensorPlace { place } if setup.places[sensor] == place => {
-                one.modes.slope(index, x) * one.modes.displacement(index, tap)
+                one.modes().slope(index, x) * one.modes().displacement(index, tap)
             }
             Small::TapPlace { visit } if setup.visit == visit => {
-                one.modes.displacement(index, x) * one.modes.slope(index, tap)
+                one.modes().displacement(index, x) * one.modes().slope(index, tap)
             }
             _ => 0.0,
         }
@@ -184,7 +185,7 @@ impl Forward<'_> {
             }
             Small::SensorPlace { place } if setup.places[sensor] == place => {
                 let x = setup.sensors[sensor].position;
-                one.modes.slope(index, x) / one.modes.displacement(index, x)
+                one.modes().slope(index, x) / one.modes().displacement(index, x)
             }
             _ => 0.0,
         }

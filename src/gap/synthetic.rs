@@ -1,17 +1,18 @@
 //! Observations that a planned test would make of a given structure: drawn from the structure's modes
-//! on the finer mesh, not from the diagnosis's own predictions.
+//! on the finer mesh, not from the diagnosis's own predictions. Only whether a fixture's peak is read follows
+//! the diagnosis's own rule: what that is worth is for the simulator, which makes signals, to say.
 
 use super::error::GapError;
 use super::fixture_peak::{SEEN, strength};
 use super::joint_path::joint_amplitude;
-use super::lone_peaks::{DECIBEL, UNPAIRED};
+use super::lone_peaks::DECIBEL;
 use super::nominal::Nominal;
-use crate::effects::{Circumstances, Effect, EffectId, SensorPlace, apply};
+use crate::effects::{Circumstances, Effect, EffectId, Seen, SensorPlace, apply};
 use crate::identify::observation::{
     AlongDecay, Configuration, DecayEnd, DecayVerdict, ExtraPeak, Observations, Observed,
-    ObservedMode, ObservedSensor, ShapeValue, effective_share,
+    ObservedMode, ObservedSensor, ShapeValue, UNPAIRED, effective_share,
 };
-use crate::structure::specimen::{Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
+use crate::structure::specimen::{BeamModes, Mesh, PointMass, Specimen, SpecimenJoint};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -91,9 +92,6 @@ fn amplitudes(plan: &TestPlan, truth: &Nominal) -> Result<Vec<f64>, GapError> {
     let most = all.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     Ok(all.into_iter().map(|amplitude| amplitude / most).collect())
 }
-
-/// Modes, and which of them is the model's mode 1, 2, ...
-type Numbered = (SpecimenModes, Vec<usize>);
 
 struct Scene<'a> {
     plan: &'a TestPlan,
@@ -186,28 +184,23 @@ impl Scene<'_> {
             modes: seen_modes,
             covariance: None,
             common: 0.0,
-            extra_peaks: self.fixture_peak(index, &modes, scale.0),
+            extra_peaks: self.fixture_peak(index, (&modes, &seen)),
         })
     }
 
     /// The fixture's own mode, where it is strong enough to be read.
-    fn fixture_peak(
-        &mut self,
-        index: usize,
-        (modes, numbers): &Numbered,
-        scale: f64,
-    ) -> Vec<ExtraPeak> {
+    fn fixture_peak(&mut self, index: usize, (own, seen): (&BeamModes, &Seen)) -> Vec<ExtraPeak> {
         let planned = &self.plan.configurations[index];
         let sensors: Vec<f64> = planned.sensors.iter().map(|sensor| sensor.1).collect();
-        let base = (0..modes.len()).find(|mode| !numbers.contains(mode));
-        let read = base.and_then(|base| {
-            let strength = strength(modes, (base, numbers), (&sensors, Some(planned.tap)))?;
+        let read = own.fixture.and_then(|base| {
+            let place = (&sensors[..], Some(planned.tap));
+            let strength = strength(&own.modes, (base, &own.numbers), place)?;
             (strength.0 > strength.1 + SEEN / DECIBEL).then_some((base, strength.0.exp()))
         });
         let Some((base, constant)) = read else {
             return Vec::new();
         };
-        let frequency = modes.frequencies()[base] * scale;
+        let frequency = seen.read(own.modes.frequencies()[base]);
         let read = self.measured(frequency, frequency * self.plan.frequency_std);
         vec![ExtraPeak {
             frequency: read.value,
@@ -236,15 +229,15 @@ impl Scene<'_> {
         }
     }
 
-    fn solve(&self, specimen: &Specimen) -> Result<Numbered, GapError> {
+    fn solve(&self, specimen: &Specimen) -> Result<BeamModes, GapError> {
         Ok(specimen.beam_modes(self.plan.modes, Mesh::SIMULATION)?)
     }
 
     fn mode(
         &mut self,
         (index, number): (usize, usize),
-        (modes, numbers): &Numbered,
-        ((scale, offset, loss), ends): ((f64, f64, f64), &[Numbered; 2]),
+        BeamModes { modes, numbers, .. }: &BeamModes,
+        ((scale, offset, loss), ends): ((f64, f64, f64), &[BeamModes; 2]),
     ) -> ObservedMode {
         let mode = numbers[number];
         let true_frequency = modes.frequencies()[mode] * scale + offset;
@@ -280,7 +273,7 @@ impl Scene<'_> {
         let damping = self.plan.damping + 0.5 * loss * modes.joint_energy_share(mode);
         let damping_std = self.plan.damping_std;
         let damping = damping_std.map(|std| self.measured(damping, damping * std));
-        let end = |k: usize| ends[k].0.frequencies()[ends[k].1[number]];
+        let end = |k: usize| ends[k].modes.frequencies()[ends[k].numbers[number]];
         let slope = (end(0) / end(1)).ln() / (ENDS[0] / ENDS[1]).ln() * true_frequency;
         let slope_std = self.plan.slope_std;
         let slope = slope_std.map(|std| self.measured(slope, std * true_frequency));

@@ -152,6 +152,9 @@ pub enum DecayVerdict {
     Doubtful,
 }
 
+/// Label of a peak that belongs to no mode and is no mains line.
+pub const UNPAIRED: &str = "unpaired";
+
 /// A peak that belongs to no mode of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtraPeak {
@@ -164,7 +167,7 @@ pub struct ExtraPeak {
     /// Modal constant at its strongest sensor (1/kg), as that of a mode; `None` without a calibrated hammer
     /// and sensor.
     pub constant: Option<f64>,
-    /// What it is ("mains 50 Hz", "unpaired").
+    /// What it is ("mains 50 Hz", [`UNPAIRED`]).
     pub label: String,
 }
 

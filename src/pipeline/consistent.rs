@@ -76,8 +76,7 @@ pub(super) fn masses_in(
 }
 
 fn place_in(recording: Option<&RecordingDescription>, sensor: &SensorDescription) -> Option<f64> {
-    let moved = recording.and_then(|recording| recording.at.get(&sensor.name).copied());
-    moved.or(sensor.position)
+    recording.map_or(sensor.position, |one| one.place_of(sensor))
 }
 
 /// Where a sensor sits (m) in the reference configuration, that of the first recording.

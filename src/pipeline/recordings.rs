@@ -154,10 +154,8 @@ fn open_described(
 
 /// What the description says of the circumstances of a recording.
 fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
-    let place = |sensor: &SensorDescription| {
-        let moved = description.at.get(&sensor.name).copied();
-        Some((sensor.name.clone(), moved.or(sensor.position)?))
-    };
+    let place =
+        |sensor: &SensorDescription| Some((sensor.name.clone(), description.place_of(sensor)?));
     Conditions {
         tap: description.tap,
         sensor_positions: test.sensors.iter().filter_map(place).collect(),

@@ -86,8 +86,7 @@ pub(super) fn sensor_places(
                 name: sensor.name.clone(),
             });
         }
-        let moved = recording.at.get(&sensor.name).copied();
-        let position = moved.or(sensor.position);
+        let position = recording.place_of(sensor);
         Ok(SensorPlace {
             position: position.ok_or_else(|| SimulateError::NoPosition {
                 name: sensor.name.clone(),

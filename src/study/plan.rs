@@ -123,10 +123,11 @@ pub(super) fn plan_of(
     let hardest = levels.fold(0.0, f64::max);
     let configurations = test.recordings.iter().map(|recording| {
         let sensors = test.sensors.iter().map(|sensor| {
-            let place = recording.at.get(&sensor.name).copied().or(sensor.position);
-            let place = place.ok_or_else(|| PlanError::NoPosition {
-                name: sensor.name.clone(),
-            })?;
+            let place = recording
+                .place_of(sensor)
+                .ok_or_else(|| PlanError::NoPosition {
+                    name: sensor.name.clone(),
+                })?;
             Ok((sensor.name.clone(), place))
         });
         Ok(PlannedConfiguration {

@@ -189,8 +189,7 @@ fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
 /// Where a sensor sits in the first recording (m).
 fn place_of(test: &TestDescription, sensor: &SensorDescription) -> Option<f64> {
     let first = test.recordings.first();
-    let moved = first.and_then(|recording| recording.at.get(&sensor.name).copied());
-    moved.or(sensor.position)
+    first.map_or(sensor.position, |recording| recording.place_of(sensor))
 }
 
 /// Sensors where the first recording has them.
@@ -333,9 +332,10 @@ fn frequencies_with(
         ..Circumstances::default()
     };
     let seen = apply(effects, &specimen, &circumstances);
-    let (modes, own) = seen.specimen.beam_modes(count, Mesh::SIMULATION)?;
-    Ok(own
-        .into_iter()
-        .map(|mode| seen.read(modes.frequencies()[mode]))
-        .collect())
+    let own = seen.specimen.beam_modes(count, Mesh::SIMULATION)?;
+    let frequencies = own
+        .numbers
+        .iter()
+        .map(|&mode| own.modes.frequencies()[mode]);
+    Ok(frequencies.map(|frequency| seen.read(frequency)).collect())
 }

@@ -8,7 +8,7 @@ use tapjoint::described::described_specimen;
 use tapjoint::description::{FastenedMass, TestDescription};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
-    GapSettings, Nominal, NominalSensor, TestPlan, Verdict, diagnose, nominal_chi_square, observe,
+    GapSettings, Nominal, TestPlan, Verdict, diagnose, nominal_chi_square, observe,
 };
 use tapjoint::identify::observation::Observations;
 use tapjoint::pipeline::{Analysis, IdentifySettings, run_test};
@@ -98,12 +98,7 @@ fn regress_impossible_masses_name_line_key_range_and_remedy() {
 // ---------------------------------------------------------------- the diagnosis
 
 fn nominal(off: f64) -> Nominal {
-    let sensor = NominalSensor {
-        name: "A".to_owned(),
-        mass: Some(0.004),
-        position: None,
-    };
-    strip_on_springs(off, vec![sensor])
+    strip_on_springs(off, Some(0.004))
 }
 
 /// Five recordings, and a sixth with this mass (kg) at the end.
@@ -152,7 +147,7 @@ fn recover_no_gap_beside_a_described_mass_and_a_gap_beside_one_that_nobody_descr
 /// One sensor place, five modes: an effect with a place has as many parameters as these leave, whatever the
 /// tap and its level. Known masses elsewhere are readings of another kind.
 #[test]
-fn prop_known_masses_make_room_for_a_name() {
+fn regress_known_masses_make_room_for_a_name() {
     let coupled = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", 0.2)]).unwrap();
     let verdict = |masses: &[f64]| {
         let mut plan = five_recordings();

@@ -3,8 +3,8 @@
 use crate::shared::{five_recordings, strip_on_springs};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
-    Diagnosis, GapSettings, NextTest, Nominal, NominalSensor, PlannedConfiguration, Step, TestPlan,
-    Verdict, diagnose, observe,
+    Diagnosis, GapSettings, NextTest, Nominal, PlannedConfiguration, Step, TestPlan, Verdict,
+    diagnose, observe,
 };
 use tapjoint::structure::specimen::PointMass;
 
@@ -12,12 +12,7 @@ const LENGTH: f64 = 0.423;
 
 /// A bolted cantilever with a sensor of unknown mass.
 fn nominal(off: f64) -> Nominal {
-    let sensor = NominalSensor {
-        name: "A".to_owned(),
-        mass: None,
-        position: None,
-    };
-    strip_on_springs(off, vec![sensor])
+    strip_on_springs(off, None)
 }
 
 /// Frequencies of one recording and nothing else.

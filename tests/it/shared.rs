@@ -51,8 +51,14 @@ macro_rules! tapped_strip {
 }
 pub(crate) use tapped_strip;
 
-/// The strip on springs of `off` times the joint of Ingole & Chatterjee, without coupling.
-pub fn strip_on_springs(off: f64, sensors: Vec<NominalSensor>) -> Nominal {
+/// The strip on springs of `off` times the joint of Ingole & Chatterjee, without coupling, as it is described
+/// with a sensor A of this mass (kg).
+pub fn strip_on_springs(off: f64, mass: Option<f64>) -> Nominal {
+    let sensor = NominalSensor {
+        name: "A".to_owned(),
+        mass,
+        position: None,
+    };
     let beam = steel_strip();
     let units = StiffnessUnits::of(&beam);
     let joint = SpecimenJoint::Springs {
@@ -62,7 +68,7 @@ pub fn strip_on_springs(off: f64, sensors: Vec<NominalSensor>) -> Nominal {
     };
     Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
-        sensors,
+        sensors: vec![sensor],
         joint_before: None,
         scale_std: None,
         reading_bias: None,

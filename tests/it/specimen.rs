@@ -1,11 +1,12 @@
 //! The tested structure with everything fastened to it, against independent solutions.
 
 use crate::shared::steel_strip;
+use proptest::prelude::*;
 use std::f64::consts::PI;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::{
     Base, Body, Hinge, LapOverlap, Mesh, PointInertia, PointMass, PointSpring, Specimen,
-    SpecimenJoint,
+    SpecimenJoint, SpecimenModes,
 };
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, StructureError, mode_shapes, natural_frequencies,
@@ -823,6 +824,49 @@ fn limit_shapes_do_not_serve_other_structures() {
         .unwrap();
     for other in [lap(1400.0, 1.2), cantilever(f64::INFINITY, 1.2, 0.0)] {
         assert!(modes.rayleigh_frequency(0, &other).is_err());
+        assert!(modes.near(&other).unwrap().is_none());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Whatever is changed by one part in 100 000. A tip behind a deep crack turns its modes by some hundred times
+    /// that; what one step leaves of a shape is the cube of it, of a frequency the sixth power.
+    #[test]
+    fn prop_modes_found_near_others_are_the_modes(
+        (kx, ky, coupling) in (10.0..3000.0, 0.1..5.0, -0.5..0.5),
+        (place, share, compliance) in (0.05..0.95, 0.0..0.3, 0.0..0.03),
+        base in 30.0..900.0,
+    ) {
+        let length = steel_strip().length;
+        let specimen = |more: f64| {
+            let mut one = cantilever(kx * more, ky / more, coupling);
+            one.base = Some(Base { frequency: base * more, ratio: 0.02 });
+            one.masses.push(PointMass {
+                position: place * length,
+                mass: more * share * steel_strip().mass(),
+                inertia: 0.0,
+            });
+            one.hinges.push(Hinge { position: (1.0 - place) * length * more, compliance });
+            one
+        };
+        let here = specimen(1.0).modes(7, Mesh::DIAGNOSIS).unwrap();
+        let other = specimen(1.00001);
+        let exact = other.modes(7, Mesh::DIAGNOSIS).unwrap();
+        let near = here.near(&other).unwrap().unwrap();
+        // Two modes so close that they exchange their shapes change by more.
+        let f = exact.frequencies();
+        prop_assume!(f.windows(2).all(|two| two[1] / two[0] > 1.05));
+        assert_close(near.frequencies(), f, 1e-10, "near");
+        for mode in 0..7 {
+            let at = |modes: &SpecimenModes, x: f64| modes.displacement(mode, x * length);
+            let sign = (at(&exact, 1.0) * at(&near, 1.0)).signum();
+            for x in [0.1, 0.37, 0.8, 1.0] {
+                let (a, b) = (sign * at(&exact, x), at(&near, x));
+                prop_assert!((a - b).abs() < 1e-6 * at(&exact, 1.0).abs(), "{mode} {x}: {a} {b}");
+            }
+        }
     }
 }
 

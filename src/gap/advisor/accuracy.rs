@@ -26,8 +26,7 @@ pub(super) fn std_of(frame: &Frame, mode: usize) -> f64 {
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    (!values.is_empty()).then(|| crate::stats::median(&mut values))
 }
 
 /// The same without what reading on lines adds, b/sqrt 3.

@@ -1,7 +1,8 @@
 //! Tests that need no vibration of the beam: scales, calipers, a clock.
 
 use super::super::forward::Layout;
-use super::super::frame::{Frame, Small};
+use super::super::frame::Frame;
+use super::super::small_unknowns::Small;
 use super::information::Outlook;
 use super::outlooks::{Expected, State};
 use super::proposals::beam_mass;

@@ -3,10 +3,11 @@
 use super::super::catalogue::Candidate;
 use super::super::evidence::covariance;
 use super::super::forward::{Forward, Layout};
-use super::super::frame::{Frame, Row, Small};
+use super::super::frame::{Frame, Row};
 use super::super::least_squares::{Knowledge, Model, Optimum};
 use super::super::posterior::Entry;
 use super::super::result::Hypothesis;
+use super::super::small_unknowns::Small;
 use super::information::Outlook;
 use super::proposals::{Added, Proposals, Structure};
 use crate::effects::EffectId;

@@ -1,10 +1,11 @@
 //! The tests that are weighed against each other, as configurations that the model can predict.
 
 use super::super::catalogue::Candidate;
-use super::super::frame::{Frame, Row, Small};
+use super::super::frame::{Frame, Row};
 use super::super::nominal::COUPLING;
 use super::super::settings::GapSettings;
 use super::super::setup::Setup;
+use super::super::small_unknowns::Small;
 use super::accuracy::{FINER, observed_modes, std_of, without_bias};
 use super::step::Step;
 use crate::effects::EffectId;

@@ -15,6 +15,7 @@ use super::analysis::{Analysis, ModeResult, RecordingResult};
 use crate::description::SensorKind;
 use crate::identify::observation::{
     Configuration, ExtraPeak, Observations, Observed, ObservedMode, ObservedSensor, ShapeValue,
+    UNPAIRED,
 };
 use crate::modal::{ModeReading, PeakLabel};
 use crate::recording::Format;
@@ -189,7 +190,7 @@ fn extra_peaks(recording: &RecordingResult, readings: &[ModeReading]) -> Vec<Ext
         let label = match (number, reading.label) {
             (Some(_), _) | (_, Some(PeakLabel::NoResonance | PeakLabel::ForceGap)) => return None,
             (None, Some(label)) => label.to_string(),
-            (None, None) => "unpaired".to_string(),
+            (None, None) => UNPAIRED.to_owned(),
         };
         Some(ExtraPeak {
             frequency: reading.frequency,

@@ -17,6 +17,12 @@ pub(super) struct Factor {
     rows: Vec<[f64; HALF_BAND + 1]>,
 }
 
+/// L D L^T of any symmetric matrix: L D left of the diagonal, D on it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Indefinite {
+    rows: Vec<[f64; HALF_BAND + 1]>,
+}
+
 impl Band {
     pub(super) fn zeros(size: usize) -> Self {
         Self {
@@ -96,11 +102,22 @@ impl Band {
         Some(Factor { rows })
     }
 
+    /// x^T self x / x^T other x.
+    pub(super) fn quotient(&self, other: &Self, x: &[f64]) -> f64 {
+        let form = |band: &Self| -> f64 { band.times(x).iter().zip(x).map(|(a, b)| a * b).sum() };
+        form(self) / form(other)
+    }
+
     /// Number of negative eigenvalues: that of the negative pivots (Sylvester's law of inertia).
     pub(super) fn negative_eigenvalues(&self) -> usize {
-        // Rows hold L D left of the diagonal and D on it.
+        let pivots = self.indefinite();
+        let negative = |row: &&[f64; HALF_BAND + 1]| row[HALF_BAND] < 0.0;
+        pivots.rows.iter().filter(negative).count()
+    }
+
+    /// Factors without exchange of rows, which a pivot of zero by chance makes infinite.
+    pub(super) fn indefinite(&self) -> Indefinite {
         let mut rows = self.rows.clone();
-        let mut negative = 0;
         for row in 0..rows.len() {
             let mut own = rows[row];
             for back in (1..=HALF_BAND.min(row)).rev() {
@@ -114,10 +131,31 @@ impl Band {
                 let entry = own[HALF_BAND - back];
                 own[HALF_BAND] -= entry * entry / rows[row - back][HALF_BAND];
             }
-            negative += usize::from(own[HALF_BAND] < 0.0);
             rows[row] = own;
         }
-        negative
+        Indefinite { rows }
+    }
+}
+
+impl Indefinite {
+    /// The solution x of L D L^T x = b.
+    pub(super) fn solve(&self, mut x: Vec<f64>) -> Vec<f64> {
+        // D y = L^-1 b: then the rows' own entries are those of L D.
+        for row in 0..x.len() {
+            let entries = &self.rows[row];
+            for back in 1..=HALF_BAND.min(row) {
+                x[row] -= entries[HALF_BAND - back] * x[row - back];
+            }
+            x[row] /= entries[HALF_BAND];
+        }
+        for row in (0..x.len()).rev() {
+            let (entries, value) = (&self.rows[row], x[row]);
+            for back in 1..=HALF_BAND.min(row) {
+                x[row - back] -=
+                    entries[HALF_BAND - back] / self.rows[row - back][HALF_BAND] * value;
+            }
+        }
+        x
     }
 }
 

@@ -109,11 +109,12 @@ impl<'a> Krylov<'a> {
     fn lowest(mut self, count: usize) -> Option<Pairs> {
         let wanted = count.saturating_sub(self.locked);
         let most = self.mass.size() - self.locked;
-        let first_look = (2 * wanted + 8).min(most);
+        // A beam's modes settle after about twice as many steps, with what is fastened to it some more.
+        let first_look = (2 * wanted + 2).min(most);
         while self.diagonal.len() < most {
             let goes_on = self.step();
             let steps = self.diagonal.len();
-            let looks = steps >= first_look && (steps - first_look).is_multiple_of(4);
+            let looks = steps >= first_look && (steps - first_look).is_multiple_of(2);
             if !(looks || steps == most || !goes_on) {
                 continue;
             }

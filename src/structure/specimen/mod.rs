@@ -17,11 +17,13 @@ mod lanczos;
 mod layout;
 mod model;
 mod modes;
+mod near;
 mod numbering;
 mod section;
 mod tridiagonal;
 
 use super::{Beam, StructureError};
+pub use beam_modes::BeamModes;
 pub use layout::LapLayout;
 pub use modes::SpecimenModes;
 

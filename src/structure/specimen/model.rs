@@ -291,6 +291,22 @@ impl Model {
     }
 }
 
+impl Model {
+    /// The equations' vector of a motion.
+    pub(super) fn vector(&self, motion: &Motion) -> Vec<f64> {
+        let mut vector = vec![0.0; self.numbering.size];
+        let nodes = self.numbering.nodes.iter().zip(&motion.nodes);
+        let moved = nodes.flat_map(|(rows, values)| rows.iter().copied().zip(*values));
+        let base = self.numbering.base.zip(motion.base);
+        for (row, value) in moved.chain(base) {
+            if let Some(entry) = vector.get_mut(row) {
+                *entry = value;
+            }
+        }
+        vector
+    }
+}
+
 impl Motion {
     /// self + factor other.
     pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {

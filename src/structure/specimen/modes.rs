@@ -37,7 +37,7 @@ pub(super) struct Mode {
 }
 
 impl Mode {
-    fn new(model: &Model, vector: &[f64]) -> Self {
+    pub(super) fn new(model: &Model, vector: &[f64]) -> Self {
         let motion = model.motion(vector);
         let energies = model.energies(&motion);
         let square = energies.quotient();

@@ -39,7 +39,8 @@ fn chase(d: &mut [f64], e: &mut [f64], vectors: &mut [Vec<f64>], (first, last): 
     let (mut sine, mut cosine, mut moved) = (1.0, 1.0, 0.0);
     for i in (first..last).rev() {
         let (f, b) = (sine * e[i], cosine * e[i]);
-        let r = f.hypot(g);
+        // Inverses of eigenvalues in units of the first: far from overflow, and what underflows is nothing.
+        let r = (f * f + g * g).sqrt();
         e[i + 1] = r;
         if r == 0.0 {
             // The block has come apart by itself.

@@ -23,10 +23,7 @@ impl StudiedTest {
         let sensors: Vec<f64> = test
             .sensors
             .iter()
-            .filter_map(|sensor| {
-                let moved = first.and_then(|recording| recording.at.get(&sensor.name).copied());
-                moved.or(sensor.position)
-            })
+            .filter_map(|sensor| first.map_or(sensor.position, |one| one.place_of(sensor)))
             .collect();
         let described = test
             .recordings

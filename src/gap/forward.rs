@@ -2,7 +2,7 @@
 
 use super::catalogue::{Candidate, PlaceKind};
 use super::frame::{Frame, Row};
-use super::joint_energy::{joint_shares, stiffened_slope};
+use super::joint_energy::joint_slopes;
 use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised, Model};
 use super::nominal::COUPLING;
@@ -342,9 +342,19 @@ impl<'a> Forward<'a> {
         }
     }
 
-    /// d ln f/d ln k = half the strain energy of that spring, as the mode has it, over that of the
-    /// structure (Rayleigh's quotient is stationary in the shape).
+    /// What the joint's stiffnesses do to every row: see [`joint_slopes`]; to shapes, what they do at the nominal
+    /// optimum.
     fn joint_slopes(&self, solved: &[Solved], slopes: &mut DMatrix<f64>) {
+        let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(solved.len());
+        for one in solved {
+            let mut before = solved[..all.len()].iter();
+            let known = before.position(|other| Arc::ptr_eq(&other.own, &one.own));
+            let directions = self.layout.joint.iter();
+            all.push(match known {
+                Some(other) => all[other].clone(),
+                None => directions.map(|k| joint_slopes(one, *k)).collect(),
+            });
+        }
         for (row, kind) in self.rows.iter().enumerate() {
             let Row::Frequency {
                 configuration,
@@ -362,20 +372,10 @@ impl<'a> Forward<'a> {
             let Some(index) = one.index(mode) else {
                 continue;
             };
-            for (column, &direction) in self.layout.joint.iter().enumerate() {
-                slopes[(row, column)] =
-                    self.joint_slope(one, (index, direction)) * offset_factor(one, index);
+            for (column, own) in all[configuration].iter().enumerate() {
+                slopes[(row, column)] = own[index] * offset_factor(one, index);
             }
         }
-    }
-
-    fn joint_slope(&self, one: &Solved, (index, direction): (usize, usize)) -> f64 {
-        let based = one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
-        if based || direction == COUPLING {
-            // The base's spring is tied to the joint's by their ratio: both move.
-            return stiffened_slope(one, index, direction);
-        }
-        0.5 * joint_shares(one, index)[direction]
     }
 }
 

@@ -29,9 +29,20 @@ pub(super) fn joint_shares(one: &Solved, index: usize) -> [f64; 2] {
     [part(q[0], q[1], kt, kr), part(q[1], q[0], kr, kt)]
 }
 
-/// d ln f/d ln k of a spring of the joint, or d ln f/d coupling, by Rayleigh's quotient of the changed
-/// structure.
-pub(super) fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f64 {
+/// d ln f/d ln k of all modes for a spring of the joint, or d ln f/d coupling: half the strain energy of that
+/// spring, as the mode has it, over that of the structure (Rayleigh's quotient is stationary in the shape).
+pub(super) fn joint_slopes(one: &Solved, direction: usize) -> Vec<f64> {
+    let based = one.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+    if based || direction == COUPLING {
+        // The base's spring is tied to the joint's by their ratio: both move.
+        return stiffened_slopes(one, direction);
+    }
+    let share = |index: usize| 0.5 * joint_shares(one, index)[direction];
+    (0..one.modes().len()).map(share).collect()
+}
+
+/// The same by Rayleigh's quotient of the changed structure.
+fn stiffened_slopes(one: &Solved, direction: usize) -> Vec<f64> {
     const STEP: f64 = 1e-4;
     let mut other = one.seen.specimen.clone();
     if let SpecimenJoint::Springs { kt, kr, coupling } = &mut other.joint {
@@ -41,8 +52,11 @@ pub(super) fn stiffened_slope(one: &Solved, index: usize, direction: usize) -> f
             _ => *kr *= STEP.exp(),
         }
     }
-    match one.modes().rayleigh_frequency(index, &other) {
-        Ok(frequency) => (frequency / one.modes().frequencies()[index]).ln() / STEP,
-        Err(_) => 0.0,
+    let own = one.modes().frequencies();
+    match one.modes().rayleigh_frequencies(&other) {
+        Ok(moved) => (moved.iter().zip(own))
+            .map(|(moved, own)| (moved / own).ln() / STEP)
+            .collect(),
+        Err(_) => vec![0.0; own.len()],
     }
 }

@@ -95,6 +95,17 @@ pub fn bound_percent(percent: f64) -> String {
     written.map_or_else(|| MISSING.to_owned(), |bound| format!("\u{b1}{bound}"))
 }
 
+/// A probability in percent to a tenth; what would read as certain or impossible is said as a bound.
+pub fn probability(value: f64) -> String {
+    if value > 0.9995 {
+        ">99.9 %".to_owned()
+    } else if value < 0.0005 {
+        "<0.1 %".to_owned()
+    } else {
+        format!("{:.1} %", 100.0 * value)
+    }
+}
+
 /// A value with the given number of significant digits; "–" for NaN, "∞" beyond all bounds.
 pub fn significant(value: f64, digits: i32) -> String {
     if value.is_nan() {

@@ -1,7 +1,7 @@
 //! The picture of the gap: errors before and after the best hypothesis, and the odds.
 
 use super::super::document::{Document, GapSection, PullSection};
-use super::super::format::signed_percent;
+use super::super::format::{probability, signed_percent};
 use super::super::tables::place_of;
 use super::axis::{Axis, extent, padded};
 use super::drawing::{Align, Drawing, Stroke, Text};
@@ -137,7 +137,7 @@ pub fn abscissa(pulls: &[PullSection], pull: &PullSection) -> f64 {
 }
 
 fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
-    let title = Text::new("probability (%)", (ODDS.0, TOP - 18.0), LABEL_SIZE);
+    let title = Text::new("probability", (ODDS.0, TOP - 18.0), LABEL_SIZE);
     drawing.text(title.bold());
     let step = (BOTTOM - TOP) / MOST_BARS as f64;
     for (row, found) in gap.hypotheses.iter().take(MOST_BARS).enumerate() {
@@ -155,8 +155,8 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
         let middle = 0.5 * (top + bottom);
         let name = Text::new(&found.effect, (ODDS.0 - 10.0, middle), TICK_SIZE);
         drawing.text(name.aligned(Align::End));
-        let value = format!("{:.1}", 100.0 * found.probability);
-        let words = format!("{}: probability {value} %", found.effect);
+        let value = probability(found.probability);
+        let words = format!("{}: probability {value}", found.effect);
         drawing.note((ERRORS_RIGHT + 20.0, top), (ODDS.1, bottom), words);
         drawing.text(Text::new(value, (ODDS.1 + 8.0, middle), TICK_SIZE).colored(SOFT));
     }

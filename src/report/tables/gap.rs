@@ -3,7 +3,8 @@
 use super::super::document::{
     ClosureSection, Document, GapSection, HypothesisSection, PullSection,
 };
-use super::hypotheses::{LEAST_PROBABILITY, percent, probability, sizes};
+use super::super::format::probability;
+use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
 use super::next_tests::next_test;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
@@ -27,7 +28,11 @@ fn verdict(gap: &GapSection) -> String {
         "no-gap" => no_gap(gap),
         "named" => {
             let size = named(gap).map_or_else(String::new, |found| format!(": {}", sizes(found)));
-            format!("The data are consistent with one cause, {effects}{odds}{size}.")
+            let causes = match gap.verdict.effects.as_slice() {
+                [first, second] => format!("two causes, {first} and {second}"),
+                _ => format!("one cause, {effects}"),
+            };
+            format!("The data are consistent with {causes}{odds}{size}.")
         }
         "group" => {
             format!("The cause is one of {effects}{odds}; these data cannot tell them apart.")

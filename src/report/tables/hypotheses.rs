@@ -1,7 +1,7 @@
 //! What may be missing in the model, as a table.
 
 use super::super::document::{Document, HypothesisSection, ParameterSection};
-use super::super::format::{MISSING, significant};
+use super::super::format::{MISSING, probability, significant};
 use super::{Table, number, words};
 
 /// Hypotheses less probable than this are not listed.
@@ -89,17 +89,6 @@ fn unit_of(name: &str) -> (&'static str, f64) {
         "force" => (" N", 1.0),
         "relative" | "ratio" | "std" | "loss_factor" => (" %", 1e2),
         _ => ("", 1.0),
-    }
-}
-
-/// A probability (%), its ends as bounds.
-pub(super) fn probability(value: f64) -> String {
-    if value > 0.9995 {
-        ">99.9 %".to_owned()
-    } else if value < 0.0005 {
-        "<0.1 %".to_owned()
-    } else {
-        format!("{:.1} %", 100.0 * value)
     }
 }
 

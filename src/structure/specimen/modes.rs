@@ -158,22 +158,13 @@ impl SpecimenModes {
         inertia * turn * turn / self.modes[mode].energies.kinetic
     }
 
-    /// Frequency (Hz) that Rayleigh's quotient gives for another specimen with this mode's shape.
+    /// Frequencies (Hz) that Rayleigh's quotient gives for another specimen with these modes' shapes.
     ///
     /// The quotient is stationary at a mode: of another specimen that differs by a small d it is the
     /// other's frequency up to d^2, and its derivative with any parameter is the frequency's.
     ///
     /// # Errors
     /// As [`Specimen::modes`], and where the other specimen has other beams or other rigid springs.
-    pub fn rayleigh_frequency(&self, mode: usize, other: &Specimen) -> Result<f64, StructureError> {
-        let model = self.model_of(other)?;
-        Ok(self.quotient_frequency(&model, mode))
-    }
-
-    /// [`Self::rayleigh_frequency`] of all modes, for hardly more than the price of one.
-    ///
-    /// # Errors
-    /// As [`Self::rayleigh_frequency`].
     pub fn rayleigh_frequencies(&self, other: &Specimen) -> Result<Vec<f64>, StructureError> {
         let model = self.model_of(other)?;
         Ok((0..self.len())

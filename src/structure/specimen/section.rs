@@ -117,9 +117,16 @@ impl Section {
     }
 }
 
+/// v^T A v of a symmetric matrix.
 pub(super) fn quadratic(matrix: &Square, v: &[f64; 4]) -> f64 {
-    let row = |i: usize| matrix[i].iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
-    (0..4).map(|i| v[i] * row(i)).sum()
+    let (mut diagonal, mut beside) = (0.0, 0.0);
+    for i in 0..4 {
+        diagonal += matrix[i][i] * v[i] * v[i];
+        for j in 0..i {
+            beside += matrix[i][j] * v[i] * v[j];
+        }
+    }
+    diagonal + 2.0 * beside
 }
 
 fn sum(a: &Square, b: &Square) -> Square {

@@ -206,13 +206,13 @@ impl Check {
             Check::Linearity => (
                 "linearity",
                 "1",
-                "The joint slips or opens with the level: its stiffness depends on the amplitude.",
-                "State the tap level with every frequency, and identify the joint at the lowest level that rises clear of the noise.",
+                "The joint changed between the recordings: it slips or opens with the level, it drifted, or it was touched.",
+                "Tap softly and hard within one recording, where a joint has no time to drift; if it is the level, state it with every frequency, and identify the joint at the lowest one that rises clear of the noise.",
             ),
             _ => (
                 "mass-loading",
                 "1",
-                "The sensor's mass lowers the modes that move where it sits.",
+                "The sensor's mass lowers the modes that move where it sits, or the joint changed between the recordings.",
                 "State the sensor's mass in the description so that the model carries it, take a lighter sensor, or place it near the joint.",
             ),
         }

@@ -139,7 +139,7 @@ pub fn check_linearity(
                 let what = format!("at {ratio:.2} times the tap level");
                 let order = |mode: &ResonanceEvidence| in_order(mode, first, recordings, settings);
                 let pair = (first, second);
-                verdicts.extend(shifts(Check::Linearity, pair, (&what, &order), settings));
+                verdicts.extend(shifts(Check::Linearity, pair, &what, &order, settings));
             }
         }
     }
@@ -170,12 +170,7 @@ pub fn check_mass_loading(
             seen.push(second);
             let what = "with the sensors elsewhere";
             let pair = (first, second);
-            verdicts.extend(shifts(
-                Check::MassLoading,
-                pair,
-                (what, &|_| None),
-                settings,
-            ));
+            verdicts.extend(shifts(Check::MassLoading, pair, what, &|_| None, settings));
         }
     }
     or_missing(
@@ -225,7 +220,8 @@ fn same_arrangement(
 fn shifts(
     check: Check,
     (first, second): (&RecordingEvidence, &RecordingEvidence),
-    (what, order): (&str, &dyn Fn(&ResonanceEvidence) -> Option<usize>),
+    what: &str,
+    order: &dyn Fn(&ResonanceEvidence) -> Option<usize>,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
     let of_pair = |mode: &ResonanceEvidence| {

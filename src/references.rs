@@ -56,3 +56,11 @@
 //!   readings would predict of them.
 //! - **Masing 1926**: "Eigenspannungen und Verfestigung beim Messing", Proceedings of the 2nd International
 //!   Congress of Applied Mechanics, 332-335. Branches of a hysteresis loop from the first loading.
+//! - **Smyth 2004**: "Linear models and empirical Bayes methods for assessing differential expression in
+//!   microarray experiments", Statistical Applications in Genetics and Molecular Biology 3, 3. Variances from
+//!   few repeats, drawn towards what they have in common.
+//! - **Kass & Raftery 1995**: "Bayes factors", Journal of the American Statistical Association 90, 773-795.
+//! - **Sellke, Bayarri & Berger 2001**: "Calibration of p values for testing precise null hypotheses", The
+//!   American Statistician 55, 62-71. The highest odds against a hypothesis that a misfit gives.
+//! - **Blake & Zisserman 1987**: "Visual Reconstruction", MIT Press. Graduated non-convexity: a search among
+//!   many valleys that begins on a smoothed surface.

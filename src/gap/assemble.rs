@@ -9,7 +9,7 @@ use super::frame::{Frame, Small};
 use super::left_out::LeftOutErrors;
 use super::nominal::COUPLING;
 use super::place_map::place_map;
-use super::posterior::{APART, Entry, confounded, lead, places, raise_unknown, spreads};
+use super::posterior::{APART, Entry, confounded, lead, lower, places, raise_unknown, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
     Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LeftOutRecordings,
@@ -22,20 +22,42 @@ use super::verdict::verdict;
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
-/// What the readings say against the best explanation is evidence for something unknown, which shares the
-/// prior of one group: a misfit of probability p speaks against it with odds of 1 to -e p ln p at most
+/// What the readings say against the best explanation. Where another one explains those that took part as well and
+/// is not refuted, that one takes its place. Else it is evidence for something unknown, which shares the prior of
+/// one group: a misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most
 /// (Sellke, Bayarri & Berger 2001).
 pub(super) fn doubt(competition: &mut Competition) {
     let Competition { frame, entries, .. } = competition;
     let Some(best) = best(entries) else { return };
-    let fit = &entries[best].fit;
-    let Some(trial) = Trial::new(frame, fit) else {
-        return;
+    // The odds against each; infinite where a fit has no uncertainty to be tested with.
+    let against = |entry: &Entry| -> f64 {
+        let Some(trial) = Trial::new(frame, &entry.fit) else {
+            return f64::INFINITY;
+        };
+        let refuting = trial.with_withheld(frame, &entry.fit).refuting();
+        refuting.map_or(1.0, most_against)
     };
-    if let Some(p) = trial.with_withheld(frame, fit).refuting() {
-        raise_unknown(entries, best, most_against(p));
+    let odds = against(&entries[best]);
+    if odds <= 1.0 {
+        return;
+    }
+    let least = entries[best].probability * (-AS_WELL).exp();
+    let as_well =
+        |entry: &Entry| entry.hypothesis != Hypothesis::Unknown && entry.probability >= least;
+    let all: Vec<Option<f64>> = entries
+        .iter()
+        .map(|entry| as_well(entry).then(|| against(entry)))
+        .collect();
+    if all.contains(&Some(1.0)) {
+        lower(entries, &all);
+    } else if odds.is_finite() {
+        raise_unknown(entries, best, odds);
     }
 }
+
+/// Logarithm of the odds up to which two explanations count as equally good ones: as much as is asked for a
+/// second effect.
+const AS_WELL: f64 = 5.0;
 
 /// Highest odds against an explanation whose misfit has the probability `p`.
 fn most_against(p: f64) -> f64 {

@@ -377,6 +377,7 @@ mod tests {
             frequency: 1.005 * observed.configurations[0].modes[2].frequency,
             std: None,
             level_db: None,
+            constant: None,
             label: "unpaired".to_owned(),
         });
         let (plain, _, _) = frames(&observed);

@@ -7,7 +7,7 @@ use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised, Model};
 use super::nominal::COUPLING;
 use crate::effects::{Circumstances, Effect, Seen, apply};
-use crate::structure::specimen::{Mesh, Specimen, SpecimenJoint, SpecimenModes};
+use crate::structure::specimen::{Specimen, SpecimenJoint, SpecimenModes};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -106,6 +106,12 @@ impl Solved {
     /// Index of the mode with this number (1 = lowest).
     pub(super) fn index(&self, mode: usize) -> Option<usize> {
         self.numbers.get(mode - 1).copied()
+    }
+
+    /// Index of the fixture's own mode: the one that is nobody's.
+    pub(super) fn base(&self) -> Option<usize> {
+        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        (0..self.modes.len()).find(|index| based && !self.numbers.contains(index))
     }
 
     /// Frequency as it is read (Hz).
@@ -241,7 +247,7 @@ impl<'a> Forward<'a> {
 
     fn modes_of(&self, specimen: &Specimen) -> Option<(Arc<SpecimenModes>, Vec<usize>)> {
         let (modes, numbers) = specimen
-            .beam_modes(self.frame.modes, Mesh::DIAGNOSIS)
+            .beam_modes(self.frame.modes, self.frame.mesh)
             .ok()?;
         Some((Arc::new(modes), numbers))
     }

@@ -2,11 +2,13 @@
 //! (columns) that every hypothesis shares.
 
 use super::decay_readings::{average_std, bent_std, widen};
+use super::lone_peaks::Peaks;
 use super::noise::{self, Reading};
 use super::nominal::{COUPLING, Nominal};
 use super::settings::GapSettings;
 use super::setup::{Lists, Setup, setup, twin};
 use crate::identify::observation::Observations;
+use crate::structure::specimen::Mesh;
 use nalgebra::DMatrix;
 
 /// What a reading is of.
@@ -76,6 +78,8 @@ pub(super) struct Frame {
     pub(super) small_centres: Vec<f64>,
     /// Modes that are solved for.
     pub(super) modes: usize,
+    /// How finely the structure is divided.
+    pub(super) mesh: Mesh,
     /// Modes above this one are withheld.
     pub(super) fitted_modes: usize,
     /// Frequencies that take no part in the fit: row and reading.
@@ -86,6 +90,8 @@ pub(super) struct Frame {
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
+    /// Peaks that belong to no mode.
+    pub(super) peaks: Peaks,
 }
 
 /// Least uncertainty of a modal constant or ratio over the root mean square of its kind (1): 1 %, what
@@ -125,10 +131,12 @@ impl Frame {
             small_stds: Vec::new(),
             small_centres: Vec::new(),
             modes: highest,
+            mesh: Mesh::DIAGNOSIS,
             fitted_modes,
             withheld: Vec::new(),
             scatter: Vec::new(),
             shape_slopes: None,
+            peaks: Peaks::new(observations),
         };
         frame.add_frequencies(observations, settings);
         frame.add_shapes(observations);

@@ -89,12 +89,15 @@ impl Search<'_> {
             return Some(self.linear_fit(&forward, &known, None)?.objective);
         };
         let (low, high) = (range.inward(range.low), range.inward(range.high));
-        let nodes = (0..range.nodes).filter_map(|node| {
-            let place = low + (high - low) * (node as f64 + 0.5) / range.nodes as f64;
-            let mut held = known.clone();
-            held[at + 1] = Knowledge::held(place);
-            Some(self.linear_fit(&forward, &held, Some(place))?.objective)
-        });
+        let spread = |node| low + (high - low) * (node as f64 + 0.5) / range.nodes as f64;
+        let places = (0..range.nodes).map(spread);
+        let nodes = places
+            .chain(self.peak_places(range.kind))
+            .filter_map(|place| {
+                let mut held = known.clone();
+                held[at + 1] = Knowledge::held(place);
+                Some(self.linear_fit(&forward, &held, Some(place))?.objective)
+            });
         nodes.min_by(f64::total_cmp)
     }
 
@@ -120,7 +123,7 @@ impl Search<'_> {
     }
 
     /// What is known of all parameters.
-    fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
+    pub(super) fn known(&self, forward: &Forward<'_>) -> Vec<Knowledge> {
         let drifts = &self.settings.drift_stds;
         let middle = drifts[drifts.len() / 2];
         knowledge(self.frame, &forward.layout, self.settings.joint_std, middle)
@@ -160,14 +163,15 @@ impl Search<'_> {
         Some(self.fit(forward, best, log_sum(&total)))
     }
 
-    fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
+    pub(super) fn fit(&self, forward: &Forward<'_>, branch: Branch, log_evidence: f64) -> Fit {
         let bend = self.bend(forward, &branch);
         let most = log_likelihood(&self.frame.readings, &branch.optimum);
-        Fit {
+        let fit = Fit {
             effects: forward.layout.effects.clone(),
             branch,
             log_evidence: (log_evidence + bend).min(most),
-        }
+        };
+        self.with_peaks(forward, fit)
     }
 
     /// Sizes from which the search begins: what the model linearised without the effect asks for, and
@@ -204,7 +208,7 @@ impl Search<'_> {
     }
 
     /// The optimum of the model linearised where there is next to nothing of the effect.
-    fn linear_fit(
+    pub(super) fn linear_fit(
         &self,
         forward: &Forward<'_>,
         known: &[Knowledge],

@@ -4,6 +4,7 @@
 //! Observations, Nominal -> frame       readings and small unknowns in order
 //!                          forward     what a hypothesis predicts (structure, effects)
 //!                          evidence    how probable the readings are under it
+//!                          fixture_peak  peaks of no mode, and the fixture whose mode they may be
 //!                          posterior   probabilities, places, what cannot be told apart
 //!                          quality     misfit overall, by block, with each mode left out
 //!                          withheld    what it predicts of readings that took no part
@@ -22,6 +23,7 @@
 //! reach the simulator, so that its answers to virtual tests are answers.
 
 mod advisor;
+mod afar;
 mod along_decay;
 mod assemble;
 mod branches;
@@ -34,6 +36,7 @@ mod decay_readings;
 mod error;
 mod evidence;
 mod fastened;
+mod fixture_peak;
 mod forward;
 mod frame;
 mod hypothesis;
@@ -42,6 +45,7 @@ mod joint_path;
 mod knowledge;
 mod least_squares;
 mod left_out;
+mod lone_peaks;
 mod noise;
 mod nominal;
 mod pairs;

@@ -1,5 +1,6 @@
 //! Two effects at once, where no single one suffices.
 
+use super::afar::{Rough, Start, unexplained};
 use super::catalogue::{Candidate, PlaceKind};
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search};
@@ -33,45 +34,45 @@ pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
     if frame.rows.len() < 6 || !competition.entries.first().is_some_and(seen) {
         return;
     }
-    let needed = if competition.entries.iter().any(suffices) {
-        PROMISED
-    } else {
-        f64::NEG_INFINITY
-    };
+    let suffices_one = competition.entries.iter().any(suffices);
     let singles: Vec<&Entry> = competition
         .entries
         .iter()
         .filter(|entry| entry.effects().len() == 1 && entry.drift.is_none())
         .collect();
-    let tasks: Vec<(&Entry, &Entry)> = singles
-        .iter()
-        .take(FIRSTS)
-        .flat_map(|first| {
-            singles
-                .iter()
-                .filter(|second| first.groups() != second.groups())
-                .map(|second| (*first, *second))
-        })
-        .collect();
-    let found: Vec<Option<Entry>> = promising((frame, settings), &tasks, needed)
+    let needed = if suffices_one {
+        PROMISED
+    } else {
+        f64::NEG_INFINITY
+    };
+    let (mut tried, mut tasks) = promising((frame, settings), &singles, needed);
+    if !suffices_one {
+        let (asked, far) = from_afar((frame, settings), &singles);
+        tasks.truncate(BESIDE);
+        tasks.extend(far);
+        tried = tried.max(asked);
+    }
+    let found: Vec<Option<Entry>> = tasks
         .par_iter()
-        .map(|(first, second)| pair(frame, settings, (first, second)))
+        .map(|task| pair(frame, settings, task))
         .collect();
     let pairs = distinct(found.into_iter().flatten().collect());
-    let tried = tasks.len();
     competition.entries.extend(pairs);
     spread_over_the_beam(&mut competition.entries);
     set_probabilities(&mut competition.entries, tried);
 }
 
+/// Whether an effect sits somewhere along the beam.
+fn is_local(candidate: &Candidate) -> bool {
+    let place = candidate.place.as_ref();
+    place.is_some_and(|place| place.kind == PlaceKind::Position)
+}
+
 /// What is unknown may be spread over a part of the beam. Two changes at places of their own imitate every
 /// such change, with as many parameters as its place, extent, mass and stiffness: it explains what they
-/// explain, and from these readings nobody can tell which it was.
-fn spread_over_the_beam(entries: &mut [Entry]) {
-    let is_local = |candidate: &Candidate| {
-        let place = candidate.place.as_ref();
-        place.is_some_and(|place| place.kind == PlaceKind::Position)
-    };
+/// explain, and from these readings nobody can tell which it was. Two of the same kind are no hypothesis of
+/// their own: they are one way of being unknown.
+fn spread_over_the_beam(entries: &mut Vec<Entry>) {
     let most = entries
         .iter()
         .filter(|entry| entry.effects().len() > 1 && entry.fit.effects.iter().all(is_local))
@@ -81,18 +82,35 @@ fn spread_over_the_beam(entries: &mut [Entry]) {
     if let Some(unknown) = all.find(|entry| entry.hypothesis == Hypothesis::Unknown) {
         unknown.fit.log_evidence = unknown.fit.log_evidence.max(most);
     }
+    entries.retain(|entry| match entry.effects() {
+        [first, second] => first != second,
+        _ => true,
+    });
 }
 
 /// How many pairs are fitted in earnest.
 const EARNEST: usize = 4;
 
-/// The pairs whose linearised models explain the readings best, and better than the best single one by what
-/// is needed.
+/// A second effect that is tried beside a first one, and where the search may begin from afar, the most
+/// promising first.
+type Task<'a> = (&'a Entry, &'a Entry, Vec<Start>);
+
+/// The pairs of one of the best effects with a second whose linearised models explain the readings best, and
+/// better than the first by what is needed; and how many were asked.
 fn promising<'a>(
     (frame, settings): (&Frame, &GapSettings),
-    tasks: &[(&'a Entry, &'a Entry)],
+    singles: &[&'a Entry],
     needed: f64,
-) -> Vec<(&'a Entry, &'a Entry)> {
+) -> (usize, Vec<Task<'a>>) {
+    let tasks: Vec<(&Entry, &Entry)> = singles
+        .iter()
+        .take(FIRSTS)
+        .flat_map(|first| {
+            let others = singles.iter();
+            let others = others.filter(|second| first.groups() != second.groups());
+            others.map(|second| (*first, *second))
+        })
+        .collect();
     let promise = |(first, second): &(&Entry, &Entry)| {
         let search = Search {
             frame,
@@ -111,12 +129,80 @@ fn promising<'a>(
         .collect();
     order.sort_by(|&a, &b| of(a).total_cmp(&of(b)));
     order.truncate(EARNEST);
-    order.into_iter().map(|k| tasks[k]).collect()
+    let chosen = order
+        .into_iter()
+        .map(|k| (tasks[k].0, tasks[k].1, Vec::new()));
+    (tasks.len(), chosen.collect())
+}
+
+/// How many pairs are looked at again with finer readings, each from so many optima.
+const FINER: usize = 12;
+const OPTIMA: usize = 3;
+
+/// How many promising pairs are fitted beside those that were found from afar.
+const BESIDE: usize = 2;
+
+/// Of all pairs those that explain the frequencies best, which count at first as uncertain as the best single
+/// effect leaves them unexplained; and how many were asked.
+fn from_afar<'a>(
+    (frame, settings): (&Frame, &GapSettings),
+    singles: &[&'a Entry],
+) -> (usize, Vec<Task<'a>>) {
+    let left = singles.iter().map(|one| unexplained(frame, &one.fit));
+    let factor = left.fold(f64::INFINITY, f64::min);
+    let rough = Rough::new(frame, settings, factor);
+    let candidate = |one: &Entry| one.fit.effects[0];
+    let alone: Vec<Option<Start>> = singles
+        .par_iter()
+        .map(|one| rough.alone(candidate(one)).into_iter().next())
+        .collect();
+    let of = |k: usize| (0..=k).map(move |first| (first, k));
+    let all: Vec<(usize, usize)> = (0..singles.len())
+        .flat_map(of)
+        .filter(|&(a, b)| match a == b {
+            true => is_local(&candidate(singles[a])),
+            false => singles[a].groups() != singles[b].groups(),
+        })
+        .collect();
+    let sorted = |mut starts: Vec<Start>| {
+        starts.sort_by(|a, b| a.objective.total_cmp(&b.objective));
+        starts.dedup_by(|one, better| one.is_like(better));
+        starts.truncate(OPTIMA);
+        starts
+    };
+    let both = |&(a, b): &(usize, usize)| {
+        let after = |first: usize, second: usize| {
+            let (first, second) = (&alone[first], candidate(singles[second]));
+            let beside = |first| rough.beside(first, second);
+            first.as_ref().map_or_else(Vec::new, beside)
+        };
+        let starts = sorted([after(a, b), after(b, a)].concat());
+        (singles[a], singles[b], starts)
+    };
+    let best = |mut found: Vec<Task<'a>>, count: usize| {
+        let misfit = |task: &Task<'a>| task.2.first().map_or(f64::INFINITY, |one| one.objective);
+        found.sort_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+        found.truncate(count);
+        found
+    };
+    let found: Vec<Task<'a>> = all.par_iter().map(both).collect();
+    let finer = Rough::new(frame, settings, factor.sqrt());
+    let again = |(first, second, starts): &Task<'a>| {
+        let starts = starts.iter().filter_map(|start| finer.go_on(start));
+        (*first, *second, sorted(starts.collect()))
+    };
+    let found = best(found, FINER).par_iter().map(again).collect();
+    // Two of a kind are no name, but what is unknown may look like them.
+    let (alike, others): (Vec<Task<'a>>, Vec<Task<'a>>) = best(found, FINER)
+        .into_iter()
+        .partition(|task| task.0.effects() == task.1.effects());
+    let others = best(others, EARNEST);
+    (all.len(), [others, best(alike, 1)].concat())
 }
 
 /// A second effect beside a first one, if it is believed: it has to beat the better of the two by
 /// themselves, in evidence and on readings that took no part.
-fn pair(frame: &Frame, settings: &GapSettings, (first, second): (&Entry, &Entry)) -> Option<Entry> {
+fn pair(frame: &Frame, settings: &GapSettings, (first, second, afar): &Task<'_>) -> Option<Entry> {
     let search = Search {
         frame,
         settings,
@@ -124,10 +210,18 @@ fn pair(frame: &Frame, settings: &GapSettings, (first, second): (&Entry, &Entry)
     };
     let objective = |fit: &Fit| fit.branch.optimum.objective;
     let candidate = *second.fit.effects.first()?;
-    let fit = [search.add(candidate), search.add_from(&second.fit)]
-        .into_iter()
-        .flatten()
-        .min_by(|a, b| objective(a).total_cmp(&objective(b)))?;
+    let deepest = |a: &Fit, b: &Fit| objective(a).total_cmp(&objective(b));
+    let fit = if afar.is_empty() {
+        let near = [search.add(candidate), search.add_from(&second.fit)];
+        near.into_iter().flatten().min_by(deepest)
+    } else {
+        let settled = afar.iter().filter_map(|start| {
+            let is_first = first.effects() == [start.first()];
+            let without = if is_first { &first.fit } else { &second.fit };
+            Search { without, ..search }.settle(std::slice::from_ref(start))
+        });
+        settled.min_by(deepest)
+    }?;
     let alone = if first.fit.log_evidence > second.fit.log_evidence {
         &first.fit
     } else {
@@ -140,7 +234,7 @@ fn pair(frame: &Frame, settings: &GapSettings, (first, second): (&Entry, &Entry)
     {
         return None;
     }
-    let effects = vec![first.effects()[0], second.effects()[0]];
+    let effects = fit.effects.iter().map(|one| one.effect).collect();
     Some(Entry::new(Hypothesis::Effects(effects), fit))
 }
 
@@ -164,7 +258,7 @@ fn distinct(found: Vec<Entry>) -> Vec<Entry> {
 }
 
 /// Whether the readings refute a fit.
-fn misfits(frame: &Frame, fit: &Fit) -> bool {
+pub(super) fn misfits(frame: &Frame, fit: &Fit) -> bool {
     Trial::new(frame, fit).is_none_or(|trial| trial.refuted())
 }
 

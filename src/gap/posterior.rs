@@ -104,6 +104,23 @@ pub(super) fn raise_unknown(entries: &mut [Entry], refuted: usize, bayes_factor:
     entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
 }
 
+/// Divides the probability of every entry against which there are odds by these.
+pub(super) fn lower(entries: &mut [Entry], odds: &[Option<f64>]) {
+    let before: Vec<f64> = entries.iter().map(|entry| entry.probability).collect();
+    for (entry, probability) in entries.iter_mut().zip(divided(&before, odds)) {
+        entry.probability = probability;
+    }
+    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
+/// Probabilities divided by odds, with the sum 1.
+fn divided(probabilities: &[f64], odds: &[Option<f64>]) -> Vec<f64> {
+    let each = probabilities.iter().zip(odds);
+    let each: Vec<f64> = each.map(|(p, odds)| p / odds.unwrap_or(1.0)).collect();
+    let total: f64 = each.iter().sum();
+    each.into_iter().map(|p| p / total).collect()
+}
+
 /// Probability of each group, pairs apart, `none` and `unknown` among them; the most probable first.
 pub(super) fn by_group(entries: &[Entry]) -> Vec<(Vec<usize>, f64)> {
     let mut groups: Vec<(Vec<usize>, f64)> = Vec::new();
@@ -210,5 +227,22 @@ pub(super) fn spreads(entry: &Entry) -> Vec<f64> {
             .map(|v| v.max(0.0).sqrt())
             .collect(),
         None => vec![f64::INFINITY; branch.knowledge.len()],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is refuted, even beyond all odds, leaves the others as they were among each other.
+    #[test]
+    fn prop_lowered_probabilities_keep_the_odds_of_all_others() {
+        for odds in [8.0, 1e10, f64::INFINITY] {
+            let after = divided(&[0.6, 0.3, 0.1], &[Some(odds), None, Some(1.0)]);
+            // Rounding of three numbers.
+            assert!((after.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            assert!((after[1] / after[2] - 3.0).abs() < 1e-14);
+            assert!((after[0] / after[1] - 2.0 / odds).abs() < 1e-15);
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::frame::{Frame, Small};
 use super::hypothesis::{Fit, Search, fit_nominal};
 use super::joint_path::joint_amplitude;
 use super::nominal::{COUPLING, Nominal};
-use super::pairs::add_pairs;
+use super::pairs::{add_pairs, misfits};
 use super::posterior::{Entry, set_probabilities};
 use super::result::Hypothesis;
 use super::settings::GapSettings;
@@ -198,6 +198,10 @@ fn compete_once(
         .into_iter()
         .flatten()
         .collect();
+    let fits = entries.iter().map(|entry| &entry.fit).chain([&none]);
+    if fits.into_iter().all(|fit| misfits(&frame, fit)) {
+        seek_from_afar(&search, &candidates, &mut entries);
+    }
     if let Some((fit, drift)) = fit_drift(&frame, &none) {
         let mut entry = Entry::new(Hypothesis::Effects(vec![EffectId::JointDrift]), fit);
         entry.drift = Some(drift);
@@ -215,6 +219,32 @@ fn compete_once(
         baseline,
         entries,
     })
+}
+
+/// Where nothing suffices: every effect once more from afar, in case it is larger than a search from without
+/// it can reach.
+fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut Vec<Entry>) {
+    let objective = |fit: &Fit| fit.branch.optimum.objective;
+    let so_far = |candidate: &Candidate| {
+        let own = |entry: &&Entry| entry.effects() == [candidate.effect];
+        entries.iter().find(own).map(|entry| &entry.fit)
+    };
+    let found: Vec<Option<Fit>> = candidates
+        .par_iter()
+        .map(|candidate| search.add_from_afar(*candidate, so_far(candidate)))
+        .collect();
+    for (candidate, fit) in candidates.iter().zip(found) {
+        let Some(fit) = fit else { continue };
+        let own = |entry: &&mut Entry| entry.effects() == [candidate.effect];
+        match entries.iter_mut().find(own) {
+            Some(entry) if objective(&fit) < objective(&entry.fit) => entry.fit = fit,
+            Some(_) => {}
+            None => {
+                let hypothesis = Hypothesis::Effects(vec![candidate.effect]);
+                entries.push(Entry::new(hypothesis, fit));
+            }
+        }
+    }
 }
 
 /// The nominal model whose geometry is taken at its word.

@@ -160,7 +160,7 @@ fn common_scatter(configuration: &Configuration) -> Vec<(usize, f64)> {
 }
 
 /// Two poles nearer than this, relative, share one decay: 1 %.
-const TWIN: f64 = 0.01;
+pub(super) const TWIN: f64 = 0.01;
 
 /// Relative distance of the farthest peak that belongs to no mode and is so near that the fit has split
 /// one decay between the two: what is then read of the mode alone is unreliable. A joint whose

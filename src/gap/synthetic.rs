@@ -2,12 +2,14 @@
 //! on the finer mesh, not from the diagnosis's own predictions.
 
 use super::error::GapError;
+use super::fixture_peak::{SEEN, strength};
 use super::joint_path::joint_amplitude;
+use super::lone_peaks::{DECIBEL, UNPAIRED};
 use super::nominal::Nominal;
 use crate::effects::{Circumstances, Effect, EffectId, SensorPlace, apply};
 use crate::identify::observation::{
-    AlongDecay, Configuration, DecayEnd, DecayVerdict, Observations, Observed, ObservedMode,
-    ObservedSensor, ShapeValue, effective_share,
+    AlongDecay, Configuration, DecayEnd, DecayVerdict, ExtraPeak, Observations, Observed,
+    ObservedMode, ObservedSensor, ShapeValue, effective_share,
 };
 use crate::structure::specimen::{Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
 use rand::{RngExt, SeedableRng};
@@ -184,8 +186,36 @@ impl Scene<'_> {
             modes: seen_modes,
             covariance: None,
             common: 0.0,
-            extra_peaks: Vec::new(),
+            extra_peaks: self.fixture_peak(index, &modes, scale.0),
         })
+    }
+
+    /// The fixture's own mode, where it is strong enough to be read.
+    fn fixture_peak(
+        &mut self,
+        index: usize,
+        (modes, numbers): &Numbered,
+        scale: f64,
+    ) -> Vec<ExtraPeak> {
+        let planned = &self.plan.configurations[index];
+        let sensors: Vec<f64> = planned.sensors.iter().map(|sensor| sensor.1).collect();
+        let base = (0..modes.len()).find(|mode| !numbers.contains(mode));
+        let read = base.and_then(|base| {
+            let strength = strength(modes, (base, numbers), (&sensors, Some(planned.tap)))?;
+            (strength.0 > strength.1 + SEEN / DECIBEL).then_some((base, strength.0.exp()))
+        });
+        let Some((base, constant)) = read else {
+            return Vec::new();
+        };
+        let frequency = modes.frequencies()[base] * scale;
+        let read = self.measured(frequency, frequency * self.plan.frequency_std);
+        vec![ExtraPeak {
+            frequency: read.value,
+            std: Some(read.std),
+            level_db: None,
+            constant: self.plan.shape_std.map(|_| constant),
+            label: UNPAIRED.to_owned(),
+        }]
     }
 
     fn power(&self) -> f64 {

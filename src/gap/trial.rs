@@ -1,6 +1,7 @@
 //! One explanation on trial: how well it fits the readings, block by block, what it predicts of those that
 //! took no part, and whether enough readings are left to test it.
 
+use super::fixture_peak;
 use super::forward::Layout;
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
@@ -27,6 +28,8 @@ pub(super) struct Trial {
     pub(super) blocks: Vec<Block>,
     /// Goodness of its prediction of withheld readings; `None` without any.
     pub(super) withheld: Option<f64>,
+    /// How probable the peak of its fixture is, or that there is none; `None` without a fixture.
+    peak: Option<f64>,
     /// Readings that its parameters have to answer for, and how many these are; `None` where nobody asked.
     pub(super) room: Option<Room>,
     /// Its closure on withheld readings; `None` where that says nothing.
@@ -120,6 +123,7 @@ impl Trial {
             goodness: residuals.goodness(),
             blocks: residuals.blocks(frame),
             withheld: None,
+            peak: fixture_peak::goodness(frame, fit),
             room: None,
             closure: None,
         })
@@ -145,7 +149,8 @@ impl Trial {
         let block = block
             .filter(|p| *p < BLOCK_MISFIT)
             .map(|p| (p * self.blocks.len() as f64).min(MISFIT));
-        let all = [overall, withheld, block].into_iter().flatten();
+        let peak = self.peak.filter(|p| *p < MISFIT);
+        let all = [overall, withheld, block, peak].into_iter().flatten();
         all.min_by(f64::total_cmp)
     }
 

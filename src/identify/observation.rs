@@ -161,6 +161,9 @@ pub struct ExtraPeak {
     pub std: Option<f64>,
     /// Height over the noise, or where that is unknown over its surroundings (dB).
     pub level_db: Option<f64>,
+    /// Modal constant at its strongest sensor (1/kg), as that of a mode; `None` without a calibrated hammer
+    /// and sensor.
+    pub constant: Option<f64>,
     /// What it is ("mains 50 Hz", "unpaired").
     pub label: String,
 }

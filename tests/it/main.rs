@@ -15,6 +15,7 @@ mod fastened;
 mod gap;
 mod gap_advice;
 mod gap_decay;
+mod gap_fixture;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;

@@ -195,6 +195,7 @@ fn extra_peaks(recording: &RecordingResult, readings: &[ModeReading]) -> Vec<Ext
             frequency: reading.frequency,
             std: reading.std,
             level_db: reading.above_noise_db.or(reading.prominence_db),
+            constant: shape_of(reading, recording).1.map(|one| one.value),
             label,
         })
     };

@@ -7,7 +7,7 @@ use crate::identify::consistent::goodness::{DOUBTFUL, NOTABLE_MISFIT};
 use crate::identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
 };
-use crate::stats::root_mean_square;
+use crate::stats::{root_mean_square, times};
 
 /// What else may be behind a misfit where modes come from several recordings.
 const BETWEEN: &str = "; recordings taken one after the other, or with sensors moved, differ by more than \
@@ -117,7 +117,7 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
          (goodness of fit {}); std and 95 % limits stand for the readings alone, and the joint is \
          not known that well{intervals}",
         Rounded(percent),
-        Rounded(root_mean_square(&standardised)),
+        times(root_mean_square(&standardised)),
         Rounded(goodness.probability.unwrap_or(0.0))
     ))
 }

@@ -7,6 +7,7 @@ use super::{
     Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject,
     Verdict,
 };
+use crate::stats::times;
 
 /// Recordings from which an order is more than the two ways that a joint can drift.
 const LEAST_ORDERED: usize = 3;
@@ -237,8 +238,10 @@ fn shifts(
         let deviations =
             (other.frequency - mode.frequency).abs() / a.hypot(b).max(f64::MIN_POSITIVE);
         let happened = format!(
-            "It moves by {shift:+.3} % {what} ({}), {deviations:.1} standard deviations (limit {:.0}).",
-            second.file, settings.deviations
+            "It moves by {shift:+.3} % {what} ({}), {} standard deviations (limit {:.0}).",
+            second.file,
+            times(deviations),
+            settings.deviations
         );
         // Time, and mounting a sensor anew, move a frequency too; neither moves it in the order of the levels.
         let usual = 0.01 * shift.abs() <= settings.drift;

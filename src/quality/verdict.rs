@@ -355,6 +355,21 @@ impl Verdict {
         self
     }
 
+    /// How far off it is, to tell the worst of one check; of no use between checks.
+    pub fn severity(&self) -> f64 {
+        let value = self.value.unwrap_or(0.0);
+        // In its own limit, which may differ between recordings.
+        let relative = if self.limit > 0.0 {
+            value / self.limit
+        } else {
+            value
+        };
+        match self.check {
+            Check::Coherence | Check::ForceNoise | Check::Reciprocity => -relative,
+            _ => relative,
+        }
+    }
+
     /// Whether a reader must be told.
     pub fn is_doubt(&self) -> bool {
         matches!(self.outcome, Outcome::Doubtful | Outcome::Bad)

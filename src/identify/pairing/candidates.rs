@@ -38,7 +38,11 @@ pub(super) fn find(
     neighbours: &Neighbours,
 ) -> Vec<(Assignment, [f64; 3])> {
     let peaks = search.log_frequencies();
+    // A weak peak at its price, lest all places take a strong one's satellites; and without, lest a strong
+    // peak that is no mode hides the mode beside it. The closer look prices both alike.
     let weak: Vec<f64> = (0..peaks.len()).map(|p| neighbours.alone(p)).collect();
+    let mut prices = vec![vec![0.0; peaks.len()]];
+    prices.extend(weak.iter().any(|price| *price > 0.0).then_some(weak));
     let plain: Assignment = (1..=peaks.len()).map(Some).collect();
     let grid: Vec<([f64; 3], Vec<f64>)> = search
         .grid()
@@ -53,8 +57,13 @@ pub(super) fn find(
         }
     };
     for (place, modes) in &grid {
-        for width in WIDTHS {
-            let (assignment, cost) = align((&peaks, &weak), modes, width, |f| search.in_band(f));
+        for (width, weak) in WIDTHS
+            .iter()
+            .flat_map(|w| prices.iter().map(move |p| (*w, p)))
+        {
+            let (assignment, cost) = align((&peaks, weak), modes, width, |f| search.in_band(f));
+            let paid: f64 = pairs(&assignment).iter().map(|pair| weak[pair.0]).sum();
+            let cost = cost - paid + neighbours.cost(&assignment);
             offer(assignment, cost, *place);
         }
         let misfit = peaks.iter().zip(modes).map(|(a, b)| (a - b).powi(2));

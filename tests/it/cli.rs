@@ -1364,8 +1364,8 @@ fn regress_one_unreadable_test_does_not_end_a_blind_check() {
         let own = folder.path().join("tests").join(name);
         fs::create_dir_all(&own).unwrap();
         let text = "[beam]\nlength = \"423 mm\"\nwidth = \"40 mm\"\nthickness = \"5 mm\"\n\
-                    modulus = \"207 GPa\"\ndensity = 7850\n[hammer]\nchannel = 1\n[[recording]]\n\
-                    file = \"lost.wav\"\n";
+                    modulus = \"207 GPa\"\ndensity = 7850\n[joint]\nkind = \"cantilever\"\n\
+                    [hammer]\nchannel = 1\n[[recording]]\nfile = \"lost.wav\"\n";
         fs::write(own.join("test.toml"), text).unwrap();
     };
     add("bad");

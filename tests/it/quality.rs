@@ -321,7 +321,7 @@ fn val_scatter_beside_what_noise_explains() {
         &[
             "110.00 Hz",
             "0.0200 %",
-            "10.0 times",
+            "10 times",
             "1.8 is chance",
             "limit 1 %",
         ],

@@ -186,7 +186,8 @@ fn score(
     let extra = (assignment.len() - pairs.len()) as f64;
     let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
     let weak = neighbours.cost(assignment);
-    let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &pairs);
+    let shaped = strength::comparable(&pairs, assignment, (search.peaks, neighbours));
+    let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
     Scored {
         cost: by_data + unseen,
         by_data,

@@ -5,7 +5,7 @@
 //! to nothing. All lie within the model's discrepancy of the mode, so that frequencies do not tell them
 //! apart, and the shape of a weak pole is as good as any direction.
 
-use super::MeasuredPeak;
+use super::{MeasuredPeak, shape};
 
 /// How strongly one recording saw a peak.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -65,6 +65,22 @@ impl Neighbours {
         let numbered = numbers.iter().enumerate().filter(|one| one.1.is_some());
         numbered.map(of_peak).sum()
     }
+}
+
+/// Pairs whose shapes may be compared: without the weak peaks beside a stronger one that is left over and
+/// whose own shape is lost in noise. What is known of the weaker one then speaks for neither.
+pub(super) fn comparable(
+    pairs: &[(usize, usize)],
+    numbers: &[Option<usize>],
+    (peaks, neighbours): (&[MeasuredPeak], &Neighbours),
+) -> Vec<(usize, usize)> {
+    let is_faint = |other: usize| {
+        let shape = &peaks[other].shape;
+        numbers[other].is_none() && !shape.is_empty() && !shape::is_clear(shape)
+    };
+    let hidden = |peak: usize| neighbours.stronger[peak].iter().any(|one| is_faint(one.0));
+    let kept = pairs.iter().filter(|pair| !hidden(pair.0));
+    kept.copied().collect()
 }
 
 /// ln of the ratio of two amplitudes in the recording that sees the weaker one best; `None` where no

@@ -18,6 +18,20 @@ pub fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
+/// Ratio beyond which its size says nothing more.
+const MOST_TIMES: f64 = 1000.0;
+
+/// A ratio of a size to its uncertainty as a text has it, "2.4" or "120": two digits below a hundred, and
+/// "more than 1000" where the uncertainty is next to nothing.
+pub fn times(ratio: f64) -> String {
+    match ratio.abs() {
+        size if size > MOST_TIMES => format!("more than {MOST_TIMES:.0}"),
+        size if size >= 9.95 => format!("{size:.0}"),
+        size if size >= 0.995 => format!("{size:.1}"),
+        size => format!("{size:.2}"),
+    }
+}
+
 /// Value that chi square of `freedom` degrees of freedom stays below with this probability; `None` without
 /// a degree of freedom.
 pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
@@ -28,6 +42,25 @@ pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn regress_a_ratio_has_the_digits_that_say_something() {
+        let written = [0.0, 0.25, 0.999, 2.44, 9.96, 120.4, 1000.0, 1000.1, 4e6];
+        let expected = [
+            "0.00",
+            "0.25",
+            "1.0",
+            "2.4",
+            "10",
+            "120",
+            "1000",
+            "more than 1000",
+            "more than 1000",
+        ];
+        assert_eq!(written.map(times), expected);
+        assert_eq!(times(-3.0), "3.0");
+        assert_eq!(times(f64::INFINITY), "more than 1000");
+    }
 
     #[test]
     fn limit_nothing_one_and_an_even_count() {

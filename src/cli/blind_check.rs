@@ -21,8 +21,8 @@ use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::{WavFormat, encode_wav};
 use tapjoint::report::blind_check::render_blind_check;
 use tapjoint::study::blind_check::{
-    Answer, Campaign, Case, DrawnTest, Extent, RecordedTest, Truth, always_scale, commitment,
-    parse_truths, render_rows, rows, score, shuffled,
+    Answer, Campaign, Case, DrawnTest, Extent, RecordedTest, Truth, TruthFile, always_scale,
+    commitment, parse_truths, render_rows, rows, score, shuffled,
 };
 
 /// Draw virtual tests with an effect withheld, diagnose each without the answer, score.
@@ -273,27 +273,29 @@ fn diagnose_recorded(
 
 /// A test that cannot be analysed or diagnosed has no answer, which is counted apart.
 fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
-    match diagnosis_of(test, folder) {
-        Some(diagnosis) => (truth.clone(), Answer::of(&diagnosis)),
-        None => (truth.clone(), Answer::none()),
-    }
+    let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::none(), |d| Answer::of(&d));
+    (truth.clone(), answer)
 }
 
-fn diagnosis_of(test: &TestDescription, folder: &Path) -> Option<Diagnosis> {
+fn diagnosis_of(test: &TestDescription, folder: &Path) -> anyhow::Result<Diagnosis> {
     let settings = IdentifySettings::default();
-    let analysis = run_test(test, (folder, "test.toml"), &settings).ok()?;
-    diagnose_test(test, &analysis, &GapSettings::default()).ok()
+    let analysis = run_test(test, (folder, "test.toml"), &settings)?;
+    Ok(diagnose_test(test, &analysis, &GapSettings::default())?)
 }
 
 /// Tests made elsewhere: those that both the folder and the truth file know.
 fn elsewhere(folder: &Path, truth: &Path, terminal: &Terminal) -> anyhow::Result<Vec<Case>> {
     let name = truth.display();
     let text = fs::read_to_string(truth).with_context(|| format!("{name}: cannot be read"))?;
-    let truths = parse_truths(&text).with_context(|| name.to_string())?;
-    let mut found = Vec::new();
-    for truth in truths {
-        let own = folder.join(&truth.name);
-        let path = own.join("test.toml");
+    let TruthFile { truths, doubts } = parse_truths(&text).with_context(|| name.to_string())?;
+    for doubt in doubts {
+        terminal.warn(&format!("{name}: {doubt}"));
+    }
+    if truths.is_empty() {
+        bail!("{name}: holds no test");
+    }
+    for truth in &truths {
+        let path = folder.join(&truth.name).join("test.toml");
         if !path.is_file() {
             bail!(
                 "{}: not there, but {name} speaks of the test \"{}\"; each test is a folder of that \
@@ -302,22 +304,52 @@ fn elsewhere(folder: &Path, truth: &Path, terminal: &Terminal) -> anyhow::Result
                 truth.name
             );
         }
-        let file = read_test(&path, terminal)?;
-        file.check_recordings()?;
-        found.push((truth, own, file));
     }
-    if found.is_empty() {
-        bail!("{name}: holds no test");
+    for unlisted in unlisted(folder, &truths) {
+        terminal.warn(&format!(
+            "{}: {name} does not speak of this test, and it is left out",
+            folder.join(unlisted).display()
+        ));
     }
     let done = AtomicUsize::new(0);
-    let cases = found.par_iter().map(|(truth, own, file)| {
-        let case = case_of(&file.test, own, truth);
+    let cases = truths.par_iter().map(|truth| {
+        let case = case_elsewhere(&folder.join(&truth.name), truth, terminal);
         terminal.count(
             "tests diagnosed",
             done.fetch_add(1, Ordering::Relaxed) + 1,
-            found.len(),
+            truths.len(),
         );
         case
     });
     Ok(cases.collect())
+}
+
+/// Folders with a test of which the truths do not speak, in order.
+fn unlisted(folder: &Path, truths: &[Truth]) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries
+        .filter(|entry| entry.path().join("test.toml").is_file())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| truths.iter().all(|truth| truth.name != *name))
+        .collect();
+    names.sort();
+    names
+}
+
+/// One test made elsewhere. What is wrong with one keeps the others from nothing: it is told, and counted
+/// among those that could not be diagnosed.
+fn case_elsewhere(folder: &Path, truth: &Truth, terminal: &Terminal) -> Case {
+    let answer = || -> anyhow::Result<Answer> {
+        let file = read_test(&folder.join("test.toml"), terminal)?;
+        file.check_recordings()?;
+        Ok(Answer::of(&diagnosis_of(&file.test, folder)?))
+    };
+    let answer = answer().unwrap_or_else(|error| {
+        terminal.warn(&format!(
+            "the test \"{}\" could not be diagnosed, and counts as that: {error:#}",
+            truth.name
+        ));
+        Answer::none()
+    });
+    (truth.clone(), answer)
 }

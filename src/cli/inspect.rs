@@ -7,7 +7,7 @@ use super::terminal::Terminal;
 use anyhow::ensure;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tapjoint::pipeline::inspect_bare;
+use tapjoint::pipeline::{inspect_bare, together};
 use tapjoint::recording::{UniversalFile, is_universal_file, list_datasets};
 use tapjoint::report::{datasets_of, inspection_of, render_text};
 
@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::R
         .iter()
         .any(|recording| !recording.measurement.taps.taps.is_empty());
     let listed_only = recordings.is_empty() && !datasets.is_empty();
-    let mut document = inspection_of(&recordings, &warnings);
+    let mut document = inspection_of(&recordings, &together(warnings));
     document.datasets = (!datasets.is_empty()).then_some(datasets);
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;

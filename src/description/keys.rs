@@ -138,7 +138,7 @@ const ALL: [&KnownTable; 12] = [
 ];
 
 /// What the field also calls these keys; no spelling distance leads from "rho" to "density".
-const SYNONYMS: [(&str, &str); 18] = [
+const SYNONYMS: [(&str, &str); 20] = [
     ("l", "length"),
     ("b", "width"),
     ("breadth", "width"),
@@ -157,6 +157,8 @@ const SYNONYMS: [(&str, &str); 18] = [
     ("location", "position"),
     ("weight", "mass"),
     ("location", "tap"),
+    ("effect", "id"),
+    ("name", "id"),
 ];
 
 /// What an unknown `key` of `table` may have been meant to be: a similar key of that table, else
@@ -166,14 +168,14 @@ pub(super) fn suggest(key: &str, table: &'static KnownTable) -> Suggestion {
     if let Some(found) = table.keys.iter().find(|known| **known == lower) {
         return Suggestion::Nearest(found);
     }
-    if let Some(found) = elsewhere(&lower) {
-        return found;
-    }
     let synonym = SYNONYMS
         .iter()
         .find(|(word, meant)| *word == lower && table.keys.contains(meant));
     if let Some((_, meant)) = synonym {
         return Suggestion::Nearest(meant);
+    }
+    if let Some(found) = elsewhere(&lower) {
+        return found;
     }
     if let Some(found) = nearest(&lower, table.keys.iter().copied()) {
         return Suggestion::Nearest(found);

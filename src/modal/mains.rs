@@ -1,4 +1,4 @@
-//! Mains hum: 50 and 60 Hz and their multiples, steady and there before the tap.
+//! Mains hum: 50 and 60 Hz and their multiples, steady and there before the tap, as a line over the noise.
 
 /// What counts as a mains line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -8,6 +8,10 @@ pub struct MainsSettings {
     /// Least share of the line's amplitude in the record that was there before the tap: 0.5. A
     /// resonance that happens to lie at 50 Hz is still before the tap.
     pub share_before: f64,
+    /// Least height of the line over the noise beside it before the tap, in amplitude: 4. Noise alone is as
+    /// high once in e^16 lines. Multiples of 50 and 60 Hz are so close at high orders that every other
+    /// peak lies near one, and a peak of mere noise was there before the tap as well.
+    pub over_noise: f64,
 }
 
 impl Default for MainsSettings {
@@ -15,6 +19,7 @@ impl Default for MainsSettings {
         MainsSettings {
             tolerance: 0.002,
             share_before: 0.5,
+            over_noise: 4.0,
         }
     }
 }
@@ -26,6 +31,8 @@ pub struct LineAmplitudes {
     pub before: f64,
     /// In the tap record, as if steady.
     pub within: f64,
+    /// What noise alone has before the tap, root mean square over the frequencies beside the line.
+    pub noise: f64,
 }
 
 /// The multiple of 50 or 60 Hz (Hz) that a peak at `frequency` is, or `None`.
@@ -37,7 +44,9 @@ pub fn mains_harmonic(
     amplitudes: LineAmplitudes,
     settings: &MainsSettings,
 ) -> Option<f64> {
-    if amplitudes.before < settings.share_before * amplitudes.within {
+    let steady = amplitudes.before >= settings.share_before * amplitudes.within;
+    let is_line = amplitudes.before > settings.over_noise * amplitudes.noise;
+    if !(steady && is_line) {
         return None;
     }
     near_mains(frequency, half_line, settings)

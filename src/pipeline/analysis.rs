@@ -117,6 +117,9 @@ pub struct ModeResult {
     pub half_line: Option<f64>,
     /// Standard uncertainty of the best frequency (Hz), where known.
     pub std: Option<f64>,
+    /// Standard deviation (Hz) between the recordings that were merged, beyond what their readings' own
+    /// uncertainties explain: joints drift, and sensors are moved; `None` of one recording.
+    pub between: Option<f64>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.

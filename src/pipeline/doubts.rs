@@ -1,20 +1,28 @@
 //! What speaks against a consistent estimate, in words.
 
+use super::analysis::ModeResult;
 use super::model::TestedStructure;
 use super::warning::Warning;
 use crate::identify::consistent::goodness::{DOUBTFUL, NOTABLE_MISFIT};
 use crate::identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
 };
-use crate::stats::root_mean_square;
+use crate::stats::{root_mean_square, times};
+
+/// What else may be behind a misfit where modes come from several recordings.
+const BETWEEN: &str = "; recordings taken one after the other, or with sensors moved, differ by more than \
+                       single readings: the diagnosis of what is missing allows for a joint that drifts \
+                       between them";
 
 /// Everything that a reader of the estimate has to know.
-pub(super) fn of_consistent(found: &ConsistentEstimate) -> Vec<Warning> {
+pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut add =
         |code: &'static str, text: String| warnings.push(Warning::Estimate { code, text });
     if let Some(text) = misfit(found) {
-        add("misfit", text);
+        let several = modes.iter().any(|mode| mode.between.is_some());
+        let drift = if several { BETWEEN } else { "" };
+        add("misfit", text + drift);
     }
     if found.goodness.verdict == Verdict::Untestable {
         add("untestable", found.goodness.words());
@@ -109,7 +117,7 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
          (goodness of fit {}); std and 95 % limits stand for the readings alone, and the joint is \
          not known that well{intervals}",
         Rounded(percent),
-        Rounded(root_mean_square(&standardised)),
+        times(root_mean_square(&standardised)),
         Rounded(goodness.probability.unwrap_or(0.0))
     ))
 }

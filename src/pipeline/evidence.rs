@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use super::analysis::RecordingResult;
 use super::frf::form_of;
 use super::measure::MeasuredSpectra;
-use super::warning::Warning;
+use super::warning::{Warning, of_quality};
 use crate::modal::ModeReading;
 use crate::quality::{
-    Check, DampingSource, ForceEvidence, Outcome, QualitySettings, RecordingEvidence,
-    ResonanceEvidence, SensorEvidence, TapEvidence, Verdict, judge_test,
+    DampingSource, ForceEvidence, QualitySettings, RecordingEvidence, ResonanceEvidence,
+    SensorEvidence, TapEvidence, Verdict, judge_test,
 };
 use crate::recording::Format;
 use crate::stats::median;
@@ -18,7 +18,7 @@ use crate::stats::median;
 pub(super) fn judge(recordings: &[RecordingResult]) -> (Vec<Verdict>, Vec<Warning>) {
     let evidence: Vec<RecordingEvidence> = recordings.iter().filter_map(evidence).collect();
     let verdicts = judge_test(&evidence, &QualitySettings::default());
-    let warnings = warnings(&verdicts);
+    let warnings = of_quality(&verdicts);
     (verdicts, warnings)
 }
 
@@ -104,44 +104,4 @@ fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvide
         tap_frequencies: taps.iter().map(|tap| tap.frequency).collect(),
         tap_std: (!stds.is_empty()).then(|| median(&mut stds)),
     }
-}
-
-/// Doubts of one check in one recording are one warning: the first in full, the others counted. What
-/// the taps' own reasons and the warnings of the spectra say already is left out.
-fn warnings(verdicts: &[Verdict]) -> Vec<Warning> {
-    let said = |verdict: &Verdict| match verdict.check {
-        Check::DoubleHit | Check::Overload | Check::WeakTap | Check::Averages | Check::Decay => {
-            true
-        }
-        // The tap was rejected for it.
-        Check::ForceRipple => verdict.outcome == Outcome::Bad,
-        _ => false,
-    };
-    let doubts: Vec<&Verdict> = verdicts
-        .iter()
-        .filter(|verdict| verdict.is_doubt() && !said(verdict))
-        .collect();
-    let same =
-        |a: &Verdict, b: &Verdict| a.check == b.check && a.subject.file() == b.subject.file();
-    let mut warnings = Vec::new();
-    for (index, verdict) in doubts.iter().enumerate() {
-        if doubts[..index].iter().any(|earlier| same(earlier, verdict)) {
-            continue;
-        }
-        let more = doubts[index + 1..]
-            .iter()
-            .filter(|later| same(later, verdict))
-            .count();
-        let mut text = verdict.to_string();
-        if more > 0 {
-            text.push_str(&format!(
-                " (And {more} more; the table of checks has them all.)"
-            ));
-        }
-        warnings.push(Warning::Quality {
-            code: verdict.check.code(),
-            text,
-        });
-    }
-    warnings
 }

@@ -82,7 +82,7 @@ pub fn identify(
         warnings.push(doubts::of_fallback(structure, reason));
     }
     if let Some(found) = &consistent {
-        warnings.extend(doubts::of_consistent(found));
+        warnings.extend(doubts::of_consistent(found, modes));
     }
     if let Some(Estimate::Joint(joint)) = &estimate {
         let told = |doubt: &&Doubt| {
@@ -120,7 +120,8 @@ pub fn identify(
     (found, warnings)
 }
 
-/// The modes with a number, ascending.
+/// The modes with a number, ascending. Modes of one list may come from recordings between which the joint
+/// drifted: no joint has them all, and how far they are apart is part of each one's uncertainty.
 pub(super) fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
     modes
         .iter()
@@ -128,7 +129,7 @@ pub(super) fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
             Some(MeasuredMode {
                 mode: mode.mode?,
                 frequency: mode.frequency,
-                std: mode.std,
+                std: mode.std.map(|std| std.hypot(mode.between.unwrap_or(0.0))),
             })
         })
         .collect()

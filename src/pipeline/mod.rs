@@ -59,7 +59,7 @@ pub use modes::{modes_of_measured, modes_of_recordings};
 pub use observations::observations;
 pub use recordings::{inspect_bare, measure_bare, si_unit};
 pub use shapes::{SampledShape, sampled_shapes};
-pub use warning::{AmplitudeChange, Warning};
+pub use warning::{AmplitudeChange, Warning, together};
 pub use wired::{Wiring, run_wired};
 
 pub use crate::described::fastened_masses;
@@ -138,7 +138,7 @@ pub fn run_test(
         modes,
         identification: Some(identification),
         verdicts,
-        warnings,
+        warnings: together(warnings),
     })
 }
 

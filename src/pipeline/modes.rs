@@ -102,7 +102,29 @@ pub fn modes_of_recordings(
     for recording in recordings.iter_mut() {
         recording.mode_numbers = own_numbers(&modes, &own_readings(recording));
     }
+    for mode in &mut modes {
+        mode.between = between(mode, recordings, reference);
+    }
     (modes, warnings)
+}
+
+/// Standard deviation of a mode's frequency between the `reference` recordings, beyond that of the readings:
+/// s^2 = sum (f - mean)^2/(n - 1) - mean of std^2; `None` below two readings.
+fn between(mode: &ModeResult, recordings: &[RecordingResult], reference: &[usize]) -> Option<f64> {
+    let number = mode.mode?;
+    let readings: Vec<ModeReading> = reference
+        .iter()
+        .filter_map(|&index| {
+            let of_mode = |own: &Option<usize>| *own == Some(number);
+            let place = recordings[index].mode_numbers.iter().position(of_mode)?;
+            own_readings(&recordings[index]).into_iter().nth(place)
+        })
+        .collect();
+    let count = readings.len() as f64;
+    let mean = readings.iter().map(|r| r.frequency).sum::<f64>() / count;
+    let squares: f64 = readings.iter().map(|r| (r.frequency - mean).powi(2)).sum();
+    let own: f64 = readings.iter().filter_map(|r| r.std).map(|s| s * s).sum();
+    (readings.len() > 1).then(|| (squares / (count - 1.0) - own / count).max(0.0).sqrt())
 }
 
 /// The readings of a bare recording, numbered as they come.
@@ -140,6 +162,7 @@ pub fn modes_of_measured(
                     of(&measured.std),
                     measured.scatter,
                 ),
+                between: None,
                 reading: None,
                 recording: None,
                 label: None,
@@ -188,6 +211,7 @@ fn from_reading(reading: ModeReading, recording: Option<String>) -> ModeResult {
         frequency: reading.frequency,
         half_line: Some(reading.half_line),
         std: reading.std,
+        between: None,
         label: reading.label.map(|label| label.to_string()),
         recording,
         lambda: None,

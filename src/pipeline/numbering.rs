@@ -1,5 +1,7 @@
 //! Numbers of the modes of a jointed structure: peaks and joint together.
 
+use std::f64::consts::TAU;
+
 use super::analysis::{ModeResult, RecordingResult};
 use super::consistent::{self, NO_SPRING, StructureDetails};
 use super::model::TestedStructure;
@@ -10,7 +12,8 @@ use crate::description::FitParameter;
 use crate::identify::consistent::Parameter;
 use crate::identify::pair_modes;
 use crate::identify::pairing::{
-    MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, ShapeAt, is_plain,
+    MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, PeakStrength,
+    ShapeAt, is_plain,
 };
 use crate::modal::ModeReading;
 use crate::structure::joint::StiffnessUnits;
@@ -30,7 +33,7 @@ pub(super) fn number_jointed(
         .collect();
     let peaks: Vec<MeasuredPeak> = free
         .iter()
-        .map(|&index| peak(&modes[index], recordings))
+        .map(|&index| peak(index, modes, recordings))
         .collect();
     if fits_the_beam(known.1) {
         // Beside an unknown beam the joint's bounds say nothing of a mode's number.
@@ -85,7 +88,8 @@ fn settings(
     }
 }
 
-fn peak(mode: &ModeResult, recordings: &[&RecordingResult]) -> MeasuredPeak {
+fn peak(index: usize, modes: &[ModeResult], recordings: &[&RecordingResult]) -> MeasuredPeak {
+    let mode = &modes[index];
     MeasuredPeak {
         frequency: mode.frequency,
         std: mode.std,
@@ -94,7 +98,38 @@ fn peak(mode: &ModeResult, recordings: &[&RecordingResult]) -> MeasuredPeak {
             .enumerate()
             .flat_map(|(index, recording)| shape(mode, recording, index))
             .collect(),
+        strengths: recordings
+            .iter()
+            .map(|recording| strength(index, modes, recording))
+            .collect(),
     }
+}
+
+/// How strongly one recording saw a peak; `None` where its reading nearest to the peak is another peak's.
+fn strength(
+    index: usize,
+    modes: &[ModeResult],
+    recording: &RecordingResult,
+) -> Option<PeakStrength> {
+    let reading = reading_of(&modes[index], recording)?;
+    let distance = |mode: &ModeResult| (mode.frequency - reading.frequency).abs();
+    let own = distance(&modes[index]);
+    if modes.iter().any(|other| distance(other) < own) {
+        return None;
+    }
+    Some(PeakStrength {
+        energy: energy(reading),
+        level_db: reading.prominence_db.and(reading.above_noise_db),
+    })
+}
+
+/// Energy of a fitted oscillation in all taps and sensors of its recording: the integral of
+/// (a e^{-zeta omega t})^2/2 is a^2/(4 zeta omega).
+fn energy(reading: &ModeReading) -> Option<f64> {
+    let mode = &reading.fit.as_deref()?.mode;
+    let squares: f64 = mode.amplitudes.iter().map(|a| a.value.norm_sqr()).sum();
+    let decay = TAU * mode.frequency.value * mode.damping_ratio.value;
+    (decay > 0.0 && squares > 0.0).then(|| squares / (4.0 * decay))
 }
 
 /// The peak's shape in one recording. Modal constants of all recordings share the hammer's unit; a

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use crate::modal::{LineAmplitudes, MainsSettings, PeakLabel, mains_harmonic, near_mains};
-use crate::spectral::{AveragedSpectra, Lines, Window, line_amplitude, noise_power};
+use crate::spectral::{AveragedSpectra, Lines, Window, line_amplitude, noise_beside, noise_power};
 
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
 pub(super) struct Quiet {
@@ -82,8 +82,12 @@ impl Quiet {
             (0..averages.responses.len()).max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
         let (sum, _) = self.window_sums(window);
         let within = 2.0 * averages.responses[strongest][index] * self.sample_rate / sum;
-        let before = line_amplitude(self.responses.get(strongest)?, self.sample_rate, frequency)?;
-        let amplitudes = LineAmplitudes { before, within };
+        let samples = self.responses.get(strongest)?;
+        let amplitudes = LineAmplitudes {
+            before: line_amplitude(samples, self.sample_rate, frequency)?,
+            within,
+            noise: noise_beside(samples, self.sample_rate, frequency)?,
+        };
         mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
     }
 

@@ -4,9 +4,12 @@ use std::fmt;
 
 mod amplitude;
 mod estimate;
+mod groups;
 
 pub use amplitude::AmplitudeChange;
 pub(super) use amplitude::of_amplitude;
+pub(super) use groups::of_quality;
+pub use groups::together;
 
 use super::measure::MeasuredSpectra;
 use crate::modal::PeakLabel;
@@ -67,6 +70,8 @@ pub enum Warning {
         remaining: f64,
         /// The window in force.
         window: Window,
+        /// Other recordings of which the same holds, and their levels.
+        others: Vec<(String, f64)>,
     },
     /// A window that is wrong for taps.
     HannOnTaps {
@@ -81,6 +86,8 @@ pub enum Warning {
         frequency: f64,
         /// What it is.
         label: PeakLabel,
+        /// Other such peaks: recording, and where (Hz).
+        others: Vec<(String, f64)>,
     },
     /// Frequency or damping changes along the decays.
     AmplitudeDependent {
@@ -187,7 +194,12 @@ impl fmt::Display for Warning {
                 file,
                 remaining,
                 window,
-            } => write_not_rung_down(f, file, *remaining, *window),
+                others,
+            } => {
+                write_not_rung_down(f, file, *remaining, *window)?;
+                let percent = |remaining: f64| format!("{:.1} %", 100.0 * remaining);
+                write_others(f, others, percent)
+            }
             Warning::HannOnTaps { file } => write!(
                 f,
                 "{file}: a Hann window suppresses the start of every record, where a tap has its \
@@ -197,11 +209,16 @@ impl fmt::Display for Warning {
                 file,
                 frequency,
                 label,
-            } => write!(
-                f,
-                "{file}: the peak at {frequency:.2} Hz was there before the tap and is taken for \
-                 {label}, not for a mode; check the grounding of the sensor cables"
-            ),
+                others,
+            } => {
+                write!(
+                    f,
+                    "{file}: the peak at {frequency:.2} Hz was there before the tap and is taken for \
+                     {label}, not for a mode; check the grounding of the sensor cables"
+                )?;
+                let hertz = |frequency: f64| format!("{frequency:.2} Hz");
+                write_others(f, others, hertz)
+            }
             Warning::Unpaired { count, text } => {
                 write!(f, "{count} peak(s) belong to no mode: {text}")
             }
@@ -214,6 +231,22 @@ impl fmt::Display for Warning {
             | Warning::UnphysicalEstimate { .. }
             | Warning::NumberedInOrder => self.write_estimate_doubt(f),
         }
+    }
+}
+
+/// " (the same of b.wav: 4.5 %, c.wav: 8.8 %)"; nothing of nothing.
+fn write_others(
+    f: &mut fmt::Formatter<'_>,
+    others: &[(String, f64)],
+    written: impl Fn(f64) -> String,
+) -> fmt::Result {
+    let listed: Vec<String> = others
+        .iter()
+        .map(|(file, value)| format!("{file}: {}", written(*value)))
+        .collect();
+    match listed.is_empty() {
+        true => Ok(()),
+        false => write!(f, " (the same of {})", listed.join(", ")),
     }
 }
 
@@ -284,6 +317,7 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
             file: file.to_string(),
             remaining: decay.remaining,
             window: spectra.window,
+            others: Vec::new(),
         });
     }
     if spectra.window == Window::Hann {
@@ -297,6 +331,7 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
                 file: file.to_string(),
                 frequency: reading.line_frequency,
                 label,
+                others: Vec::new(),
             });
         }
     }

@@ -7,6 +7,10 @@ use super::{
     Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, SensorEvidence, Subject,
     Verdict,
 };
+use crate::stats::times;
+
+/// Recordings from which an order is more than the two ways that a joint can drift.
+const LEAST_ORDERED: usize = 3;
 
 /// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
 pub fn check_reciprocity(
@@ -134,7 +138,9 @@ pub fn check_linearity(
             let differ = ratio.max(1.0 / ratio) >= settings.two_levels;
             if differ && same_arrangement(first, second, settings) {
                 let what = format!("at {ratio:.2} times the tap level");
-                verdicts.extend(shifts(Check::Linearity, (first, second), &what, settings));
+                let order = |mode: &ResonanceEvidence| in_order(mode, first, recordings, settings);
+                let pair = (first, second);
+                verdicts.extend(shifts(Check::Linearity, pair, &what, &order, settings));
             }
         }
     }
@@ -164,7 +170,8 @@ pub fn check_mass_loading(
             }
             seen.push(second);
             let what = "with the sensors elsewhere";
-            verdicts.extend(shifts(Check::MassLoading, (first, second), what, settings));
+            let pair = (first, second);
+            verdicts.extend(shifts(Check::MassLoading, pair, what, &|_| None, settings));
         }
     }
     or_missing(
@@ -215,6 +222,7 @@ fn shifts(
     check: Check,
     (first, second): (&RecordingEvidence, &RecordingEvidence),
     what: &str,
+    order: &dyn Fn(&ResonanceEvidence) -> Option<usize>,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
     let of_pair = |mode: &ResonanceEvidence| {
@@ -229,19 +237,68 @@ fn shifts(
         };
         let deviations =
             (other.frequency - mode.frequency).abs() / a.hypot(b).max(f64::MIN_POSITIVE);
-        // Mounting a sensor anew moves a frequency too; the tap's level alone does not.
-        let remounting = check == Check::MassLoading && 0.01 * shift.abs() <= settings.remounting;
-        let outcome = match remounting || deviations <= settings.deviations {
-            true => Outcome::Good,
-            false => Outcome::Doubtful,
-        };
         let happened = format!(
-            "It moves by {shift:+.3} % {what} ({}), {deviations:.1} standard deviations (limit {:.0}).",
-            second.file, settings.deviations
+            "It moves by {shift:+.3} % {what} ({}), {} standard deviations (limit {:.0}).",
+            second.file,
+            times(deviations),
+            settings.deviations
         );
+        // Time, and mounting a sensor anew, move a frequency too; neither moves it in the order of the levels.
+        let usual = 0.01 * shift.abs() <= settings.drift;
+        let (outcome, more) = match order(mode) {
+            _ if deviations <= settings.deviations => (Outcome::Good, String::new()),
+            Some(count) => (
+                Outcome::Doubtful,
+                format!(" Over {count} recordings it follows the order of their levels."),
+            ),
+            None if usual => (
+                Outcome::Good,
+                format!(
+                    " A joint's usual drift between recordings leaves up to {:.1} %.",
+                    100.0 * settings.drift
+                ),
+            ),
+            None => (Outcome::Doubtful, String::new()),
+        };
+        let happened = happened + &more;
         Some(verdict.found(deviations, outcome, happened))
     };
     first.resonances.iter().filter_map(of_pair).collect()
+}
+
+/// Number of recordings, three at least, over which a mode's frequency follows the order of the tap levels:
+/// all in `first`'s arrangement, each level and each frequency clearly apart from the one before.
+fn in_order(
+    mode: &ResonanceEvidence,
+    first: &RecordingEvidence,
+    recordings: &[RecordingEvidence],
+    settings: &QualitySettings,
+) -> Option<usize> {
+    let same = recordings
+        .iter()
+        .filter(|one| same_arrangement(first, one, settings));
+    let mut seen: Vec<(f64, f64, f64)> = same
+        .filter_map(|one| {
+            let own = partner(mode, first, one, settings)?;
+            Some((one.tap_level()?, own.frequency, own.std?))
+        })
+        .collect();
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let levels = seen
+        .windows(2)
+        .all(|two| two[1].0 >= settings.two_levels * two[0].0);
+    let steps = seen.windows(2).map(|two| {
+        let clear = settings.deviations * two[0].2.hypot(two[1].2);
+        let step = two[1].1 - two[0].1;
+        if step.abs() > clear {
+            step.signum()
+        } else {
+            0.0
+        }
+    });
+    let total: f64 = steps.sum();
+    let follows = seen.len() >= LEAST_ORDERED && total.abs() == (seen.len() - 1) as f64;
+    (levels && follows).then_some(seen.len())
 }
 
 /// The nearest resonance of the other recording, where each is the other's nearest and both are within

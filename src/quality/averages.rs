@@ -4,6 +4,7 @@ use super::{
     Check, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Subject, Verdict,
 };
 use crate::spectral::random_error;
+use crate::stats::times;
 
 /// Quantile of the normal distribution beyond which one in a hundred lies.
 const ONE_IN_A_HUNDRED: f64 = 2.326;
@@ -135,7 +136,8 @@ pub fn check_frequency_scatter(
             _ => Outcome::Good,
         };
         let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {
-            format!("{excess:.1} times what noise explains, where {largest:.1} is chance")
+            let excess = times(excess);
+            format!("{excess} times what noise explains, where {largest:.1} is chance")
         });
         let happened = format!(
             "The frequency scatters by {:.4} % over {} taps, {noise} (limit {:.0} %).",

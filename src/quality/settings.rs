@@ -37,9 +37,10 @@ pub struct QualitySettings {
     pub frequency_scatter: f64,
     /// Standard deviations by which two frequencies must differ. 3: one in 370 by chance.
     pub deviations: f64,
-    /// Relative change of a frequency that taking a structure down and a sensor off may leave. 0.1 %: a
-    /// bolted joint repeats no better.
-    pub remounting: f64,
+    /// Relative change of a frequency that time, and taking a sensor off, may leave between recordings.
+    /// 0.5 %: bolted joints drift by some 1 % of their stiffness, and no frequency changes by more than half
+    /// of that, f^2 being at most proportional to the stiffness.
+    pub drift: f64,
     /// Agreement of two FRFs that should be equal, |sum H1 conj(H2)|^2/(sum |H1|^2 sum |H2|^2). 0.9: they
     /// share nine tenths of their power.
     pub reciprocity: f64,
@@ -73,7 +74,7 @@ impl Default for QualitySettings {
             window_share: 0.5,
             frequency_scatter: 0.01,
             deviations: 3.0,
-            remounting: 1e-3,
+            drift: 5e-3,
             reciprocity: 0.9,
             reciprocity_gain: 0.2,
             same_position: 0.005,

@@ -206,13 +206,13 @@ impl Check {
             Check::Linearity => (
                 "linearity",
                 "1",
-                "The joint slips or opens with the level: its stiffness depends on the amplitude.",
-                "State the tap level with every frequency, and identify the joint at the lowest level that rises clear of the noise.",
+                "The joint changed between the recordings: it slips or opens with the level, it drifted, or it was touched.",
+                "Tap softly and hard within one recording, where a joint has no time to drift; if it is the level, state it with every frequency, and identify the joint at the lowest one that rises clear of the noise.",
             ),
             _ => (
                 "mass-loading",
                 "1",
-                "The sensor's mass lowers the modes that move where it sits.",
+                "The sensor's mass lowers the modes that move where it sits, or the joint changed between the recordings.",
                 "State the sensor's mass in the description so that the model carries it, take a lighter sensor, or place it near the joint.",
             ),
         }
@@ -353,6 +353,21 @@ impl Verdict {
     pub(super) fn missing(mut self, why: &str) -> Self {
         self.happened = why.to_owned();
         self
+    }
+
+    /// How far off it is, to tell the worst of one check; of no use between checks.
+    pub fn severity(&self) -> f64 {
+        let value = self.value.unwrap_or(0.0);
+        // In its own limit, which may differ between recordings.
+        let relative = if self.limit > 0.0 {
+            value / self.limit
+        } else {
+            value
+        };
+        match self.check {
+            Check::Coherence | Check::ForceNoise | Check::Reciprocity => -relative,
+            _ => relative,
+        }
     }
 
     /// Whether a reader must be told.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::RecordingError;
-use super::layout::{self, CsvLayout, HeadExtent};
+use super::layout::{self, CsvLayout, FlatTime, HeadExtent};
 use super::riff::{MAX_CHANNELS, read_fully, unreadable};
 use super::rows::{RowPlace, RowReader};
 use super::time::{TimeCheck, UnevenStep};
@@ -34,6 +34,8 @@ pub(super) struct CsvRates {
     pub by_time: Option<(f64, f64)>,
     /// A column that rises evenly though it is not named as time, 0-based.
     pub unnamed_time: Option<usize>,
+    /// A column that is named as time though it does not rise.
+    pub flat_time: Option<FlatTime>,
 }
 
 impl CsvSource {
@@ -63,6 +65,10 @@ impl CsvSource {
             unnamed_time: match source.layout.time {
                 Some(_) => None,
                 None => layout::evenly_rising_column(&head, extent(&head), &source.layout),
+            },
+            flat_time: match source.layout.time {
+                Some(_) => None,
+                None => layout::flat_time(&head, extent(&head), &source.layout),
             },
         };
         let index = pass.index;

@@ -51,6 +51,14 @@ pub enum RecordingError {
         /// What the first bytes say it is.
         format: &'static str,
     },
+    /// Text of two bytes a character.
+    #[error(
+        "{file}: the text is UTF-16, two bytes a character; save it as UTF-8 (in spreadsheets the type \"CSV UTF-8\")"
+    )]
+    Utf16 {
+        /// The file.
+        file: String,
+    },
     /// Neither a WAV file, a universal file nor text.
     #[error(
         "{file}: neither a WAV file, a universal file nor text (first bytes {first_bytes}); export as WAV, CSV or UFF58"
@@ -278,6 +286,22 @@ pub enum RecordingError {
         line: u64,
         /// ` (column N rises evenly: is it the time?)` where one does, empty otherwise.
         hint: String,
+    },
+    /// A column is named as time, but its values do not rise.
+    #[error(
+        "{file}:{line}: column {column} is named as time, but repeats or falls here, as in most rows: {} after {}; export the time with more digits, or remove the column and give sample_rate in Hz",
+        times[0],
+        times[1]
+    )]
+    RepeatedTime {
+        /// The file.
+        file: String,
+        /// Line of the first value that does not rise, 1-based.
+        line: u64,
+        /// Number, 1-based, and name of the column.
+        column: String,
+        /// The value there and the one before it (the column's unit).
+        times: [f64; 2],
     },
     /// A rate that is none.
     #[error(

@@ -244,21 +244,7 @@ impl<'a> Candidate<'a> {
     /// the head. (That it rises in all of them is checked when the rows are read, and is an error
     /// there.)
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
-        let names = |exact: bool| {
-            let is_time = move |column: &Column| {
-                // An unknown unit stays in the name; it is refused later, with its own message.
-                let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
-                let name = name.to_ascii_lowercase();
-                match exact {
-                    true => name == "t" || name == "time",
-                    false => name.starts_with("t_") || name.starts_with("time_"),
-                }
-            };
-            (0..columns.len()).filter(move |at| columns.get(*at).is_some_and(is_time))
-        };
-        names(true)
-            .chain(names(false))
-            .find(|column| self.rises(*column, first))
+        named_as_time(columns).find(|column| self.rises(*column, first))
     }
 
     fn rises(&self, column: usize, first: usize) -> bool {
@@ -283,6 +269,60 @@ impl<'a> Candidate<'a> {
             })
             .collect()
     }
+}
+
+/// Columns named t or time, then those named t_* or time_*.
+fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
+    let names = |exact: bool| {
+        let is_time = move |column: &Column| {
+            // An unknown unit stays in the name; it is refused later, with its own message.
+            let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
+            let name = name.to_ascii_lowercase();
+            match exact {
+                true => name == "t" || name == "time",
+                false => name.starts_with("t_") || name.starts_with("time_"),
+            }
+        };
+        (0..columns.len()).filter(move |at| columns.get(*at).is_some_and(is_time))
+    };
+    names(true).chain(names(false))
+}
+
+/// A column named as time whose values do not rise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FlatTime {
+    /// Column, 0-based.
+    pub column: usize,
+    /// First line in which it does not rise, 1-based.
+    pub line: u64,
+    /// Value there and the one before.
+    pub values: [f64; 2],
+}
+
+/// The column that is named as time without being one, and where that shows first in the head.
+pub(super) fn flat_time(head: &[u8], whole: HeadExtent, layout: &CsvLayout) -> Option<FlatTime> {
+    let column = named_as_time(&layout.columns).next()?;
+    let mut cells = Vec::new();
+    let lines = head_lines(head, layout.line_end, whole);
+    let rows = lines.iter().enumerate();
+    let values = rows
+        .skip_while(|(_, (offset, _))| *offset < layout.start)
+        .filter_map(|(at, (_, text))| {
+            split_cells(text, layout.separator, &mut cells);
+            let cell = text.get(cells.get(column)?.clone())?;
+            Some((at as u64 + 1, parse_number(cell, &mut None).ok()?))
+        });
+    let mut before = None;
+    for (line, value) in values {
+        if let Some(previous) = before.replace(value).filter(|previous| value <= *previous) {
+            return Some(FlatTime {
+                column,
+                line,
+                values: [value, previous],
+            });
+        }
+    }
+    None
 }
 
 /// The error of a text without rows shows the line that has most numbers.

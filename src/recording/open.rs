@@ -190,6 +190,14 @@ fn csv_rate(
     if let Some(given) = settings.sample_rate {
         return Ok((given, Vec::new()));
     }
+    if let Some(flat) = rates.flat_time {
+        return Err(RecordingError::RepeatedTime {
+            file: file.to_owned(),
+            line: flat.line,
+            column: format!("{}{}", flat.column + 1, layout.shown_name(flat.column)),
+            times: flat.values,
+        });
+    }
     let hint = match (layout.time, rates.unnamed_time) {
         (Some(_), _) => " (a single row has no step)".to_owned(),
         (None, Some(column)) => {

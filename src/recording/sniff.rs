@@ -40,8 +40,6 @@ const UNREAD: &[(usize, &[u8], &str)] = &[
     (0, b"\x1f\x8b", "a gzip archive"),
     (0, b"%PDF", "a PDF document"),
     (0, b"PAR1", "a Parquet file"),
-    (0, b"\xff\xfe", "UTF-16 text"),
-    (0, b"\xfe\xff", "UTF-16 text"),
 ];
 
 /// How many bytes decide.
@@ -60,6 +58,12 @@ pub(super) fn recognise(path: &Path, file: &str) -> Result<Kind, RecordingError>
 fn recognise_head(head: &[u8], file: &str) -> Result<Kind, RecordingError> {
     if head.is_empty() {
         return Err(RecordingError::EmptyFile {
+            file: file.to_owned(),
+        });
+    }
+    // The mark that begins such text in either order of bytes.
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return Err(RecordingError::Utf16 {
             file: file.to_owned(),
         });
     }

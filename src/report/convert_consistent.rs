@@ -6,6 +6,7 @@ use super::document::{
 };
 use super::format::significant;
 use crate::identify::consistent::{ConsistentEstimate, EstimatedQuantity, Limit, Quantity};
+use crate::stats::times;
 use crate::structure::Beam;
 
 /// The main estimate; what stands beside it is added by the caller.
@@ -22,7 +23,7 @@ pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection 
                 "the model misses the frequencies by {} % rms; uncertainties that would allow \
                      that are {} times the stated ones",
                 significant(100.0 * goodness.relative_misfit, 2),
-                significant(factor, 2)
+                times(factor)
             )
         }),
         kx: value(Quantity::Kx),

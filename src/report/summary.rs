@@ -188,6 +188,11 @@ fn estimate(document: &Document) -> Option<String> {
         .map(|parameter| {
             let [value, _, low, high, unit] = parameter.written();
             let interval = match (parameter.value.low, parameter.value.high) {
+                // More digits of a stiffness than that say nothing; how narrow the interval is does.
+                (Some(from), Some(to)) if low == high && to > from => format!(
+                    " (95 %: \u{b1}{} %)",
+                    significant(50.0 * (to - from) / parameter.value.value.abs(), 2)
+                ),
                 (Some(_), Some(_)) => format!(" (95 %: {low} to {high})"),
                 (Some(_), None) => format!(" (95 %: above {low})"),
                 (None, Some(_)) => format!(" (95 %: below {high})"),

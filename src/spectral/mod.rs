@@ -21,7 +21,7 @@ pub use chirp::chirp_z;
 pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
 pub use frf::{FrfEstimator, LinePowers, LineQuality, random_error};
 pub use lines::{DISPLAY_RATIO, Lines};
-pub use noise::{line_amplitude, noise_power};
+pub use noise::{line_amplitude, noise_beside, noise_power};
 pub use transform::{Transformer, Workspace, transform_block};
 pub use window::{Window, apply_force_window};
 pub(crate) use zoom::Decimator;

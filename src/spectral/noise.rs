@@ -64,3 +64,24 @@ pub fn line_amplitude(samples: &[f64], sample_rate: f64, frequency: f64) -> Opti
     }
     Some(2.0 * sum.norm() / samples.len() as f64)
 }
+
+/// Root mean square of the amplitudes that noise has beside `frequency` (Hz), as [`line_amplitude`] gives
+/// them; `None` where it gives none.
+///
+/// From the median over 3 to 8 resolutions 1/T to either side: nearer ones hold the line itself, and
+/// another line among them does not count. Powers of noise are exponentially distributed, so that their
+/// median is ln 2 of their mean.
+pub fn noise_beside(samples: &[f64], sample_rate: f64, frequency: f64) -> Option<f64> {
+    let resolution = sample_rate / samples.len() as f64;
+    let places = (3..=8).flat_map(|k| [-1.0, 1.0].map(|side| side * f64::from(k) * resolution));
+    let mut amplitudes: Vec<f64> = places
+        .map(|offset| frequency + offset)
+        .filter(|place| *place > 0.0)
+        .filter_map(|place| line_amplitude(samples, sample_rate, place))
+        .collect();
+    let half = amplitudes.len() / 2;
+    (!amplitudes.is_empty()).then(|| {
+        let median = *amplitudes.select_nth_unstable_by(half, f64::total_cmp).1;
+        median / std::f64::consts::LN_2.sqrt()
+    })
+}

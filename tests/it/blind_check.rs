@@ -202,7 +202,7 @@ fn val_truths_of_tests_made_elsewhere() {
          "params": {"sensor-mass": {"mass": 0.008}, "local-crack": {"compliance": 0.01}}},
         {"name": "d", "effects": ["loose-screw"], "params": {"torque": 1}}
     ]"#;
-    let truths = parse_truths(text).expect("a list of truths");
+    let truths = parse_truths(text).expect("a list of truths").truths;
     assert_eq!(truths.len(), 4);
     assert_eq!(truths[0].class(), Some(Class::None));
     let values: BTreeMap<_, _> = [("mass".to_owned(), 0.02), ("position".to_owned(), 0.3)].into();
@@ -227,5 +227,50 @@ fn regress_a_wrong_truth_file_says_what_is_expected() {
     ] {
         let error = parse_truths(text).expect_err("no truths").to_string();
         assert!(error.contains(expected), "{text}: {error}");
+    }
+}
+
+#[test]
+fn regress_a_slip_in_a_truth_file_is_told() {
+    let told = |entry: &str| -> Vec<String> {
+        let file = parse_truths(&format!("[{entry}]")).expect("a list of truths");
+        file.doubts.iter().map(ToString::to_string).collect()
+    };
+    for (entry, expected) in [
+        (
+            r#"{"name": "a", "effects": ["joint_mass"]}"#,
+            "did you mean `joint-mass`?",
+        ),
+        (r#"{"name": "a", "effects": ["none"]}"#, "`\"effects\": []`"),
+        (
+            r#"{"name": "a", "effects": ["loose-screw"], "params": {"torque": 1}}"#,
+            "outside the catalogue",
+        ),
+        (
+            r#"{"name": "a", "effects": ["joint-mass"], "params": {"mas": 0.012}}"#,
+            "`mas` is no parameter",
+        ),
+        (
+            r#"{"name": "a", "effects": ["joint-mass"], "params": {"mass": "12 g"}}"#,
+            "`mass` is no parameter with a number",
+        ),
+        (
+            r#"{"name": "a", "effects": ["modulus", "length"], "params": {"relative": 0.01}}"#,
+            "modulus, length with their own",
+        ),
+        (r#"{"name": "a", "effects": [], "extra": 1}"#, "`extra`"),
+    ] {
+        let told = told(entry);
+        assert_eq!(told.len(), 1, "{entry}: {told:?}");
+        assert!(told[0].contains(expected), "{entry}: {}", told[0]);
+    }
+    for entry in [
+        r#"{"name": "a", "effects": []}"#,
+        r#"{"name": "a", "effects": ["joint-mass"], "params": {"mass": 0.012, "inertia": 1e-6}}"#,
+        r#"{"name": "a", "effects": ["modulus"], "params": {"modulus": {"relative": 0.01}}}"#,
+        // What virtual tests are drawn with is meant.
+        r#"{"name": "a", "effects": ["soft-patch"], "params": {}}"#,
+    ] {
+        assert_eq!(told(entry), [""; 0], "{entry}");
     }
 }

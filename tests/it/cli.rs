@@ -1356,3 +1356,41 @@ fn regress_plan_checks_its_joint_as_every_command_does() {
         "a source of energy",
     );
 }
+
+#[test]
+fn regress_one_unreadable_test_does_not_end_a_blind_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let add = |name: &str| {
+        let own = folder.path().join("tests").join(name);
+        fs::create_dir_all(&own).unwrap();
+        let text = "[beam]\nlength = \"423 mm\"\nwidth = \"40 mm\"\nthickness = \"5 mm\"\n\
+                    modulus = \"207 GPa\"\ndensity = 7850\n[joint]\nkind = \"cantilever\"\n\
+                    [hammer]\nchannel = 1\n[[recording]]\nfile = \"lost.wav\"\n";
+        fs::write(own.join("test.toml"), text).unwrap();
+    };
+    add("bad");
+    add("unlisted");
+    let truth = r#"[{"name": "bad", "effects": ["joint_mass"], "params": {}}]"#;
+    fs::write(folder.path().join("truth.json"), truth).unwrap();
+    let arguments = [
+        "blind-check",
+        "--folder",
+        "tests",
+        "--truth",
+        "truth.json",
+        "--out",
+        "out",
+    ];
+    let output = tapjoint(folder.path()).args(arguments).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).replace('\n', " ");
+    assert!(output.status.success(), "{told}");
+    for part in [
+        "the test \"bad\" could not be diagnosed",
+        "lost.wav",
+        "unlisted",
+        "did you mean `joint-mass`?",
+    ] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    assert!(folder.path().join("out").is_dir());
+}

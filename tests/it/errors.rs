@@ -1301,3 +1301,11 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn regress_an_effect_is_named_by_its_id() {
+    let text = format!("{VALID}[[effect]]\neffect = \"modulus\"\nrelative = 0.01\n");
+    let error = TestDescription::parse(&text, "test.toml").expect_err("no id");
+    let message = error.to_string();
+    assert!(message.contains("did you mean `id`?"), "{message}");
+}

@@ -89,6 +89,7 @@ const TABLE: &[(&str, &[&str])] = &[
             "gap",
             "pipeline",
             "study",
+            "stats",
         ],
     ),
 ];

@@ -198,6 +198,7 @@ fn prop_mains_must_be_near_a_multiple_and_there_before_the_tap() {
     let steady = LineAmplitudes {
         before: 0.9,
         within: 1.0,
+        noise: 0.01,
     };
     assert_eq!(mains_harmonic(50.05, 0.1, steady, &settings), Some(50.0));
     assert_eq!(mains_harmonic(180.1, 0.1, steady, &settings), Some(180.0));
@@ -209,11 +210,22 @@ fn prop_mains_must_be_near_a_multiple_and_there_before_the_tap() {
     let rings = LineAmplitudes {
         before: 0.01,
         within: 1.0,
+        noise: 0.001,
     };
     assert_eq!(
         mains_harmonic(50.0, 0.1, rings, &settings),
         None,
         "it came with the tap"
+    );
+    let noise = LineAmplitudes {
+        before: 0.9,
+        within: 1.0,
+        noise: 0.3,
+    };
+    assert_eq!(
+        mains_harmonic(1802.7, 0.1, noise, &settings),
+        None,
+        "as high as the noise beside it"
     );
 }
 

@@ -321,7 +321,7 @@ fn val_scatter_beside_what_noise_explains() {
         &[
             "110.00 Hz",
             "0.0200 %",
-            "10.0 times",
+            "10 times",
             "1.8 is chance",
             "limit 1 %",
         ],
@@ -535,35 +535,44 @@ fn val_two_levels_and_a_moved_sensor() {
     };
     let judge = |second, check| worst(&judge_test(&[good(), second], &settings()), check);
     let harder = |r: &mut RecordingEvidence| r.taps.iter_mut().for_each(|t| t.peak *= 3.0);
-    // 1e-5 each: sqrt(2) 1e-5 of the difference, which is 1e-4: 7.1.
-    let soft = judge(shifted(-1e-4, harder), Check::Linearity);
+    // 1e-5 each: sqrt(2) 1e-5 of the difference, which is 1e-2: 707.
+    let soft = judge(shifted(-1e-2, harder), Check::Linearity);
     assert_doubt(
         &soft,
         Outcome::Doubtful,
         &[
             "40.00 Hz",
-            "-0.010 %",
+            "-1.000 %",
             "3.00 times",
-            "7.1 standard",
+            "707 standard",
             "limit 3",
         ],
     );
     let same = judge(shifted(2e-5, harder), Check::Linearity);
     assert_eq!(same.outcome, Outcome::Good, "{same}");
+    let verdicts = judge_test(&[good(), shifted(-1e-3, harder)], &settings());
+    let moved_mode =
+        |v: &&Verdict| v.check == Check::Linearity && v.to_string().contains("40.00 Hz");
+    let drifted = verdicts
+        .iter()
+        .find(moved_mode)
+        .expect("the mode that moves");
+    assert_eq!(drifted.outcome, Outcome::Good, "{drifted}");
+    assert!(drifted.happened.contains("usual drift"), "{drifted}");
     assert_missing(
         &judge(shifted(1e-4, |_| {}), Check::Linearity),
         "tap level alone",
     );
 
     let moved = |r: &mut RecordingEvidence| r.sensors[1].position = Some(0.2);
-    let loaded = judge(shifted(-2e-3, moved), Check::MassLoading);
+    let loaded = judge(shifted(-8e-3, moved), Check::MassLoading);
     assert_doubt(
         &loaded,
         Outcome::Doubtful,
-        &["-0.200 %", "c.wav", "limit 3", "sensor's mass"],
+        &["-0.800 %", "c.wav", "limit 3", "sensor's mass"],
     );
     assert_eq!(
-        judge(shifted(0.0, moved), Check::MassLoading).outcome,
+        judge(shifted(-2e-3, moved), Check::MassLoading).outcome,
         Outcome::Good
     );
     assert_missing(
@@ -587,4 +596,31 @@ fn val_two_levels_and_a_moved_sensor() {
         &judge(shifted(1e-3, unknown), Check::Linearity),
         "not known",
     );
+}
+
+#[test]
+fn val_three_levels_in_order_are_more_than_drift() {
+    let at = |level: f64, relative: f64| {
+        changed(|r| {
+            r.file = format!("{level}.wav");
+            r.resonances[0].frequency *= 1.0 + relative;
+            r.taps.iter_mut().for_each(|tap| tap.peak *= level);
+        })
+    };
+    let judge = |shifts: [f64; 3]| {
+        let recordings = [at(1.0, shifts[0]), at(2.0, shifts[1]), at(4.0, shifts[2])];
+        worst(&judge_test(&recordings, &settings()), Check::Linearity)
+    };
+    // Far below a usual drift, and far above the uncertainty of 1e-5.
+    let ordered = judge([0.0, -1e-3, -2e-3]);
+    assert_doubt(
+        &ordered,
+        Outcome::Doubtful,
+        &["Over 3 recordings", "slips or opens"],
+    );
+    let jumping = judge([0.0, -2e-3, -1e-3]);
+    assert_eq!(jumping.outcome, Outcome::Good, "{jumping}");
+    // Twice nearly the same frequency is no order.
+    let equal = judge([0.0, -1e-3, -1.01e-3]);
+    assert_eq!(equal.outcome, Outcome::Good, "{equal}");
 }

@@ -8,8 +8,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint::spectral::{
     DecayCheck, Lines, SpectralAverager, SpectralError, Window, apply_force_window, band_limited,
-    chirp_z, choose_window, largest_smooth_block, line_amplitude, measure_decay, noise_power,
-    smallest_smooth_block, transform_block,
+    chirp_z, choose_window, largest_smooth_block, line_amplitude, measure_decay, noise_beside,
+    noise_power, smallest_smooth_block, transform_block,
 };
 
 fn noise(length: usize, seed: u64) -> Vec<f64> {
@@ -246,6 +246,26 @@ fn recover_amplitude_of_a_steady_line() {
         line_amplitude(&hum[..200], rate, 50.0).is_none(),
         "two periods are too few"
     );
+}
+
+#[test]
+fn recover_noise_beside_a_line() {
+    let (rate, count) = (4096.0, 4096);
+    let ratio = |hum: f64, seed: u64| {
+        let mut samples = noise(count, seed);
+        for (n, x) in samples.iter_mut().enumerate() {
+            *x += hum * (TAU * 1800.0 * n as f64 / rate).sin();
+        }
+        let line = line_amplitude(&samples, rate, 1800.0).unwrap();
+        line / noise_beside(&samples, rate, 1800.0).unwrap()
+    };
+    // White noise of unit variance leaves amplitudes of 2/sqrt(n) = 0.03 root mean square: a line of 0.5 is
+    // 16 times as high, give or take the scatter of a median of twelve (a third).
+    for seed in 0..20 {
+        assert!(ratio(0.0, seed) < 4.0, "{}", ratio(0.0, seed));
+        let found = ratio(0.5, seed);
+        assert!((8.0..32.0).contains(&found), "{found}");
+    }
 }
 
 #[test]

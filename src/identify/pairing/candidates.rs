@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::EXTRA_COST;
 use super::joint::JointSearch;
+use super::strength::Neighbours;
 
 /// A number, or none, for each peak.
 pub(super) type Assignment = Vec<Option<usize>>;
@@ -32,8 +33,16 @@ pub(super) fn pairs(assignment: &Assignment) -> Vec<(usize, usize)> {
 
 /// The most likely assignments, each with the joint of the grid that suits it best; the plain one is
 /// always there.
-pub(super) fn find(search: &JointSearch<'_>) -> Vec<(Assignment, [f64; 3])> {
+pub(super) fn find(
+    search: &JointSearch<'_>,
+    neighbours: &Neighbours,
+) -> Vec<(Assignment, [f64; 3])> {
     let peaks = search.log_frequencies();
+    // A weak peak at its price, lest all places take a strong one's satellites; and without, lest a strong
+    // peak that is no mode hides the mode beside it. The closer look prices both alike.
+    let weak: Vec<f64> = (0..peaks.len()).map(|p| neighbours.alone(p)).collect();
+    let mut prices = vec![vec![0.0; peaks.len()]];
+    prices.extend(weak.iter().any(|price| *price > 0.0).then_some(weak));
     let plain: Assignment = (1..=peaks.len()).map(Some).collect();
     let grid: Vec<([f64; 3], Vec<f64>)> = search
         .grid()
@@ -48,8 +57,13 @@ pub(super) fn find(search: &JointSearch<'_>) -> Vec<(Assignment, [f64; 3])> {
         }
     };
     for (place, modes) in &grid {
-        for width in WIDTHS {
-            let (assignment, cost) = align(&peaks, modes, width, |f| search.in_band(f));
+        for (width, weak) in WIDTHS
+            .iter()
+            .flat_map(|w| prices.iter().map(move |p| (*w, p)))
+        {
+            let (assignment, cost) = align((&peaks, weak), modes, width, |f| search.in_band(f));
+            let paid: f64 = pairs(&assignment).iter().map(|pair| weak[pair.0]).sum();
+            let cost = cost - paid + neighbours.cost(&assignment);
             offer(assignment, cost, *place);
         }
         let misfit = peaks.iter().zip(modes).map(|(a, b)| (a - b).powi(2));
@@ -69,9 +83,9 @@ pub(super) fn find(search: &JointSearch<'_>) -> Vec<(Assignment, [f64; 3])> {
 }
 
 /// The cheapest assignment that keeps the order, by dynamic programming over peaks and modes (both as
-/// logarithms of frequency). Modes above the highest peak are free.
+/// logarithms of frequency), weak peaks at their price. Modes above the highest peak are free.
 fn align(
-    peaks: &[f64],
+    (peaks, weak): (&[f64], &[f64]),
     modes: &[f64],
     width: f64,
     in_band: impl Fn(f64) -> bool,
@@ -83,8 +97,9 @@ fn align(
         .iter()
         .map(|f| if in_band(f.exp()) { MISSING_COST } else { 0.0 })
         .collect();
-    let matched =
-        |i: usize, j: usize| 0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln();
+    let matched = |i: usize, j: usize| {
+        0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln() + weak[i]
+    };
     for i in 0..=n {
         for j in 0..=m {
             let extra = (i > 0).then(|| cost[i - 1][j] + EXTRA_COST);

@@ -11,20 +11,24 @@
 //!    could have explained is not preferred for a perfect fit.
 //! 3. *Shape* (`shape`): measured shapes and signs against those of that joint; whether a mode left out
 //!    could have been seen at all.
-//! 4. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
+//! 4. *Strength* (`strength`): of several poles that may be the same mode, a weak one has its price.
+//! 5. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
 //!    Where the plain one (peaks numbered in ascending order) is among them it stays.
 
 mod by_frequency;
 mod candidates;
 mod joint;
 mod shape;
+mod strength;
 
 pub use by_frequency::{WeightedPeak, pair_by_frequency, pair_by_ratio};
+pub use strength::PeakStrength;
 
 use super::consistent::{FrequencyModel, JointedStructure, Parameter};
 use crate::structure::StructureError;
 use candidates::Assignment;
 use joint::JointSearch;
+use strength::Neighbours;
 
 /// A measured peak that may be a mode.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +39,9 @@ pub struct MeasuredPeak {
     pub std: Option<f64>,
     /// What sensors saw of its shape; empty where places or amplitudes are unknown.
     pub shape: Vec<ShapeAt>,
+    /// How strongly each recording saw it, in the same order for all peaks, `None` where it did not;
+    /// empty where that is unknown.
+    pub strengths: Vec<Option<PeakStrength>>,
 }
 
 /// A shape's value at one sensor.
@@ -140,11 +147,12 @@ pub fn pair_modes(
     bare.springs.clear();
     let coarse = FrequencyModel::new(&bare, highest)?;
     let fine = FrequencyModel::new(structure, highest)?;
-    let found = candidates::find(&JointSearch::new(&coarse, peaks, settings));
+    let neighbours = Neighbours::of(peaks);
+    let found = candidates::find(&JointSearch::new(&coarse, peaks, settings), &neighbours);
     let search = JointSearch::new(&fine, peaks, settings);
     let mut numberings: Vec<Scored> = found
         .iter()
-        .map(|(assignment, start)| score(&search, assignment, *start))
+        .map(|(assignment, start)| score(&search, (assignment, &neighbours), *start))
         .collect();
     numberings.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     Ok(verdict(numberings, settings.odds))
@@ -162,7 +170,11 @@ struct Scored {
 /// frequency.
 const EXTRA_COST: f64 = 3.0 + 1.6;
 
-fn score(search: &JointSearch<'_>, assignment: &Assignment, start: [f64; 3]) -> Scored {
+fn score(
+    search: &JointSearch<'_>,
+    (assignment, neighbours): (&Assignment, &Neighbours),
+    start: [f64; 3],
+) -> Scored {
     let pairs = candidates::pairs(assignment);
     let fit = search.refine(&pairs, start);
     let view = shape::View::new(search, &fit);
@@ -173,7 +185,9 @@ fn score(search: &JointSearch<'_>, assignment: &Assignment, start: [f64; 3]) -> 
         .collect();
     let extra = (assignment.len() - pairs.len()) as f64;
     let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
-    let by_data = fit.cost + extra * EXTRA_COST + view.cost(search, &pairs);
+    let weak = neighbours.cost(assignment);
+    let shaped = strength::comparable(&pairs, assignment, (search.peaks, neighbours));
+    let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
     Scored {
         cost: by_data + unseen,
         by_data,

@@ -137,6 +137,17 @@ impl View {
     }
 }
 
+/// Whether any group of sensors shows a direction.
+pub(super) fn is_clear(shape: &[ShapeAt]) -> bool {
+    shape.iter().any(|one| {
+        let group = shape.iter().filter(|at| at.group == one.group);
+        let (measured, noise) = group.fold((0.0, 0.0), |(measured, noise), at| {
+            (measured + at.value.powi(2), noise + at.std.powi(2))
+        });
+        measured > CLEAR.powi(2) * noise
+    })
+}
+
 /// ln of the density of the angle between two shapes over that of any direction: a normal one of width
 /// s has pi/(s sqrt(2 pi)) of it in a plane, 1/s^2 in space (half a circle, half a sphere); more
 /// dimensions count as three.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::Warning;
+use crate::stats::times;
 
 impl Warning {
     pub(super) fn write_estimate_doubt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -50,8 +51,8 @@ fn write_misfit(
     if let Some(deviations) = deviations {
         write!(
             f,
-            " ({:.0} standard deviations of its reading)",
-            deviations.abs()
+            " ({} standard deviations of its reading)",
+            times(deviations)
         )?;
     }
     f.write_str(

@@ -6,6 +6,7 @@ use super::super::document::{
 use super::super::format::probability;
 use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
 use super::next_tests::next_test;
+use crate::stats::times;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
 pub fn gap_story(document: &Document) -> Vec<String> {
@@ -154,12 +155,12 @@ fn place(gap: &GapSection) -> Option<String> {
         .iter()
         .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))?;
     Some(format!(
-        "Where: {}. Largest misfit before: mode {} in {}, {} % ({:.0} standard deviations).",
+        "Where: {}. Largest misfit before: mode {} in {}, {} % ({} standard deviations).",
         listed.join(", "),
         worst.mode,
         place_of(worst),
         change(worst.error_percent, 3),
-        worst.z.abs()
+        times(worst.z)
     ))
 }
 

@@ -35,4 +35,4 @@ pub use record::{Recorded, RecordedTest};
 pub use score::{Case, SET_SHARE, Scores, score};
 pub use sizes::{GROUPS, draw_effect};
 pub use table::{Row, Target, render_rows, rows};
-pub use truth_file::{TruthError, parse_truths};
+pub use truth_file::{TruthDoubt, TruthError, TruthFile, parse_truths};

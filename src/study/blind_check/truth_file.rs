@@ -3,7 +3,8 @@
 //! An empty list of effects means that nothing was planted; an id that the catalogue does not have
 //! means something outside it. Parameters may stand under their effect's id, or by themselves where
 //! there is but one effect. `"detectable"` and `"refutable"` say whether the effect could be noticed, and
-//! whether the catalogue could be seen not to explain it; both may be left out.
+//! whether the catalogue could be seen not to explain it; both may be left out. What a slip of the pen may
+//! have left is told as a doubt: it would change the score without a word.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +12,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::case::{Planted, Truth};
-use crate::effects::EffectId;
+use super::outside::OutsideKind;
+use crate::effects::{EffectError, EffectId};
 
 /// Why a truth file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -33,6 +35,57 @@ pub enum TruthError {
     },
 }
 
+/// The truths of a file, and what about them is odd.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TruthFile {
+    /// One for each test, in the order of the file.
+    pub truths: Vec<Truth>,
+    /// Oddities that keep no truth from being used.
+    pub doubts: Vec<TruthDoubt>,
+}
+
+/// Something in a truth file that may be a slip of the pen.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TruthDoubt {
+    /// An id that the catalogue does not have.
+    #[error(
+        "the test \"{test}\": the catalogue has no effect `{effect}`, so that it counts as something outside \
+         the catalogue{hint}"
+    )]
+    Outside {
+        /// The test.
+        test: String,
+        /// The id.
+        effect: String,
+        /// `; did you mean ...?`, or empty.
+        hint: String,
+    },
+    /// A parameter that is not used.
+    #[error(
+        "the test \"{test}\": `{parameter}` is no parameter with a number of its effects and is left out; \
+         allowed: {allowed}"
+    )]
+    Parameter {
+        /// The test.
+        test: String,
+        /// The parameter.
+        parameter: String,
+        /// Those that are known.
+        allowed: String,
+    },
+    /// A key that is not used.
+    #[error(
+        "the test \"{test}\": the key `{key}` is not known and is left out; known: name, effects, params, \
+         detectable, refutable"
+    )]
+    Key {
+        /// The test.
+        test: String,
+        /// The key.
+        key: String,
+    },
+}
+
 #[derive(Deserialize)]
 struct Entry {
     name: String,
@@ -41,23 +94,106 @@ struct Entry {
     params: BTreeMap<String, Value>,
     detectable: Option<bool>,
     refutable: Option<bool>,
+    #[serde(flatten)]
+    unknown: BTreeMap<String, Value>,
 }
 
 /// Reads a truth file's text.
 ///
 /// # Errors
 /// [`TruthError`] where the text is no such list, or names a test twice.
-pub fn parse_truths(text: &str) -> Result<Vec<Truth>, TruthError> {
+pub fn parse_truths(text: &str) -> Result<TruthFile, TruthError> {
     let entries: Vec<Entry> =
         serde_json::from_str(text).map_err(|source| TruthError::Shape { source })?;
     let mut truths: Vec<Truth> = Vec::new();
+    let mut doubts = Vec::new();
     for entry in entries {
         if truths.iter().any(|truth| truth.name == entry.name) {
             return Err(TruthError::Twice { name: entry.name });
         }
+        doubts.extend(doubts_of(&entry));
         truths.push(truth_of(entry));
     }
-    Ok(truths)
+    Ok(TruthFile { truths, doubts })
+}
+
+fn doubts_of(entry: &Entry) -> Vec<TruthDoubt> {
+    let test = || entry.name.clone();
+    let keys = entry.unknown.keys().map(|key| TruthDoubt::Key {
+        test: test(),
+        key: key.clone(),
+    });
+    let effects = entry.effects.iter().filter_map(|effect| {
+        Some(TruthDoubt::Outside {
+            test: test(),
+            effect: effect.clone(),
+            hint: hint(effect)?,
+        })
+    });
+    let known: Vec<EffectId> = entry
+        .effects
+        .iter()
+        .filter_map(|name| EffectId::parse(name).ok())
+        .collect();
+    let mut all: Vec<TruthDoubt> = effects.chain(keys).collect();
+    // What lies outside the catalogue has parameters of its own.
+    if known.len() == entry.effects.len() {
+        all.extend(
+            unused_parameters(entry, &known)
+                .into_iter()
+                .map(|(parameter, allowed)| TruthDoubt::Parameter {
+                    test: test(),
+                    parameter,
+                    allowed,
+                }),
+        );
+    }
+    all
+}
+
+/// What may have been meant by an id outside the catalogue; `None` of one in it, and of those that virtual
+/// tests are drawn with.
+fn hint(effect: &str) -> Option<String> {
+    let Err(error) = EffectId::parse(effect) else {
+        return None;
+    };
+    if OutsideKind::ALL.iter().any(|kind| kind.name() == effect) {
+        return None;
+    }
+    if effect.is_empty() || effect == "none" {
+        return Some("; where nothing was planted write `\"effects\": []`".to_owned());
+    }
+    let EffectError::UnknownEffect { nearest, .. } = error else {
+        return Some(String::new());
+    };
+    Some(nearest.map_or_else(String::new, |name| format!("; did you mean `{name}`?")))
+}
+
+/// Parameters that no effect of the entry takes up, each with those that would be.
+fn unused_parameters(entry: &Entry, effects: &[EffectId]) -> Vec<(String, String)> {
+    let names = |id: EffectId| id.parameters().iter().map(|info| info.name);
+    let mut unused = Vec::new();
+    for (key, value) in &entry.params {
+        let own = effects.iter().find(|id| id.name() == key);
+        match (own, value, effects) {
+            (Some(&id), Value::Object(values), _) => {
+                let odd = values.iter().filter(|(name, value)| {
+                    !(names(id).any(|known| known == *name) && value.is_number())
+                });
+                let allowed = || names(id).collect::<Vec<_>>().join(", ");
+                unused.extend(odd.map(|(name, _)| (name.clone(), allowed())));
+            }
+            (_, value, [id]) if names(*id).any(|known| known == key) && value.is_number() => {}
+            (_, _, [id]) => unused.push((key.clone(), names(*id).collect::<Vec<_>>().join(", "))),
+            (_, _, []) => unused.push((key.clone(), "none, for nothing was planted".to_owned())),
+            _ => {
+                let ids: Vec<&str> = effects.iter().map(|id| id.name()).collect();
+                let allowed = format!("{} with their own parameters in braces", ids.join(", "));
+                unused.push((key.clone(), allowed));
+            }
+        }
+    }
+    unused
 }
 
 fn truth_of(entry: Entry) -> Truth {

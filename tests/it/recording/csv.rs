@@ -628,3 +628,24 @@ fn names_that_miss_are_answered_with_what_exists() {
     let (_file, numbered) = open(table("time,2,1", ",", ".", "\n"));
     assert_eq!(numbered.unwrap().channel_index("2").unwrap(), 0);
 }
+
+#[test]
+fn regress_a_time_column_with_too_few_digits_is_told_as_such() {
+    let rows: String = (0..40)
+        .map(|row| format!("{:.3},{row},1\n", f64::from(row) / 4096.0))
+        .collect();
+    let message = open_error(format!("Time (s),force,response\n{rows}"));
+    // 0/4096 and 1/4096 s are 0.000 both: line 3.
+    assert_message(
+        &message,
+        "tested.dat:3: column 1 (\"Time\") is named as time",
+        &["repeats", "more digits", "sample_rate in Hz"],
+    );
+}
+
+#[test]
+fn regress_utf_16_is_named_with_its_remedy() {
+    let mut bytes = vec![0xff, 0xfe];
+    bytes.extend("t;a\n0;1\n".encode_utf16().flat_map(u16::to_le_bytes));
+    assert_message(&open_error(bytes), "tested.dat: ", &["UTF-16", "UTF-8"]);
+}

@@ -279,6 +279,21 @@ fn val_summary_counts() {
     assert!(sentences.contains(&reason.to_owned()), "{sentences:?}");
 }
 
+#[test]
+fn regress_a_narrow_interval_shows_its_width() {
+    let mut document = fixture::document();
+    let estimate = document.estimate.as_mut().and_then(Option::as_mut);
+    let stiffness = estimate.and_then(|e| e.kt.as_mut()).expect("a stiffness");
+    // 1.96 standard deviations of 1 N/m in 1.382 MN/m.
+    (stiffness.low, stiffness.high) = (Some(1_382_000.0 - 1.96), Some(1_382_000.0 + 1.96));
+    stiffness.std = Some(1.0);
+    let text = summary::sentences(&document)
+        .join(" ")
+        .replace('\u{a0}', " ");
+    let expected = "Kt = 1.3820 MN/m (95 %: \u{b1}0.00014 %)";
+    assert!(text.contains(expected), "{text}");
+}
+
 /// The fixture without what only a description gives, as of a bare recording.
 fn bare() -> Document {
     let mut document = fixture::document();

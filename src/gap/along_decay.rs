@@ -1,12 +1,13 @@
 //! Damping, and what a joint whose stiffness depends on the amplitude does to frequencies.
 
-use super::forward::{Forward, Solved};
+use super::forward::Forward;
 use super::frame::Frame;
 use super::hypothesis::Fit;
 use super::joint_energy::joint_shares;
 use super::joint_path::{Changes, JointPath};
 use super::setup::Setup;
 use super::small_unknowns::Small;
+use super::solved::Solved;
 use crate::effects::{EffectId, JointLaw};
 use crate::identify::observation::{Observations, effective_share};
 

@@ -6,10 +6,11 @@
 
 use super::along_decay::lawful_change;
 use super::decay_law::{Changes, LARGEST, Regression};
-use super::forward::{Forward, Solved};
+use super::forward::Forward;
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
 use super::noise::{self, Reading};
+use super::solved::Solved;
 use crate::effects::JointLaw;
 
 /// Probability by chance below which a change counts: a false one in a thousand tests.

@@ -3,10 +3,10 @@
 
 use super::along_decay::stiffness_change;
 use super::decay_finding::{law_of, predicted, slopes};
-use super::forward::Solved;
 use super::frame::{Frame, Row, reading_of};
 use super::joint_energy::joint_shares;
 use super::noise::Reading;
+use super::solved::Solved;
 use crate::effects::{JointLaw, JointLawKind};
 use crate::identify::observation::{DecayVerdict, Observations, ObservedMode};
 

@@ -1,10 +1,10 @@
 //! Known masses that are fastened for single recordings: known as well as a scale and a ruler know them.
 
-use super::forward::Solved;
 use super::frame::Frame;
 use super::settings::GapSettings;
 use super::setup::Setup;
 use super::small_unknowns::Small;
+use super::solved::Solved;
 use crate::structure::specimen::PointMass;
 
 impl Frame {

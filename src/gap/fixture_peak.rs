@@ -18,13 +18,14 @@
 
 use super::catalogue::PlaceKind;
 use super::evidence::{Branch, covariance, evaluate, log_sum};
-use super::forward::{Forward, Solved};
+use super::forward::Forward;
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search};
 use super::least_squares::Knowledge;
 use super::lone_peaks::{DECIBEL, Peak, STATED};
 use super::noise::chi_square_tail;
 use super::setup::TWIN;
+use super::solved::Solved;
 use crate::structure::specimen::SpecimenModes;
 use std::f64::consts::TAU;
 

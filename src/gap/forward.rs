@@ -3,11 +3,11 @@
 use super::catalogue::{Candidate, PlaceKind};
 use super::frame::{Frame, Row};
 use super::joint_energy::joint_slopes;
-use super::joint_path::Changes;
 use super::least_squares::{Knowledge, Linearised, Model};
 use super::nominal::COUPLING;
-use crate::effects::{Circumstances, Effect, Seen, apply};
-use crate::structure::specimen::{BeamModes, Specimen, SpecimenJoint, SpecimenModes};
+use super::solved::Solved;
+use crate::effects::Effect;
+use crate::structure::specimen::{Specimen, SpecimenJoint};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -61,7 +61,7 @@ impl Layout {
     }
 
     /// The nominal structure with the joint that the parameters give it.
-    fn with_joint(&self, specimen: &Specimen, parameters: &[f64]) -> Specimen {
+    pub(super) fn with_joint(&self, specimen: &Specimen, parameters: &[f64]) -> Specimen {
         let mut specimen = specimen.clone();
         if let SpecimenJoint::Springs { kt, kr, coupling } = &mut specimen.joint {
             for (direction, value) in self.joint.iter().zip(parameters) {
@@ -89,38 +89,6 @@ pub(super) fn effect_of(candidate: &Candidate, size: f64, place: Option<f64>) ->
         });
     }
     Effect::from_pairs(candidate.effect, &pairs).ok()
-}
-
-/// A configuration's structure under a hypothesis, and its modes.
-#[derive(Clone)]
-pub(super) struct Solved {
-    pub(super) seen: Seen,
-    own: Arc<BeamModes>,
-    /// What its modes feel of a joint whose stiffness depends on the amplitude.
-    pub(super) changes: Option<Changes>,
-}
-
-impl Solved {
-    /// All its modes, that of a fixture among them.
-    pub(super) fn modes(&self) -> &SpecimenModes {
-        &self.own.modes
-    }
-
-    /// Index of the mode with this number (1 = lowest): that of a fixture has none.
-    pub(super) fn index(&self, mode: usize) -> Option<usize> {
-        self.own.numbers.get(mode - 1).copied()
-    }
-
-    /// Index of the fixture's own mode.
-    pub(super) fn base(&self) -> Option<usize> {
-        self.own.fixture
-    }
-
-    /// Frequency as it is read (Hz).
-    pub(super) fn frequency(&self, mode: usize) -> Option<f64> {
-        let own = self.modes().frequencies()[self.index(mode)?];
-        Some(self.seen.read(own))
-    }
 }
 
 /// What a prediction leaves behind for its slopes.
@@ -215,58 +183,6 @@ impl<'a> Forward<'a> {
             ));
         }
         steps
-    }
-
-    /// Structure and modes of each configuration; equal structures are solved once.
-    pub(super) fn solve(&self, parameters: &[f64]) -> Option<Vec<Solved>> {
-        self.solve_by(parameters, |_, specimen| self.modes_of(specimen))
-    }
-
-    /// The same next to a point that is solved.
-    pub(super) fn solve_near(&self, parameters: &[f64], there: &[Solved]) -> Option<Vec<Solved>> {
-        self.solve_by(parameters, |configuration, specimen| {
-            let known = &there[configuration];
-            if known.seen.specimen == *specimen {
-                return Some(known.own.clone());
-            }
-            match known.own.near(specimen).ok()? {
-                Some(near) => Some(Arc::new(near)),
-                None => self.modes_of(specimen),
-            }
-        })
-    }
-
-    fn solve_by(
-        &self,
-        parameters: &[f64],
-        modes_of: impl Fn(usize, &Specimen) -> Option<Arc<BeamModes>>,
-    ) -> Option<Vec<Solved>> {
-        let effects = self.layout.effects_at(parameters)?;
-        let mut all: Vec<Solved> = Vec::with_capacity(self.frame.setups.len());
-        for (configuration, setup) in self.frame.setups.iter().enumerate() {
-            let nominal = self.layout.with_joint(&setup.specimen, parameters);
-            let changes = self.changes(configuration, parameters);
-            let circumstances = Circumstances {
-                sensors: &setup.carried,
-                level: self.level(setup, changes.as_ref(), parameters),
-                ..Circumstances::default()
-            };
-            let seen = apply(&effects, &nominal, &circumstances);
-            let known = all
-                .iter()
-                .find(|other| other.seen.specimen == seen.specimen);
-            let own = match known {
-                Some(other) => other.own.clone(),
-                None => modes_of(configuration, &seen.specimen)?,
-            };
-            all.push(Solved { seen, own, changes });
-        }
-        Some(all)
-    }
-
-    fn modes_of(&self, specimen: &Specimen) -> Option<Arc<BeamModes>> {
-        let found = specimen.beam_modes(self.frame.modes, self.frame.mesh);
-        Some(Arc::new(found.ok()?))
     }
 
     /// Slopes of all rows with respect to the joint's stiffnesses by finite differences.

@@ -1,7 +1,7 @@
 //! How much of a mode's energy sits in the joint's springs, and what that does to its frequency.
 
-use super::forward::Solved;
 use super::nominal::COUPLING;
+use super::solved::Solved;
 use crate::structure::specimen::SpecimenJoint;
 
 /// Share of each spring of the joint in the strain energy of a mode, q_t F_t/omega^2 for a shape of

@@ -6,8 +6,8 @@
 //! or its frequency at two times.
 
 use super::decay_readings::beginning;
-use super::forward::Solved;
 use super::setup::Setup;
+use super::solved::Solved;
 use crate::effects::{JointLaw, ModeMotion};
 use crate::identify::observation::Configuration;
 use crate::structure::specimen::SpecimenModes;

@@ -59,6 +59,7 @@ mod settings;
 mod setup;
 mod small_slopes;
 mod small_unknowns;
+mod solved;
 mod synthetic;
 mod trial;
 mod verdict;

@@ -6,11 +6,12 @@
 //! regularised least squares, beside the joint and all small unknowns.
 
 use super::evidence::covariance;
-use super::forward::{Forward, Solved};
+use super::forward::Forward;
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
 use super::least_squares::{Knowledge, Optimum, maximise_linear};
 use super::result::PlaceMap;
+use super::solved::Solved;
 use crate::structure::specimen::Body;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;

@@ -327,7 +327,7 @@ fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
     let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
         return;
     };
-    let amplitude = |(setup, one): (&Setup, &super::forward::Solved)| -> Option<f64> {
+    let amplitude = |(setup, one): (&Setup, &super::solved::Solved)| -> Option<f64> {
         let tap = setup.tap?;
         let modes = (1..=frame.fitted_modes).filter_map(|mode| one.index(mode));
         Some(joint_amplitude(one.modes(), (tap, setup.level), modes))

@@ -1,10 +1,11 @@
 //! What the small unknowns do to each reading.
 
 use super::fastened::fastened_slope;
-use super::forward::{Forward, Solved};
+use super::forward::Forward;
 use super::frame::Row;
 use super::joint_energy::joint_shares;
 use super::small_unknowns::Small;
+use super::solved::Solved;
 use nalgebra::DMatrix;
 
 impl Forward<'_> {

@@ -17,7 +17,7 @@ pub(super) struct Factor {
     rows: Vec<[f64; HALF_BAND + 1]>,
 }
 
-/// L D L^T of any symmetric matrix: L D left of the diagonal, D on it.
+/// L D L^T of any symmetric matrix: L D left of the diagonal, 1/D on it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Indefinite {
     rows: Vec<[f64; HALF_BAND + 1]>,
@@ -102,12 +102,6 @@ impl Band {
         Some(Factor { rows })
     }
 
-    /// x^T self x / x^T other x.
-    pub(super) fn quotient(&self, other: &Self, x: &[f64]) -> f64 {
-        let form = |band: &Self| -> f64 { band.times(x).iter().zip(x).map(|(a, b)| a * b).sum() };
-        form(self) / form(other)
-    }
-
     /// Number of negative eigenvalues: that of the negative pivots (Sylvester's law of inertia).
     pub(super) fn negative_eigenvalues(&self) -> usize {
         let pivots = self.indefinite();
@@ -123,14 +117,15 @@ impl Band {
             for back in (1..=HALF_BAND.min(row)).rev() {
                 for further in back + 1..=HALF_BAND.min(row) {
                     let other = rows[row - back][HALF_BAND + back - further];
-                    let pivot = rows[row - further][HALF_BAND];
-                    own[HALF_BAND - back] -= own[HALF_BAND - further] * other / pivot;
+                    let inverse = rows[row - further][HALF_BAND];
+                    own[HALF_BAND - back] -= own[HALF_BAND - further] * other * inverse;
                 }
             }
             for back in 1..=HALF_BAND.min(row) {
                 let entry = own[HALF_BAND - back];
-                own[HALF_BAND] -= entry * entry / rows[row - back][HALF_BAND];
+                own[HALF_BAND] -= entry * entry * rows[row - back][HALF_BAND];
             }
+            own[HALF_BAND] = 1.0 / own[HALF_BAND];
             rows[row] = own;
         }
         Indefinite { rows }
@@ -146,13 +141,13 @@ impl Indefinite {
             for back in 1..=HALF_BAND.min(row) {
                 x[row] -= entries[HALF_BAND - back] * x[row - back];
             }
-            x[row] /= entries[HALF_BAND];
+            x[row] *= entries[HALF_BAND];
         }
         for row in (0..x.len()).rev() {
             let (entries, value) = (&self.rows[row], x[row]);
             for back in 1..=HALF_BAND.min(row) {
                 x[row - back] -=
-                    entries[HALF_BAND - back] / self.rows[row - back][HALF_BAND] * value;
+                    entries[HALF_BAND - back] * self.rows[row - back][HALF_BAND] * value;
             }
         }
         x

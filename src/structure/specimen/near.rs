@@ -1,6 +1,7 @@
 //! Modes of a specimen that differs little from one that is solved.
 
 use super::Specimen;
+use super::lanczos::dot;
 use super::model::Model;
 use super::modes::{Mode, SpecimenModes};
 use crate::structure::StructureError;
@@ -26,10 +27,10 @@ impl SpecimenModes {
             .map(|mode| {
                 let vector = self.model.vector(&mode.motion);
                 let pulled = mass.times(&vector);
-                let square = stiffness.quotient(&mass, &vector);
+                let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
                 let shifted = stiffness.plus(-square, &mass).indefinite();
                 let moved = shifted.solve(pulled.clone());
-                let along: f64 = moved.iter().zip(&pulled).map(|(a, b)| a * b).sum();
+                let along = dot(&moved, &pulled);
                 (along.is_finite() && along != 0.0).then(|| {
                     // As long as the matrix is near to singular, and of either sign.
                     let shape: Vec<f64> = moved.iter().map(|value| value / along).collect();

@@ -25,9 +25,8 @@ use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
 /// What the readings say against the best explanation. Where another one explains those that took part about as
-/// well and is not refuted, that one takes its place, if what speaks against the first outweighs its lead. Else
-/// it is evidence for something unknown, which shares the prior of
-/// one group: a misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most
+/// well and what speaks against the first outweighs its lead, that one takes its place. What speaks against the
+/// one that is left is evidence for something unknown, which shares the prior of one group: a misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most
 /// (Sellke, Bayarri & Berger 2001).
 pub(super) fn doubt(competition: &mut Competition) {
     let Competition { frame, entries, .. } = competition;
@@ -59,12 +58,16 @@ pub(super) fn doubt(competition: &mut Competition) {
             least = entries[k].probability * (-SECOND).exp();
         }
     }
-    let weight = |k: usize| all[k].map_or(0.0, |odds| entries[k].probability / odds);
-    let leads = |stands: &usize| (best..*stands).all(|k| weight(k) < weight(*stands));
-    if stands.filter(leads).is_some() {
-        lower(entries, &all);
-    } else if odds.is_finite() {
-        raise_unknown(entries, best, odds);
+    let weight = |k: &usize| all[*k].map_or(-1.0, |odds| entries[*k].probability / odds);
+    let left = (best..entries.len()).max_by(|a, b| weight(a).total_cmp(&weight(b)));
+    let Some((left, odds)) = left.and_then(|left| Some((left, all[left].take()?))) else {
+        return;
+    };
+    let name = entries[left].hypothesis.clone();
+    lower(entries, &all);
+    let left = entries.iter().position(|entry| entry.hypothesis == name);
+    if let Some(left) = left.filter(|_| odds > 1.0 && odds.is_finite()) {
+        raise_unknown(entries, left, odds);
     }
 }
 

@@ -118,7 +118,7 @@ pub struct ModeResult {
     /// Standard uncertainty of the best frequency (Hz), where known.
     pub std: Option<f64>,
     /// Standard deviation (Hz) between the recordings that were merged, beyond what their readings' own
-    /// uncertainties explain: joints drift, and sensors are moved; `None` of one recording.
+    /// uncertainties explain: joints drift; `None` of one recording.
     pub between: Option<f64>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,

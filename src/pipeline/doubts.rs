@@ -10,7 +10,7 @@ use crate::identify::consistent::{
 use crate::stats::{root_mean_square, times};
 
 /// What else may be behind a misfit where modes come from several recordings.
-const BETWEEN: &str = "; recordings taken one after the other, or with sensors moved, differ by more than \
+const BETWEEN: &str = "; recordings taken one after the other differ by more than \
                        single readings: the diagnosis of what is missing allows for a joint that drifts \
                        between them";
 
@@ -20,7 +20,9 @@ pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) ->
     let mut add =
         |code: &'static str, text: String| warnings.push(Warning::Estimate { code, text });
     if let Some(text) = misfit(found) {
-        let several = modes.iter().any(|mode| mode.between.is_some());
+        let several = modes
+            .iter()
+            .any(|mode| mode.between.is_some_and(|std| std > 0.0));
         let drift = if several { BETWEEN } else { "" };
         add("misfit", text + drift);
     }

@@ -8,6 +8,7 @@ use super::warning::Warning;
 use crate::description::{MeasuredFrequencies, TestDescription};
 use crate::identify::{WeightedPeak, pair_by_ratio};
 use crate::modal::{ModeReading, merge_modes};
+use crate::stats::root_mean_square;
 use crate::structure::{Assembly, JointStiffness, natural_frequencies};
 
 /// Recordings count as tapped at the same level when their median peak forces differ by less than
@@ -123,8 +124,9 @@ fn between(mode: &ModeResult, recordings: &[RecordingResult], reference: &[usize
     let count = readings.len() as f64;
     let mean = readings.iter().map(|r| r.frequency).sum::<f64>() / count;
     let squares: f64 = readings.iter().map(|r| (r.frequency - mean).powi(2)).sum();
-    let own: f64 = readings.iter().filter_map(|r| r.std).map(|s| s * s).sum();
-    (readings.len() > 1).then(|| (squares / (count - 1.0) - own / count).max(0.0).sqrt())
+    let stds: Vec<f64> = readings.iter().filter_map(|reading| reading.std).collect();
+    let own = root_mean_square(&stds).powi(2);
+    (readings.len() > 1).then(|| (squares / (count - 1.0) - own).max(0.0).sqrt())
 }
 
 /// The readings of a bare recording, numbered as they come.

@@ -83,20 +83,15 @@ fn joint(document: &Document) -> Option<String> {
 
 /// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two.
 fn with_std(parameter: &Parameter<'_>) -> String {
-    let [value, std, _, _, unit] = parameter.written();
-    let std = match parameter.value.std_scaled {
-        Some(_) => parameter.written_scaled(),
-        None => std,
-    };
-    let symbol = parameter.symbol;
-    let known = std.chars().any(|letter| letter.is_ascii_digit());
-    let spread = if known {
-        format!(" \u{b1} {std}")
+    let [value, _, _, _, unit] = parameter.written();
+    let rounded = parameter.written_together();
+    let shown = if rounded.uncertainty.is_some() {
+        rounded.joined()
     } else {
-        String::new()
+        value
     };
     // A number stays on the line of its unit.
-    format!("{symbol} = {value}{spread} {unit}").replace(' ', "\u{a0}")
+    format!("{} = {shown} {unit}", parameter.symbol).replace(' ', "\u{a0}")
 }
 
 fn model(document: &Document) -> Option<String> {

@@ -11,7 +11,6 @@ use tapjoint::structure::specimen::SpecimenJoint;
 
 const LENGTH: f64 = 0.423;
 
-/// The paper's cantilever with one sensor, of a mass that may be known, and its joint off by `off`.
 fn diagnosed(mass: Option<f64>, effects: &[Effect], seed: u64) -> Diagnosis {
     let observed = observe(
         &five_recordings(),

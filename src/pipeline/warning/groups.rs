@@ -69,7 +69,7 @@ fn words(doubts: &[&Verdict]) -> Option<String> {
 fn places(doubts: &[&Verdict], worst: &Verdict) -> Vec<String> {
     let mut modes: Vec<(f64, Vec<&str>)> = Vec::new();
     let mut others: Vec<String> = Vec::new();
-    for doubt in doubts.iter().filter(|doubt| !is_place_of(worst, doubt)) {
+    for doubt in doubts.iter().filter(|doubt| doubt.subject != worst.subject) {
         let Subject::Mode { file, frequency } = &doubt.subject else {
             others.push(doubt.subject.to_string());
             continue;
@@ -94,20 +94,6 @@ fn places(doubts: &[&Verdict], worst: &Verdict) -> Vec<String> {
     });
     others.dedup();
     modes.chain(others).collect()
-}
-
-/// Whether two doubts are of the same mode of the same recording, or of the same anything.
-fn is_place_of(worst: &Verdict, doubt: &Verdict) -> bool {
-    match (&worst.subject, &doubt.subject) {
-        (
-            Subject::Mode { file, frequency },
-            Subject::Mode {
-                file: other,
-                frequency: there,
-            },
-        ) => file == other && frequency == there,
-        (own, other) => own == other,
-    }
 }
 
 fn is_same(first: f64, second: f64) -> bool {

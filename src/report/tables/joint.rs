@@ -2,8 +2,8 @@
 
 use super::super::document::{Document, EstimateSection, PredictionSection, ValueSection};
 use super::super::format::{
-    MISSING, RIGID, bound_percent, last_place, optional, prefix, rounded_to, signed_percent,
-    significant, with_decimals_of,
+    MISSING, RIGID, Rounded, bound_percent, last_place, optional, prefix, rounded_to,
+    signed_percent, significant, with_decimals_of,
 };
 use super::modes::reading;
 use super::{Table, bound_of, mode_of, number, words};
@@ -89,6 +89,14 @@ impl Parameter<'_> {
         std.filter(|std| std.is_finite() && *std > 0.0)
             .and_then(|std| rounded_to(value, Some(std), self.finest_place(value)).uncertainty)
             .unwrap_or_else(|| MISSING.to_owned())
+    }
+
+    /// Value and standard deviation, the scaled one where there are two, rounded together.
+    pub fn written_together(&self) -> Rounded {
+        let (factor, _) = self.scale();
+        let value = factor * self.value.value;
+        let std = self.value.std_scaled.or(self.value.std);
+        rounded_to(value, std.map(|std| factor * std), self.finest_place(value))
     }
 
     /// The 95 % limits scaled by the misfit, in the unit of the value; `None` where there are none.

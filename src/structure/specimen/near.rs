@@ -13,7 +13,7 @@ impl SpecimenModes {
     /// modes, for a fraction of the price.
     ///
     /// `None` where the other has other motions (rigid springs, a base) or where some are loose: there
-    /// [`Specimen::modes`] has to solve anew.
+    /// [`Specimen::modes`] has to solve anew. Of [`SpecimenModes::hung`] modes the suspension is lost.
     ///
     /// # Errors
     /// As [`Specimen::modes`].

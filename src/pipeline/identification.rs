@@ -11,6 +11,7 @@ use crate::identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodn
 use crate::identify::{
     Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
 };
+use crate::stats::root_mean_square;
 use crate::structure::specimen::Specimen;
 
 /// Which estimate is the main one.
@@ -121,15 +122,20 @@ pub fn identify(
 }
 
 /// The modes with a number, ascending. Modes of one list may come from recordings between which the joint
-/// drifted: no joint has them all, and how far they are apart is part of each one's uncertainty.
+/// drifted: no joint has them all, and how far they are apart is part of each one's uncertainty. All get the
+/// same share of their frequency: weighed by its own scatter, a mode that feels the joint most would count
+/// least.
 pub(super) fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let scatters = numbered.filter_map(|mode| Some(mode.between? / mode.frequency));
+    let scatter = root_mean_square(&scatters.collect::<Vec<f64>>());
     modes
         .iter()
         .filter_map(|mode| {
             Some(MeasuredMode {
                 mode: mode.mode?,
                 frequency: mode.frequency,
-                std: mode.std.map(|std| std.hypot(mode.between.unwrap_or(0.0))),
+                std: mode.std.map(|std| std.hypot(scatter * mode.frequency)),
             })
         })
         .collect()

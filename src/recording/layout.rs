@@ -288,7 +288,7 @@ fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
     names(true).chain(names(false))
 }
 
-/// A column named as time whose values do not rise.
+/// A column named as time whose values do not rise throughout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FlatTime {
     /// Column, 0-based.
@@ -299,7 +299,8 @@ pub(super) struct FlatTime {
     pub values: [f64; 2],
 }
 
-/// The column that is named as time without being one, and where that shows first in the head.
+/// The column that is named as time without being one, and where that shows first in the head; `None` of one that
+/// stands still, a temperature perhaps.
 pub(super) fn flat_time(head: &[u8], whole: HeadExtent, layout: &CsvLayout) -> Option<FlatTime> {
     let column = named_as_time(&layout.columns).next()?;
     let mut cells = Vec::new();
@@ -312,17 +313,18 @@ pub(super) fn flat_time(head: &[u8], whole: HeadExtent, layout: &CsvLayout) -> O
             let cell = text.get(cells.get(column)?.clone())?;
             Some((at as u64 + 1, parse_number(cell, &mut None).ok()?))
         });
-    let mut before = None;
-    for (line, value) in values {
-        if let Some(previous) = before.replace(value).filter(|previous| value <= *previous) {
-            return Some(FlatTime {
-                column,
-                line,
-                values: [value, previous],
-            });
-        }
-    }
-    None
+    let values: Vec<(u64, f64)> = values.collect();
+    let mut steps = values.windows(2);
+    let (line, value, previous) = steps.clone().find_map(|step| {
+        let ((_, previous), (line, value)) = (step[0], step[1]);
+        (value <= previous).then_some((line, value, previous))
+    })?;
+    let rises = steps.any(|step| step[1].1 > step[0].1);
+    rises.then_some(FlatTime {
+        column,
+        line,
+        values: [value, previous],
+    })
 }
 
 /// The error of a text without rows shows the line that has most numbers.

@@ -190,8 +190,7 @@ fn csv_rate(
     if let Some(given) = settings.sample_rate {
         return Ok((given, Vec::new()));
     }
-    // A column that rises evenly is more likely the time than one that stands still.
-    if let (Some(flat), None) = (rates.flat_time, rates.unnamed_time) {
+    if let Some(flat) = rates.flat_time {
         return Err(RecordingError::RepeatedTime {
             file: file.to_owned(),
             line: flat.line,
@@ -200,10 +199,10 @@ fn csv_rate(
         });
     }
     let hint = match (layout.time, rates.unnamed_time) {
-        (_, Some(column)) => {
+        (Some(_), _) => " (a single row has no step)".to_owned(),
+        (None, Some(column)) => {
             format!(" (column {} rises evenly: is it the time?)", column + 1)
         }
-        (Some(_), None) => " (a single row has no step)".to_owned(),
         (None, None) => String::new(),
     };
     Err(RecordingError::NoSampleRate {

@@ -8,9 +8,8 @@ use crate::structure::StructureError;
 
 impl SpecimenModes {
     /// The modes of another specimen that differs little, in the order of these: one step of Rayleigh quotient
-    /// iteration from each. A shape that is off by a small e is off by about e^3 afterwards (Parlett, "The
-    /// Symmetric Eigenvalue Problem", 4.7), so that finite differences over small steps are those of exact
-    /// modes, for a fraction of the price.
+    /// iteration from each. A shape that is off by a small e is off by about e^3 afterwards (Parlett 1998, 4.7), so
+    /// that differences over small steps are those of exact modes, for less than their price.
     ///
     /// `None` where the other has other motions (rigid springs, a base) or where some are loose: there
     /// [`Specimen::modes`] has to solve anew. Of [`SpecimenModes::hung`] modes the suspension is lost.

@@ -1,7 +1,7 @@
 //! `tapjoint blind-check`: how often the diagnosis is right on tests whose effect it is not told.
 
 use super::Outcome;
-use super::input::read_test;
+use super::input::{TestFile, read_test};
 use super::output::{OutputError, OutputFolder};
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
@@ -312,14 +312,33 @@ fn elsewhere(folder: &Path, truth: &Path, terminal: &Terminal) -> anyhow::Result
         ));
     }
     let done = AtomicUsize::new(0);
-    let cases = truths.par_iter().map(|truth| {
-        let case = case_elsewhere(&folder.join(&truth.name), truth, terminal);
-        terminal.count(
-            "tests diagnosed",
-            done.fetch_add(1, Ordering::Relaxed) + 1,
-            truths.len(),
-        );
-        case
+    // Descriptions have warnings, which are told in the order of the file.
+    let read: Vec<anyhow::Result<TestFile>> = truths
+        .iter()
+        .map(|truth| read_test(&folder.join(&truth.name).join("test.toml"), terminal))
+        .collect();
+    let answers: Vec<anyhow::Result<Answer>> = read
+        .into_par_iter()
+        .map(|file| {
+            let answer = file.and_then(|file| answer_elsewhere(&file));
+            terminal.count(
+                "tests diagnosed",
+                done.fetch_add(1, Ordering::Relaxed) + 1,
+                truths.len(),
+            );
+            answer
+        })
+        .collect();
+    // What is wrong with one keeps the others from nothing.
+    let cases = truths.into_iter().zip(answers).map(|(truth, answer)| {
+        let answer = answer.unwrap_or_else(|error| {
+            terminal.warn(&format!(
+                "the test \"{}\" could not be diagnosed, and counts as that: {error:#}",
+                truth.name
+            ));
+            Answer::none()
+        });
+        (truth, answer)
     });
     Ok(cases.collect())
 }
@@ -336,20 +355,8 @@ fn unlisted(folder: &Path, truths: &[Truth]) -> Vec<String> {
     names
 }
 
-/// One test made elsewhere. What is wrong with one keeps the others from nothing: it is told, and counted
-/// among those that could not be diagnosed.
-fn case_elsewhere(folder: &Path, truth: &Truth, terminal: &Terminal) -> Case {
-    let answer = || -> anyhow::Result<Answer> {
-        let file = read_test(&folder.join("test.toml"), terminal)?;
-        file.check_recordings()?;
-        Ok(Answer::of(&diagnosis_of(&file.test, folder)?))
-    };
-    let answer = answer().unwrap_or_else(|error| {
-        terminal.warn(&format!(
-            "the test \"{}\" could not be diagnosed, and counts as that: {error:#}",
-            truth.name
-        ));
-        Answer::none()
-    });
-    (truth.clone(), answer)
+/// What the program answers to one test made elsewhere.
+fn answer_elsewhere(file: &TestFile) -> anyhow::Result<Answer> {
+    file.check_recordings()?;
+    Ok(Answer::of(&diagnosis_of(&file.test, &file.folder)?))
 }

@@ -171,6 +171,14 @@ impl fmt::Display for ChannelRef {
     }
 }
 
+impl TestDescription {
+    /// Where a sensor sits (m) in the reference configuration, that of the first recording.
+    pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {
+        let first = self.recordings.first();
+        first.map_or(sensor.position, |recording| recording.place_of(sensor))
+    }
+}
+
 impl RecordingDescription {
     /// Where a sensor sits (m) in this recording.
     pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {

@@ -3,14 +3,14 @@
 use super::advisor::advise;
 use super::catalogue::PlaceKind;
 use super::decay_finding::decay_finding;
+use super::doubt::best;
 use super::evidence::log_likelihood;
 use super::forward::Layout;
 use super::frame::Frame;
 use super::left_out::LeftOutErrors;
 use super::nominal::COUPLING;
-use super::pairs::SECOND;
 use super::place_map::place_map;
-use super::posterior::{APART, Entry, confounded, lead, lower, places, raise_unknown, spreads};
+use super::posterior::{APART, Entry, confounded, lead, places, spreads};
 use super::quality::{Residuals, noise_floor, pulls};
 use super::result::{
     Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift, LeftOutRecordings,
@@ -23,70 +23,6 @@ use super::trial::{Room, Trial};
 use super::verdict::verdict;
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
-
-/// What the readings say against the best explanation. Where another one explains those that took part about as
-/// well and what speaks against the first outweighs its lead, that one takes its place. What speaks against the
-/// one that is left is evidence for something unknown, which shares the prior of one group: a misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most
-/// (Sellke, Bayarri & Berger 2001).
-pub(super) fn doubt(competition: &mut Competition) {
-    let Competition { frame, entries, .. } = competition;
-    let Some(best) = best(entries) else { return };
-    // The odds against each; infinite where a fit has no uncertainty to be tested with.
-    let against = |entry: &Entry| -> f64 {
-        let Some(trial) = Trial::new(frame, &entry.fit) else {
-            return f64::INFINITY;
-        };
-        let refuting = trial.with_withheld(frame, &entry.fit).refuting();
-        refuting.map_or(1.0, most_against)
-    };
-    let odds = against(&entries[best]);
-    if odds <= 1.0 {
-        return;
-    }
-    let mut all: Vec<Option<f64>> = vec![None; entries.len()];
-    all[best] = Some(odds);
-    // Down to what explains as well as the best, and then as well as the best that is not refuted.
-    let mut least = entries[best].probability * (-SECOND).exp();
-    let mut stands = None;
-    for k in best + 1..entries.len() {
-        if entries[k].hypothesis == Hypothesis::Unknown || entries[k].probability < least {
-            continue;
-        }
-        all[k] = Some(against(&entries[k]));
-        if stands.is_none() && all[k] == Some(1.0) {
-            stands = Some(k);
-            least = entries[k].probability * (-SECOND).exp();
-        }
-    }
-    let weight = |k: &usize| all[*k].map_or(-1.0, |odds| entries[*k].probability / odds);
-    let left = (best..entries.len()).max_by(|a, b| weight(a).total_cmp(&weight(b)));
-    let Some((left, odds)) = left.and_then(|left| Some((left, all[left].take()?))) else {
-        return;
-    };
-    let name = entries[left].hypothesis.clone();
-    lower(entries, &all);
-    let left = entries.iter().position(|entry| entry.hypothesis == name);
-    if let Some(left) = left.filter(|_| odds > 1.0 && odds.is_finite()) {
-        raise_unknown(entries, left, odds);
-    }
-}
-
-/// Highest odds against an explanation whose misfit has the probability `p`.
-fn most_against(p: f64) -> f64 {
-    use std::f64::consts::E;
-    let p = p.clamp(SMALLEST_MISFIT, 1.0 / E);
-    -1.0 / (E * p * p.ln())
-}
-
-/// Probability of a misfit below which its logarithm decides nothing any more: 1e-12 is certainty in all
-/// that is shown, and odds from it stay finite.
-const SMALLEST_MISFIT: f64 = 1e-12;
-
-/// The best explanation that can be shown: what is unknown has no residual.
-fn best(entries: &[Entry]) -> Option<usize> {
-    let known = |entry: &Entry| entry.hypothesis != Hypothesis::Unknown;
-    entries.iter().position(known)
-}
 
 /// The answer to a competition.
 pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Diagnosis {
@@ -140,7 +76,10 @@ fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
         .iter()
         .filter(|entry| entry.hypothesis != Hypothesis::Unknown);
     let likelihood = |entry: &Entry| log_likelihood(&frame.readings, &entry.fit.branch.optimum);
+    let weight = |entry: &Entry| entry.fit.log_evidence + entry.prior.ln();
     match (named.next(), named.next()) {
+        // Readings that took no part have turned the order about.
+        (Some(first), Some(rival)) if weight(first) < weight(rival) => DecidedBy::Readings,
         (Some(first), Some(rival)) if likelihood(first) - likelihood(rival) < 3.0_f64.ln() => {
             DecidedBy::Priors
         }
@@ -367,28 +306,5 @@ fn plain(effect: EffectId, name: &'static str, (value, std): (f64, Option<f64>))
         std: std.filter(|std| std.is_finite()),
         smallest_detectable: None,
         smallest_isolable: None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// At p = 1/e and above a misfit says nothing; below, the odds grow and stay finite down to zero.
-    #[test]
-    fn limit_odds_from_a_misfit_are_even_at_best_and_finite_at_worst() {
-        assert!((most_against(1.0) - 1.0).abs() < 1e-15);
-        assert!((most_against((-1.0_f64).exp()) - 1.0).abs() < 1e-15);
-        assert!(most_against(0.0).is_finite());
-        assert!(most_against(0.0) > most_against(1e-6));
-    }
-
-    /// Sellke, Bayarri & Berger (2001), table 1: at least 0.407 at p = 0.05 and 0.125 at p = 0.01, to the
-    /// digits printed there.
-    #[test]
-    fn val_odds_from_a_misfit_are_those_of_sellke() {
-        for (p, bound) in [(0.05, 0.407), (0.01, 0.125)] {
-            assert!((1.0 / most_against(p) - bound).abs() < 5e-4, "{p}");
-        }
     }
 }

@@ -226,65 +226,22 @@ fn slope_of(mode: &ObservedMode) -> Option<Reading> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::example::{plan, strip};
     use super::super::hypothesis::fit_nominal;
-    use super::super::nominal::{Nominal, NominalSensor};
     use super::super::settings::GapSettings;
-    use super::super::synthetic::{PlannedConfiguration, TestPlan, observe};
+    use super::super::synthetic::{TestPlan, observe};
     use super::*;
     use crate::identify::observation::{ExtraPeak, UNPAIRED};
-    use crate::structure::Beam;
-    use crate::structure::specimen::{Body, Specimen, SpecimenJoint};
-
-    /// A steel strip of 0.42 m on springs.
-    fn strip() -> Nominal {
-        let beam = Beam {
-            length: 0.423,
-            width: 0.05,
-            thickness: 0.005,
-            modulus: 207e9,
-            density: 7850.0,
-            poisson: 0.3,
-        };
-        let joint = SpecimenJoint::Springs {
-            kt: 1.994e6,
-            kr: 1223.0,
-            coupling: 0.0,
-        };
-        let sensor = NominalSensor {
-            name: "A".to_owned(),
-            mass: Some(0.0),
-            position: None,
-        };
-        Nominal {
-            specimen: Specimen::new(Body::One(beam), joint),
-            sensors: vec![sensor],
-            joint_before: None,
-            scale_std: None,
-            reading_bias: None,
-        }
-    }
 
     /// Two recordings of five modes, of a joint that does not depend on the amplitude.
     fn observations() -> Observations {
-        let one = PlannedConfiguration {
-            sensors: vec![("A".to_owned(), 0.34)],
-            tap: 0.4,
-            level: 1.0,
-            masses: Vec::new(),
-        };
         let plan = TestPlan {
-            configurations: vec![one.clone(), one],
             modes: 5,
-            taps: 5,
             frequency_std: 1e-5,
-            shape_std: None,
-            damping_std: None,
             slope_std: Some(1e-4),
-            drift: 0.0,
-            damping: 0.003,
-            scatter: 1.0,
+            ..plan(&[0.34, 0.34])
         };
-        observe(&plan, &strip(), &[], 3).unwrap()
+        observe(&plan, &strip(0.0), &[], 3).unwrap()
     }
 
     /// Sets the changes per e-fold, relative, of one mode; all known to 1e-4.
@@ -299,7 +256,7 @@ mod tests {
     /// The frame before and after the changes along the decays are taken up, and sensitivities.
     fn frames(observations: &Observations) -> (Frame, Frame, Vec<f64>) {
         let settings = GapSettings::default();
-        let before = Frame::new(observations, &strip(), &settings);
+        let before = Frame::new(observations, &strip(0.0), &settings);
         let fit = fit_nominal(&before, &settings).unwrap();
         let forward = super::super::forward::Forward::new(&before, &[]);
         let solved = forward.solve(&fit.branch.optimum.parameters).unwrap();

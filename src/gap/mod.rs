@@ -33,8 +33,11 @@ mod checks;
 mod decay_finding;
 mod decay_law;
 mod decay_readings;
+mod doubt;
 mod error;
 mod evidence;
+#[cfg(test)]
+mod example;
 mod fastened;
 mod fixture_peak;
 mod forward;
@@ -76,6 +79,8 @@ pub use result::{
 };
 pub use settings::GapSettings;
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
+pub use trial::MISFIT;
+pub use verdict::SEEN;
 
 use crate::identify::observation::Observations;
 
@@ -107,6 +112,6 @@ pub fn diagnose(
     settings.check()?;
     checks::check(observations, nominal)?;
     let mut competition = search::compete(observations, nominal, settings)?;
-    assemble::doubt(&mut competition);
+    doubt::doubt(&mut competition);
     Ok(assemble::diagnosis(&competition, settings))
 }

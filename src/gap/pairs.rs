@@ -9,7 +9,8 @@ use super::quality::Residuals;
 use super::result::Hypothesis;
 use super::search::Competition;
 use super::settings::GapSettings;
-use super::trial::Trial;
+use super::trial::{Trial, refutes_withheld};
+use super::withheld::WithheldErrors;
 use crate::effects::EffectId;
 use rayon::prelude::*;
 
@@ -260,15 +261,15 @@ pub(super) fn misfits(frame: &Frame, fit: &Fit) -> bool {
     Trial::new(frame, fit).is_none_or(|trial| trial.refuted())
 }
 
-/// Whether the readings that took no part, or each mode from the others, are predicted better.
+/// Whether the readings that took no part are predicted better, or as well as the fit can without being refuted:
+/// two effects leave more open than one does. Without such readings, whether each mode is from the others.
 fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
-    use super::withheld::WithheldErrors;
     match (
         WithheldErrors::new(frame, before),
         WithheldErrors::new(frame, after),
     ) {
         (Some(before), Some(after)) => {
-            after.rms() < before.rms() || after.rms() < 1.5 * after.floor()
+            after.rms() < before.rms() || !after.goodness().is_some_and(refutes_withheld)
         }
         _ => {
             let left_out =

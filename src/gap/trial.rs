@@ -12,12 +12,18 @@ use super::setup::Setup;
 use super::withheld::WithheldErrors;
 use crate::effects::EffectId;
 
-/// Goodness of fit below which an explanation is refused.
-const MISFIT: f64 = 0.01;
-/// The same for the worst of many blocks.
+/// Goodness of fit below which an explanation is refused: by chance one in a hundred.
+pub const MISFIT: f64 = 0.01;
+/// The same for the worst of many blocks, some ten of which together are wrong as often.
 const BLOCK_MISFIT: f64 = 0.001;
 /// Probability of an error of withheld readings from which the hypothesis counts as predicting them.
 const PREDICTED: f64 = 0.05;
+
+/// Whether a misfit of withheld readings, of probability `p`, refutes an explanation. They are few, and linearised
+/// about the fit: as little is believed as of one block among many.
+pub(super) fn refutes_withheld(p: f64) -> bool {
+    p < BLOCK_MISFIT
+}
 
 /// What the readings say of one explanation.
 #[derive(Debug, Clone)]
@@ -145,13 +151,18 @@ impl Trial {
     pub(super) fn refuting(&self) -> Option<f64> {
         let block = self.blocks.first().map(|block| block.goodness_of_fit);
         let overall = self.goodness.filter(|p| *p < MISFIT);
-        let withheld = self.withheld.filter(|p| *p < BLOCK_MISFIT);
+        let withheld = self.refuting_withheld();
         let block = block
             .filter(|p| *p < BLOCK_MISFIT)
             .map(|p| (p * self.blocks.len() as f64).min(MISFIT));
         let peak = self.peak.filter(|p| *p < MISFIT);
         let all = [overall, withheld, block, peak].into_iter().flatten();
         all.min_by(f64::total_cmp)
+    }
+
+    /// The probability of the misfit of withheld readings, where that refutes the hypothesis.
+    pub(super) fn refuting_withheld(&self) -> Option<f64> {
+        self.withheld.filter(|p| refutes_withheld(*p))
     }
 
     /// Whether withheld readings speak for the hypothesis: it closes some of the gap for certain, or predicts

@@ -12,7 +12,7 @@ const SET: (f64, usize) = (0.9, 4);
 
 /// Logarithm of the Bayes factor against the nominal model from which an effect counts as seen: 20 to 1
 /// (Kass & Raftery 1995, "strong").
-const SEEN: f64 = 3.0;
+pub const SEEN: f64 = 3.0;
 
 /// The verdict on a ranking.
 pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Trial>) -> Verdict {

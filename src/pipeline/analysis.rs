@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::between::BetweenRecordings;
 use super::measure::Measurement;
 use super::model::TestedStructure;
 use super::warning::Warning;
@@ -117,9 +118,8 @@ pub struct ModeResult {
     pub half_line: Option<f64>,
     /// Standard uncertainty of the best frequency (Hz), where known.
     pub std: Option<f64>,
-    /// Standard deviation (Hz) between the recordings that were merged, beyond what their readings' own
-    /// uncertainties explain: joints drift; `None` of one recording.
-    pub between: Option<f64>,
+    /// How far it scatters between the recordings that were merged; `None` of one recording.
+    pub between: Option<BetweenRecordings>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.

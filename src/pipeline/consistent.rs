@@ -3,7 +3,7 @@
 use super::model::TestedStructure;
 use crate::described::{fastened_masses, lap_layout};
 use crate::description::{
-    FitParameter, RecordingDescription, SensorDescription, SensorKind, TestDescription, Weights,
+    FitParameter, RecordingDescription, SensorKind, TestDescription, Weights,
 };
 use crate::identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
@@ -63,7 +63,7 @@ pub(super) fn masses_in(
     });
     let sensors = sensors.filter_map(|sensor| {
         Some(PointAttachment {
-            position: place_in(recording, sensor)?,
+            position: recording.map_or(sensor.position, |one| one.place_of(sensor))?,
             size: sensor.mass?,
         })
     });
@@ -73,15 +73,6 @@ pub(super) fn masses_in(
         size: mass.mass,
     });
     sensors.chain(fastened).collect()
-}
-
-fn place_in(recording: Option<&RecordingDescription>, sensor: &SensorDescription) -> Option<f64> {
-    recording.map_or(sensor.position, |one| one.place_of(sensor))
-}
-
-/// Where a sensor sits (m) in the reference configuration, that of the first recording.
-pub(super) fn reference_place(test: &TestDescription, sensor: &SensorDescription) -> Option<f64> {
-    place_in(test.recordings.first(), sensor)
 }
 
 /// The structure that the estimator takes.

@@ -1,6 +1,7 @@
 //! What speaks against a consistent estimate, in words.
 
 use super::analysis::ModeResult;
+use super::between::differ;
 use super::model::TestedStructure;
 use super::warning::Warning;
 use crate::identify::consistent::goodness::{DOUBTFUL, NOTABLE_MISFIT};
@@ -20,10 +21,7 @@ pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) ->
     let mut add =
         |code: &'static str, text: String| warnings.push(Warning::Estimate { code, text });
     if let Some(text) = misfit(found) {
-        let several = modes
-            .iter()
-            .any(|mode| mode.between.is_some_and(|std| std > 0.0));
-        let drift = if several { BETWEEN } else { "" };
+        let drift = if differ(modes) { BETWEEN } else { "" };
         add("misfit", text + drift);
     }
     if found.goodness.verdict == Verdict::Untestable {
@@ -116,7 +114,7 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
     };
     Some(format!(
         "the model misses the frequencies by {} % rms, {} times their uncertainty \
-         (goodness of fit {}); std and 95 % limits stand for the readings alone, and the joint is \
+         (goodness of fit {}); std and 95 % limits stand for the frequencies' uncertainty alone, and the joint is \
          not known that well{intervals}",
         Rounded(percent),
         times(root_mean_square(&standardised)),
@@ -140,7 +138,7 @@ impl std::fmt::Display for Rounded {
     }
 }
 
-/// "Kx: ±0.01 % from the readings alone, ±1.3 % scaled by the misfit", for non-dimensional ones
+/// "Kx: ±0.01 % from the frequencies' uncertainty alone, ±1.3 % scaled by the misfit", for non-dimensional ones
 /// and the material.
 fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     // Half width of a 95 % interval of a normal distribution, in standard deviations, in percent.
@@ -152,7 +150,7 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     let value = quantity.value.filter(|value| told && *value != 0.0)?;
     let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
     Some(format!(
-        "95 % interval of {} from the readings alone \u{b1}{} %, scaled by the misfit \u{b1}{} %",
+        "95 % interval of {} from the frequencies' uncertainty alone \u{b1}{} %, scaled by the misfit \u{b1}{} %",
         quantity.quantity.name(),
         Rounded(PERCENT_95 * std / value.abs()),
         Rounded(50.0 * (high - low) / value.abs())

@@ -1,6 +1,7 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::analysis::{Estimate, Identification, ModeResult};
+use super::between::scatter;
 use super::consistent::{self, StructureDetails};
 use super::doubts;
 use super::model::TestedStructure;
@@ -11,7 +12,6 @@ use crate::identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodn
 use crate::identify::{
     Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
 };
-use crate::stats::root_mean_square;
 use crate::structure::specimen::Specimen;
 
 /// Which estimate is the main one.
@@ -122,13 +122,11 @@ pub fn identify(
 }
 
 /// The modes with a number, ascending. Modes of one list may come from recordings between which the joint
-/// drifted: no joint has them all, and how far they are apart is part of each one's uncertainty. All get the
-/// same share of their frequency: weighed by its own scatter, a mode that feels the joint most would count
-/// least.
+/// drifted, or the room's temperature or the mounting: no joint has them all, and how far they are apart is part
+/// of each one's uncertainty. All get the same share of their frequency: weighed by its own scatter, a mode that
+/// feels the joint most would count least.
 pub(super) fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
-    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
-    let scatters = numbered.filter_map(|mode| Some(mode.between? / mode.frequency));
-    let scatter = root_mean_square(&scatters.collect::<Vec<f64>>());
+    let scatter = scatter(modes);
     modes
         .iter()
         .filter_map(|mode| {

@@ -10,6 +10,7 @@
 //! writes.
 
 mod analysis;
+mod between;
 mod consistent;
 mod decays;
 mod doubts;
@@ -44,6 +45,7 @@ pub use analysis::{
     Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
     Perturbation, RecordingResult, Response,
 };
+pub use between::BetweenRecordings;
 pub use consistent::{
     StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
     structure_details,

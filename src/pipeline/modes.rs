@@ -1,14 +1,15 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
 use super::analysis::{ModeResult, RecordingResult};
+use super::between::{BetweenRecordings, between};
 use super::consistent::StructureDetails;
 use super::model::TestedStructure;
 use super::numbering::number_jointed;
 use super::warning::Warning;
 use crate::description::{MeasuredFrequencies, TestDescription};
+use crate::identify::observation::UNPAIRED;
 use crate::identify::{WeightedPeak, pair_by_ratio};
 use crate::modal::{ModeReading, merge_modes};
-use crate::stats::root_mean_square;
 use crate::structure::{Assembly, JointStiffness, natural_frequencies};
 
 /// Recordings count as tapped at the same level when their median peak forces differ by less than
@@ -104,14 +105,17 @@ pub fn modes_of_recordings(
         recording.mode_numbers = own_numbers(&modes, &own_readings(recording));
     }
     for mode in &mut modes {
-        mode.between = between(mode, recordings, reference);
+        mode.between = between_recordings(mode, recordings, reference);
     }
     (modes, warnings)
 }
 
-/// Standard deviation of a mode's frequency between the `reference` recordings, beyond that of the readings:
-/// s^2 = sum (f - mean)^2/(n - 1) - mean of std^2; `None` below two readings.
-fn between(mode: &ModeResult, recordings: &[RecordingResult], reference: &[usize]) -> Option<f64> {
+/// How far a mode's frequency scatters between the `reference` recordings.
+fn between_recordings(
+    mode: &ModeResult,
+    recordings: &[RecordingResult],
+    reference: &[usize],
+) -> Option<BetweenRecordings> {
     let number = mode.mode?;
     let readings: Vec<ModeReading> = reference
         .iter()
@@ -121,12 +125,7 @@ fn between(mode: &ModeResult, recordings: &[RecordingResult], reference: &[usize
             own_readings(&recordings[index]).into_iter().nth(place)
         })
         .collect();
-    let count = readings.len() as f64;
-    let mean = readings.iter().map(|r| r.frequency).sum::<f64>() / count;
-    let squares: f64 = readings.iter().map(|r| (r.frequency - mean).powi(2)).sum();
-    let stds: Vec<f64> = readings.iter().filter_map(|reading| reading.std).collect();
-    let own = root_mean_square(&stds).powi(2);
-    (readings.len() > 1).then(|| (squares / (count - 1.0) - own).max(0.0).sqrt())
+    between(&readings)
 }
 
 /// The readings of a bare recording, numbered as they come.
@@ -274,7 +273,7 @@ pub(super) fn apply_numbers(
     for (&index, &number) in which.iter().zip(numbers) {
         modes[index].mode = number;
         if number.is_none() {
-            modes[index].label = Some("unpaired".to_string());
+            modes[index].label = Some(UNPAIRED.to_string());
             unpaired += 1;
         }
     }

@@ -1,6 +1,5 @@
 //! What the estimates leave out of the described test.
 
-use super::consistent::reference_place;
 use super::identification::EstimateMethod;
 use super::model::TestedStructure;
 use super::warning::Warning;
@@ -137,8 +136,7 @@ fn of_masses(
     );
     let lowers = "it lowers the measured frequencies and thereby what is estimated from them";
     let included = method == EstimateMethod::Consistent && test.analysis.sensor_mass;
-    let unplaced =
-        loading().any(|sensor| sensor.mass.is_some() && reference_place(test, sensor).is_none());
+    let unplaced = loading().any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
     match (included, unplaced, structure.regression) {
         (true, true, _) => Some(format!(
             "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"

@@ -6,6 +6,7 @@ use super::evidence;
 use super::measure::MeasureSettings;
 use super::modes::modes_of_bare;
 use super::recordings::finish;
+use super::warning::together;
 use crate::recording::Recording;
 use crate::taps::TapSource;
 
@@ -63,7 +64,7 @@ pub(super) fn analysis_of(mut recording: RecordingResult) -> Analysis {
         name: recording.file.clone(),
         structure: None,
         verdicts,
-        warnings,
+        warnings: together(warnings),
         modes,
         identification: None,
         recordings: vec![recording],

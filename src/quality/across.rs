@@ -9,8 +9,9 @@ use super::{
 };
 use crate::stats::times;
 
-/// Recordings from which an order is more than the two ways that a joint can drift.
-const LEAST_ORDERED: usize = 3;
+/// Largest probability that a drift alone brings the frequencies into the order of the levels: that of three
+/// levels. It is no proof, and enough for a doubt; each further recording makes it smaller.
+const LARGEST_CHANCE: f64 = 1.0 / 3.0 + 1e-9;
 
 /// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
 pub fn check_reciprocity(
@@ -266,8 +267,9 @@ fn shifts(
     first.resonances.iter().filter_map(of_pair).collect()
 }
 
-/// Number of recordings, three at least, over which a mode's frequency follows the order of the tap levels:
-/// all in `first`'s arrangement, each level and each frequency clearly apart from the one before.
+/// Number of recordings over which a mode's frequency follows the order of the tap levels: all in `first`'s
+/// arrangement, and every frequency at one level clearly on the same side of every one at the level below. `None`
+/// where it does not, or where so few would by chance.
 fn in_order(
     mode: &ResonanceEvidence,
     first: &RecordingEvidence,
@@ -277,28 +279,47 @@ fn in_order(
     let same = recordings
         .iter()
         .filter(|one| same_arrangement(first, one, settings));
-    let mut seen: Vec<(f64, f64, f64)> = same
+    let mut seen: Vec<Seen> = same
         .filter_map(|one| {
             let own = partner(mode, first, one, settings)?;
-            Some((one.tap_level()?, own.frequency, own.std?))
+            Some(Seen {
+                level: one.tap_level()?,
+                frequency: own.frequency,
+                std: own.std?,
+            })
         })
         .collect();
-    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let levels = seen
-        .windows(2)
-        .all(|two| two[1].0 >= settings.two_levels * two[0].0);
-    let steps = seen.windows(2).map(|two| {
-        let clear = settings.deviations * two[0].2.hypot(two[1].2);
-        let step = two[1].1 - two[0].1;
-        if step.abs() > clear {
-            step.signum()
-        } else {
-            0.0
-        }
-    });
-    let total: f64 = steps.sum();
-    let follows = seen.len() >= LEAST_ORDERED && total.abs() == (seen.len() - 1) as f64;
-    (levels && follows).then_some(seen.len())
+    seen.sort_by(|a, b| a.level.total_cmp(&b.level));
+    let levels: Vec<&[Seen]> = seen
+        .chunk_by(|a, b| b.level < settings.two_levels * a.level)
+        .collect();
+    let clearly = |low: &Seen, high: &Seen, sign: f64| {
+        sign * (high.frequency - low.frequency) > settings.deviations * low.std.hypot(high.std)
+    };
+    let all = |sign: f64| {
+        levels.windows(2).all(|two| {
+            let above = |low: &Seen| two[1].iter().all(|high| clearly(low, high, sign));
+            two[0].iter().all(above)
+        })
+    };
+    let follows = levels.len() > 1 && (all(1.0) || all(-1.0));
+    let sizes: Vec<usize> = levels.iter().map(|level| level.len()).collect();
+    (follows && chance_of_order(&sizes) <= LARGEST_CHANCE).then_some(seen.len())
+}
+
+/// A mode's frequency (Hz) in one recording, and the level that it was tapped at.
+struct Seen {
+    level: f64,
+    frequency: f64,
+    std: f64,
+}
+
+/// Probability that values in random order rise, or fall, from level to level: 2 prod(n_k!)/n! with n_k of the n
+/// values at each level.
+fn chance_of_order(sizes: &[usize]) -> f64 {
+    let ln_factorial = |n: usize| (2..=n).map(|k| (k as f64).ln()).sum::<f64>();
+    let within: f64 = sizes.iter().map(|&n| ln_factorial(n)).sum();
+    2.0 * (within - ln_factorial(sizes.iter().sum())).exp()
 }
 
 /// The nearest resonance of the other recording, where each is the other's nearest and both are within
@@ -320,4 +341,25 @@ fn nearest(modes: &[ResonanceEvidence], frequency: f64) -> Option<&ResonanceEvid
     modes
         .iter()
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 3! orders of three values two are monotonic; of 4!/(2! 2!) ways to put four on two levels, two keep them
+    /// apart. To rounding of logarithms.
+    #[test]
+    fn val_chance_of_an_order() {
+        for (sizes, expected) in [
+            (vec![1, 1], 1.0),
+            (vec![1, 1, 1], 1.0 / 3.0),
+            (vec![2, 2], 1.0 / 3.0),
+            (vec![2, 1], 2.0 / 3.0),
+            (vec![2, 1, 1], 1.0 / 6.0),
+        ] {
+            let chance = chance_of_order(&sizes);
+            assert!((chance - expected).abs() < 1e-12, "{sizes:?}: {chance}");
+        }
+    }
 }

@@ -6,7 +6,7 @@
 use super::error::RecordingError;
 use super::header::Column;
 use super::text::{Cell, CellProblem, Separator, is_comment, parse_number, shown, split_cells};
-use super::units::split_unit;
+use super::units::{channel_unit, split_unit};
 
 /// The layout of a text file.
 #[derive(Debug, Clone, PartialEq)]
@@ -244,17 +244,21 @@ impl<'a> Candidate<'a> {
     /// the head. (That it rises in all of them is checked when the rows are read, and is an error
     /// there.)
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
-        named_as_time(columns).find(|column| self.rises(*column, first))
+        named_as_time(columns).find(|at| {
+            let (rising, steps) = self.rising_steps(*at, first);
+            // A unit that nobody knows may be one of time; a temperature's values rise half of the time.
+            match columns.get(*at).is_some_and(has_other_unit) {
+                true => rising == steps,
+                false => 2 * rising >= steps,
+            }
+        })
     }
 
-    fn rises(&self, column: usize, first: usize) -> bool {
+    /// How many steps of a column in the head rise, and of how many.
+    fn rising_steps(&self, column: usize, first: usize) -> (usize, usize) {
         let values = self.column_values(column, first);
-        let steps = values.len().saturating_sub(1);
-        let rising = values
-            .windows(2)
-            .filter(|pair| pair.last() > pair.first())
-            .count();
-        2 * rising >= steps
+        let rising = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
+        (rising, values.len().saturating_sub(1))
     }
 
     /// The readable numbers of one column in the head.
@@ -299,10 +303,18 @@ pub(super) struct FlatTime {
     pub values: [f64; 2],
 }
 
+/// Whether a column's header gives a unit that is none of time: "T (°C)" is a temperature.
+fn has_other_unit(column: &Column) -> bool {
+    let in_name = split_unit(column.name.as_deref().unwrap_or_default()).1;
+    let unit = column.unit.as_deref().or(in_name);
+    unit.is_some_and(|unit| channel_unit(unit).is_none_or(|(_, si)| si != "s"))
+}
+
 /// The column that is named as time without being one, and where that shows first in the head; `None` of one that
 /// stands still, a temperature perhaps.
 pub(super) fn flat_time(head: &[u8], whole: HeadExtent, layout: &CsvLayout) -> Option<FlatTime> {
-    let column = named_as_time(&layout.columns).next()?;
+    let column = named_as_time(&layout.columns)
+        .find(|at| !layout.columns.get(*at).is_some_and(has_other_unit))?;
     let mut cells = Vec::new();
     let lines = head_lines(head, layout.line_end, whole);
     let rows = lines.iter().enumerate();

@@ -97,7 +97,7 @@ pub fn bound_percent(percent: f64) -> String {
 
 /// A probability in percent to a tenth; what would read as certain or impossible is said as a bound.
 pub fn probability(value: f64) -> String {
-    if value > 0.9995 {
+    if value >= 0.9995 {
         ">99.9 %".to_owned()
     } else if value < 0.0005 {
         "<0.1 %".to_owned()

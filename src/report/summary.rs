@@ -3,6 +3,7 @@
 use super::document::{Document, ModeSection, PredictionSection, RecordingSection};
 use super::format::{bound_percent, signed_percent, significant, trimmed};
 use super::tables::{estimated, gap_story, quality_count, reading_bound};
+use crate::identify::observation::UNPAIRED;
 use crate::pipeline::AmplitudeChange;
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -147,7 +148,7 @@ fn modes(document: &Document) -> Option<String> {
 fn others(modes: &[ModeSection]) -> String {
     let mut kinds: Vec<(&str, usize)> = Vec::new();
     for mode in modes.iter().filter(|mode| mode.mode.is_none()) {
-        let name = mode.label.as_deref().unwrap_or("unpaired");
+        let name = mode.label.as_deref().unwrap_or(UNPAIRED);
         match kinds.iter_mut().find(|(known, _)| *known == name) {
             Some((_, count)) => *count += 1,
             None => kinds.push((name, 1)),
@@ -189,7 +190,7 @@ fn estimate(document: &Document) -> Option<String> {
             let [value, _, low, high, unit] = parameter.written();
             let interval = match (parameter.value.low, parameter.value.high) {
                 // More digits of a stiffness than that say nothing; how narrow the interval is does.
-                (Some(from), Some(to)) if low == high && to > from => format!(
+                (Some(from), Some(to)) if low == high && to > from && parameter.value.value != 0.0 => format!(
                     " (95 %: \u{b1}{} %)",
                     significant(50.0 * (to - from) / parameter.value.value.abs(), 2)
                 ),
@@ -202,7 +203,7 @@ fn estimate(document: &Document) -> Option<String> {
             let limits = limits.map_or(String::new(), |[low, high]| format!(", 95 %: {low} to {high}"));
             let interval = match parameter.value.std_scaled {
                 Some(_) if parameter.value.std.is_some() => format!(
-                    "{interval}, from the readings alone; standard deviation scaled by the misfit {}{limits}",
+                    "{interval}, from the frequencies' uncertainty alone; standard deviation scaled by the misfit {}{limits}",
                     parameter.written_scaled()
                 ),
                 Some(_) => format!(

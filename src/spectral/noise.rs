@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use super::lines::Lines;
 use super::transform::transform_block;
 use super::window::Window;
+use crate::stats::median;
 
 /// Lines over which the noise is smoothed, to either side.
 const REACH: usize = 8;
@@ -79,9 +80,6 @@ pub fn noise_beside(samples: &[f64], sample_rate: f64, frequency: f64) -> Option
         .filter(|place| *place > 0.0)
         .filter_map(|place| line_amplitude(samples, sample_rate, place))
         .collect();
-    let half = amplitudes.len() / 2;
-    (!amplitudes.is_empty()).then(|| {
-        let median = *amplitudes.select_nth_unstable_by(half, f64::total_cmp).1;
-        median / std::f64::consts::LN_2.sqrt()
-    })
+    let half_power = std::f64::consts::LN_2.sqrt();
+    (!amplitudes.is_empty()).then(|| median(&mut amplitudes) / half_power)
 }

@@ -1,7 +1,7 @@
 //! The described model with what the diagnosis found: as a description that can be predicted with, and its
 //! natural frequencies.
 
-use crate::description::{FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription};
+use crate::description::{FastenedMass, JointKind, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
@@ -186,12 +186,6 @@ fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
     text
 }
 
-/// Where a sensor sits in the first recording (m).
-fn place_of(test: &TestDescription, sensor: &SensorDescription) -> Option<f64> {
-    let first = test.recordings.first();
-    first.map_or(sensor.position, |recording| recording.place_of(sensor))
-}
-
 /// Sensors where the first recording has them.
 fn sensors(test: &TestDescription) -> String {
     // A microphone is not on the beam.
@@ -200,7 +194,7 @@ fn sensors(test: &TestDescription) -> String {
         .iter()
         .filter(|sensor| sensor.kind != SensorKind::Sound);
     let tables = on_beam.filter_map(|sensor| {
-        let position = place_of(test, sensor)?;
+        let position = test.place_of(sensor)?;
         let mut text = format!("\n[[sensor]]\nname = {}\n", quoted(&sensor.name));
         text.push_str(&line("position", position));
         text.push_str(
@@ -311,7 +305,7 @@ fn frequencies_with(
         .filter(|(sensor, _)| sensor.kind != SensorKind::Sound)
         .filter_map(|(sensor, known)| {
             Some(SensorPlace {
-                position: place_of(test, sensor)?,
+                position: test.place_of(sensor)?,
                 mass: known.mass.unwrap_or(0.0),
             })
         })

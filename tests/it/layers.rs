@@ -15,7 +15,7 @@ const TABLE: &[(&str, &[&str])] = &[
     ("recording", &["quantity"]),
     ("stats", &[]),
     ("taps", &["recording", "stats"]),
-    ("spectral", &["recording", "taps"]),
+    ("spectral", &["recording", "taps", "stats"]),
     ("modal", &["recording", "taps", "spectral", "stats"]),
     (
         "quality",

@@ -193,40 +193,29 @@ fn limit_prominence_on_a_flank_counts_from_the_saddle() {
 }
 
 #[test]
-fn prop_mains_must_be_near_a_multiple_and_there_before_the_tap() {
+fn limit_mains_must_be_near_a_multiple_and_there_before_the_tap() {
     let settings = MainsSettings::default();
-    let steady = LineAmplitudes {
-        before: 0.9,
+    let line = |before: f64, noise: f64| LineAmplitudes {
+        before,
         within: 1.0,
-        noise: 0.01,
+        noise,
     };
-    assert_eq!(mains_harmonic(50.05, 0.1, steady, &settings), Some(50.0));
-    assert_eq!(mains_harmonic(180.1, 0.1, steady, &settings), Some(180.0));
-    assert_eq!(
-        mains_harmonic(52.0, 0.1, steady, &settings),
-        None,
-        "not near a multiple"
-    );
-    let rings = LineAmplitudes {
-        before: 0.01,
-        within: 1.0,
-        noise: 0.001,
-    };
-    assert_eq!(
-        mains_harmonic(50.0, 0.1, rings, &settings),
-        None,
-        "it came with the tap"
-    );
-    let noise = LineAmplitudes {
-        before: 0.9,
-        within: 1.0,
-        noise: 0.3,
-    };
-    assert_eq!(
-        mains_harmonic(1802.7, 0.1, noise, &settings),
-        None,
-        "as high as the noise beside it"
-    );
+    let steady = line(0.9, 0.01);
+    for (frequency, line, expected, why) in [
+        (50.05, steady, Some(50.0), "a line of 50 Hz"),
+        (180.1, steady, Some(180.0), "a multiple of 60 Hz"),
+        (52.0, steady, None, "not near a multiple"),
+        (50.0, line(0.01, 0.001), None, "it came with the tap"),
+        (
+            1802.7,
+            line(0.9, 0.3),
+            None,
+            "as high as the noise beside it",
+        ),
+    ] {
+        let found = mains_harmonic(frequency, 0.1, line, &settings);
+        assert_eq!(found, expected, "{frequency} Hz: {why}");
+    }
 }
 
 fn reading(frequency: f64, half_line: f64) -> ModeReading {

@@ -295,13 +295,19 @@ fn seen(amplitude: f64) -> Vec<Option<PeakStrength>> {
     })]
 }
 
+/// A cantilever whose modes are all seen, equally strong.
+fn strong_case(seed: u64) -> Case {
+    let mut case = case(Assembly::Cantilever, Change::Nothing, Seen::Shapes, seed);
+    for peak in &mut case.peaks {
+        peak.strengths = seen(1.0);
+    }
+    case
+}
+
 #[test]
 fn regress_weak_poles_beside_a_strong_one_are_not_the_mode() {
     for seed in 0..10 {
-        let mut case = case(Assembly::Cantilever, Change::Nothing, Seen::Shapes, seed);
-        for peak in &mut case.peaks {
-            peak.strengths = seen(1.0);
-        }
+        let mut case = strong_case(seed);
         // A mode whose frequency changes while it rings leaves poles about it that carry a hundredth.
         let mode = case.peaks[3].clone();
         for (place, factor) in [(3, 0.994), (5, 1.005), (6, 1.017)] {
@@ -322,10 +328,7 @@ fn regress_weak_poles_beside_a_strong_one_are_not_the_mode() {
 fn regress_a_weak_poles_shape_says_nothing_where_the_strong_ones_is_lost() {
     let mut found = 0;
     for seed in 0..10 {
-        let mut case = case(Assembly::Cantilever, Change::Nothing, Seen::Shapes, seed);
-        for peak in &mut case.peaks {
-            peak.strengths = seen(1.0);
-        }
+        let mut case = strong_case(seed);
         // Mode 4 near a node of both sensors; a satellite 1 % below pretends to the model's shape.
         let mut weak = case.peaks[3].clone();
         weak.frequency *= 0.99;
@@ -346,10 +349,7 @@ fn regress_a_strong_peak_of_another_shape_is_not_the_mode() {
     // Torsion 2 % above a bending mode, rung twice as strongly by a tap beside the axis.
     let mut found = 0;
     for seed in 0..10 {
-        let mut case = case(Assembly::Cantilever, Change::Nothing, Seen::Shapes, seed);
-        for peak in &mut case.peaks {
-            peak.strengths = seen(1.0);
-        }
+        let mut case = strong_case(seed);
         let mut torsion = case.peaks[2].clone();
         torsion.frequency *= 1.02;
         torsion.strengths = seen(2.0);

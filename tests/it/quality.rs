@@ -607,10 +607,11 @@ fn val_three_levels_in_order_are_more_than_drift() {
             r.taps.iter_mut().for_each(|tap| tap.peak *= level);
         })
     };
-    let judge = |shifts: [f64; 3]| {
-        let recordings = [at(1.0, shifts[0]), at(2.0, shifts[1]), at(4.0, shifts[2])];
+    let judge_all = |all: &[(f64, f64)]| {
+        let recordings: Vec<_> = all.iter().map(|&(level, shift)| at(level, shift)).collect();
         worst(&judge_test(&recordings, &settings()), Check::Linearity)
     };
+    let judge = |[a, b, c]: [f64; 3]| judge_all(&[(1.0, a), (2.0, b), (4.0, c)]);
     // Far below a usual drift, and far above the uncertainty of 1e-5.
     let ordered = judge([0.0, -1e-3, -2e-3]);
     assert_doubt(
@@ -623,4 +624,12 @@ fn val_three_levels_in_order_are_more_than_drift() {
     // Twice nearly the same frequency is no order.
     let equal = judge([0.0, -1e-3, -1.01e-3]);
     assert_eq!(equal.outcome, Outcome::Good, "{equal}");
+    // A level that was recorded twice shows how far the joint drifts by itself.
+    let repeated = judge_all(&[(1.0, 0.0), (1.0, 2e-4), (2.0, -1e-3), (4.0, -2e-3)]);
+    assert_doubt(&repeated, Outcome::Doubtful, &["Over 4 recordings"]);
+    let within = judge_all(&[(1.0, 0.0), (1.0, -1.5e-3), (2.0, -1e-3), (4.0, -2e-3)]);
+    assert_eq!(within.outcome, Outcome::Good, "{within}");
+    // Of three on two levels, two in three are in order by chance.
+    let few = judge_all(&[(1.0, 0.0), (1.0, 2e-4), (2.0, -1e-3)]);
+    assert_eq!(few.outcome, Outcome::Good, "{few}");
 }

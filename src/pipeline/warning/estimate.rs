@@ -51,7 +51,7 @@ fn write_misfit(
     if let Some(deviations) = deviations {
         write!(
             f,
-            " ({} standard deviations of its reading)",
+            " ({} standard deviations of its frequency)",
             times(deviations)
         )?;
     }

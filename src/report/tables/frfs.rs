@@ -2,7 +2,7 @@
 
 use super::super::document::{Document, FrfResonanceSection, FrfSection};
 use super::super::format::{MISSING, optional, trimmed, unit_words};
-use super::{Table, coherence, number, words};
+use super::{Table, coherence, mode_name, number, words};
 
 /// One row for each resonance on each function; `None` where no functions were asked for or none
 /// exist.
@@ -101,11 +101,7 @@ fn row(
     found: &FrfResonanceSection,
     (recording, unit): (String, String),
 ) -> Vec<String> {
-    let name = match (found.mode, &found.label) {
-        (Some(mode), _) => mode.to_string(),
-        (None, Some(label)) => label.clone(),
-        (None, None) => "unpaired".to_owned(),
-    };
+    let name = mode_name(found.mode, found.label.as_deref());
     let phase = |value: f64| format!("{value:.1}").replace('-', "\u{2212}");
     vec![
         recording,

@@ -6,6 +6,7 @@ use super::super::document::{
 use super::super::format::probability;
 use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
 use super::next_tests::next_test;
+use crate::gap::{MISFIT, SEEN};
 use crate::stats::times;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
@@ -50,7 +51,7 @@ fn unknown(gap: &GapSection) -> String {
         matches!(
             found.effect.as_str(),
             "added-mass+local-crack" | "local-crack+added-mass"
-        ) && found.goodness_of_fit.is_some_and(|p| p >= REFUSED)
+        ) && found.goodness_of_fit.is_some_and(|p| p >= MISFIT)
             && found.probability >= LEAST_PROBABILITY
     };
     let likeness = gap
@@ -70,15 +71,15 @@ fn unknown(gap: &GapSection) -> String {
     )
 }
 
-/// Goodness of fit below which an explanation is refused.
-const REFUSED: f64 = 0.01;
-
 /// That nothing is missing, and why so even where an effect leads the table.
 fn no_gap(gap: &GapSection) -> String {
     let first = gap.hypotheses.first();
     let open = match first.filter(|first| first.effect != "none") {
-        Some(_) => " No effect is established: 20 to 1 against none is asked for.",
-        None => "",
+        Some(_) => format!(
+            " No effect is established: {:.0} to 1 against none is asked for.",
+            SEEN.exp()
+        ),
+        None => String::new(),
     };
     format!("No gap: the described model explains the frequencies within their uncertainty.{open}")
 }

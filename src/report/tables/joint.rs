@@ -80,14 +80,12 @@ impl Parameter<'_> {
         ]
     }
 
-    /// Standard deviation scaled by the misfit, in the unit of the value.
+    /// Standard deviation scaled by the misfit, in the unit of the value, to the same last digit as the std beside it.
     pub fn written_scaled(&self) -> String {
-        let (factor, _) = self.scale();
-        let value = factor * self.value.value;
-        let std = self.value.std_scaled.map(|std| factor * std);
-        // To the same last digit as the std beside it.
-        std.filter(|std| std.is_finite() && *std > 0.0)
-            .and_then(|std| rounded_to(value, Some(std), self.finest_place(value)).uncertainty)
+        let known = |std: &f64| std.is_finite() && *std > 0.0;
+        let scaled = self.value.std_scaled.filter(known);
+        scaled
+            .and_then(|_| self.written_together().uncertainty)
             .unwrap_or_else(|| MISSING.to_owned())
     }
 
@@ -185,7 +183,7 @@ fn scaled_note(estimate: &EstimateSection) -> String {
     let stated = list.iter().any(|p| p.value.std.is_some());
     match (scaled, stated) {
         (false, _) => String::new(),
-        (true, true) => " Std and limits stand for the readings alone; the model misses the \
+        (true, true) => " Std and limits stand for the frequencies' uncertainty alone; the model misses the \
                          frequencies by more than their uncertainty, and the scaled std takes the \
                          misfit for it, and so do the scaled 95 % limits, by Student's distribution."
             .to_owned(),

@@ -28,6 +28,7 @@ pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 
 use super::document::{Document, ModeSection};
 use super::format::MISSING;
+use crate::identify::observation::UNPAIRED;
 
 /// A table of words.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -189,12 +190,11 @@ pub fn bound_of(mode: &ModeSection) -> Option<f64> {
         .filter(|bound| bound.is_finite() && *bound > 0.0)
 }
 
-/// "4" or "mains 50 Hz".
-fn mode_name(mode: &ModeSection) -> String {
-    match (mode.mode, &mode.label) {
-        (Some(number), _) => number.to_string(),
-        (None, Some(label)) => label.clone(),
-        (None, None) => "unpaired".to_owned(),
+/// "4" or "mains 50 Hz", from a resonance's number and its label.
+fn mode_name(number: Option<usize>, label: Option<&str>) -> String {
+    match number {
+        Some(number) => number.to_string(),
+        None => label.unwrap_or(UNPAIRED).to_owned(),
     }
 }
 

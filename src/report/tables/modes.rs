@@ -198,7 +198,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
     let fit = mode.fit.as_ref();
     let scatter = fit.and_then(|fit| fit.scatter_probability);
     vec![
-        mode_name(mode),
+        mode_name(mode.mode, mode.label.as_deref()),
         reading(mode).joined(),
         mode.method.clone(),
         fit.map_or_else(|| MISSING.into(), |fit| fit.uncertainty_from.clone()),

@@ -105,8 +105,10 @@ impl Band {
     /// Number of negative eigenvalues: that of the negative pivots (Sylvester's law of inertia).
     pub(super) fn negative_eigenvalues(&self) -> usize {
         let pivots = self.indefinite();
-        // After a pivot of zero the next one is infinite, and its inverse a zero with a sign.
-        let negative = |row: &&[f64; HALF_BAND + 1]| row[HALF_BAND].is_sign_negative();
+        // After a pivot of zero the next one is infinite, and its inverse a zero with a sign; a NaN's sign says nothing.
+        let negative = |row: &&[f64; HALF_BAND + 1]| {
+            row[HALF_BAND].is_sign_negative() && !row[HALF_BAND].is_nan()
+        };
         pivots.rows.iter().filter(negative).count()
     }
 

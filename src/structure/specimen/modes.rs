@@ -95,7 +95,7 @@ impl SpecimenModes {
         })
     }
 
-    /// Natural frequencies (Hz), ascending.
+    /// Natural frequencies (Hz), ascending; of [`SpecimenModes::near`] in the order of the modes they came from.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
     }
@@ -240,23 +240,20 @@ impl Model {
 
     /// Translation (0) or rotation (1) of the runs from `first` on, about the first one's left end.
     pub(super) fn rigid_vector(&self, kind: usize, first: usize) -> Vec<f64> {
-        let mut vector = vec![0.0; self.numbering.size];
+        let mut motion = Motion {
+            nodes: vec![[0.0; 2]; self.numbering.nodes.len()],
+            base: None,
+        };
         for run in &self.runs[first..] {
             for index in 0..=run.elements {
                 let x = run.start + index as f64 * run.section.element.length;
-                let values = if kind == 0 {
+                motion.nodes[run.first_node + index] = if kind == 0 {
                     [1.0, 0.0]
                 } else {
                     [x - self.runs[first].start, 1.0]
                 };
-                let equations = self.numbering.nodes[run.first_node + index];
-                for (row, value) in equations.into_iter().zip(values) {
-                    if let Some(entry) = vector.get_mut(row) {
-                        *entry = value;
-                    }
-                }
             }
         }
-        vector
+        self.vector(&motion)
     }
 }

@@ -47,7 +47,7 @@ pub struct TruthFile {
 /// Something in a truth file that may be a slip of the pen.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TruthDoubt {
-    /// An id that the catalogue does not have.
+    /// An id that the catalogue does not have, and that is near one which it has, or says that there is none.
     #[error(
         "the test \"{test}\": the catalogue has no effect `{effect}`, so that it counts as something outside \
          the catalogue{hint}"
@@ -57,7 +57,7 @@ pub enum TruthDoubt {
         test: String,
         /// The id.
         effect: String,
-        /// `; did you mean ...?`, or empty.
+        /// `; did you mean ...?`, or what to write instead.
         hint: String,
     },
     /// A parameter that is not used.
@@ -151,8 +151,8 @@ fn doubts_of(entry: &Entry) -> Vec<TruthDoubt> {
     all
 }
 
-/// What may have been meant by an id outside the catalogue; `None` of one in it, and of those that virtual
-/// tests are drawn with.
+/// What may have been meant by an id outside the catalogue; `None` where nothing speaks for a slip: of an id in it,
+/// of one that virtual tests are drawn with, and of one that is like none of these.
 fn hint(effect: &str) -> Option<String> {
     let Err(error) = EffectId::parse(effect) else {
         return None;
@@ -163,10 +163,12 @@ fn hint(effect: &str) -> Option<String> {
     if effect.is_empty() || effect == "none" {
         return Some("; where nothing was planted write `\"effects\": []`".to_owned());
     }
-    let EffectError::UnknownEffect { nearest, .. } = error else {
-        return Some(String::new());
-    };
-    Some(nearest.map_or_else(String::new, |name| format!("; did you mean `{name}`?")))
+    match error {
+        EffectError::UnknownEffect { nearest, .. } => {
+            nearest.map(|name| format!("; did you mean `{name}`?"))
+        }
+        _ => None,
+    }
 }
 
 /// Parameters that no effect of the entry takes up, each with those that would be.

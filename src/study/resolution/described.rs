@@ -23,7 +23,7 @@ impl StudiedTest {
         let sensors: Vec<f64> = test
             .sensors
             .iter()
-            .filter_map(|sensor| first.map_or(sensor.position, |one| one.place_of(sensor)))
+            .filter_map(|sensor| test.place_of(sensor))
             .collect();
         let described = test
             .recordings

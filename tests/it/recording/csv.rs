@@ -644,6 +644,18 @@ fn regress_a_time_column_with_too_few_digits_is_told_as_such() {
 }
 
 #[test]
+fn regress_a_temperature_named_t_is_no_time() {
+    let rows: String = (0..40)
+        .map(|row| format!("{},{row},1\n", 20 + row % 2))
+        .collect();
+    for unit in ["\u{b0}C", "K"] {
+        let message = open_error(format!("T ({unit}),force,response\n{rows}"));
+        assert!(!message.contains("named as time"), "{message}");
+        assert!(message.contains("sample_rate"), "{message}");
+    }
+}
+
+#[test]
 fn regress_utf_16_is_named_with_its_remedy() {
     let mut bytes = vec![0xff, 0xfe];
     bytes.extend("t;a\n0;1\n".encode_utf16().flat_map(u16::to_le_bytes));

@@ -69,7 +69,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     }
 }
 
-/// Likelihood ratio of the two best hypotheses at their optima. What is unknown has readings of another
+/// By the likelihood ratio of the two best hypotheses at their optima, and whether one had to give way. What is unknown has readings of another
 /// uncertainty; its likelihood cannot be held against the others'.
 fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
     let mut named = entries
@@ -77,9 +77,10 @@ fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
         .filter(|entry| entry.hypothesis != Hypothesis::Unknown);
     let likelihood = |entry: &Entry| log_likelihood(&frame.readings, &entry.fit.branch.optimum);
     let weight = |entry: &Entry| entry.fit.log_evidence + entry.prior.ln();
+    let most = named.clone().map(weight).fold(f64::NEG_INFINITY, f64::max);
     match (named.next(), named.next()) {
-        // Readings that took no part have turned the order about.
-        (Some(first), Some(rival)) if weight(first) < weight(rival) => DecidedBy::Readings,
+        // What speaks against a better one as such has brought it to the top.
+        (Some(first), Some(_)) if weight(first) < most => DecidedBy::Readings,
         (Some(first), Some(rival)) if likelihood(first) - likelihood(rival) < 3.0_f64.ln() => {
             DecidedBy::Priors
         }

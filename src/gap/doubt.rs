@@ -1,4 +1,4 @@
-//! What the readings say against the explanations that are left, beside how these compare with each other.
+//! What the readings say against an explanation as such, whatever the others are worth.
 
 use super::frame::Frame;
 use super::pairs::SECOND;
@@ -7,54 +7,22 @@ use super::result::Hypothesis;
 use super::search::Competition;
 use super::trial::Trial;
 
-/// Odds against one explanation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Odds {
-    /// Of readings that took no part, which its evidence does not know of.
-    withheld: f64,
-    /// Of all readings.
-    all: f64,
-}
-
-impl Odds {
-    /// Nothing speaks against it.
-    const EVEN: Odds = Odds {
-        withheld: 1.0,
-        all: 1.0,
-    };
-
-    /// Of a fit that has no uncertainty to be tested with.
-    const NONE: Odds = Odds {
-        withheld: f64::INFINITY,
-        all: f64::INFINITY,
-    };
-
-    fn of(frame: &Frame, entry: &Entry) -> Self {
-        let Some(trial) = Trial::new(frame, &entry.fit) else {
-            return Self::NONE;
-        };
-        let trial = trial.with_withheld(frame, &entry.fit);
-        Odds {
-            withheld: trial.refuting_withheld().map_or(1.0, most_against),
-            all: trial.refuting().map_or(1.0, most_against),
-        }
-    }
-}
-
-/// Weighs what the readings say against the best explanation, by itself and not beside the others.
+/// Weighs what the readings say against the best explanation as such, and not beside the others.
 ///
 /// A misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most (Sellke, Bayarri &
-/// Berger 2001). Among explanations that fit about as well as the best, those odds decide that come from
-/// readings which took no part: what took part is in their evidence already. What any readings say against the
-/// one that is left is evidence for something unknown, which has no residuals of its own.
+/// Berger 2001). Such odds count against every explanation that is about as probable as the best: evidence compares
+/// how well explanations fit under the noise that is assumed, and one that this noise refutes is no explanation
+/// while another stands. What is still held against the one that is left is evidence for something unknown, which
+/// has no misfit of its own. A best explanation that stands is left alone: what refutes its rivals makes it no
+/// better.
 pub(super) fn doubt(competition: &mut Competition) {
     let Competition { frame, entries, .. } = competition;
     let Some(best) = best(entries) else { return };
-    let odds = Odds::of(frame, &entries[best]);
-    if odds == Odds::EVEN {
+    let odds = odds_against(frame, &entries[best]);
+    if odds <= 1.0 {
         return;
     }
-    let mut all: Vec<Option<Odds>> = vec![None; entries.len()];
+    let mut all: Vec<Option<f64>> = vec![None; entries.len()];
     all[best] = Some(odds);
     // Down to what explains as well as the best, and then as well as the best that is not refuted.
     let mut least = entries[best].probability * (-SECOND).exp();
@@ -63,27 +31,31 @@ pub(super) fn doubt(competition: &mut Competition) {
         if entries[k].hypothesis == Hypothesis::Unknown || entries[k].probability < least {
             continue;
         }
-        all[k] = Some(Odds::of(frame, &entries[k]));
-        if !stands && all[k] == Some(Odds::EVEN) {
+        all[k] = Some(odds_against(frame, &entries[k]));
+        if !stands && all[k] == Some(1.0) {
             stands = true;
             least = entries[k].probability * (-SECOND).exp();
         }
     }
     let probabilities: Vec<f64> = entries.iter().map(|entry| entry.probability).collect();
-    let withheld: Vec<Option<f64>> = all
-        .iter()
-        .map(|odds| Some(odds.as_ref()?.withheld))
-        .collect();
-    let Some((left, relative)) = left(&probabilities, &withheld) else {
+    let Some((left, relative)) = left(&probabilities, &all) else {
         return;
     };
     let name = entries[left].hypothesis.clone();
     lower(entries, &relative);
-    let against = all[left].map_or(1.0, |odds| odds.all);
-    let left = entries.iter().position(|entry| entry.hypothesis == name);
-    if let Some(left) = left.filter(|_| against > 1.0 && against.is_finite()) {
-        raise_unknown(entries, left, against);
+    let left_now = entries.iter().position(|entry| entry.hypothesis == name);
+    if let Some((left_now, odds)) = left_now.zip(all[left].filter(|odds| *odds > 1.0)) {
+        raise_unknown(entries, left_now, odds);
     }
+}
+
+/// The odds against one explanation; infinite where its fit has no uncertainty to be tested with.
+fn odds_against(frame: &Frame, entry: &Entry) -> f64 {
+    let Some(trial) = Trial::new(frame, &entry.fit) else {
+        return f64::INFINITY;
+    };
+    let refuting = trial.with_withheld(frame, &entry.fit).refuting();
+    refuting.map_or(1.0, most_against)
 }
 
 /// Which of the explanations that were looked at is left, the first of equal ones, and the odds against every
@@ -145,9 +117,9 @@ mod tests {
         assert_eq!(relative, [Some(1.0), Some(1.0), None]);
     }
 
-    /// A rival against which less speaks takes the place, and keeps it against what was not looked at.
+    /// A rival against which less speaks takes the place; what was not looked at keeps its odds to it.
     #[test]
-    fn val_the_least_refuted_is_left() {
+    fn regress_an_explanation_that_stands_takes_the_place_of_a_refuted_one() {
         let (first, relative) = left(&[0.8, 0.15, 0.05], &[Some(40.0), Some(4.0), None]).unwrap();
         assert_eq!(first, 1);
         assert_eq!(relative, [Some(10.0), Some(1.0), None]);

@@ -204,7 +204,7 @@ fn from_afar<'a>(
 }
 
 /// A second effect beside a first one, if it is believed: it has to beat the better of the two by
-/// themselves, in evidence and on readings that took no part.
+/// themselves in evidence, and hold on readings that took no part.
 fn pair(frame: &Frame, settings: &GapSettings, (first, second, afar): &Task<'_>) -> Option<Entry> {
     let search = Search {
         frame,
@@ -261,15 +261,15 @@ pub(super) fn misfits(frame: &Frame, fit: &Fit) -> bool {
     Trial::new(frame, fit).is_none_or(|trial| trial.refuted())
 }
 
-/// Whether the readings that took no part are predicted better, or as well as the fit can without being refuted:
-/// two effects leave more open than one does. Without such readings, whether each mode is from the others.
+/// Whether the readings that took no part are predicted better, or at least do not refute the fit: two effects leave
+/// more open than one does. Where that cannot be said, whether each mode is predicted better from the others.
 fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
     match (
         WithheldErrors::new(frame, before),
         WithheldErrors::new(frame, after),
     ) {
         (Some(before), Some(after)) => {
-            after.rms() < before.rms() || !after.goodness().is_some_and(refutes_withheld)
+            after.rms() < before.rms() || after.goodness().is_some_and(|p| !refutes_withheld(p))
         }
         _ => {
             let left_out =

@@ -290,7 +290,7 @@ pub struct PlaceMap {
 /// What decided between the first hypothesis and the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DecidedBy {
-    /// The readings: the likelihood ratio is 3 or more.
+    /// The readings: the likelihood ratio is 3 or more, or they refute what was more probable.
     Readings,
     /// The priors: the readings alone would leave both.
     Priors,

@@ -1,6 +1,7 @@
 //! What the diagnosis takes for granted where nobody says otherwise.
 
 use super::error::GapError;
+use crate::identify::FREQUENCY_FLOOR;
 
 /// Settings of the diagnosis.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,8 +13,7 @@ pub struct GapSettings {
     /// 0.2 %, a modulus known to 0.3 % and a length to 0.1 %. What is larger than this counts as a gap
     /// that has a name (`modulus`, `length`, `timebase`); whoever knows the geometry less well states it.
     pub scale_std: f64,
-    /// Relative uncertainty of any frequency that repetition cannot show (1): 0.005 %, a steel
-    /// beam's change over a third of a kelvin.
+    /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
     pub frequency_floor: f64,
     /// Relative standard uncertainty of a sensor's stated mass: 10 %, cable and mounting.
     pub sensor_mass_std: f64,
@@ -63,7 +63,7 @@ impl Default for GapSettings {
         GapSettings {
             drift_stds: vec![0.002, 0.01, 0.02],
             scale_std: 0.002,
-            frequency_floor: 5e-5,
+            frequency_floor: FREQUENCY_FLOOR,
             sensor_mass_std: 0.1,
             fastened_mass_std: 0.01,
             position_std: 0.001,

@@ -182,7 +182,7 @@ mod tests {
 
     /// From frequencies alone and with shapes, for every effect, wherever it sits.
     #[test]
-    fn val_slopes_near_a_solution_are_those_of_new_solutions() {
+    fn limit_slopes_near_a_solution_are_those_of_new_solutions() {
         // One-sided steps of 1e-4 of the size bend by a few times that, and a kink by more; what calibration
         // does to a shape, 1 % here, is left out of its slopes.
         for (frame, most) in [(frame(None), 0.005), (frame(Some(0.01)), 0.02)] {

@@ -151,18 +151,13 @@ impl Trial {
     pub(super) fn refuting(&self) -> Option<f64> {
         let block = self.blocks.first().map(|block| block.goodness_of_fit);
         let overall = self.goodness.filter(|p| *p < MISFIT);
-        let withheld = self.refuting_withheld();
+        let withheld = self.withheld.filter(|p| refutes_withheld(*p));
         let block = block
             .filter(|p| *p < BLOCK_MISFIT)
             .map(|p| (p * self.blocks.len() as f64).min(MISFIT));
         let peak = self.peak.filter(|p| *p < MISFIT);
         let all = [overall, withheld, block, peak].into_iter().flatten();
         all.min_by(f64::total_cmp)
-    }
-
-    /// The probability of the misfit of withheld readings, where that refutes the hypothesis.
-    pub(super) fn refuting_withheld(&self) -> Option<f64> {
-        self.withheld.filter(|p| refutes_withheld(*p))
     }
 
     /// Whether withheld readings speak for the hypothesis: it closes some of the gap for certain, or predicts

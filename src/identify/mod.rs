@@ -27,7 +27,9 @@ pub mod perturbation;
 pub mod predict;
 
 pub use doubt::Doubt;
-pub use estimate::{JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator};
+pub use estimate::{
+    FREQUENCY_FLOOR, JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator,
+};
 pub use free_beam::{FreeBeamEstimate, estimate_modulus};
 pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
 pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio, pair_modes};

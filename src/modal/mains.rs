@@ -9,8 +9,9 @@ pub struct MainsSettings {
     /// resonance that happens to lie at 50 Hz is still before the tap.
     pub share_before: f64,
     /// Least height of the line over the noise beside it before the tap, in amplitude: 4. Noise alone is as
-    /// high in one line of some ten thousand: the noise is that of twelve lines, and itself uncertain. Multiples of 50 and 60 Hz are so close at high orders that every other
-    /// peak lies near one, and a peak of mere noise was there before the tap as well.
+    /// high in one line of some ten thousand: the noise is that of twelve lines, and itself uncertain.
+    /// Multiples of 50 and 60 Hz are so close at high orders that every other peak lies near one, and a peak
+    /// of mere noise was there before the tap as well.
     pub over_noise: f64,
 }
 

@@ -146,7 +146,7 @@ pub struct MergedMode {
 /// Merges the readings of several recordings, ascending in frequency.
 ///
 /// Readings are the same resonance when they differ by less than their half lines together plus
-/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule; a drift of up to 0.5 % lists a
+/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule; a larger drift lists a
 /// mode twice, which is less harm than two modes taken for one); a fitted
 /// one stays before one that is not, of two fits the one with the smaller standard deviation, else the
 /// one with the smaller half line, and among equals the one that stands out most. Two readings of one recording are

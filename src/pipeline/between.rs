@@ -18,7 +18,7 @@ pub struct BetweenRecordings {
 /// From the readings of one mode that have an uncertainty; `None` below two.
 pub(super) fn between(readings: &[ModeReading]) -> Option<BetweenRecordings> {
     let known = |reading: &ModeReading| {
-        let std = reading.std.filter(|std| *std > 0.0)?;
+        let std = reading.std.filter(|std| *std > 0.0 && std.is_finite())?;
         Some((reading.frequency, std))
     };
     of_known(&readings.iter().filter_map(known).collect::<Vec<_>>())
@@ -41,36 +41,48 @@ fn of_known(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
     })
 }
 
-/// Steps of the iteration for the common share: each changes it by less than the one before, and ten leave less
-/// than a tenth of a percent.
-const ROUNDS: usize = 10;
-
 /// The share of its frequency (1) by which every mode scatters between recordings beyond its own uncertainty.
 ///
-/// The variances less what is expected of them, weighed by the inverse of their own variance, which is
-/// 2 (own + share^2)^2/freedom (after DerSimonian & Laird 1986, iterated): a mode that is read coarsely says
-/// little, and where the share is large all count alike. 0 where there is no more than noise.
+/// That with which the squares are as large as expected, sum f variance/(own + share^2) = sum f with f degrees of
+/// freedom each (Paule & Mandel 1982, "Consensus values and weighting factors"): a mode that is read coarsely says
+/// little, and one that stands still beside others that do not decides nothing by itself. 0 where there is no more
+/// than noise.
 pub(super) fn scatter(modes: &[ModeResult]) -> f64 {
     common_share(&of_modes(modes))
 }
 
+/// Halvings of the interval in which the square lies: it is known to 1e-15 of its largest possible value.
+const HALVINGS: usize = 50;
+
 fn common_share(all: &[BetweenRecordings]) -> f64 {
-    let mut square = 0.0;
-    for _ in 0..ROUNDS {
-        let (mut weights, mut sum) = (0.0, 0.0);
-        for one in all {
-            let weight = one.freedom as f64 / (one.own + square).powi(2);
-            weights += weight;
-            sum += weight * (one.variance - one.own);
-        }
-        if weights > 0.0 {
-            square = (sum / weights).max(0.0);
+    let freedom: f64 = all.iter().map(|one| one.freedom as f64).sum();
+    let squares = |square: f64| -> f64 {
+        let of = |one: &BetweenRecordings| one.freedom as f64 * one.variance / (one.own + square);
+        all.iter().map(of).sum()
+    };
+    if all.is_empty() || squares(0.0) <= freedom {
+        return 0.0;
+    }
+    // Without uncertainties of their own the mean variance would be the square: it is no larger.
+    let mean = all
+        .iter()
+        .map(|one| one.freedom as f64 * one.variance)
+        .sum::<f64>()
+        / freedom;
+    let (mut low, mut high) = (0.0, mean);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if squares(middle) > freedom {
+            low = middle;
+        } else {
+            high = middle;
         }
     }
-    square.sqrt()
+    high.sqrt()
 }
 
-/// Whether the recordings differ by more than single readings, as one test in a hundred does by chance.
+/// Whether the recordings differ by more than their readings' uncertainty explains; one test in a hundred does so by
+/// chance.
 pub(super) fn differ(modes: &[ModeResult]) -> bool {
     exceeds_noise(&of_modes(modes))
 }
@@ -94,8 +106,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    /// Modes in three recordings between which all drift by their own draw of `share`; each is read to its own
-    /// relative standard deviation.
+    /// Modes in three recordings, each drifting by a draw of its own of `share`, and read to its own relative standard
+    /// deviation.
     fn drawn(stds: &[f64], share: f64, random: &mut ChaCha8Rng) -> Vec<BetweenRecordings> {
         let of_mode = |(mode, std): (usize, &f64)| {
             let nominal = 40.0 * (mode as f64 + 1.0).powi(2);
@@ -139,19 +151,39 @@ mod tests {
         let all: Vec<_> = (0..2000).map(|_| drawn(&STDS, 0.0, &mut random)).collect();
         let told = all.iter().filter(|one| exceeds_noise(one)).count();
         assert!((2..40).contains(&told), "{told}");
-        // The finest readings are known to 5e-5 each, and a share that is not there is below that.
+        // The finest readings are known to 5e-5 each; what ten degrees of freedom take for a share is below that.
         let mean = all.iter().map(|one| common_share(one)).sum::<f64>() / 2000.0;
-        assert!(mean < 3e-5, "{mean}");
+        assert!(mean < 5e-5, "{mean}");
     }
 
-    /// A mode read to 1 % scatters by that; the others, read to 0.01 %, know that nothing drifted.
+    /// A mode that feels no drift, and is read best of all, does not hide that of the others.
+    #[test]
+    fn regress_one_mode_that_stands_still_does_not_hide_the_others() {
+        let one = |variance: f64, own: f64| BetweenRecordings {
+            variance,
+            own,
+            freedom: 2,
+        };
+        let found = common_share(&[one(0.5e-12, 1e-12), one(2.5e-5, 1e-8)]);
+        // 4 = 2 variance/share^2, to the other mode's own variance.
+        assert!(
+            (found / (2.5e-5_f64 / 2.0).sqrt() - 1.0).abs() < 1e-3,
+            "{found}"
+        );
+    }
+
+    /// A mode read to 1 % may say that nothing drifted, with its two of twelve degrees of freedom: sqrt(12/10) is 1.1.
     #[test]
     fn limit_a_coarse_mode_says_little_beside_fine_ones() {
         let mut random = ChaCha8Rng::seed_from_u64(7);
-        let coarse = of_known(&[(40.0, 0.4), (41.0, 0.4), (39.2, 0.4)]).unwrap();
-        let mut all = drawn(&STDS, 0.0, &mut random);
+        let mut all = drawn(&STDS, 1e-3, &mut random);
         let without = common_share(&all);
-        all.push(coarse);
-        assert!((common_share(&all) - without).abs() < 1e-5);
+        for off in [0.0, 0.3] {
+            let coarse = of_known(&[(40.0 - off, 0.4), (40.0 + off, 0.4), (40.0, 0.4)]);
+            all.push(coarse.unwrap());
+            let with = common_share(&all);
+            assert!((with / without - 1.0).abs() < 0.1, "{with} for {without}");
+            all.pop();
+        }
     }
 }

@@ -10,7 +10,8 @@ use super::shapes::predicted_specimen;
 use super::warning::Warning;
 use crate::identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodness};
 use crate::identify::{
-    Doubt, IdentifyError, MeasuredMode, PredictedMode, estimate_joint, estimate_modulus, predict,
+    Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, PredictedMode, estimate_joint,
+    estimate_modulus, predict,
 };
 use crate::structure::specimen::Specimen;
 
@@ -34,6 +35,9 @@ pub struct IdentifySettings {
     pub details: StructureDetails,
     /// The first so many modes enter; `None` = all.
     pub fit_modes: Option<usize>,
+    /// Relative standard uncertainty that a frequency read from recordings has beside that of its reading (1):
+    /// [`FREQUENCY_FLOOR`]. Frequencies that a description states have the uncertainty that it states.
+    pub frequency_floor: f64,
     /// Methods whose estimate is perturbed: both, so that they can be compared.
     pub perturbed: Vec<EstimateMethod>,
     /// Changes of all frequencies for the perturbation (%).
@@ -48,6 +52,7 @@ impl Default for IdentifySettings {
             method: EstimateMethod::Consistent,
             details: StructureDetails::default(),
             fit_modes: None,
+            frequency_floor: FREQUENCY_FLOOR,
             perturbed: vec![EstimateMethod::Pairs, EstimateMethod::Consistent],
             percents: crate::identify::perturbation::PAPER_PERCENTS.to_vec(),
             monte_carlo: None,
@@ -65,7 +70,7 @@ pub fn identify(
     modes: &[ModeResult],
     settings: &IdentifySettings,
 ) -> (Identification, Vec<Warning>) {
-    let measured = measured_modes(modes);
+    let measured = measured_modes(modes, settings.frequency_floor);
     let used: Vec<MeasuredMode> = measured
         .iter()
         .copied()
@@ -124,16 +129,21 @@ pub fn identify(
 /// The modes with a number, ascending. Modes of one list may come from recordings between which the joint
 /// drifted, or the room's temperature or the mounting: no joint has them all, and how far they are apart is part
 /// of each one's uncertainty. All get the same share of their frequency: weighed by its own scatter, a mode that
-/// feels the joint most would count least.
-pub(super) fn measured_modes(modes: &[ModeResult]) -> Vec<MeasuredMode> {
+/// feels the joint most would count least. What no repetition shows, `floor` (1), is added to
+/// every one that was read here.
+pub(super) fn measured_modes(modes: &[ModeResult], floor: f64) -> Vec<MeasuredMode> {
     let scatter = scatter(modes);
+    let share = |mode: &ModeResult| match mode.reading {
+        Some(_) => scatter.hypot(floor),
+        None => scatter,
+    };
     modes
         .iter()
         .filter_map(|mode| {
             Some(MeasuredMode {
                 mode: mode.mode?,
                 frequency: mode.frequency,
-                std: mode.std.map(|std| std.hypot(scatter * mode.frequency)),
+                std: mode.std.map(|std| std.hypot(share(mode) * mode.frequency)),
             })
         })
         .collect()

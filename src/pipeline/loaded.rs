@@ -8,6 +8,7 @@ use super::model::TestedStructure;
 use super::modes::{own_numbers, own_readings};
 use super::warning::Warning;
 use crate::description::{RecordingDescription, TestDescription};
+use crate::identify::FREQUENCY_FLOOR;
 use crate::identify::consistent::FrequencyModel;
 
 /// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
@@ -77,7 +78,7 @@ fn frequencies(
     structure: &TestedStructure,
     both: [&StructureDetails; 2],
 ) -> Option<[Vec<f64>; 2]> {
-    let measured = measured_modes(modes);
+    let measured = measured_modes(modes, FREQUENCY_FLOOR);
     let count = measured.last()?.mode;
     let found = estimator(structure, both[0], &measured).map(|estimator| estimator.fit());
     let of = |details: &StructureDetails| {

@@ -9,8 +9,8 @@ use super::{
 };
 use crate::stats::times;
 
-/// Largest probability that a drift alone brings the frequencies into the order of the levels: that of three
-/// levels. It is no proof, and enough for a doubt; each further recording makes it smaller.
+/// Largest probability that a drift without direction brings the frequencies into the order of the levels: that of
+/// three levels. It is no proof, and enough for a doubt; each further recording makes it smaller.
 const LARGEST_CHANCE: f64 = 1.0 / 3.0 + 1e-9;
 
 /// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
@@ -223,7 +223,7 @@ fn shifts(
     check: Check,
     (first, second): (&RecordingEvidence, &RecordingEvidence),
     what: &str,
-    order: &dyn Fn(&ResonanceEvidence) -> Option<usize>,
+    order: &dyn Fn(&ResonanceEvidence) -> Option<Order>,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
     let of_pair = |mode: &ResonanceEvidence| {
@@ -244,14 +244,11 @@ fn shifts(
             times(deviations),
             settings.deviations
         );
-        // Time, and mounting a sensor anew, move a frequency too; neither moves it in the order of the levels.
+        // Time, and mounting a sensor anew, move a frequency too, but seldom in the order of the levels.
         let usual = 0.01 * shift.abs() <= settings.drift;
         let (outcome, more) = match order(mode) {
             _ if deviations <= settings.deviations => (Outcome::Good, String::new()),
-            Some(count) => (
-                Outcome::Doubtful,
-                format!(" Over {count} recordings it follows the order of their levels."),
-            ),
+            Some(order) => (Outcome::Doubtful, order.words()),
             None if usual => (
                 Outcome::Good,
                 format!(
@@ -267,15 +264,38 @@ fn shifts(
     first.resonances.iter().filter_map(of_pair).collect()
 }
 
-/// Number of recordings over which a mode's frequency follows the order of the tap levels: all in `first`'s
-/// arrangement, and every frequency at one level clearly on the same side of every one at the level below. `None`
-/// where it does not, or where so few would by chance.
+/// A frequency that follows the order of the tap levels.
+struct Order {
+    /// Over so many recordings.
+    recordings: usize,
+    /// Whether the levels only rose, or only fell, from one recording to the next.
+    in_time: bool,
+}
+
+impl Order {
+    fn words(&self) -> String {
+        let settling = if self.in_time {
+            " So it would with a joint that settles from one to the next: record the first level once more."
+        } else {
+            ""
+        };
+        format!(
+            " Over {} recordings it follows the order of their levels.{settling}",
+            self.recordings
+        )
+    }
+}
+
+/// Whether a mode's frequency follows the order of the tap levels: of all recordings in `first`'s arrangement that
+/// read it, every frequency at one level is clearly on the same side of every one at the level below. A level is
+/// another one where it is `two_levels` times the next lower recording's. `None` where it does not, or where so few
+/// would by chance.
 fn in_order(
     mode: &ResonanceEvidence,
     first: &RecordingEvidence,
     recordings: &[RecordingEvidence],
     settings: &QualitySettings,
-) -> Option<usize> {
+) -> Option<Order> {
     let same = recordings
         .iter()
         .filter(|one| same_arrangement(first, one, settings));
@@ -289,6 +309,8 @@ fn in_order(
             })
         })
         .collect();
+    let in_time = seen.is_sorted_by(|a, b| a.level <= b.level)
+        || seen.is_sorted_by(|a, b| a.level >= b.level);
     seen.sort_by(|a, b| a.level.total_cmp(&b.level));
     let levels: Vec<&[Seen]> = seen
         .chunk_by(|a, b| b.level < settings.two_levels * a.level)
@@ -304,7 +326,10 @@ fn in_order(
     };
     let follows = levels.len() > 1 && (all(1.0) || all(-1.0));
     let sizes: Vec<usize> = levels.iter().map(|level| level.len()).collect();
-    (follows && chance_of_order(&sizes) <= LARGEST_CHANCE).then_some(seen.len())
+    (follows && chance_of_order(&sizes) <= LARGEST_CHANCE).then_some(Order {
+        recordings: seen.len(),
+        in_time,
+    })
 }
 
 /// A mode's frequency (Hz) in one recording, and the level that it was tapped at.
@@ -350,7 +375,7 @@ mod tests {
     /// Of 3! orders of three values two are monotonic; of 4!/(2! 2!) ways to put four on two levels, two keep them
     /// apart. To rounding of logarithms.
     #[test]
-    fn val_chance_of_an_order() {
+    fn limit_chance_of_an_order() {
         for (sizes, expected) in [
             (vec![1, 1], 1.0),
             (vec![1, 1, 1], 1.0 / 3.0),

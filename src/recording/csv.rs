@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::RecordingError;
-use super::layout::{self, CsvLayout, FlatTime, HeadExtent};
+use super::layout::{self, CsvLayout, HeadExtent};
 use super::riff::{MAX_CHANNELS, read_fully, unreadable};
 use super::rows::{RowPlace, RowReader};
 use super::time::{TimeCheck, UnevenStep};
+use super::time_column::{FlatTime, flat_time};
 use super::units::channel_unit;
 
 /// Bytes from which the layout is decided: thousands of ordinary rows.
@@ -68,7 +69,7 @@ impl CsvSource {
             },
             flat_time: match source.layout.time {
                 Some(_) => None,
-                None => layout::flat_time(&head, extent(&head), &source.layout),
+                None => flat_time(&head, extent(&head), &source.layout),
             },
         };
         let index = pass.index;

@@ -6,7 +6,7 @@
 use super::error::RecordingError;
 use super::header::Column;
 use super::text::{Cell, CellProblem, Separator, is_comment, parse_number, shown, split_cells};
-use super::units::{channel_unit, split_unit};
+use super::time_column::time_column;
 
 /// The layout of a text file.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +111,7 @@ pub(super) enum HeadExtent {
 }
 
 /// The lines of the head with their offsets; one that is cut off by the end of the head is left out.
-fn head_lines(head: &[u8], line_end: u8, whole: HeadExtent) -> Vec<(u64, &[u8])> {
+pub(super) fn head_lines(head: &[u8], line_end: u8, whole: HeadExtent) -> Vec<(u64, &[u8])> {
     let byte_order_mark = b"\xef\xbb\xbf";
     let mut offset = 0;
     let mut lines = Vec::new();
@@ -240,18 +240,8 @@ impl<'a> Candidate<'a> {
         used.map_or(0, |last| last + 1)
     }
 
-    /// The time column: named t, time, t_* or time_*, and rising in at least half of the steps of
-    /// the head. (That it rises in all of them is checked when the rows are read, and is an error
-    /// there.)
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
-        named_as_time(columns).find(|at| {
-            let (rising, steps) = self.rising_steps(*at, first);
-            // A unit that nobody knows may be one of time; a temperature's values rise half of the time.
-            match columns.get(*at).is_some_and(has_other_unit) {
-                true => rising == steps,
-                false => 2 * rising >= steps,
-            }
-        })
+        time_column(columns, |at| self.rising_steps(at, first))
     }
 
     /// How many steps of a column in the head rise, and of how many.
@@ -273,70 +263,6 @@ impl<'a> Candidate<'a> {
             })
             .collect()
     }
-}
-
-/// Columns named t or time, then those named t_* or time_*.
-fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
-    let names = |exact: bool| {
-        let is_time = move |column: &Column| {
-            // An unknown unit stays in the name; it is refused later, with its own message.
-            let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
-            let name = name.to_ascii_lowercase();
-            match exact {
-                true => name == "t" || name == "time",
-                false => name.starts_with("t_") || name.starts_with("time_"),
-            }
-        };
-        (0..columns.len()).filter(move |at| columns.get(*at).is_some_and(is_time))
-    };
-    names(true).chain(names(false))
-}
-
-/// A column named as time whose values do not rise throughout.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct FlatTime {
-    /// Column, 0-based.
-    pub column: usize,
-    /// First line in which it does not rise, 1-based.
-    pub line: u64,
-    /// Value there and the one before.
-    pub values: [f64; 2],
-}
-
-/// Whether a column's header gives a unit that is none of time: "T (°C)" is a temperature.
-fn has_other_unit(column: &Column) -> bool {
-    let in_name = split_unit(column.name.as_deref().unwrap_or_default()).1;
-    let unit = column.unit.as_deref().or(in_name);
-    unit.is_some_and(|unit| channel_unit(unit).is_none_or(|(_, si)| si != "s"))
-}
-
-/// The column that is named as time without being one, and where that shows first in the head; `None` of one that
-/// stands still, a temperature perhaps.
-pub(super) fn flat_time(head: &[u8], whole: HeadExtent, layout: &CsvLayout) -> Option<FlatTime> {
-    let column = named_as_time(&layout.columns)
-        .find(|at| !layout.columns.get(*at).is_some_and(has_other_unit))?;
-    let mut cells = Vec::new();
-    let lines = head_lines(head, layout.line_end, whole);
-    let rows = lines.iter().enumerate();
-    let values = rows
-        .skip_while(|(_, (offset, _))| *offset < layout.start)
-        .filter_map(|(at, (_, text))| {
-            split_cells(text, layout.separator, &mut cells);
-            let cell = text.get(cells.get(column)?.clone())?;
-            Some((at as u64 + 1, parse_number(cell, &mut None).ok()?))
-        });
-    let values: Vec<(u64, f64)> = values.collect();
-    let mut steps = values.windows(2);
-    let (line, value, previous) = steps.clone().find_map(|step| {
-        let ((_, previous), (line, value)) = (step[0], step[1]);
-        (value <= previous).then_some((line, value, previous))
-    })?;
-    let rises = steps.any(|step| step[1].1 > step[0].1);
-    rises.then_some(FlatTime {
-        column,
-        line,
-        values: [value, previous],
-    })
 }
 
 /// The error of a text without rows shows the line that has most numbers.

@@ -31,6 +31,7 @@ mod sniff;
 mod source;
 mod text;
 mod time;
+mod time_column;
 mod uff;
 mod units;
 mod warning;

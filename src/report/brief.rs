@@ -1,8 +1,8 @@
 //! What was found, in five lines for a terminal.
 
-use super::document::{Document, PredictionSection};
-use super::format::{signed_percent, significant};
-use super::summary::channels;
+use super::document::Document;
+use super::format::{signed_or_below, significant};
+use super::summary::{channels, most_missed};
 use super::tables::{Parameter, estimated, quality_count};
 
 /// At most five lines, each with what it is about; what was not computed has none.
@@ -95,11 +95,7 @@ fn with_std(parameter: &Parameter<'_>) -> String {
 }
 
 fn model(document: &Document) -> Option<String> {
-    let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
-    let rows = document.prediction.as_deref()?.iter();
-    let worst = rows
-        .filter(|row| row.error_percent.is_some_and(f64::is_finite))
-        .max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let worst = most_missed(document)?;
     let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
         let effects = gap.verdict.effects.join(", ");
         let colon = if effects.is_empty() { "" } else { ": " };
@@ -107,7 +103,7 @@ fn model(document: &Document) -> Option<String> {
     });
     Some(format!(
         "largest frequency error of the model {} % (mode {}){gap}",
-        signed_percent(worst.error_percent),
+        signed_or_below(worst.error_percent?),
         worst.mode
     ))
 }

@@ -162,6 +162,15 @@ pub fn signed_percent(percent: Option<f64>) -> String {
     }
 }
 
+/// The same where one number stands in a sentence: what would read as nothing is said to be below the last digit.
+pub fn signed_or_below(percent: f64) -> String {
+    if percent.abs() < 0.0005 {
+        "below 0.001".to_owned()
+    } else {
+        signed_percent(Some(percent))
+    }
+}
+
 /// A reading on a spectral line and its half-line bound (Hz).
 ///
 /// Lines lie at exact fractions, 335.625 ± 0.625, which rounding to two digits would spoil: where

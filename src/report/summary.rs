@@ -1,7 +1,7 @@
 //! What was found, in a few plain sentences.
 
 use super::document::{Document, ModeSection, PredictionSection, RecordingSection};
-use super::format::{bound_percent, signed_percent, significant, trimmed};
+use super::format::{bound_percent, signed_or_below, significant, trimmed};
 use super::tables::{estimated, gap_story, quality_count, reading_bound};
 use crate::identify::observation::UNPAIRED;
 use crate::pipeline::AmplitudeChange;
@@ -234,14 +234,17 @@ fn capital(text: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
+/// The mode that the model misses most.
+pub(super) fn most_missed(document: &Document) -> Option<&PredictionSection> {
+    let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
+    let rows = document.prediction.as_deref()?.iter();
+    rows.filter(|row| row.error_percent.is_some_and(f64::is_finite))
+        .max_by(|a, b| size(a).total_cmp(&size(b)))
+}
+
 /// The largest misfit among the modes, with what the reading alone explains.
 fn misfit(document: &Document) -> Option<String> {
-    let prediction = document.prediction.as_deref()?;
-    let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
-    let largest = prediction
-        .iter()
-        .filter(|row| row.error_percent.is_some_and(f64::is_finite))
-        .max_by(|a, b| size(a).total_cmp(&size(b)))?;
+    let largest = most_missed(document)?;
     let used = if largest.used { "used" } else { "not used" };
     let bound = reading_bound(document, largest.mode)
         .zip(largest.measured)
@@ -254,7 +257,7 @@ fn misfit(document: &Document) -> Option<String> {
     });
     Some(format!(
         "The largest difference between predicted and measured frequency is {} % (mode {}, {used} in the estimate{reading}).",
-        signed_percent(largest.error_percent),
+        signed_or_below(largest.error_percent?),
         largest.mode
     ))
 }

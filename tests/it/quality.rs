@@ -617,7 +617,7 @@ fn val_three_levels_in_order_are_more_than_drift() {
     assert_doubt(
         &ordered,
         Outcome::Doubtful,
-        &["Over 3 recordings", "slips or opens"],
+        &["Over 3 recordings", "settles", "slips or opens"],
     );
     let jumping = judge([0.0, -2e-3, -1e-3]);
     assert_eq!(jumping.outcome, Outcome::Good, "{jumping}");
@@ -626,7 +626,14 @@ fn val_three_levels_in_order_are_more_than_drift() {
     assert_eq!(equal.outcome, Outcome::Good, "{equal}");
     // A level that was recorded twice shows how far the joint drifts by itself.
     let repeated = judge_all(&[(1.0, 0.0), (1.0, 2e-4), (2.0, -1e-3), (4.0, -2e-3)]);
-    assert_doubt(&repeated, Outcome::Doubtful, &["Over 4 recordings"]);
+    assert_doubt(
+        &repeated,
+        Outcome::Doubtful,
+        &["Over 4 recordings", "settles"],
+    );
+    let returned = judge_all(&[(1.0, 0.0), (2.0, -1e-3), (4.0, -2e-3), (1.0, 2e-4)]);
+    assert!(!returned.happened.contains("settles"), "{returned}");
+    assert_doubt(&returned, Outcome::Doubtful, &["Over 4 recordings"]);
     let within = judge_all(&[(1.0, 0.0), (1.0, -1.5e-3), (2.0, -1e-3), (4.0, -2e-3)]);
     assert_eq!(within.outcome, Outcome::Good, "{within}");
     // Of three on two levels, two in three are in order by chance.

@@ -102,14 +102,18 @@ impl Band {
         Some(Factor { rows })
     }
 
-    /// Number of negative eigenvalues: that of the negative pivots (Sylvester's law of inertia).
-    pub(super) fn negative_eigenvalues(&self) -> usize {
+    /// Number of negative eigenvalues: that of the negative pivots (Sylvester's law of inertia); `None` where a pivot
+    /// of zero leaves it open.
+    pub(super) fn negative_eigenvalues(&self) -> Option<usize> {
         let pivots = self.indefinite();
-        // After a pivot of zero the next one is infinite, and its inverse a zero with a sign; a NaN's sign says nothing.
-        let negative = |row: &&[f64; HALF_BAND + 1]| {
-            row[HALF_BAND].is_sign_negative() && !row[HALF_BAND].is_nan()
-        };
-        pivots.rows.iter().filter(negative).count()
+        // After a pivot of zero the next one is infinite, and its inverse a zero with a sign.
+        let inverses = pivots.rows.iter().map(|row| row[HALF_BAND]);
+        let known = inverses.clone().all(|inverse| !inverse.is_nan());
+        known.then(|| {
+            inverses
+                .filter(|inverse| inverse.is_sign_negative())
+                .count()
+        })
     }
 
     /// Factors without exchange of rows, which a pivot of zero by chance makes infinite.

@@ -43,7 +43,7 @@ pub(super) fn lowest_pairs(
     if let Some(pairs) = found {
         let top = pairs.values.last().copied().unwrap_or(0.0);
         let trial = shifted.plus(-top - apart(top), mass);
-        if trial.negative_eigenvalues() == count {
+        if trial.negative_eigenvalues() == Some(count) {
             return Ok(unshifted(pairs, shift));
         }
     }
@@ -271,7 +271,7 @@ fn by_subspace(
     }
     let top = pairs.values[count - 1] + 10.0 * apart(pairs.values[count - 1]);
     let below = pairs.values.iter().filter(|value| **value < top).count();
-    if below < width && shifted.plus(-top, mass).negative_eigenvalues() != below {
+    if below < width && shifted.plus(-top, mass).negative_eigenvalues() != Some(below) {
         return Err(failure(
             "some of its modes lie too close together to be told apart",
         ));

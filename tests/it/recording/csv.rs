@@ -648,11 +648,17 @@ fn regress_a_temperature_named_t_is_no_time() {
     let rows: String = (0..40)
         .map(|row| format!("{},{row},1\n", 20 + row % 2))
         .collect();
-    for unit in ["\u{b0}C", "K"] {
-        let message = open_error(format!("T ({unit}),force,response\n{rows}"));
+    for header in ["T (\u{b0}C)", "T (K)", "T (V)", "time (V)"] {
+        let message = open_error(format!("{header},force,response\n{rows}"));
         assert!(!message.contains("named as time"), "{message}");
         assert!(message.contains("sample_rate"), "{message}");
     }
+    // One that rises throughout, with and without a time beside it.
+    let both = "T (K),time (s),a\n20,0.000,1\n21,0.001,2\n22,0.002,3\n";
+    let (_file, recording) = open(both);
+    assert_eq!(recording.expect("it has a time").sample_rate(), 1000.0);
+    let furlongs = open_error("t (furlong),a\n0,1\n1,2\n2,3\n");
+    assert!(furlongs.contains("not one of time"), "{furlongs}");
 }
 
 #[test]

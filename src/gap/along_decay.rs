@@ -45,8 +45,8 @@ impl Frame {
 }
 
 impl Forward<'_> {
-    /// Damping ratio: the nominal level and eta/2 times the joint's share of the strain energy; and the
-    /// nominal level alone.
+    /// Damping ratio: the nominal one, a level times a power of the frequency, and eta/2 times the joint's share
+    /// of the strain energy; and the nominal one alone.
     pub(super) fn damping(
         &self,
         mode: usize,
@@ -54,7 +54,9 @@ impl Forward<'_> {
         parameters: &[f64],
     ) -> Option<(f64, f64)> {
         let level = self.frame.small_index(Small::Damping)?;
-        let nominal = parameters[self.layout.smalls() + level].exp();
+        let tilt = self.frame.small_index(Small::DampingTilt)?;
+        let small = |index: usize| parameters[self.layout.smalls() + index];
+        let nominal = (small(level) + small(tilt) * self.frame.tilt(mode)).exp();
         let solved = all.first()?;
         let shares = joint_shares(solved, solved.index(mode)?);
         let slip = self.slip_loss(mode, all, parameters) * shares[1];

@@ -59,9 +59,14 @@ pub(super) struct Frame {
     /// What the frequency of a configuration and mode moves by for one standard deviation of the taps' common
     /// scatter (logarithm).
     pub(super) scatter: Vec<((usize, usize), f64)>,
+    /// Derivatives of the logarithms of each configuration's frequencies with respect to the relative size of shear
+    /// and rotary inertia, taken once at the nominal optimum.
+    pub(super) shear_slopes: Vec<Vec<f64>>,
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
+    /// Modes with a damping ratio, and the logarithm of the frequency of each over their geometric mean.
+    pub(super) tilts: Vec<(usize, f64)>,
     /// Peaks that belong to no mode.
     pub(super) peaks: Peaks,
 }
@@ -103,7 +108,9 @@ impl Frame {
             fitted_modes,
             withheld: Vec::new(),
             scatter: Vec::new(),
+            shear_slopes: Vec::new(),
             shape_slopes: None,
+            tilts: Vec::new(),
             peaks: Peaks::new(observations),
         };
         frame.add_frequencies(observations, settings);
@@ -232,6 +239,20 @@ impl Frame {
         }
     }
 
+    /// What the frequency of a mode in a configuration owes to shear and rotary inertia; 0 before it is known.
+    pub(super) fn shear_slope(&self, configuration: usize, mode: usize) -> f64 {
+        let own = self.shear_slopes.get(configuration);
+        own.and_then(|own| own.get(mode - 1))
+            .copied()
+            .unwrap_or(0.0)
+    }
+
+    /// Logarithm of a mode's frequency over the geometric mean of all fitted ones; 0 of one without a reading.
+    pub(super) fn tilt(&self, mode: usize) -> f64 {
+        let own = self.tilts.iter().find(|tilt| tilt.0 == mode);
+        own.map_or(0.0, |tilt| tilt.1)
+    }
+
     /// One damping ratio for each mode: the weighted mean of all configurations, since nothing but
     /// noise and level distinguishes them.
     fn add_damping(&mut self, observations: &Observations, settings: &GapSettings) {
@@ -241,6 +262,7 @@ impl Frame {
                 .iter()
                 .filter_map(|c| c.mode(mode));
             let (mut weights, mut sum) = (0.0, 0.0);
+            let frequency = seen.clone().map(|mode| mode.frequency).next();
             for damping in seen.filter_map(|mode| mode.damping) {
                 if damping.value > 0.0 && damping.std > 0.0 {
                     let weight = (damping.value / damping.std).powi(2);
@@ -252,8 +274,11 @@ impl Frame {
                 let std = weights.powf(-0.5).hypot(settings.damping_scatter);
                 let reading = reading_of(sum / weights, std, f64::INFINITY);
                 self.push(Row::Damping { mode }, reading);
+                self.tilts.push((mode, frequency.map_or(0.0, f64::ln)));
             }
         }
+        let mean = self.tilts.iter().map(|tilt| tilt.1).sum::<f64>() / self.tilts.len() as f64;
+        self.tilts.iter_mut().for_each(|tilt| tilt.1 -= mean);
     }
 
     /// What one standard deviation of the taps' common scatter moves a frequency by (logarithm).

@@ -170,6 +170,7 @@ fn nominal_of(
     let first = fit_nominal(&frame, settings)?;
     set_amplitudes(&mut frame, &first);
     frame.set_paths(observations, &first);
+    set_shear_slopes(&mut frame, &first);
     let forward = Forward::new(&frame, &[]);
     let shapes = forward.joint_differences(&first.branch.optimum.parameters)?;
     frame.shape_slopes = Some(shapes);
@@ -318,6 +319,32 @@ fn possible(frame: &Frame, effect: EffectId) -> bool {
         EffectId::Resolution => frame.nominal.reading_bias.is_some(),
         _ => true,
     }
+}
+
+/// What each frequency owes to shear and rotary inertia, by Rayleigh's quotient of a beam that has a little less.
+fn set_shear_slopes(frame: &mut Frame, nominal: &Fit) {
+    const STEP: f64 = 1e-3;
+    let whole = frame.nominal.specimen.shear_rotary;
+    let solved = Forward::new(frame, &[]).solve(&nominal.branch.optimum.parameters);
+    let (Some(solved), true) = (solved, whole > 0.0) else {
+        return;
+    };
+    let slopes = |one: &super::solved::Solved| -> Option<Vec<f64>> {
+        let mut less = one.seen.specimen.clone();
+        less.shear_rotary -= STEP * whole;
+        let moved = one.modes().rayleigh_frequencies(&less).ok()?;
+        let slope = |mode: usize| {
+            let index = one.index(mode)?;
+            Some((one.modes().frequencies()[index] / moved[index]).ln() / STEP)
+        };
+        Some(
+            (1..=frame.modes)
+                .map(|mode| slope(mode).unwrap_or(0.0))
+                .collect(),
+        )
+    };
+    let all: Option<Vec<Vec<f64>>> = solved.iter().map(slopes).collect();
+    frame.shear_slopes = all.unwrap_or_default();
 }
 
 /// Amplitude of the joint's rotation in each configuration over that of the hardest. Where a tap has no

@@ -13,6 +13,9 @@ pub struct GapSettings {
     /// 0.2 %, a modulus known to 0.3 % and a length to 0.1 %. What is larger than this counts as a gap
     /// that has a name (`modulus`, `length`, `timebase`); whoever knows the geometry less well states it.
     pub scale_std: f64,
+    /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
+    /// the shear coefficients of Timoshenko and of Cowper differ, as do Poisson's ratios of 0.28 and 0.31.
+    pub shear_std: f64,
     /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
     pub frequency_floor: f64,
     /// Relative standard uncertainty of a sensor's stated mass: 10 %, cable and mounting.
@@ -25,8 +28,11 @@ pub struct GapSettings {
     /// Standard uncertainty of the calibration of hammer and sensor together (1), anew in every visit: 3 %,
     /// since a sensor that is mounted again is not aligned as before.
     pub gain_std: f64,
-    /// Scatter of the nominal damping ratios about their common value (natural logarithm): 0.4.
+    /// Scatter of the nominal damping ratios about a power of the frequency (natural logarithm): 0.4.
     pub damping_scatter: f64,
+    /// Standard deviation of that power: 0.5, so that damping proportional to the mass (air, cables), which falls
+    /// with the frequency, and to the stiffness, which rises with it, are both two standard deviations off.
+    pub damping_tilt: f64,
     /// Standard deviation of the logarithm of the joint's stiffnesses about where the search begins:
     /// 1.5, a factor of 20 either way in 95 % of cases.
     pub joint_std: f64,
@@ -63,12 +69,14 @@ impl Default for GapSettings {
         GapSettings {
             drift_stds: vec![0.002, 0.01, 0.02],
             scale_std: 0.002,
+            shear_std: 0.02,
             frequency_floor: FREQUENCY_FLOOR,
             sensor_mass_std: 0.1,
             fastened_mass_std: 0.01,
             position_std: 0.001,
             gain_std: 0.03,
             damping_scatter: 0.4,
+            damping_tilt: 0.5,
             joint_std: 1.5,
             withhold_from: 6,
             withheld_modes: 1,

@@ -26,8 +26,11 @@ impl Forward<'_> {
             }
         }
         for (k, small) in self.frame.smalls.iter().enumerate() {
-            // These two enter the solution itself.
-            if matches!(small, Small::Damping | Small::Amplitude) {
+            // These enter the solution itself.
+            if matches!(
+                small,
+                Small::Damping | Small::DampingTilt | Small::Amplitude
+            ) {
                 continue;
             }
             let value = parameters[first + k];
@@ -93,11 +96,15 @@ impl Forward<'_> {
                 let away = self.ratio_slope(small, (configuration, mode, reference), one);
                 predicted * (towards - away)
             }
-            Row::Damping { mode } if *small == Small::Damping => {
+            Row::Damping { mode } => {
                 let (all, nominal) = self.damping(mode, solved, parameters).unwrap_or((1.0, 1.0));
-                nominal / all
+                match small {
+                    Small::Damping => nominal / all,
+                    Small::DampingTilt => nominal / all * self.frame.tilt(mode),
+                    _ => 0.0,
+                }
             }
-            Row::Damping { .. } | Row::Slope { .. } => 0.0,
+            Row::Slope { .. } => 0.0,
         }
     }
 
@@ -114,6 +121,7 @@ impl Forward<'_> {
         let displacement = |x: f64| one.modes().displacement(index, x);
         match *small {
             Small::Scale => 1.0,
+            Small::Shear => self.frame.shear_slope(configuration, mode),
             Small::Discrepancy { mode: own } if own == mode => 1.0,
             Small::Scatter { configuration: own } if own == configuration => {
                 self.frame.scatter_of(configuration, mode)

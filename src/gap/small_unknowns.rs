@@ -10,6 +10,8 @@ use super::setup::Lists;
 pub(super) enum Small {
     /// Common factor on all frequencies (logarithm).
     Scale,
+    /// Shear flexibility and rotary inertia of a Timoshenko beam over the nominal ones (1).
+    Shear,
     /// Stiffness of the joint in one visit (logarithm): direction 0 translation, 1 rotation.
     Drift { visit: usize, direction: usize },
     /// Mass of a sensor over its stated one (1).
@@ -26,6 +28,8 @@ pub(super) enum Small {
     Gain { visit: usize, name: usize },
     /// Common level of the nominal damping ratios (logarithm).
     Damping,
+    /// Power of the frequency by which the nominal damping ratios rise.
+    DampingTilt,
     /// Amplitude of the joint over what the sensors' amplitudes and the shapes make of it (logarithm).
     Amplitude,
     /// What the taps of one configuration scatter in common (standard deviations).
@@ -43,6 +47,9 @@ impl Frame {
         let (names, places) = (&lists.names, &lists.places);
         let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
         self.small(Small::Scale, 0.0, scale);
+        if self.nominal.specimen.shear_rotary > 0.0 {
+            self.small(Small::Shear, 0.0, settings.shear_std);
+        }
         let mut visits: Vec<usize> = self.setups.iter().map(|setup| setup.visit).collect();
         visits.sort_unstable();
         visits.dedup();
@@ -105,6 +112,7 @@ impl Frame {
                     });
             // Wide: nobody knows the damping of a beam beforehand.
             self.small(Small::Damping, sum / count, 2.0);
+            self.small(Small::DampingTilt, 0.0, settings.damping_tilt);
         }
         self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
     }

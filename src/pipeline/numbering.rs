@@ -221,7 +221,9 @@ fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
 
 /// How probable the other is beside the chosen, from the ratio of the two.
 fn compared(times: f64) -> String {
-    if times >= 1.0 {
+    if (0.95..1.05).contains(&times) {
+        "as probable".to_owned()
+    } else if times >= 1.0 {
         format!("{times:.1} times as probable")
     } else {
         format!("{:.1} times less probable", 1.0 / times)

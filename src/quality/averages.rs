@@ -132,7 +132,9 @@ pub fn check_frequency_scatter(
         let largest = largest_ratio(mode.tap_frequencies.len());
         let outcome = match excess {
             _ if relative > limit => Outcome::Bad,
-            Some(excess) if excess > largest => Outcome::Doubtful,
+            Some(excess) if excess > largest && relative > settings.least_scatter => {
+                Outcome::Doubtful
+            }
             _ => Outcome::Good,
         };
         let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {

@@ -35,6 +35,9 @@ pub struct QualitySettings {
     pub window_share: f64,
     /// Relative scatter of a frequency from tap to tap. 1 % (ASTM E1876: readings agree within 1 %).
     pub frequency_scatter: f64,
+    /// The same below which it is none to doubt, whatever noise explains: 0.005 %, what a third of a kelvin does to
+    /// steel.
+    pub least_scatter: f64,
     /// Standard deviations by which two frequencies must differ. 3: one in 370 by chance.
     pub deviations: f64,
     /// Relative change of a frequency that time, and taking a sensor off, may leave between recordings.
@@ -73,6 +76,7 @@ impl Default for QualitySettings {
             remaining_for_window: 0.25,
             window_share: 0.5,
             frequency_scatter: 0.01,
+            least_scatter: 5e-5,
             deviations: 3.0,
             drift: 5e-3,
             reciprocity: 0.9,

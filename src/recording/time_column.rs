@@ -5,7 +5,7 @@ use super::layout::{CsvLayout, HeadExtent, head_lines};
 use super::text::{parse_number, split_cells};
 use super::units::{channel_unit, split_unit};
 
-/// The time column: named t, time, t_* or time_*, and rising in at least half of the steps of
+/// The time column: named t, time (or that in German, French, Spanish), t_* or time_*, and rising in at least half of the steps of
 /// the head. (That it rises in all of them is checked when the rows are read, and is an error
 /// there.) One that may as well be a temperature has to rise in all of them, and comes last.
 ///
@@ -28,7 +28,7 @@ pub(super) fn time_column(
     rises(Doubt::None).or_else(|| rises(Doubt::Temperature))
 }
 
-/// Columns named t or time, then those named t_* or time_*.
+/// Columns named t, time or the like, then those named t_* or time_*.
 fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
     let names = |exact: bool| {
         let is_time = move |column: &Column| {
@@ -36,7 +36,7 @@ fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
             let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
             let name = name.to_ascii_lowercase();
             match exact {
-                true => name == "t" || name == "time",
+                true => ["t", "time", "zeit", "temps", "tiempo"].contains(&name.as_str()),
                 false => name.starts_with("t_") || name.starts_with("time_"),
             }
         };

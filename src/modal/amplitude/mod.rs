@@ -192,6 +192,10 @@ impl AmplitudeCurve {
     }
 }
 
+/// Farthest that a point may lie from its mode's frequency (1, relative). Joints that slip move a frequency by a few
+/// percent; a segment that is fitted farther off has followed noise or another mode.
+const FARTHEST: f64 = 0.1;
+
 /// Least points of a trend: two of its own, and two more for its uncertainty.
 const LEAST_POINTS: usize = 4;
 
@@ -237,9 +241,10 @@ fn follow_mode(
         };
         let context = context::explain(&series, band);
         curve.companions.extend(context.companions(band));
-        curve
-            .points
-            .extend(walk::walk_decay(&series, band, &context, settings));
+        let points = walk::walk_decay(&series, band, &context, settings);
+        let is_of_mode =
+            |point: &AmplitudePoint| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST;
+        curve.points.extend(points.into_iter().filter(is_of_mode));
         doubts.extend(context.doubt(band));
         followed += 1;
     }

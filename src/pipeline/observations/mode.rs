@@ -15,6 +15,7 @@ use crate::modal::{FittedReading, FrequencySource, ModeReading};
 use crate::pipeline::RecordingResult;
 use crate::pipeline::analysis::Response;
 use crate::pipeline::frf::form_of;
+use crate::pipeline::measure::MeasuredSpectra;
 use crate::recording::ResponseForm;
 use crate::stats::{median, root_mean_square};
 
@@ -212,9 +213,11 @@ impl<'a> ModeSeen<'a> {
         let found = constants
             .iter()
             .find(|constant| constant.sensor == sensor)?;
+        let of_force = self.recording.measurement.spectra.as_ref();
+        let of_force = of_force.map_or(0.0, |spectra| force_uncertainty(spectra, self.reading));
         Some(Observed {
             value: found.value,
-            std: found.std,
+            std: found.std.hypot(of_force * found.value),
             freedom: None,
         })
     }
@@ -296,6 +299,26 @@ impl<'a> ModeSeen<'a> {
             damping: observed(reading.damping_ratio, reading.damping_bound),
         })
     }
+}
+
+/// What the hammer's noise leaves in a modal constant (1, relative): r/sqrt(n) at random over n taps, and r^2 in
+/// common, by which the mean square of a noisy force is too large; r is the noise over the force at the mode's line.
+/// 0 without a hammer or a quiet stretch.
+fn force_uncertainty(spectra: &MeasuredSpectra, reading: &ModeReading) -> f64 {
+    let averages = &spectra.averages;
+    let Some((noise, force)) = spectra.force_noise.as_ref().zip(averages.force.as_ref()) else {
+        return 0.0;
+    };
+    let line = averages.lines.nearest(reading.frequency);
+    let Some((noise, force)) = noise.get(line).zip(force.get(line)) else {
+        return 0.0;
+    };
+    // What is measured holds the noise already.
+    let power = (force * force - noise * noise).max(f64::MIN_POSITIVE);
+    let squared = noise * noise / power;
+    (squared / averages.taps.max(1) as f64)
+        .sqrt()
+        .hypot(squared)
 }
 
 /// The sensor where a shape is 1 by definition.

@@ -189,8 +189,12 @@ fn how_far(gap: &GapSection) -> Option<String> {
             .iter()
             .find(|found| !matches!(found.effect.as_str(), "none" | "unknown"))
     })?;
+    let shrink = match found.gap_before.zip(found.gap_after) {
+        Some((before, after)) if after >= before => "go",
+        _ => "shrink",
+    };
     let mut text = format!(
-        "How far: with {} the errors shrink from {} to {} % (rms over fitted frequencies)",
+        "How far: with {} the errors {shrink} from {} to {} % (rms over fitted frequencies)",
         found.effect,
         percent(found.gap_before),
         percent(found.gap_after),

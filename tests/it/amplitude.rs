@@ -64,6 +64,21 @@ fn follow(samples: Vec<f64>, modes: &[KnownMode]) -> AmplitudeCurve {
     follow_amplitude(&decays, modes, &AmplitudeSettings::default()).remove(0)
 }
 
+#[test]
+fn regress_no_point_lies_far_from_its_mode() {
+    for seed in 0..20 {
+        // A mode that hardly stands above its noise, and a strong one half an octave above.
+        let weak = linear(2.0, (150.0, 0.01), (0.02, 0.3));
+        let strong = linear(2.0, (225.0, 0.01), (1.0, 0.0));
+        let samples = with_noise(&sum(&weak, &strong), 30.0, seed);
+        let curve = follow(samples, &[mode(150.0, 0.01)]);
+        for point in &curve.points {
+            let off = (point.frequency / 150.0 - 1.0).abs();
+            assert!(off <= 0.1, "seed {seed}: {} Hz", point.frequency);
+        }
+    }
+}
+
 /// A joint that slips: frequency and damping change with a power of the amplitude.
 #[derive(Clone, Copy)]
 struct Law {

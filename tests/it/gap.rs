@@ -276,6 +276,53 @@ fn regress_what_cannot_be_diagnosed_is_refused_with_a_reason() {
 }
 
 #[test]
+fn regress_damping_that_falls_with_the_frequency_is_not_the_joints() {
+    for seed in 31..36 {
+        let nominal = strip_on_springs(1.0, None);
+        let mut observed = observe(&five_recordings(), &nominal, &[], seed).unwrap();
+        for mode in observed
+            .configurations
+            .iter_mut()
+            .flat_map(|c| &mut c.modes)
+        {
+            // Air and cables: proportional to the mass.
+            let factor = 30.0 / mode.frequency;
+            let damping = mode.damping.as_mut().unwrap();
+            (damping.value, damping.std) = (factor * damping.value, factor * damping.std);
+        }
+        let diagnosis = diagnose(&observed, &nominal, &GapSettings::default()).unwrap();
+        assert_eq!(diagnosis.verdict, Verdict::NoGap, "seed {seed}");
+    }
+}
+
+#[test]
+fn regress_another_shear_coefficient_is_no_gap() {
+    let plan = TestPlan {
+        frequency_std: 1e-5,
+        drift: 0.0,
+        ..five_recordings()
+    };
+    let mut nominal = strip_on_springs(1.0, None);
+    nominal.specimen.shear_rotary = 1.0;
+    // Thick enough for it to matter.
+    nominal.specimen.body.beams_mut()[0].thickness = 0.015;
+    let mut true_one = nominal.clone();
+    true_one.specimen.shear_rotary = 0.96;
+    let observed = observe(&plan, &true_one, &[], 37).unwrap();
+    let settings = GapSettings::default();
+    let tolerant = diagnose(&observed, &nominal, &settings).unwrap();
+    assert_eq!(tolerant.verdict, Verdict::NoGap);
+    let exact = GapSettings {
+        shear_std: 1e-6,
+        ..settings
+    };
+    // That it is no gap is the tolerance's doing.
+    let strict = diagnose(&observed, &nominal, &exact).unwrap();
+    let none = |diagnosis: &Diagnosis| result(diagnosis, "none").probability;
+    assert!(none(&strict) < 0.5 * none(&tolerant), "{}", none(&strict));
+}
+
+#[test]
 fn regress_sensors_that_see_nothing_are_refused() {
     let mut observed = observe(&five_recordings(), &strip_on_springs(1.0, None), &[], 1).unwrap();
     for sensor in observed

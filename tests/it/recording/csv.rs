@@ -657,6 +657,8 @@ fn regress_a_temperature_named_t_is_no_time() {
     let both = "T (K),time (s),a\n20,0.000,1\n21,0.001,2\n22,0.002,3\n";
     let (_file, recording) = open(both);
     assert_eq!(recording.expect("it has a time").sample_rate(), 1000.0);
+    let (_file, german) = open("Zeit [s],a\n0.000,1\n0.001,2\n0.002,3\n");
+    assert_eq!(german.expect("it has a time").sample_rate(), 1000.0);
     let furlongs = open_error("t (furlong),a\n0,1\n1,2\n2,3\n");
     assert!(furlongs.contains("not one of time"), "{furlongs}");
 }

@@ -12,7 +12,7 @@ use super::trial::Trial;
 /// A misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most (Sellke, Bayarri &
 /// Berger 2001). Such odds count against every explanation that is about as probable as the best: evidence compares
 /// how well explanations fit under the noise that is assumed, and one that this noise refutes is no explanation
-/// while another stands. What is still held against the one that is left is evidence for something unknown, which
+/// while another stands; where none does, the noise is in doubt, and with it what evidence says. What is still held against the one that is left is evidence for something unknown, which
 /// has no misfit of its own. A best explanation that stands is left alone: what refutes its rivals makes it no
 /// better.
 pub(super) fn doubt(competition: &mut Competition) {

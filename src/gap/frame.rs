@@ -59,9 +59,10 @@ pub(super) struct Frame {
     /// What the frequency of a configuration and mode moves by for one standard deviation of the taps' common
     /// scatter (logarithm).
     pub(super) scatter: Vec<((usize, usize), f64)>,
-    /// Derivatives of the logarithms of each configuration's frequencies with respect to the relative size of shear
-    /// and rotary inertia, taken once at the nominal optimum.
-    pub(super) shear_slopes: Vec<Vec<f64>>,
+    /// Derivatives of the frequencies' logarithms with respect to the relative size of shear and rotary inertia, mode
+    /// by mode, taken once at the nominal optimum of the first configuration: what is fastened to the beam changes
+    /// them little. With the modes that a next test may add.
+    pub(super) shear_slopes: Vec<f64>,
     /// Slopes of all rows but frequencies with respect to the joint's stiffnesses, taken once at the
     /// nominal optimum: shapes depend on the joint little enough for that.
     pub(super) shape_slopes: Option<DMatrix<f64>>,
@@ -239,15 +240,12 @@ impl Frame {
         }
     }
 
-    /// What the frequency of a mode in a configuration owes to shear and rotary inertia; 0 before it is known.
-    pub(super) fn shear_slope(&self, configuration: usize, mode: usize) -> f64 {
-        let own = self.shear_slopes.get(configuration);
-        own.and_then(|own| own.get(mode - 1))
-            .copied()
-            .unwrap_or(0.0)
+    /// What the frequency of a mode owes to shear and rotary inertia; 0 before it is known.
+    pub(super) fn shear_slope(&self, mode: usize) -> f64 {
+        self.shear_slopes.get(mode - 1).copied().unwrap_or(0.0)
     }
 
-    /// Logarithm of a mode's frequency over the geometric mean of all fitted ones; 0 of one without a reading.
+    /// Logarithm of a mode's frequency over the geometric mean of all that have a damping ratio; 0 of others.
     pub(super) fn tilt(&self, mode: usize) -> f64 {
         let own = self.tilts.iter().find(|tilt| tilt.0 == mode);
         own.map_or(0.0, |tilt| tilt.1)

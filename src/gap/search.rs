@@ -1,5 +1,6 @@
 //! All hypotheses against each other.
 
+use super::advisor::MORE_MODES;
 use super::catalogue::{Candidate, Scales, candidate};
 use super::catch_all::{fit_drift, fit_unknown};
 use super::error::GapError;
@@ -15,6 +16,7 @@ use super::result::Hypothesis;
 use super::settings::GapSettings;
 use super::setup::Setup;
 use super::small_unknowns::Small;
+use super::solved::Solved;
 use crate::effects::EffectId;
 use crate::identify::observation::Observations;
 use rayon::prelude::*;
@@ -251,8 +253,10 @@ fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut V
 /// The nominal model whose geometry is taken at its word.
 fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     let mut exact = frame.clone();
-    if let Some(scale) = exact.small_index(Small::Scale) {
-        exact.small_stds[scale] = EXACT;
+    for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
+        if matches!(small, Small::Scale | Small::Shear) {
+            *std = EXACT;
+        }
     }
     fit_nominal(&exact, settings)
 }
@@ -263,7 +267,7 @@ fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
         if matches!(
             small,
-            Small::Scale | Small::SensorMass { .. } | Small::FastenedMass { .. }
+            Small::Scale | Small::Shear | Small::SensorMass { .. } | Small::FastenedMass { .. }
         ) {
             *std = EXACT;
         }
@@ -325,26 +329,23 @@ fn possible(frame: &Frame, effect: EffectId) -> bool {
 fn set_shear_slopes(frame: &mut Frame, nominal: &Fit) {
     const STEP: f64 = 1e-3;
     let whole = frame.nominal.specimen.shear_rotary;
-    let solved = Forward::new(frame, &[]).solve(&nominal.branch.optimum.parameters);
-    let (Some(solved), true) = (solved, whole > 0.0) else {
-        return;
-    };
-    let slopes = |one: &super::solved::Solved| -> Option<Vec<f64>> {
-        let mut less = one.seen.specimen.clone();
-        less.shear_rotary -= STEP * whole;
-        let moved = one.modes().rayleigh_frequencies(&less).ok()?;
-        let slope = |mode: usize| {
-            let index = one.index(mode)?;
-            Some((one.modes().frequencies()[index] / moved[index]).ln() / STEP)
+    if whole > 0.0 {
+        let mut planned = frame.clone();
+        planned.modes += MORE_MODES;
+        let solved = Forward::new(&planned, &[]).solve(&nominal.branch.optimum.parameters);
+        let first = solved.as_ref().and_then(|solved| solved.first());
+        let slopes = |one: &Solved| -> Option<Vec<f64>> {
+            let mut less = one.seen.specimen.clone();
+            less.shear_rotary -= STEP * whole;
+            let moved = one.modes().rayleigh_frequencies(&less).ok()?;
+            let slope = |mode: usize| {
+                let index = one.index(mode)?;
+                Some((one.modes().frequencies()[index] / moved[index]).ln() / STEP)
+            };
+            Some((1..=planned.modes).map_while(slope).collect())
         };
-        Some(
-            (1..=frame.modes)
-                .map(|mode| slope(mode).unwrap_or(0.0))
-                .collect(),
-        )
-    };
-    let all: Option<Vec<Vec<f64>>> = solved.iter().map(slopes).collect();
-    frame.shear_slopes = all.unwrap_or_default();
+        frame.shear_slopes = first.and_then(slopes).unwrap_or_default();
+    }
 }
 
 /// Amplitude of the joint's rotation in each configuration over that of the hardest. Where a tap has no
@@ -354,7 +355,7 @@ fn set_amplitudes(frame: &mut Frame, nominal: &Fit) {
     let Some(solved) = forward.solve(&nominal.branch.optimum.parameters) else {
         return;
     };
-    let amplitude = |(setup, one): (&Setup, &super::solved::Solved)| -> Option<f64> {
+    let amplitude = |(setup, one): (&Setup, &Solved)| -> Option<f64> {
         let tap = setup.tap?;
         let modes = (1..=frame.fitted_modes).filter_map(|mode| one.index(mode));
         Some(joint_amplitude(one.modes(), (tap, setup.level), modes))

@@ -58,6 +58,15 @@ impl GapSettings {
             s if s.withheld_modes >= s.withhold_from => {
                 refused("withheld_modes must be less than withhold_from")
             }
+            s if ![s.scale_std, s.shear_std, s.damping_tilt]
+                .iter()
+                .all(positive) =>
+            {
+                refused("scale_std, shear_std and damping_tilt must be above 0")
+            }
+            s if s.frequency_floor.is_nan() || s.frequency_floor < 0.0 => {
+                refused("frequency_floor must not be below 0")
+            }
             s if s.unknown_positions == 0 => refused("unknown_positions must be at least 1"),
             _ => Ok(()),
         }

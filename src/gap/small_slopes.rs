@@ -121,7 +121,7 @@ impl Forward<'_> {
         let displacement = |x: f64| one.modes().displacement(index, x);
         match *small {
             Small::Scale => 1.0,
-            Small::Shear => self.frame.shear_slope(configuration, mode),
+            Small::Shear => self.frame.shear_slope(mode),
             Small::Discrepancy { mode: own } if own == mode => 1.0,
             Small::Scatter { configuration: own } if own == configuration => {
                 self.frame.scatter_of(configuration, mode)

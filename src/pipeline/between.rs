@@ -44,7 +44,7 @@ fn of_known(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
 /// The share of its frequency (1) by which every mode scatters between recordings beyond its own uncertainty.
 ///
 /// That with which the squares are as large as expected, sum f variance/(own + share^2) = sum f with f degrees of
-/// freedom each (Paule & Mandel 1982, "Consensus values and weighting factors"): a mode that is read coarsely says
+/// freedom each (in the manner of Paule & Mandel 1982, "Consensus values and weighting factors"): a mode that is read coarsely says
 /// little, and one that stands still beside others that do not decides nothing by itself. 0 where there is no more
 /// than noise.
 pub(super) fn scatter(modes: &[ModeResult]) -> f64 {

@@ -268,7 +268,7 @@ fn shifts(
 struct Order {
     /// Over so many recordings.
     recordings: usize,
-    /// Whether the levels only rose, or only fell, from one recording to the next.
+    /// Whether the levels only rose, or only fell, from one recording to the next as the test lists them.
     in_time: bool,
 }
 
@@ -309,8 +309,8 @@ fn in_order(
             })
         })
         .collect();
-    let in_time = seen.is_sorted_by(|a, b| a.level <= b.level)
-        || seen.is_sorted_by(|a, b| a.level >= b.level);
+    let not_above = |a: &Seen, b: &Seen| a.level < settings.two_levels * b.level;
+    let in_time = seen.is_sorted_by(not_above) || seen.is_sorted_by(|a, b| not_above(b, a));
     seen.sort_by(|a, b| a.level.total_cmp(&b.level));
     let levels: Vec<&[Seen]> = seen
         .chunk_by(|a, b| b.level < settings.two_levels * a.level)

@@ -70,7 +70,9 @@ fn doubt_of_time(column: &Column) -> Doubt {
     let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
     match column.unit.as_deref().map(channel_unit) {
         Some(Some((_, si))) if si != "s" => Doubt::OtherUnit,
-        Some(None) if name.eq_ignore_ascii_case("t") => Doubt::Temperature,
+        Some(None) if name.to_ascii_lowercase().split('_').next() == Some("t") => {
+            Doubt::Temperature
+        }
         _ => Doubt::None,
     }
 }

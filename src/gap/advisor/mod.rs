@@ -13,6 +13,7 @@ mod outlooks;
 mod proposals;
 mod step;
 
+pub(super) use proposals::MORE_MODES;
 pub use step::{NextTest, Step};
 
 use super::posterior::Entry;

@@ -82,7 +82,7 @@ pub(super) enum Added {
 /// Configurations at hand that are kept for reading them again.
 const KEPT: usize = 4;
 /// How many modes more might be read.
-const MORE_MODES: usize = 2;
+pub(in crate::gap) const MORE_MODES: usize = 2;
 /// Places to which a sensor might be moved, over the length.
 const PLACES: [f64; 5] = [0.3, 0.45, 0.6, 0.75, 0.95];
 /// A sensor counts as moved from this share of the length on.

@@ -8,6 +8,7 @@
 //! ```
 
 mod covariance;
+mod force_noise;
 mod mode;
 mod repeats;
 

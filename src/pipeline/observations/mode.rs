@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use super::force_noise::{ForceNoise, noise_of_force};
 use super::repeats::Repeats;
 use crate::description::SensorKind;
 use crate::identify::observation::{
@@ -15,7 +16,6 @@ use crate::modal::{FittedReading, FrequencySource, ModeReading};
 use crate::pipeline::RecordingResult;
 use crate::pipeline::analysis::Response;
 use crate::pipeline::frf::form_of;
-use crate::pipeline::measure::MeasuredSpectra;
 use crate::recording::ResponseForm;
 use crate::stats::{median, root_mean_square};
 
@@ -213,11 +213,12 @@ impl<'a> ModeSeen<'a> {
         let found = constants
             .iter()
             .find(|constant| constant.sensor == sensor)?;
-        let of_force = self.recording.measurement.spectra.as_ref();
-        let of_force = of_force.map_or(0.0, |spectra| noise_of_force(spectra, self.reading));
+        let spectra = self.recording.measurement.spectra.as_ref();
+        let of_force = spectra.map(|spectra| noise_of_force(spectra, self.reading));
+        let of_force = of_force.unwrap_or(Some(ForceNoise::NONE))?;
         Some(Observed {
             value: found.value,
-            std: found.std.hypot(of_force * found.value),
+            std: of_force.added_to(found.std, found.value),
             freedom: None,
         })
     }
@@ -301,26 +302,6 @@ impl<'a> ModeSeen<'a> {
     }
 }
 
-/// What the hammer's noise leaves in a modal constant (1, relative); 0 without a hammer or a quiet stretch.
-fn noise_of_force(spectra: &MeasuredSpectra, reading: &ModeReading) -> f64 {
-    let averages = &spectra.averages;
-    let line = averages.lines.nearest(reading.frequency);
-    let at_line = |values: &Option<Vec<f64>>| values.as_ref()?.get(line).copied();
-    let both = at_line(&spectra.force_noise).zip(at_line(&averages.force));
-    both.map_or(0.0, |(noise, force)| {
-        force_uncertainty(noise, force, averages.taps)
-    })
-}
-
-/// Relative uncertainty of a ratio to the force of n taps (1): r/sqrt(n) at random, and r^2 in common, by which the
-/// mean square of a noisy force is too large. r is the noise over the force without it, whose root mean squares are
-/// given (N s).
-fn force_uncertainty(noise: f64, measured: f64, taps: usize) -> f64 {
-    let power = (measured * measured - noise * noise).max(f64::MIN_POSITIVE);
-    let squared = noise * noise / power;
-    (squared / taps.max(1) as f64).sqrt().hypot(squared)
-}
-
 /// The sensor where a shape is 1 by definition.
 fn reference(shape: &[ShapeValue]) -> Option<usize> {
     let one = shape.iter().find(|value| value.std == 0.0);
@@ -355,21 +336,4 @@ fn derivatives(response: &Response, force_unit: Option<&str>) -> Option<i32> {
         ResponseForm::Mobility => 1,
         ResponseForm::Accelerance => 2,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Nothing without noise, everything where there is nothing but noise; in between the larger of the two parts
-    /// at least, and both together at most.
-    #[test]
-    fn limit_the_force_is_as_certain_as_it_is_clear_of_noise() {
-        assert_eq!(force_uncertainty(0.0, 1.0, 5), 0.0);
-        assert!(force_uncertainty(1.0, 1.0, 5) > 1e3);
-        // r^2 = 1/9: noise of 1 beside a force of 3, in a measured root mean square of sqrt(10).
-        let found = force_uncertainty(1.0, 10.0_f64.sqrt(), 4);
-        let expected = (1.0 / 36.0 + 1.0 / 81.0_f64).sqrt();
-        assert!((found - expected).abs() < 1e-12, "{found}");
-    }
 }

@@ -36,7 +36,8 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
     let mut trial = Trial::new(frame, fit).map(|trial| trial.with_withheld(frame, fit));
     if let Some(trial) = &mut trial {
         trial.room = Some(Room::of(frame, &entries[best]));
-        trial.closure = hypotheses[best].closure.filter(|_| context.decides(best));
+        trial.closure = hypotheses[best].closure;
+        trial.decides = context.decides(best);
     }
     let none = entries
         .iter()

@@ -38,8 +38,10 @@ pub(super) struct Trial {
     peak: Option<f64>,
     /// Readings that its parameters have to answer for, and how many these are; `None` where nobody asked.
     pub(super) room: Option<Room>,
-    /// Its closure on withheld readings; `None` where that says nothing.
+    /// Its closure on withheld readings; `None` where the nominal model has no gap there.
     pub(super) closure: Option<Closure>,
+    /// Whether that closure could come out certain: the gap there is larger than what the prediction leaves open.
+    pub(super) decides: bool,
 }
 
 /// What a hypothesis is tested with.
@@ -132,6 +134,7 @@ impl Trial {
             peak: fixture_peak::goodness(frame, fit),
             room: None,
             closure: None,
+            decides: false,
         })
     }
 
@@ -160,11 +163,52 @@ impl Trial {
         all.min_by(f64::total_cmp)
     }
 
-    /// Whether withheld readings speak for the hypothesis: it closes some of the gap for certain, or predicts
-    /// them within what it leaves open.
+    /// Whether withheld readings leave the hypothesis its name: it closes some of the gap for certain, or closes
+    /// some and predicts them within what it leaves open. Where they cannot decide, either will do.
     pub(super) fn holds(&self) -> bool {
         let predicts = self.withheld.is_some_and(|p| p > PREDICTED);
-        self.closure
-            .is_none_or(|closure| closure.low > 0.0 || predicts && closure.value > 0.0)
+        self.closure.is_none_or(|closure| match self.decides {
+            true => closure.low > 0.0 || predicts && closure.value > 0.0,
+            false => predicts || closure.value > 0.0,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trial(withheld: f64, decides: bool, [value, low]: [f64; 2]) -> Trial {
+        let closure = Closure {
+            value,
+            low,
+            high: 1.0,
+        };
+        Trial {
+            goodness: None,
+            blocks: Vec::new(),
+            withheld: Some(withheld),
+            peak: None,
+            room: None,
+            closure: Some(closure),
+            decides,
+        }
+    }
+
+    #[test]
+    fn limit_what_makes_withheld_readings_worse_has_to_predict_them() {
+        for (withheld, decides, closure, holds) in [
+            (0.01, true, [0.9, 0.5], true),
+            (0.01, true, [0.9, -0.5], false),
+            (0.5, true, [0.9, -0.5], true),
+            (0.5, true, [-0.9, -5.0], false),
+            // Too small a gap to decide by.
+            (0.01, false, [0.9, -0.5], true),
+            (0.5, false, [-0.9, -5.0], true),
+            (0.01, false, [-6.0, -20.0], false),
+        ] {
+            let found = trial(withheld, decides, closure).holds();
+            assert_eq!(found, holds, "{withheld} {decides} {closure:?}");
+        }
     }
 }

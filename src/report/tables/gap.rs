@@ -39,6 +39,10 @@ fn verdict(gap: &GapSection) -> String {
         "group" => {
             format!("The cause is one of {effects}{odds}; these data cannot tell them apart.")
         }
+        "set" if gap.verdict.effects.len() == 1 => format!(
+            "{effects} explains the readings best, but does not predict those that were kept from it any better: it \
+             is not held for the cause."
+        ),
         "set" => format!("The cause is most likely one of {effects}; these data do not decide."),
         "unknown" => unknown(gap),
         _ => undecided(gap),

@@ -55,6 +55,9 @@
 //!   readings would predict of them.
 //! - **Masing 1926**: "Eigenspannungen und Verfestigung beim Messing", Proceedings of the 2nd International
 //!   Congress of Applied Mechanics, 332-335. Branches of a hysteresis loop from the first loading.
+//! - **Cowper 1966**: "The shear coefficient in Timoshenko's beam theory", Journal of Applied Mechanics 33, 335-340.
+//! - **Paule & Mandel 1982**: "Consensus values and weighting factors", Journal of Research of the National Bureau
+//!   of Standards 87, 377-385. Scatter between groups beyond their own uncertainties.
 //! - **Smyth 2004**: "Linear models and empirical Bayes methods for assessing differential expression in
 //!   microarray experiments", Statistical Applications in Genetics and Molecular Biology 3, 3. Variances from
 //!   few repeats, drawn towards what they have in common.

@@ -77,11 +77,13 @@ fn decided_by(frame: &Frame, entries: &[Entry]) -> DecidedBy {
         .iter()
         .filter(|entry| entry.hypothesis != Hypothesis::Unknown);
     let likelihood = |entry: &Entry| log_likelihood(&frame.readings, &entry.fit.branch.optimum);
-    let weight = |entry: &Entry| entry.fit.log_evidence + entry.prior.ln();
-    let most = named.clone().map(weight).fold(f64::NEG_INFINITY, f64::max);
+    let most = named
+        .clone()
+        .map(Entry::log_weight)
+        .fold(f64::NEG_INFINITY, f64::max);
     match (named.next(), named.next()) {
         // What speaks against a better one as such has brought it to the top.
-        (Some(first), Some(_)) if weight(first) < most => DecidedBy::Readings,
+        (Some(first), Some(_)) if first.log_weight() < most => DecidedBy::Readings,
         (Some(first), Some(rival)) if likelihood(first) - likelihood(rival) < 3.0_f64.ln() => {
             DecidedBy::Priors
         }

@@ -60,6 +60,7 @@ mod result;
 mod search;
 mod settings;
 mod setup;
+mod shear;
 mod small_slopes;
 mod small_unknowns;
 mod solved;

@@ -30,6 +30,11 @@ impl Entry {
         }
     }
 
+    /// Logarithm of evidence times prior.
+    pub(super) fn log_weight(&self) -> f64 {
+        self.fit.log_evidence + self.prior.ln()
+    }
+
     /// Its effects; none of `none` and `unknown`.
     pub(super) fn effects(&self) -> &[EffectId] {
         match &self.hypothesis {
@@ -73,10 +78,7 @@ pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
     for (entry, prior) in entries.iter_mut().zip(priors) {
         entry.prior = prior;
     }
-    let logs: Vec<f64> = entries
-        .iter()
-        .map(|entry| entry.fit.log_evidence + entry.prior.ln())
-        .collect();
+    let logs: Vec<f64> = entries.iter().map(Entry::log_weight).collect();
     let total = log_sum(&logs);
     for (entry, log) in entries.iter_mut().zip(&logs) {
         entry.probability = (log - total).exp();

@@ -1,6 +1,5 @@
 //! All hypotheses against each other.
 
-use super::advisor::MORE_MODES;
 use super::catalogue::{Candidate, Scales, candidate};
 use super::catch_all::{fit_drift, fit_unknown};
 use super::error::GapError;
@@ -172,7 +171,7 @@ fn nominal_of(
     let first = fit_nominal(&frame, settings)?;
     set_amplitudes(&mut frame, &first);
     frame.set_paths(observations, &first);
-    set_shear_slopes(&mut frame, &first);
+    frame.set_shear_slopes(&first)?;
     let forward = Forward::new(&frame, &[]);
     let shapes = forward.joint_differences(&first.branch.optimum.parameters)?;
     frame.shape_slopes = Some(shapes);
@@ -322,29 +321,6 @@ fn possible(frame: &Frame, effect: EffectId) -> bool {
         EffectId::JointNonlinearity => sought.iter().any(|(direction, _)| *direction == 1),
         EffectId::Resolution => frame.nominal.reading_bias.is_some(),
         _ => true,
-    }
-}
-
-/// What each frequency owes to shear and rotary inertia, by Rayleigh's quotient of a beam that has a little less.
-fn set_shear_slopes(frame: &mut Frame, nominal: &Fit) {
-    const STEP: f64 = 1e-3;
-    let whole = frame.nominal.specimen.shear_rotary;
-    if whole > 0.0 {
-        let mut planned = frame.clone();
-        planned.modes += MORE_MODES;
-        let solved = Forward::new(&planned, &[]).solve(&nominal.branch.optimum.parameters);
-        let first = solved.as_ref().and_then(|solved| solved.first());
-        let slopes = |one: &Solved| -> Option<Vec<f64>> {
-            let mut less = one.seen.specimen.clone();
-            less.shear_rotary -= STEP * whole;
-            let moved = one.modes().rayleigh_frequencies(&less).ok()?;
-            let slope = |mode: usize| {
-                let index = one.index(mode)?;
-                Some((one.modes().frequencies()[index] / moved[index]).ln() / STEP)
-            };
-            Some((1..=planned.modes).map_while(slope).collect())
-        };
-        frame.shear_slopes = first.and_then(slopes).unwrap_or_default();
     }
 }
 

@@ -14,7 +14,7 @@ pub struct GapSettings {
     /// that has a name (`modulus`, `length`, `timebase`); whoever knows the geometry less well states it.
     pub scale_std: f64,
     /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
-    /// the shear coefficients of Timoshenko and of Cowper differ, as do Poisson's ratios of 0.28 and 0.31.
+    /// the shear coefficient used here, 5/6, and Cowper's (1966) 10 (1 + nu)/(12 + 11 nu) differ for metals.
     pub shear_std: f64,
     /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
     pub frequency_floor: f64,
@@ -62,10 +62,10 @@ impl GapSettings {
                 .iter()
                 .all(positive) =>
             {
-                refused("scale_std, shear_std and damping_tilt must be above 0")
+                refused("scale_std, shear_std and damping_tilt must be finite and above 0")
             }
-            s if s.frequency_floor.is_nan() || s.frequency_floor < 0.0 => {
-                refused("frequency_floor must not be below 0")
+            s if !(s.frequency_floor.is_finite() && s.frequency_floor >= 0.0) => {
+                refused("frequency_floor must be finite and not below 0")
             }
             s if s.unknown_positions == 0 => refused("unknown_positions must be at least 1"),
             _ => Ok(()),

@@ -96,15 +96,14 @@ impl Forward<'_> {
                 let away = self.ratio_slope(small, (configuration, mode, reference), one);
                 predicted * (towards - away)
             }
-            Row::Damping { mode } => {
+            Row::Damping { mode } if matches!(small, Small::Damping | Small::DampingTilt) => {
                 let (all, nominal) = self.damping(mode, solved, parameters).unwrap_or((1.0, 1.0));
                 match small {
-                    Small::Damping => nominal / all,
                     Small::DampingTilt => nominal / all * self.frame.tilt(mode),
-                    _ => 0.0,
+                    _ => nominal / all,
                 }
             }
-            Row::Slope { .. } => 0.0,
+            Row::Damping { .. } | Row::Slope { .. } => 0.0,
         }
     }
 

@@ -81,8 +81,8 @@ fn common_share(all: &[BetweenRecordings]) -> f64 {
     high.sqrt()
 }
 
-/// Whether the recordings differ by more than their readings' uncertainty explains; one test in a hundred does so by
-/// chance.
+/// Whether the recordings differ by more than their readings' uncertainty explains. One test in a hundred does so by
+/// chance where that is known and alike in all recordings; of a few taps, several.
 pub(super) fn differ(modes: &[ModeResult]) -> bool {
     exceeds_noise(&of_modes(modes))
 }

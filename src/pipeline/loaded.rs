@@ -78,6 +78,7 @@ fn frequencies(
     structure: &TestedStructure,
     both: [&StructureDetails; 2],
 ) -> Option<[Vec<f64>; 2]> {
+    // Only the weights depend on the floor, and of these the numbering does not.
     let measured = measured_modes(modes, FREQUENCY_FLOOR);
     let count = measured.last()?.mode;
     let found = estimator(structure, both[0], &measured).map(|estimator| estimator.fit());

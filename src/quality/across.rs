@@ -9,9 +9,10 @@ use super::{
 };
 use crate::stats::times;
 
-/// Largest probability that a drift without direction brings the frequencies into the order of the levels: that of
-/// three levels. It is no proof, and enough for a doubt; each further recording makes it smaller.
-const LARGEST_CHANCE: f64 = 1.0 / 3.0 + 1e-9;
+/// Largest probability that scatter, independent from recording to recording, brings the frequencies into the order
+/// of the levels: 0.34, which three levels just keep. It is no proof, and enough for a doubt; each further recording
+/// makes it smaller.
+const LARGEST_CHANCE: f64 = 0.34;
 
 /// Two FRFs that swap the places of tap and sensor are equal (Maxwell).
 pub fn check_reciprocity(

@@ -130,19 +130,25 @@ pub fn check_frequency_scatter(
         let explained = mode.tap_std.filter(|std| *std > 0.0);
         let excess = explained.map(|std| scatter / std);
         let largest = largest_ratio(mode.tap_frequencies.len());
-        let outcome = match excess {
-            _ if relative > limit => Outcome::Bad,
-            Some(excess) if excess > largest && relative > settings.least_scatter => {
-                Outcome::Doubtful
-            }
-            _ => Outcome::Good,
+        let beyond_noise = excess.is_some_and(|excess| excess > largest);
+        let (outcome, small) = match relative {
+            _ if relative > limit => (Outcome::Bad, String::new()),
+            _ if !beyond_noise => (Outcome::Good, String::new()),
+            _ if relative > settings.least_scatter => (Outcome::Doubtful, String::new()),
+            _ => (
+                Outcome::Good,
+                format!(
+                    "; up to {:.3} % is none to doubt",
+                    100.0 * settings.least_scatter
+                ),
+            ),
         };
         let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {
             let excess = times(excess);
             format!("{excess} times what noise explains, where {largest:.1} is chance")
         });
         let happened = format!(
-            "The frequency scatters by {:.4} % over {} taps, {noise} (limit {:.0} %).",
+            "The frequency scatters by {:.4} % over {} taps, {noise}{small} (limit {:.0} %).",
             100.0 * relative,
             mode.tap_frequencies.len(),
             100.0 * limit

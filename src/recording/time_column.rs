@@ -7,28 +7,20 @@ use super::units::{channel_unit, split_unit};
 
 /// The time column: named t, time (or that in German, French, Spanish), t_* or time_*, and rising in at least half of the steps of
 /// the head. (That it rises in all of them is checked when the rows are read, and is an error
-/// there.) One that may as well be a temperature has to rise in all of them, and comes last.
+/// there.)
 ///
 /// `rising_steps` tells of a column, 0-based, how many of how many steps rise.
 pub(super) fn time_column(
     columns: &[Column],
     rising_steps: impl Fn(usize) -> (usize, usize),
 ) -> Option<usize> {
-    let rises = |doubt: Doubt| {
-        named_as_time(columns).find(|at| {
-            let (rising, steps) = rising_steps(*at);
-            let enough = match doubt {
-                Doubt::None => 2 * rising >= steps,
-                Doubt::Temperature => steps > 0 && rising == steps,
-                Doubt::OtherUnit => false,
-            };
-            columns.get(*at).map(doubt_of_time) == Some(doubt) && enough
-        })
-    };
-    rises(Doubt::None).or_else(|| rises(Doubt::Temperature))
+    named_as_time(columns).find(|at| {
+        let (rising, steps) = rising_steps(*at);
+        2 * rising >= steps
+    })
 }
 
-/// Columns named t, time or the like, then those named t_* or time_*.
+/// Columns named t, time or the like, then those named t_* or time_*, but for those whose unit says otherwise.
 fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
     let names = |exact: bool| {
         let is_time = move |column: &Column| {
@@ -40,7 +32,10 @@ fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
                 false => name.starts_with("t_") || name.starts_with("time_"),
             }
         };
-        (0..columns.len()).filter(move |at| columns.get(*at).is_some_and(is_time))
+        (0..columns.len()).filter(move |at| {
+            let column = columns.get(*at);
+            column.is_some_and(|column| is_time(column) && !has_other_unit(column))
+        })
     };
     names(true).chain(names(false))
 }
@@ -56,32 +51,23 @@ pub(super) struct FlatTime {
     pub values: [f64; 2],
 }
 
-/// What speaks against the time in a column that is named as time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Doubt {
-    None,
-    /// "T (°C)": a unit that is not known, which for "time (sec.)" is an error worth telling.
-    Temperature,
-    /// A unit that is known, and none of time.
-    OtherUnit,
-}
+/// Units of temperature, which no channel has here and the names t and T often mean.
+const TEMPERATURES: [&str; 7] = ["K", "\u{b0}C", "C", "degC", "\u{b0}F", "F", "degF"];
 
-fn doubt_of_time(column: &Column) -> Doubt {
-    let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
-    match column.unit.as_deref().map(channel_unit) {
-        Some(Some((_, si))) if si != "s" => Doubt::OtherUnit,
-        Some(None) if name.to_ascii_lowercase().split('_').next() == Some("t") => {
-            Doubt::Temperature
-        }
-        _ => Doubt::None,
+/// Whether a column's unit says that it is no time. One that is not known may be one of time, "sec.": that is an
+/// error worth telling.
+fn has_other_unit(column: &Column) -> bool {
+    let unit = column.unit.as_deref().unwrap_or("s");
+    match channel_unit(unit) {
+        Some((_, si)) => si != "s",
+        None => TEMPERATURES.contains(&unit),
     }
 }
 
 /// The column that is named as time without being one, and where that shows first in the head; `None` of one that
 /// stands still, a temperature perhaps.
 pub(super) fn flat_time(head: &[u8], whole: HeadExtent, layout: &CsvLayout) -> Option<FlatTime> {
-    let is_time = |at: &usize| layout.columns.get(*at).map(doubt_of_time) == Some(Doubt::None);
-    let column = named_as_time(&layout.columns).find(is_time)?;
+    let column = named_as_time(&layout.columns).next()?;
     let mut cells = Vec::new();
     let lines = head_lines(head, layout.line_end, whole);
     let rows = lines.iter().enumerate();

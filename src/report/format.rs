@@ -147,7 +147,7 @@ pub fn signed(value: f64) -> String {
     format!("{sign}{}", trimmed(value, 4))
 }
 
-/// A percentage with its sign and two significant digits, at most two decimals: "+0.31", "−12".
+/// A percentage with its sign and two significant digits, at most three decimals: "+0.31", "−12".
 pub fn signed_percent(percent: Option<f64>) -> String {
     let Some(percent) = percent.filter(|p| p.is_finite()) else {
         return MISSING.to_owned();

@@ -1,5 +1,6 @@
 //! The described model with what the diagnosis found: as a description that can be predicted with, and its
-//! natural frequencies.
+//! natural frequencies. What the diagnosis leaves open of shear and rotary inertia, 2 %, has no place in a description
+//! and stays out.
 
 use crate::description::{FastenedMass, JointKind, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};

@@ -307,7 +307,9 @@ fn val_averages_and_coherence() {
 fn val_scatter_beside_what_noise_explains() {
     let spread = |relative: f64| {
         changed(|r| {
-            let mode = &mut r.resonances[1];
+            // The mode at 110 Hz alone.
+            r.resonances = vec![r.resonances[1].clone()];
+            let mode = &mut r.resonances[0];
             let at = [-1.0, 1.0, -1.0, 1.0, 0.0].map(|s| mode.frequency * (1.0 + relative * s));
             mode.tap_frequencies = at.to_vec();
         })
@@ -330,6 +332,12 @@ fn val_scatter_beside_what_noise_explains() {
         judged(&spread(3e-5), Check::FrequencyScatter).outcome,
         Outcome::Good
     );
+    // 2.25 and 2.75 times what noise explains, below and above what a little warmth does.
+    let warm = judged(&spread(4.5e-5), Check::FrequencyScatter);
+    assert_eq!(warm.outcome, Outcome::Good, "{warm}");
+    assert!(warm.happened.contains("up to 0.005 %"), "{warm}");
+    let more = judged(&spread(5.5e-5), Check::FrequencyScatter);
+    assert_eq!(more.outcome, Outcome::Doubtful, "{more}");
     assert_doubt(
         &judged(&spread(0.02), Check::FrequencyScatter),
         Outcome::Bad,

@@ -240,11 +240,15 @@ fn follow_mode(
             continue;
         };
         let context = context::explain(&series, band);
+        let mut points = walk::walk_decay(&series, band, &context, settings);
+        let found = !points.is_empty();
+        points.retain(|point| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST);
+        if found && points.is_empty() {
+            // What was followed is something else.
+            continue;
+        }
         curve.companions.extend(context.companions(band));
-        let points = walk::walk_decay(&series, band, &context, settings);
-        let is_of_mode =
-            |point: &AmplitudePoint| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST;
-        curve.points.extend(points.into_iter().filter(is_of_mode));
+        curve.points.extend(points);
         doubts.extend(context.doubt(band));
         followed += 1;
     }

@@ -80,7 +80,7 @@ impl Parameter<'_> {
         ]
     }
 
-    /// Standard deviation scaled by the misfit, in the unit of the value, to the same last digit as the std beside it.
+    /// Standard deviation scaled by the misfit, in the unit of the value.
     pub fn written_scaled(&self) -> String {
         let known = |std: &f64| std.is_finite() && *std > 0.0;
         let scaled = self.value.std_scaled.filter(known);

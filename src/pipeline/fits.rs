@@ -10,8 +10,8 @@ use super::decays::FreeDecays;
 use crate::description::ReadingMethod;
 use crate::modal::amplitude::{AmplitudeSettings, KnownMode, follow_amplitude};
 use crate::modal::fit::{
-    ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
-    modal_constants, test_extra_mode,
+    Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit,
+    fit_modes, modal_constants,
 };
 use crate::modal::polyreference::{
     BandSearch, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, SubBandSettings,
@@ -87,17 +87,21 @@ impl Candidates<'_> {
         };
         let proposed = all_modes(&self.stabilisation.searches);
         let (mut starts, peaks, extras) = self.starts(readings, &proposed);
+        let (mut accepted, mut fits) = Accepted::new(self.data, &starts, &settings);
         let mut added = Vec::new();
         for extra in extras.into_iter().take(MOST_EXTRA) {
             let start = start_of(extra);
-            let test = test_extra_mode(self.data, &starts, start, &settings);
+            let (test, together) = accepted.test(&start);
             if self.is_mode(&test, &starts) {
                 starts.push(start);
                 added.push(extra);
+                accepted = together;
             }
         }
         let peaks_alone = starts.len() - added.len();
-        let fits = self.settled(&mut starts, &mut added, &settings);
+        if !added.is_empty() {
+            fits = self.settled(&mut starts, &mut added, &settings);
+        }
         let (of_peaks, of_added) = fits.split_at(peaks_alone);
         for (index, fit) in peaks.into_iter().zip(of_peaks) {
             self.adopt(&mut readings[index], fit.as_ref().ok());

@@ -8,9 +8,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint::modal::fit::{
-    Basis, Column, ExtraVerdict, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
-    PoleStart, TapForce, UncertaintySource, Unfit, bands_for, fit_modes, modal_constants,
-    modal_constants_of_frf, test_extra_mode,
+    Accepted, Basis, Column, ExtraMode, ExtraVerdict, FitError, FitSettings, FreeDecayCollector,
+    ModalData, ModeFit, PoleStart, TapForce, UncertaintySource, Unfit, bands_for, fit_modes,
+    modal_constants, modal_constants_of_frf,
 };
 use tapjoint::recording::ResponseForm;
 use tapjoint::simulate::{SimulatedMode, TapTestSettings, simulate_tap_test};
@@ -224,6 +224,32 @@ fn recover_two_modes_within_one_peak() {
     assert!((143..=160).contains(&covered), "{covered} of {all}");
 }
 
+/// The test of one more mode beside others.
+fn beside(
+    data: &ModalData,
+    accepted: &[PoleStart],
+    extra: PoleStart,
+    settings: &FitSettings,
+) -> ExtraMode {
+    Accepted::new(data, accepted, settings).0.test(&extra).0
+}
+
+#[test]
+fn prop_a_mode_is_tested_as_it_would_be_fitted() {
+    let settings = FitSettings::default();
+    for seed in 0..20 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let (modes, data) = close_pair(&mut random, 0.05);
+        let starts = modes.map(|mode| start(mode, 0.05));
+        let fits = fit_modes(&data, &starts, &settings);
+        let tested = beside(&data, &starts[..1], starts[1], &settings);
+        let (one, other) = (tested.fit.unwrap(), fits[1].clone().unwrap());
+        let apart = (one.frequency.value - other.frequency.value).abs();
+        // Both stop within a fiftieth of a standard deviation.
+        assert!(apart < 0.05 * other.frequency.std, "seed {seed}: {apart}");
+    }
+}
+
 #[test]
 fn recover_a_second_mode_only_where_there_is_one() {
     let mut mistaken = 0;
@@ -232,7 +258,7 @@ fn recover_a_second_mode_only_where_there_is_one() {
         let settings = FitSettings::default();
         let (modes, data) = close_pair(&mut random, 0.05);
         let accepted = [start(modes[0], 0.05)];
-        let found = test_extra_mode(&data, &accepted, start(modes[1], 0.05), &settings);
+        let found = beside(&data, &accepted, start(modes[1], 0.05), &settings);
         assert_eq!(
             found.verdict,
             ExtraVerdict::Needed,
@@ -240,7 +266,7 @@ fn recover_a_second_mode_only_where_there_is_one() {
         );
         assert!(found.likeness.unwrap() < 0.9, "{found:?}");
         let (modes, data) = close_pair(&mut random, 0.0);
-        let found = test_extra_mode(&data, &accepted, start(modes[1], 0.05), &settings);
+        let found = beside(&data, &accepted, start(modes[1], 0.05), &settings);
         mistaken += usize::from(found.verdict == ExtraVerdict::Needed);
     }
     // On the level of 10^-4 for each of some ten places one mistake in 1000 is to be expected.
@@ -632,7 +658,7 @@ proptest! {
                 prop_assert!(value.low < value.high && value.high.is_finite());
             }
         }
-        let extra = test_extra_mode(&data, &starts[1..], starts[0], &FitSettings::default());
+        let extra = beside(&data, &starts[1..], starts[0], &FitSettings::default());
         prop_assert!((0.0..=1.0).contains(&extra.probability));
     }
 }

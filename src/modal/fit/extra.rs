@@ -6,7 +6,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::data::ModalData;
 use super::local::{GroupFit, Local};
 use super::result::{ModeFit, report};
-use super::sweep::Sweeper;
+use super::sweep::{Group, Sweeper};
 use super::{FitSettings, PoleStart, Unfit};
 
 /// What speaks for one more mode, and what against it.
@@ -46,53 +46,97 @@ pub enum ExtraVerdict {
 const LEVEL: f64 = 1e-4;
 /// Least amplitude in standard deviations.
 const LEAST_AMPLITUDE: f64 = 4.0;
+/// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
+/// thousand of them, which tell no more than the decay's own length has room for.
+const SCREENED: usize = 1000;
 
-/// Tests whether the data ask for a mode that begins at `extra` beside the `accepted` ones.
-///
-/// Both models are fitted to the same lines with the same background; the one more pole must lower the
-/// residual by far more than its unknowns explain, decay, and stand out of its own uncertainty.
-pub fn test_extra_mode(
-    data: &ModalData,
-    accepted: &[PoleStart],
-    extra: PoleStart,
-    settings: &FitSettings,
-) -> ExtraMode {
-    let mut starts = accepted.to_vec();
-    starts.push(extra);
-    let place = accepted.len();
-    let mut sweeper = Sweeper::new(data, &starts, &settings.steady_lines, settings.added_decay);
-    let groups = sweeper.run();
-    let fit = report(&mut sweeper, &groups, settings)
-        .pop()
-        .unwrap_or(Err(Unfit::NotIndependent));
-    let group = groups.iter().find(|group| group.members.contains(&place));
-    let (Some(group), Ok(mode)) = (group, &fit) else {
-        return without_mode(fit);
-    };
-    let inside = group.members.iter().position(|&index| index == place);
-    let compared = inside.and_then(|inside| {
-        let local = sweeper.local(&group.members).ok()?;
-        compare(&local, &group.fit, inside)
-    });
-    let Some((f_statistic, probability, information_gain)) = compared else {
-        return without_mode(fit);
-    };
-    let amplitude_over_std = over_std(mode);
-    let decays = mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
-    let needed =
-        probability < LEVEL && information_gain > 0.0 && amplitude_over_std > LEAST_AMPLITUDE;
-    ExtraMode {
-        verdict: match (needed, decays) {
-            (true, true) => ExtraVerdict::Needed,
-            (true, false) => ExtraVerdict::NoMode,
-            (false, _) => ExtraVerdict::NotSignificant,
-        },
-        f_statistic,
-        probability,
-        information_gain,
-        amplitude_over_std,
-        likeness: inside.and_then(|inside| likeness(&group.fit, inside)),
-        fit,
+/// Modes that are fitted, beside which others are tested.
+#[derive(Debug, Clone)]
+pub struct Accepted<'a> {
+    sweeper: Sweeper<'a>,
+    settings: FitSettings,
+}
+
+impl<'a> Accepted<'a> {
+    /// The modes that begin at `starts`, and for each start its mode or why there is none, as [`fit_modes`] has
+    /// them.
+    ///
+    /// [`fit_modes`]: super::fit_modes
+    pub fn new(
+        data: &'a ModalData,
+        starts: &[PoleStart],
+        settings: &FitSettings,
+    ) -> (Self, Vec<Result<ModeFit, Unfit>>) {
+        let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
+        let groups = sweeper.run();
+        let fits = report(&mut sweeper, &groups, settings);
+        let settings = settings.clone();
+        (Accepted { sweeper, settings }, fits)
+    }
+
+    /// Tests whether the data ask for a mode that begins at `extra` beside these; and all of them together.
+    ///
+    /// Both models are fitted to the same lines with the same background; the one more pole must lower the
+    /// residual by far more than its unknowns explain, decay, and stand out of its own uncertainty. Modes that
+    /// are not fitted jointly with it stay as they are. What fails on the lines of a thinned band is not tried on
+    /// all of them.
+    pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
+        let screened = self.test_on(extra, SCREENED);
+        if screened.0.verdict != ExtraVerdict::Needed {
+            return screened;
+        }
+        self.test_on(extra, usize::MAX)
+    }
+
+    /// The test on so many lines of its band at most.
+    fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self) {
+        let mut beside = self.clone();
+        beside.sweeper.most_lines = most_lines;
+        let group = beside.sweeper.add(extra, self.settings.added_decay);
+        let test = match group {
+            Some(group) => beside.judge(&group),
+            None => {
+                let last = beside.sweeper.modes.last();
+                let failed = last.and_then(|mode| mode.failed.clone());
+                without_mode(Err(failed.unwrap_or(Unfit::NotIndependent)))
+            }
+        };
+        (test, beside)
+    }
+
+    /// What speaks for the last mode, one of this group.
+    fn judge(&mut self, group: &Group) -> ExtraMode {
+        let last = self.sweeper.modes.len() - 1;
+        let groups = std::slice::from_ref(group);
+        let fit = report(&mut self.sweeper, groups, &self.settings)
+            .pop()
+            .unwrap_or(Err(Unfit::NotIndependent));
+        let inside = group.members.iter().position(|&index| index == last);
+        let (Some(inside), Ok(mode)) = (inside, &fit) else {
+            return without_mode(fit);
+        };
+        let local = self.sweeper.local(&group.members).ok();
+        let compared = local.and_then(|local| compare(&local, &group.fit, inside));
+        let Some((f_statistic, probability, information_gain)) = compared else {
+            return without_mode(fit);
+        };
+        let amplitude_over_std = over_std(mode);
+        let decays = mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
+        let needed =
+            probability < LEVEL && information_gain > 0.0 && amplitude_over_std > LEAST_AMPLITUDE;
+        ExtraMode {
+            verdict: match (needed, decays) {
+                (true, true) => ExtraVerdict::Needed,
+                (true, false) => ExtraVerdict::NoMode,
+                (false, _) => ExtraVerdict::NotSignificant,
+            },
+            f_statistic,
+            probability,
+            information_gain,
+            amplitude_over_std,
+            likeness: likeness(&group.fit, inside),
+            fit,
+        }
     }
 }
 

@@ -25,6 +25,8 @@ pub(super) const STEADY: f64 = 1e-6;
 pub(super) struct Lines {
     /// First line of the band in the data.
     pub first: usize,
+    /// Which lines from there are taken: 1 all, 2 every other one.
+    pub stride: usize,
     /// Positions (lines).
     pub positions: Vec<f64>,
     /// 2 pi/M of a decay; `None` for a frequency response function.
@@ -38,10 +40,12 @@ struct Values {
 }
 
 impl Lines {
-    /// The lines from index `first` up to `end` (not included).
-    pub fn new(data: &ModalData, first: usize, end: usize) -> Self {
+    /// The lines from index `first` up to `end` (not included), evenly thinned to `most` at most.
+    pub fn new(data: &ModalData, (first, end): (usize, usize), most: usize) -> Self {
+        let stride = (end - first).div_ceil(most).max(1);
         let positions = data.frequencies()[first..end]
             .iter()
+            .step_by(stride)
             .map(|f| f / data.spacing())
             .collect();
         let kappa = match data.basis() {
@@ -50,6 +54,7 @@ impl Lines {
         };
         Lines {
             first,
+            stride,
             positions,
             kappa,
         }
@@ -178,7 +183,7 @@ mod tests {
             values,
         };
         let data = ModalData::new(basis, frequencies, vec![column]).unwrap();
-        Lines::new(&data, 0, 20)
+        Lines::new(&data, (0, 20), usize::MAX)
     }
 
     const DECAY: Basis = Basis::FreeDecay {

@@ -56,12 +56,12 @@ pub(super) struct GroupFit {
 impl<'a> Local<'a> {
     /// Takes the band of `poles` (lines) out of the data. Neighbours that were fitted and lie outside
     /// are subtracted; those inside, or not half a band away, keep free amplitudes. `steady` are the
-    /// positions of undamped lines (lines).
+    /// positions of undamped lines (lines). Of the band `most` lines are taken at most.
     pub fn new(
         data: &'a ModalData,
-        poles: &[Complex64],
-        neighbours: &[Neighbour],
+        (poles, neighbours): (&[Complex64], &[Neighbour]),
         steady: &[f64],
+        most: usize,
     ) -> Result<Self, Unfit> {
         let (low, high) = band::reach(poles);
         let (first, end) = band::within(data, (low, high));
@@ -73,7 +73,7 @@ impl<'a> Local<'a> {
                 least,
             });
         }
-        let lines = Lines::new(data, first, end);
+        let lines = Lines::new(data, (first, end), most.max(least));
         let margin = 0.25 * (high - low);
         let inside = |position: f64| (low - margin..=high + margin).contains(&position);
         let (near, far): (Vec<&Neighbour>, Vec<&Neighbour>) =
@@ -97,16 +97,20 @@ impl<'a> Local<'a> {
 
     /// Stacks real over imaginary parts of every column that is not zero throughout.
     fn fill(&mut self, far: &[&Neighbour]) {
-        let (first, count) = (self.lines.first, self.lines.count());
+        let (first, stride) = (self.lines.first, self.lines.stride);
+        let count = self.lines.count();
         let columns = self.data.columns();
         let holds = |&index: &usize| {
-            let values = &columns[index].values[first..first + count];
-            values.iter().any(|value| value.norm_sqr() > 0.0)
+            let mut values = columns[index].values[first..].iter().step_by(stride);
+            values
+                .by_ref()
+                .take(count)
+                .any(|value| value.norm_sqr() > 0.0)
         };
         self.used = (0..columns.len()).filter(holds).collect();
         let used = &self.used;
         self.values = DMatrix::from_fn(2 * count, used.len(), |row, place| {
-            let value = columns[used[place]].values[first + row % count];
+            let value = columns[used[place]].values[first + stride * (row % count)];
             if row < count { value.re } else { value.im }
         });
         let poles: Vec<Complex64> = far.iter().map(|other| other.pole).collect();

@@ -26,7 +26,7 @@ mod uncertainty;
 pub use band::bands_for;
 pub use collector::FreeDecayCollector;
 pub use data::{Basis, Column, ModalData};
-pub use extra::{ExtraMode, ExtraVerdict, test_extra_mode};
+pub use extra::{Accepted, ExtraMode, ExtraVerdict};
 pub use kernel::StopReason;
 pub use residue::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
 pub use result::{ColumnAmplitude, ModeFit, fit_modes};

@@ -34,11 +34,14 @@ pub(super) struct Group {
 }
 
 /// All modes and what surrounds them.
+#[derive(Debug, Clone)]
 pub(super) struct Sweeper<'a> {
     pub data: &'a ModalData,
     pub modes: Vec<Mode>,
     /// Positions of undamped lines (lines).
     pub steady: Vec<f64>,
+    /// Most lines of a band that are taken.
+    pub most_lines: usize,
 }
 
 impl<'a> Sweeper<'a> {
@@ -52,7 +55,38 @@ impl<'a> Sweeper<'a> {
             data,
             modes,
             steady: steady.iter().map(|&f| lines(f)).collect(),
+            most_lines: usize::MAX,
         }
+    }
+
+    /// One more start beside modes that were swept: its group once it stays, or nothing where it fails. Modes of
+    /// other groups stay as they are.
+    pub fn add(&mut self, start: &PoleStart, added: f64) -> Option<Group> {
+        let place = self.modes.len();
+        self.modes
+            .push(mode(self.data, start, added / std::f64::consts::TAU));
+        let mut fitted = Vec::new();
+        for sweep in 0..MOST_SWEEPS {
+            let groups = band::groups(&self.alive());
+            let own = groups.into_iter().find(|group| group.contains(&place))?;
+            let own = self.resolved(own, place);
+            let moved = self.sweep(vec![own], &mut fitted);
+            if sweep > 0 && moved < STILL {
+                break;
+            }
+        }
+        let settled = self.modes[place].amplitudes.is_some();
+        fitted.pop().filter(|_| settled)
+    }
+
+    /// Of a group those that lines thinned for the mode at `place` still resolve: the others, far narrower than
+    /// it, keep their poles.
+    fn resolved(&self, mut group: Vec<usize>, place: usize) -> Vec<usize> {
+        let lines = 2.0 * band::half_band(self.modes[place].pole);
+        let stride = lines / self.most_lines as f64;
+        let width = |index: usize| band::half_width(self.modes[index].pole);
+        group.retain(|&index| index == place || stride <= 1.0 || width(index) >= stride);
+        group
     }
 
     fn alive(&self) -> Vec<(usize, Complex64)> {
@@ -200,7 +234,13 @@ impl<'a> Sweeper<'a> {
             .iter()
             .map(|&index| self.modes[index].pole)
             .collect();
-        Local::new(self.data, &poles, &self.neighbours(members), &self.steady)
+        let neighbours = self.neighbours(members);
+        Local::new(
+            self.data,
+            (&poles, &neighbours),
+            &self.steady,
+            self.most_lines,
+        )
     }
 
     fn neighbours(&self, members: &[usize]) -> Vec<Neighbour> {

@@ -278,7 +278,7 @@ fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
 }
 
 fn diagnosis_of(test: &TestDescription, folder: &Path) -> anyhow::Result<Diagnosis> {
-    let settings = IdentifySettings::default();
+    let settings = IdentifySettings::unperturbed();
     let analysis = run_test(test, (folder, "test.toml"), &settings)?;
     Ok(diagnose_test(test, &analysis, &GapSettings::default())?)
 }

@@ -42,7 +42,7 @@ pub(super) fn run(
         .as_deref()
         .map(OutputFile::prepare)
         .transpose()?;
-    let analysis = file.analyse(&IdentifySettings::default())?;
+    let analysis = file.analyse(&IdentifySettings::unperturbed())?;
     let settings = GapSettings {
         seed,
         ..GapSettings::default()

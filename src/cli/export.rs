@@ -95,7 +95,7 @@ fn estimated(
     file.test.check_has_data(&file.name)?;
     file.check_recordings()?;
     let progress = terminal.progress("estimating the joint");
-    let analysis = file.analyse(&IdentifySettings::default())?;
+    let analysis = file.analyse(&IdentifySettings::unperturbed())?;
     drop(progress);
     Ok(source_of(&file.test, &analysis))
 }

@@ -203,11 +203,7 @@ fn picture_files(png: &Path, stems: &[String]) -> Vec<PathBuf> {
 pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let request = resolve(arguments, &terminal)?;
     let analysis = match &request.subject {
-        Subject::Test(file) => file.analyse(&IdentifySettings {
-            // Only the functions are wanted.
-            perturbed: Vec::new(),
-            ..IdentifySettings::default()
-        })?,
+        Subject::Test(file) => file.analyse(&IdentifySettings::unperturbed())?,
         Subject::Recording(hammer) => bare(arguments, hammer)?,
     };
     let frfs: Vec<Vec<Frf>> = analysis

@@ -97,9 +97,7 @@ pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
     let analysis = file.analyse(&IdentifySettings {
         method: arguments.method.method(),
-        // The perturbation has a command of its own.
-        perturbed: Vec::new(),
-        ..IdentifySettings::default()
+        ..IdentifySettings::unperturbed()
     })?;
     let document = document_of(&analysis);
     terminal.say(&render_text(&document))?;

@@ -5,12 +5,13 @@
 //! resolution bound, and every sign pattern of all bounds.
 
 use super::IdentifyError;
+use rayon::prelude::*;
 
 /// Perturbations of Ingole & Chatterjee's table 9 (%).
 pub const PAPER_PERCENTS: [f64; 2] = [0.05, 0.1];
 
-/// Beyond so many modes the sign patterns are refused: 4096 estimates take some ten milliseconds,
-/// and every further mode twice as many.
+/// Beyond so many modes the sign patterns are refused: 4096 consistent estimates take some seconds, and every
+/// further mode twice as many.
 pub const SIGN_PATTERN_MODES: usize = 12;
 
 /// Stiffnesses of one estimate (1).
@@ -186,7 +187,7 @@ pub struct SignPatternSpans {
 pub fn sign_pattern_spans(
     frequencies: &[f64],
     bounds: &[f64],
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> Result<SignPatternSpans, IdentifyError> {
     let patterns = sign_pattern_estimates(frequencies, bounds, &estimator)?;
     Ok(spans_of(estimator(frequencies), &patterns))
@@ -200,7 +201,7 @@ pub fn sign_pattern_spans(
 pub fn sign_pattern_estimates(
     frequencies: &[f64],
     bounds: &[f64],
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> Result<Vec<Option<Stiffnesses>>, IdentifyError> {
     check_bounds(frequencies, bounds)?;
     if frequencies.len() > SIGN_PATTERN_MODES {
@@ -209,8 +210,10 @@ pub fn sign_pattern_estimates(
             limit: SIGN_PATTERN_MODES,
         });
     }
-    Ok(sign_patterns(frequencies, bounds)
-        .map(|shifted| estimator(&shifted))
+    let patterns: Vec<Vec<f64>> = sign_patterns(frequencies, bounds).collect();
+    Ok(patterns
+        .par_iter()
+        .map(|shifted| estimator(shifted))
         .collect())
 }
 

@@ -60,6 +60,16 @@ impl Default for IdentifySettings {
     }
 }
 
+impl IdentifySettings {
+    /// The defaults, but nothing is perturbed: where the estimate alone is wanted.
+    pub fn unperturbed() -> Self {
+        IdentifySettings {
+            perturbed: Vec::new(),
+            ..Self::default()
+        }
+    }
+}
+
 /// A misfit is worth a warning beyond this error (%): what a beam's stated dimensions usually leave
 /// open in its frequencies.
 const NOTABLE_MISFIT: f64 = 100.0 * goodness::NOTABLE_MISFIT;

@@ -102,7 +102,7 @@ fn perturbation(
     (method, random): (EstimateMethod, Option<MonteCarlo>),
     frequencies: &Frequencies,
     settings: &IdentifySettings,
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> Option<Perturbation> {
     let nominal = estimator(&frequencies.values)?;
     let uniform = perturb_uniformly(&frequencies.values, &settings.percents, &estimator);
@@ -120,7 +120,7 @@ fn perturbation(
 fn of_bounds(
     (nominal, bounds): (Stiffnesses, &[f64]),
     frequencies: &Frequencies,
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> BoundPerturbation {
     let patterns = sign_pattern_estimates(&frequencies.values, bounds, &estimator).ok();
     let sensitivities = mode_sensitivities(&frequencies.values, bounds, &estimator);

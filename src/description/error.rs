@@ -234,6 +234,8 @@ pub enum Doubt {
         /// What may have been meant.
         question: &'static str,
     },
+    /// A mass whose place nobody said.
+    Unplaced,
     /// Has no effect where it stands.
     NoMeaning {
         /// Why.
@@ -256,6 +258,10 @@ impl fmt::Display for Doubt {
                     with_unit(*value, unit)
                 )
             }
+            Self::Unplaced => out.write_str(
+                "acts where the sensor sits, and `position` is missing: the diagnosis tries places along the beam, \
+                 prediction and estimate leave the mass out; add `position` (m along the beam) if it is known",
+            ),
             Self::NoMeaning { reason } => write!(out, "has no effect; {reason}"),
         }
     }

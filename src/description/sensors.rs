@@ -159,7 +159,7 @@ fn read_position(
     }
 }
 
-/// A mass acts on the beam at the place where it sits; without a place it can only be ignored.
+/// A mass acts on the beam at the place where it sits; without a place only the diagnosis has a use for it.
 fn check_mass(
     table: &Table<'_>,
     sensor: &SensorDescription,
@@ -175,10 +175,7 @@ fn check_mass(
         return Ok(());
     }
     if sensor.position.is_none() {
-        return Err(entry.error(DescriptionProblem::Conflict {
-            reason: "a sensor's mass acts where the sensor sits, and `position` is missing".into(),
-            remedy: "add `position` (m along the beam), or remove `mass`",
-        }));
+        warnings.push(entry.warning(Doubt::Unplaced));
     }
     let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
     if mass > beam_mass {

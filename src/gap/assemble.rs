@@ -20,12 +20,17 @@ use super::search::Competition;
 use super::settings::GapSettings;
 use super::small_unknowns::Small;
 use super::trial::{Room, Trial};
+use super::unplaced::Unplaced;
 use super::verdict::verdict;
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
 
 /// The answer to a competition.
-pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Diagnosis {
+pub(super) fn diagnosis(
+    competition: &Competition,
+    unplaced: Option<Unplaced>,
+    settings: &GapSettings,
+) -> Diagnosis {
     let frame = &competition.frame;
     let entries = &competition.entries;
     let context = Context::new(competition, settings);
@@ -43,7 +48,16 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         .iter()
         .find(|entry| entry.hypothesis == Hypothesis::None)
         .and_then(|none| Some(Trial::new(frame, &none.fit)?.with_withheld(frame, &none.fit)));
-    let verdict = verdict(entries, trial.as_ref(), none.as_ref());
+    let verdict = match verdict(entries, trial.as_ref(), none.as_ref()) {
+        // Masses at places of their choice explain much that has other causes.
+        Verdict::NoGap if unplaced.as_ref().is_some_and(Unplaced::is_gap) => {
+            Verdict::NotEnoughData(
+                "sensors whose place nobody said explain them, and so would other causes; state the places"
+                    .to_owned(),
+            )
+        }
+        answer => answer,
+    };
     let joint_shift = match verdict {
         Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => hypotheses[best].joint_shift,
         Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => JointShift::default(),
@@ -67,6 +81,7 @@ pub(super) fn diagnosis(competition: &Competition, settings: &GapSettings) -> Di
         decided_by: decided_by(frame, entries),
         along_decays: decay_finding(frame, &competition.baseline),
         fitted_modes: frame.fitted_modes,
+        unplaced,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::GapError;
 use super::nominal::Nominal;
-use crate::identify::observation::Observations;
+use crate::identify::observation::{Configuration, Observations, UNPAIRED};
 use crate::structure::specimen::Mesh;
 
 /// Ratio of frequencies of one mode between configurations beyond which they are of two structures: a
@@ -25,6 +25,7 @@ pub(super) fn check(observations: &Observations, nominal: &Nominal) -> Result<()
         return Err(GapError::NoUncertainty);
     }
     one_structure(observations)?;
+    same_peaks(observations)?;
     sensors_see(observations, nominal)
 }
 
@@ -48,11 +49,58 @@ fn enough_modes(observations: &Observations, nominal: &Nominal) -> Result<(), Ga
     Ok(())
 }
 
+/// How a configuration is called.
+fn name_of(observations: &Observations, k: usize) -> String {
+    let file = observations.configurations[k].file.clone();
+    file.unwrap_or_else(|| format!("configuration {}", k + 1))
+}
+
+/// Peaks from which on a configuration shows a structure of its own.
+const LEAST_PEAKS: usize = 4;
+/// What moved sensors and another level move a frequency by at most (1, relative).
+const MOVED: f64 = 0.05;
+
+/// Refuses configurations of which each has fewer than half of its peaks in common with the other: peaks may be
+/// missing in one, where a sensor sits on nodes, or stray, but then most of the other's are found.
+fn same_peaks(observations: &Observations) -> Result<(), GapError> {
+    let all = &observations.configurations;
+    let peaks: Vec<Vec<f64>> = all.iter().map(peaks_of).collect();
+    for second in 0..all.len() {
+        for first in (0..second).filter(|&first| all[first].masses == all[second].masses) {
+            let strangers = [(second, first), (first, second)].map(|(own, other)| {
+                let strange = |own: &&f64| {
+                    let near = |other: &f64| (*own / other - 1.0).abs() <= MOVED;
+                    !peaks[other].iter().any(near)
+                };
+                peaks[own].iter().filter(strange).count()
+            });
+            let most = |strangers: usize, own: usize| {
+                peaks[own].len() >= LEAST_PEAKS && 2 * strangers > peaks[own].len()
+            };
+            if most(strangers[0], second) && most(strangers[1], first) {
+                return Err(GapError::AnotherStructure {
+                    first: name_of(observations, first),
+                    second: name_of(observations, second),
+                    strangers: strangers[0],
+                    peaks: peaks[second].len(),
+                    percent: 100.0 * MOVED,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Frequencies of all its resonances (Hz), with a number or without.
+fn peaks_of(configuration: &Configuration) -> Vec<f64> {
+    let resonances = configuration.extra_peaks.iter();
+    let extra = resonances.filter(|peak| peak.label == UNPAIRED);
+    let modes = configuration.modes.iter().map(|mode| mode.frequency);
+    modes.chain(extra.map(|peak| peak.frequency)).collect()
+}
+
 fn one_structure(observations: &Observations) -> Result<(), GapError> {
-    let name = |k: usize| {
-        let file = observations.configurations[k].file.clone();
-        file.unwrap_or_else(|| format!("configuration {}", k + 1))
-    };
+    let name = |k: usize| name_of(observations, k);
     for (second, configuration) in observations.configurations.iter().enumerate() {
         for mode in &configuration.modes {
             for first in 0..second {

@@ -39,10 +39,27 @@ pub enum GapError {
         /// In the other (Hz).
         high: f64,
     },
+    /// Hardly a peak of one configuration is found again in another.
+    #[error(
+        "{first} and {second} do not show the same structure: {strangers} of the {peaks} peaks of {second} lie more \
+         than {percent} % from every peak of {first}; diagnose recordings of one structure only"
+    )]
+    AnotherStructure {
+        /// One configuration.
+        first: String,
+        /// The other.
+        second: String,
+        /// Peaks of the other that are not found in the one.
+        strangers: usize,
+        /// All peaks of the other.
+        peaks: usize,
+        /// How near they would have to lie (%).
+        percent: f64,
+    },
     /// Nothing was seen because every sensor sits where nothing moves.
     #[error(
         "every sensor sits within {percent} % of the largest displacement of zero in all observed modes: \
-         move one at least {distance} m away"
+         move one at least {distance:.3} m away"
     )]
     SensorsAtNodes {
         /// Largest displacement at a sensor over that of the mode (%).

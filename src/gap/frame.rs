@@ -52,6 +52,8 @@ pub(super) struct Frame {
     pub(super) modes: usize,
     /// How finely the structure is divided.
     pub(super) mesh: Mesh,
+    /// Radius of gyration of a sensor (m).
+    pub(super) sensor_radius: f64,
     /// Modes above this one are withheld.
     pub(super) fitted_modes: usize,
     /// Frequencies that take no part in the fit: row and reading.
@@ -84,6 +86,7 @@ impl Frame {
         settings: &GapSettings,
     ) -> Self {
         let highest = highest_mode(observations);
+        let observations = &up_to(highest, observations);
         let fitted_modes = if highest >= settings.withhold_from {
             highest.saturating_sub(settings.withheld_modes)
         } else {
@@ -106,6 +109,7 @@ impl Frame {
             small_centres: Vec::new(),
             modes: highest,
             mesh: Mesh::DIAGNOSIS,
+            sensor_radius: settings.sensor_radius,
             fitted_modes,
             withheld: Vec::new(),
             scatter: Vec::new(),
@@ -300,11 +304,25 @@ fn root_mean_square(readings: &[(Row, Reading)]) -> f64 {
     crate::stats::root_mean_square(&values)
 }
 
+/// The highest mode that half of the configurations show: by what one among many shows, a stray peak at the end of
+/// its band perhaps, nothing is tested.
 fn highest_mode(observations: &Observations) -> usize {
-    observations
-        .configurations
+    let all = &observations.configurations;
+    let seen = |mode: usize| all.iter().filter(|one| one.mode(mode).is_some()).count();
+    let modes = all
         .iter()
-        .flat_map(|c| c.modes.iter().map(|mode| mode.mode))
+        .flat_map(|c| c.modes.iter().map(|mode| mode.mode));
+    modes
+        .filter(|&mode| 2 * seen(mode) >= all.len())
         .max()
         .unwrap_or(0)
+}
+
+/// The observations without modes above this one.
+fn up_to(highest: usize, observations: &Observations) -> Observations {
+    let mut kept = observations.clone();
+    for one in &mut kept.configurations {
+        one.modes.retain(|mode| mode.mode <= highest);
+    }
+    kept
 }

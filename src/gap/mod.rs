@@ -66,6 +66,7 @@ mod small_unknowns;
 mod solved;
 mod synthetic;
 mod trial;
+mod unplaced;
 mod verdict;
 mod withheld;
 
@@ -81,6 +82,7 @@ pub use result::{
 pub use settings::GapSettings;
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
 pub use trial::MISFIT;
+pub use unplaced::Unplaced;
 pub use verdict::SEEN;
 
 use crate::identify::observation::Observations;
@@ -114,5 +116,6 @@ pub fn diagnose(
     checks::check(observations, nominal)?;
     let mut competition = search::compete(observations, nominal, settings)?;
     doubt::doubt(&mut competition);
-    Ok(assemble::diagnosis(&competition, settings))
+    let unplaced = unplaced::unplaced(observations, nominal, settings);
+    Ok(assemble::diagnosis(&competition, unplaced, settings))
 }

@@ -2,6 +2,7 @@
 
 use super::advisor::NextTest;
 use super::decay_finding::DecayFinding;
+use super::unplaced::Unplaced;
 use crate::effects::{Effect, EffectId, Group};
 
 /// The answer.
@@ -35,6 +36,9 @@ pub struct Diagnosis {
     pub along_decays: Option<DecayFinding>,
     /// Modes above this number took no part in the fit.
     pub fitted_modes: usize,
+    /// What the described model is worth without sensors that weigh and sat nobody knows where; `None` where
+    /// every place is known.
+    pub unplaced: Option<Unplaced>,
     /// Tests that would tell more, those first that tell most per cost.
     pub next_tests: Vec<NextTest>,
 }

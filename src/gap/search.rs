@@ -55,18 +55,11 @@ pub(super) fn compete(
     Ok(competition)
 }
 
-/// The observations with every place that nobody said filled in: once each for a row of places along
-/// the structure.
-fn placements(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Vec<Observations> {
-    let heavy = |name: &str| nominal.mass_of(name) > 0.0;
+/// The observations with the sensors that were described where they name none: frequencies read elsewhere were
+/// read with all of them somewhere.
+pub(super) fn filled(observations: &Observations, nominal: &Nominal) -> Observations {
     let mut filled = observations.clone();
-    let mut open = false;
     for configuration in &mut filled.configurations {
-        // Frequencies read elsewhere name no sensors: all that were described sat somewhere.
         if configuration.sensors.is_empty() && configuration.recording.is_none() {
             configuration.sensors = nominal
                 .sensors
@@ -74,14 +67,21 @@ fn placements(
                 .map(super::nominal::NominalSensor::observed)
                 .collect();
         }
-        // A sensor without a place and without a mass says nothing and weighs nothing.
-        configuration
-            .sensors
-            .iter()
-            .filter(|s| s.position.is_none() && heavy(&s.name))
-            .for_each(|_| open = true);
     }
-    if !open {
+    filled
+}
+
+/// The observations with every place that nobody said filled in: once each for a row of places along
+/// the structure.
+fn placements(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Vec<Observations> {
+    let filled = filled(observations, nominal);
+    // A sensor without a place and without a mass says nothing and weighs nothing.
+    let mut sensors = filled.configurations.iter().flat_map(|c| &c.sensors);
+    if !sensors.any(|s| s.position.is_none() && nominal.mass_of(&s.name) > 0.0) {
         return vec![filled];
     }
     let length = nominal.specimen.body.length();
@@ -162,7 +162,7 @@ pub(super) fn nominal_chi_square(
 }
 
 /// The readings, with amplitudes and slopes as the nominal model has them, and its fit.
-fn nominal_of(
+pub(super) fn nominal_of(
     observations: &Observations,
     nominal: &Nominal,
     settings: &GapSettings,
@@ -266,7 +266,12 @@ fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
         if matches!(
             small,
-            Small::Scale | Small::Shear | Small::SensorMass { .. } | Small::FastenedMass { .. }
+            Small::Scale
+                | Small::Shear
+                | Small::Temperature { .. }
+                | Small::SensorMass { .. }
+                | Small::SensorInertia { .. }
+                | Small::FastenedMass { .. }
         ) {
             *std = EXACT;
         }

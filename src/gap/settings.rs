@@ -16,10 +16,15 @@ pub struct GapSettings {
     /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
     /// the shear coefficient used here, 5/6, and Cowper's (1966) 10 (1 + nu)/(12 + 11 nu) differ for metals.
     pub shear_std: f64,
+    /// Standard deviation of a common factor on the frequencies of one visit (1): 0.02 %, a kelvin more or less on
+    /// steel.
+    pub temperature_std: f64,
     /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
     pub frequency_floor: f64,
     /// Relative standard uncertainty of a sensor's stated mass: 10 %, cable and mounting.
     pub sensor_mass_std: f64,
+    /// Radius of gyration of a sensor about the beam's axis (m): 8 mm, of one some 12 mm high on a beam 5 mm thick.
+    pub sensor_radius: f64,
     /// Relative standard uncertainty of a mass that is fastened to be known: 1 %, a kitchen scale's 0.1 g
     /// of 10 g, and the wax under it.
     pub fastened_mass_std: f64,
@@ -58,14 +63,19 @@ impl GapSettings {
             s if s.withheld_modes >= s.withhold_from => {
                 refused("withheld_modes must be less than withhold_from")
             }
-            s if ![s.scale_std, s.shear_std, s.damping_tilt]
+            s if ![s.scale_std, s.shear_std, s.temperature_std, s.damping_tilt]
                 .iter()
                 .all(positive) =>
             {
-                refused("scale_std, shear_std and damping_tilt must be finite and above 0")
+                refused(
+                    "scale_std, shear_std, temperature_std and damping_tilt must be finite and above 0",
+                )
             }
             s if !(s.frequency_floor.is_finite() && s.frequency_floor >= 0.0) => {
                 refused("frequency_floor must be finite and not below 0")
+            }
+            s if !(s.sensor_radius.is_finite() && s.sensor_radius >= 0.0) => {
+                refused("sensor_radius must be finite and not below 0")
             }
             s if s.unknown_positions == 0 => refused("unknown_positions must be at least 1"),
             _ => Ok(()),
@@ -79,8 +89,10 @@ impl Default for GapSettings {
             drift_stds: vec![0.002, 0.01, 0.02],
             scale_std: 0.002,
             shear_std: 0.02,
+            temperature_std: 2e-4,
             frequency_floor: FREQUENCY_FLOOR,
             sensor_mass_std: 0.1,
+            sensor_radius: 0.008,
             fastened_mass_std: 0.01,
             position_std: 0.001,
             gain_std: 0.03,

@@ -121,6 +121,7 @@ impl Forward<'_> {
         match *small {
             Small::Scale => 1.0,
             Small::Shear => self.frame.shear_slope(mode),
+            Small::Temperature { visit } if visit == setup.visit => 1.0,
             Small::Discrepancy { mode: own } if own == mode => 1.0,
             Small::Scatter { configuration: own } if own == configuration => {
                 self.frame.scatter_of(configuration, mode)
@@ -135,6 +136,17 @@ impl Forward<'_> {
                 .zip(&setup.sensors)
                 .filter(|(own, _)| **own == name)
                 .map(|(_, sensor)| -0.5 * sensor.mass * displacement(sensor.position).powi(2))
+                .sum(),
+            // d ln f/d J = -(phi')^2/2.
+            Small::SensorInertia { name } => setup
+                .names
+                .iter()
+                .zip(&setup.sensors)
+                .filter(|(own, _)| **own == name)
+                .map(|(_, sensor)| {
+                    let inertia = sensor.mass * self.frame.sensor_radius.powi(2);
+                    -0.5 * inertia * one.modes().slope(index, sensor.position).powi(2)
+                })
                 .sum(),
             Small::SensorPlace { place } => setup
                 .places

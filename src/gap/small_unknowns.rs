@@ -14,8 +14,12 @@ pub(super) enum Small {
     Shear,
     /// Stiffness of the joint in one visit (logarithm): direction 0 translation, 1 rotation.
     Drift { visit: usize, direction: usize },
+    /// Common factor on all frequencies of one visit (logarithm): it was warmer or colder than the others.
+    Temperature { visit: usize },
     /// Mass of a sensor over its stated one (1).
     SensorMass { name: usize },
+    /// Rotary inertia of a sensor over its mass times the square of [`GapSettings::sensor_radius`] (1).
+    SensorInertia { name: usize },
     /// Place of a sensor (m), the same in all configurations where it has the same stated one.
     SensorPlace { place: usize },
     /// A fastened mass over its stated one (1).
@@ -63,6 +67,7 @@ impl Frame {
                         settings.drift_stds[0],
                     );
                 }
+                self.small(Small::Temperature { visit }, 0.0, settings.temperature_std);
             }
         }
         for configuration in 0..self.setups.len() {
@@ -73,6 +78,7 @@ impl Frame {
         for (name, text) in names.iter().enumerate() {
             if self.nominal.mass_of(text) > 0.0 {
                 self.small(Small::SensorMass { name }, 0.0, settings.sensor_mass_std);
+                self.small(Small::SensorInertia { name }, 0.0, 1.0);
             }
         }
         let shapes = self

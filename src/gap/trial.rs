@@ -163,6 +163,12 @@ impl Trial {
         all.min_by(f64::total_cmp)
     }
 
+    /// Whether withheld readings are not predicted worse than by the nominal model: what two effects at once must
+    /// not, which have the freedom to imitate a change that no one has named.
+    pub(super) fn improves(&self) -> bool {
+        self.closure.is_none_or(|closure| closure.value > 0.0)
+    }
+
     /// Whether withheld readings leave the hypothesis its name: it closes some of the gap for certain, or closes
     /// some and predicts them within what it leaves open. Where they cannot decide, either will do.
     pub(super) fn holds(&self) -> bool {

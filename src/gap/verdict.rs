@@ -17,7 +17,8 @@ pub const SEEN: f64 = 3.0;
 /// The verdict on a ranking.
 pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Trial>) -> Verdict {
     // Many weak hypotheses share out the probability; together they are no effect either.
-    if !none.is_some_and(Trial::refuted) && most_over_none(entries) < SEEN {
+    let refuted = none.is_some_and(Trial::refuted);
+    if !refuted && most_over_none(entries) < SEEN {
         return Verdict::NoGap;
     }
     let groups = by_group(entries);
@@ -29,6 +30,10 @@ pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Tr
     // readings better than the nominal model, there is no gap.
     if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
+    }
+    // What refutes the nominal model makes no effect probable that explains the readings less well.
+    if evidence_over_none(entries, first) < SEEN {
+        return Verdict::Unknown;
     }
     // With as many unknowns as readings everything fits.
     let Some(trial) = trial.filter(|trial| trial.goodness.is_some()) else {
@@ -47,7 +52,7 @@ pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Tr
             room.readings
         ));
     }
-    let holds = trial.holds();
+    let holds = trial.holds() && (first.effects().len() < 2 || trial.improves());
     if groups[0].1 >= NAMED && holds {
         return name_of(entries, &groups[0].0);
     }
@@ -68,14 +73,19 @@ pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Tr
 
 /// Logarithm of the largest Bayes factor against the nominal model.
 fn most_over_none(entries: &[Entry]) -> f64 {
-    let evidence = |entry: &Entry| entry.fit.log_evidence;
+    let over = entries
+        .iter()
+        .map(|entry| evidence_over_none(entries, entry));
+    over.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Logarithm of the Bayes factor of one hypothesis against the nominal model.
+fn evidence_over_none(entries: &[Entry], entry: &Entry) -> f64 {
     let is_none = |entry: &&Entry| entry.hypothesis == Hypothesis::None;
     let none = entries.iter().find(is_none);
-    let most = entries
-        .iter()
-        .map(evidence)
-        .fold(f64::NEG_INFINITY, f64::max);
-    none.map_or(f64::INFINITY, |none| most - evidence(none))
+    none.map_or(f64::INFINITY, |none| {
+        entry.fit.log_evidence - none.fit.log_evidence
+    })
 }
 
 /// One effect by name; a group whose members the readings do not separate as a group.

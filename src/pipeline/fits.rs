@@ -28,6 +28,9 @@ const APART: f64 = 3.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
 /// whose frequency changes while it rings is fitted by two poles of one shape.
 const UNLIKE: f64 = 0.9;
+/// Distance from the ends of the band within which a mode without a peak is none: lines, and a share of the frequency,
+/// whichever is more.
+const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
 
@@ -186,11 +189,17 @@ impl Candidates<'_> {
         ends.is_some_and(|(first, last)| (*first..=*last).contains(&fit.frequency.value))
     }
 
-    /// Whether a fit without a peak may be a mode at all: within the band, and no more damped than what
-    /// proposes modes lets pass.
+    /// Whether a fit without a peak may be a mode at all: well within the band, and no more damped than what
+    /// proposes modes lets pass. At the ends of a band poles stand for what lies beyond it.
     fn may_be_added(&self, fit: &ModeFit) -> bool {
         let most_damping = PolyreferenceSettings::default().most_damping;
-        self.is_within(fit) && fit.damping_ratio.value < most_damping
+        let lines = self.data.frequencies();
+        let margin = |end: f64| (NEAR_ENDS.0 * self.data.spacing()).max(NEAR_ENDS.1 * end);
+        let ends = lines.first().zip(lines.last());
+        let inside = ends.is_some_and(|(first, last)| {
+            (first + margin(*first)..last - margin(*last)).contains(&fit.frequency.value)
+        });
+        inside && fit.damping_ratio.value < most_damping
     }
 
     /// Whether a proposed mode is one: asked for by the data, and no mending of a neighbour's line.

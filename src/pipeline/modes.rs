@@ -299,13 +299,15 @@ pub(super) fn number_in_order(modes: &mut [ModeResult]) {
 
 /// The numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
 /// to it, within their half lines together and [`OTHER_CONFIGURATION`], and no reading serves two
-/// modes.
+/// modes. A reading that lies nearer to a peak without a number is that peak's: a torsion mode stays one where the
+/// sensor sits on a node of the bending mode beside it.
 pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
         let distance = |index: &usize| (mode.frequency - readings[*index].frequency).abs();
         let nearest = (0..readings.len())
             .filter(|&index| readings[index].label.is_none() && numbers[index].is_none())
+            .filter(|&index| !is_of_another(modes, mode, readings[index].frequency))
             .filter(|index| {
                 let half_lines = mode.half_line.unwrap_or(0.0) + readings[*index].half_line;
                 distance(index) <= half_lines + OTHER_CONFIGURATION * mode.frequency
@@ -316,4 +318,18 @@ pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec
         }
     }
     numbers
+}
+
+/// Peaks without a number that lie nearer than this to a mode may be a part of its line (1, relative).
+const OF_ITS_LINE: f64 = 0.01;
+
+/// Whether a frequency lies nearer to a peak without a number, one apart from this mode, than to the mode.
+fn is_of_another(modes: &[ModeResult], mode: &ModeResult, frequency: f64) -> bool {
+    let apart =
+        |peak: &&ModeResult| (peak.frequency - mode.frequency).abs() > OF_ITS_LINE * mode.frequency;
+    let unpaired =
+        |peak: &&ModeResult| peak.mode.is_none() && peak.label.as_deref() == Some(UNPAIRED);
+    let own = (frequency - mode.frequency).abs();
+    let mut peaks = modes.iter().filter(unpaired).filter(apart);
+    peaks.any(|peak| (frequency - peak.frequency).abs() < own)
 }

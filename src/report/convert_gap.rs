@@ -4,11 +4,12 @@ use super::document::{
     AlongDecaysSection, BaselineSection, ClosureSection, DecayChangeSection, GapPlaceSection,
     GapSection, GapVerdictSection, HypothesisSection, JointShiftSection, LeftOutRecordingSection,
     LeftOutSection, NextTestSection, ParameterSection, PlaceMapSection, PullSection,
+    UnplacedSection,
 };
 use crate::effects::EffectId;
 use crate::gap::{
     Closure, DecayFinding, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult,
-    JointShift, LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Verdict,
+    JointShift, LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Unplaced, Verdict,
 };
 
 /// The section of a diagnosis, or of the reason why there is none.
@@ -38,6 +39,7 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         goodness_of_fit: found.goodness_of_fit,
         joint_shift: Some(shift(&found.joint_shift)),
         fitted_modes: Some(found.fitted_modes),
+        unplaced: found.unplaced.as_ref().map(unplaced),
         decided_by: Some(
             match found.decided_by {
                 DecidedBy::Readings => "readings",
@@ -50,6 +52,15 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         baselines: baselines(&found.hypotheses),
         next_test: found.next_tests.iter().map(next_test).collect(),
         updated_model: None,
+    }
+}
+
+fn unplaced(found: &Unplaced) -> UnplacedSection {
+    UnplacedSection {
+        sensors: found.sensors.clone(),
+        mass: found.mass,
+        gap: found.gap,
+        goodness_of_fit: found.goodness_of_fit,
     }
 }
 

@@ -21,7 +21,7 @@ pub use super::document_gap::{
     AlongDecaysSection, BaselineSection, ClosureSection, DecayChangeSection, GapPlaceSection,
     GapSection, GapVerdictSection, HypothesisSection, JointShiftSection, LeftOutRecordingSection,
     LeftOutSection, NextTestSection, ParameterSection, PlaceMapSection, PullSection,
-    UpdatedModelSection,
+    UnplacedSection, UpdatedModelSection,
 };
 pub use super::document_perturbation::{
     AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,

@@ -23,6 +23,9 @@ pub struct GapSection {
     pub joint_shift: Option<JointShiftSection>,
     /// Modes above this number took no part in the fit; null without a diagnosis.
     pub fitted_modes: Option<usize>,
+    /// What the described model is worth without sensors that weigh and sat nobody knows where; null where every
+    /// place is known.
+    pub unplaced: Option<UnplacedSection>,
     /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
     pub decided_by: Option<String>,
     /// What the decays by themselves say of a joint whose stiffness depends on the amplitude, whatever the
@@ -37,6 +40,19 @@ pub struct GapSection {
     /// The model with what was found, to predict with; null where nothing predicts, and where the verdict is
     /// "unknown".
     pub updated_model: Option<UpdatedModelSection>,
+}
+
+/// Sensors that weigh and sat nobody knows where.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct UnplacedSection {
+    /// Their names.
+    pub sensors: Vec<String>,
+    /// Their mass together (kg).
+    pub mass: f64,
+    /// Root mean square of the frequency errors of the described model without them (%).
+    pub gap: f64,
+    /// Probability of a misfit as large or larger without them.
+    pub goodness_of_fit: f64,
 }
 
 /// A model brought up to date.

@@ -482,12 +482,6 @@ fn regress_sensors_and_hammers_that_cannot_be() {
                 &["allowed: 0 to 0.423 m"],
             ),
             case(
-                ("position = 0.338\n", ""),
-                24,
-                "sensor[1].mass",
-                &["`position` is missing"],
-            ),
-            case(
                 ("mass = \"24 g\"", "mass = -1"),
                 25,
                 "sensor[1].mass",

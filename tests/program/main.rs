@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
 mod browser;
+mod diagnose;
 mod documents;
 mod export;
 mod first_steps;

@@ -64,6 +64,8 @@ pub(super) struct Proposals {
     pub(super) whole: Frame,
     /// How well each small unknown is known that was added for a planned test.
     pub(super) added: Vec<Added>,
+    /// How much warmer or colder a new visit may be, as a factor on its frequencies (1).
+    temperature_std: f64,
     /// The beam by itself.
     pub(super) bare: Option<Frame>,
     /// The configuration in which gravity is turned over.
@@ -107,6 +109,7 @@ impl Proposals {
             all: Vec::new(),
             whole,
             added: Vec::new(),
+            temperature_std: settings.temperature_std,
             bare: None,
             turned: None,
         };
@@ -294,6 +297,10 @@ impl Proposals {
         for (direction, _) in sought.filter(|one| one.0 != COUPLING) {
             self.add(Small::Drift { visit, direction }, Added::Drift(drift));
         }
+        self.add(
+            Small::Temperature { visit },
+            Added::Stated(self.temperature_std),
+        );
         let configuration = self.whole.setups.len();
         self.whole.setups.push(setup);
         observed_modes(frame)

@@ -3,7 +3,7 @@
 use super::super::document::{
     ClosureSection, Document, GapSection, HypothesisSection, PullSection,
 };
-use super::super::format::probability;
+use super::super::format::{probability, trimmed};
 use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
 use super::next_tests::next_test;
 use crate::gap::{MISFIT, SEEN};
@@ -98,7 +98,20 @@ fn undecided(gap: &GapSection) -> String {
     let Some(none) = of("none") else {
         return format!("No diagnosis: {reason}.");
     };
-    let mut text = if none.probability < GAP {
+    let without = gap
+        .unplaced
+        .as_ref()
+        .filter(|one| one.goodness_of_fit < MISFIT);
+    let mut text = if let Some(without) = without {
+        format!(
+            "There is a gap: without the {} g of {}, which sat nobody knows where, the described model misses the \
+             frequencies by {} % (rms), as chance would in {} of tests. These data cannot say what causes it: {reason}.",
+            trimmed(1e3 * without.mass, 3),
+            without.sensors.join(" and "),
+            percent(Some(without.gap)),
+            probability(without.goodness_of_fit),
+        )
+    } else if none.probability < GAP {
         format!(
             "There is a gap ({}): the described model with its joint refitted misses the frequencies by \
              {} % (rms), where their uncertainty is {} %. These data cannot say what causes it: {reason}.",

@@ -3,6 +3,7 @@
 use super::Outcome;
 use super::input::{TestFile, read_test};
 use super::output::{OutputError, OutputFolder};
+use super::renamed::renamed;
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -21,8 +22,8 @@ use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::{WavFormat, encode_wav};
 use tapjoint::report::blind_check::render_blind_check;
 use tapjoint::study::blind_check::{
-    Answer, Campaign, Case, DrawnTest, Extent, RecordedTest, Truth, TruthFile, always_scale,
-    commitment, parse_truths, render_rows, rows, score, shuffled,
+    Answer, Campaign, Case, Conduct, DrawnTest, Extent, RecordedTest, Truth, TruthFile, commitment,
+    parse_truths, render_rows, rows, score,
 };
 
 /// Draw virtual tests with an effect withheld, diagnose each without the answer, score.
@@ -117,7 +118,7 @@ pub(super) fn run(
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
     let output = OutputFolder::prepare(&arguments.out)?;
-    let cases = match (&arguments.folder, &arguments.truth) {
+    let (cases, conduct) = match (&arguments.folder, &arguments.truth) {
         (Some(folder), Some(truth)) => elsewhere(folder, truth, &terminal)?,
         _ => drawn(
             &arguments.campaign(seed)?,
@@ -126,23 +127,25 @@ pub(super) fn run(
         )?,
     };
     let scores = score(&cases);
-    terminal.say(&render_rows(&rows(&scores)))?;
-    let chance = score(&shuffled(&cases, seed)).top_1.value();
-    let scale = score(&always_scale(&cases)).top_1.value();
+    let conduct = conduct.mutated(&cases, seed);
+    terminal.say(&render_rows(&rows(&scores, conduct.extent)))?;
     let percent =
         |share: Option<f64>| share.map_or("-".to_owned(), |p| format!("{:.0} %", 100.0 * p));
     terminal.say(&format!(
-        "\nFirst group right by answers dealt out to other tests: {}; by always answering one common\n\
-         factor: {}.",
-        percent(chance),
-        percent(scale)
+        "\nFirst group right by answers dealt out to other tests: {}; by always\n\
+         answering one common factor: {}. Files renamed: same answers ({} tests).",
+        percent(conduct.shuffled),
+        percent(conduct.always_scale),
+        conduct.renamed
     ))?;
-    for file in render_blind_check(&cases, &scores)? {
+    for file in render_blind_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
     }
     let folder = output.publish()?;
     terminal.say(&format!("Results: {}", folder.display()))?;
-    terminal.write_json(&tapjoint::report::blind_check::score_json(&scores))?;
+    terminal.write_json(&tapjoint::report::blind_check::score_json(
+        &scores, &conduct,
+    ))?;
     Ok(Outcome::Answered)
 }
 
@@ -151,7 +154,7 @@ fn drawn(
     campaign: &Campaign,
     keep: Option<&Path>,
     terminal: &Terminal,
-) -> anyhow::Result<Vec<Case>> {
+) -> anyhow::Result<(Vec<Case>, Conduct)> {
     let kept = keep.map(new_folder).transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
@@ -169,10 +172,10 @@ fn drawn(
         })
         .collect::<Result<Vec<Truth>, _>>()?;
     let sealed = tapjoint::report::blind_check::truths_json(&truths)?;
-    terminal.say(&format!(
-        "{} tests drawn; SHA-256 of truth.json: {}",
-        tests.len(),
-        commitment(&sealed)
+    let commitment = commitment(&sealed);
+    terminal.seal(&format!(
+        "{} tests drawn; SHA-256 of truth.json: {commitment}",
+        tests.len()
     ))?;
     let done = AtomicUsize::new(0);
     let diagnosed = tests
@@ -196,12 +199,17 @@ fn drawn(
             Ok(case)
         })
         .collect::<anyhow::Result<Vec<Case>>>()?;
-    check_names(&tests, &diagnosed)?;
+    let conduct = Conduct {
+        extent: Some(campaign.extent),
+        commitment: Some(commitment),
+        renamed: check_names(&tests, &diagnosed)?,
+        ..Conduct::default()
+    };
     if let Some(kept) = kept {
         kept.add("truth.json", sealed.as_bytes())?;
         kept.publish()?;
     }
-    Ok(diagnosed)
+    Ok((diagnosed, conduct))
 }
 
 /// A new folder of tests that appears whole or not at all.
@@ -213,9 +221,11 @@ fn new_folder(name: &Path) -> anyhow::Result<OutputFolder> {
     Ok(OutputFolder::prepare(name)?)
 }
 
-/// The first tests again under other names: the answers must not change.
-fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<()> {
-    const AGAIN: usize = 3;
+/// How many tests are diagnosed again under other names.
+const AGAIN: usize = 3;
+
+/// The first tests again under other names: the answers must not change. Returns how many there were.
+fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
     for (test, (_, answer)) in tests.iter().zip(cases).take(AGAIN) {
         let mut recorded = test.record()?;
         let mut random = ChaCha8Rng::seed_from_u64(test.seed ^ 0x5eed);
@@ -235,7 +245,7 @@ fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<()> {
             );
         }
     }
-    Ok(())
+    Ok(tests.len().min(AGAIN))
 }
 
 fn diagnose_in_passing(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
@@ -284,7 +294,11 @@ fn diagnosis_of(test: &TestDescription, folder: &Path) -> anyhow::Result<Diagnos
 }
 
 /// Tests made elsewhere: those that both the folder and the truth file know.
-fn elsewhere(folder: &Path, truth: &Path, terminal: &Terminal) -> anyhow::Result<Vec<Case>> {
+fn elsewhere(
+    folder: &Path,
+    truth: &Path,
+    terminal: &Terminal,
+) -> anyhow::Result<(Vec<Case>, Conduct)> {
     let name = truth.display();
     let text = fs::read_to_string(truth).with_context(|| format!("{name}: cannot be read"))?;
     let TruthFile { truths, doubts } = parse_truths(&text).with_context(|| name.to_string())?;
@@ -340,7 +354,32 @@ fn elsewhere(folder: &Path, truth: &Path, terminal: &Terminal) -> anyhow::Result
         });
         (truth, answer)
     });
-    Ok(cases.collect())
+    let cases: Vec<Case> = cases.collect();
+    let conduct = Conduct {
+        renamed: check_names_elsewhere(folder, &cases)?,
+        ..Conduct::default()
+    };
+    Ok((cases, conduct))
+}
+
+/// The first of the tests made elsewhere again, with their recordings under other names.
+fn check_names_elsewhere(folder: &Path, cases: &[Case]) -> anyhow::Result<usize> {
+    let mut again = 0;
+    for (truth, answer) in cases.iter().take(AGAIN) {
+        let Some(copy) = renamed(&folder.join(&truth.name))? else {
+            continue;
+        };
+        let text = fs::read_to_string(copy.path().join("test.toml"))?;
+        let test = TestDescription::parse(&text, "test.toml")?;
+        if case_of(&test, copy.path(), truth).1 != *answer {
+            bail!(
+                "the answer to {} depends on the names of its files",
+                truth.name
+            );
+        }
+        again += 1;
+    }
+    Ok(again)
 }
 
 /// Folders with a test of which the truths do not speak, in order.

@@ -10,6 +10,7 @@ mod help;
 mod input;
 mod output;
 mod progress;
+mod renamed;
 mod stiffness;
 mod terminal;
 mod updated_model;

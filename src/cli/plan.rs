@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use tapjoint::description::{JointModel, TestDescription};
 use tapjoint::report::blind_check::{render_confusion_picture, score_json, tell_apart};
 use tapjoint::structure::JointStiffness;
-use tapjoint::study::blind_check::score;
+use tapjoint::study::blind_check::{Conduct, score};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
 /// Before measuring: which effects this test could tell apart.
@@ -83,7 +83,7 @@ pub(super) fn run(
         let picture = render_confusion_picture(&cases, png.picture_format())?;
         png.write(&picture)?;
     }
-    terminal.write_json(&score_json(&score(&cases)))?;
+    terminal.write_json(&score_json(&score(&cases), &Conduct::default()))?;
     Ok(Outcome::Answered)
 }
 

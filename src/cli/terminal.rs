@@ -48,6 +48,14 @@ impl Terminal {
         print(text)
     }
 
+    /// Prints what has to be said before the work begins: on standard error where standard output belongs to JSON.
+    pub(super) fn seal(&self, text: &str) -> io::Result<()> {
+        if !self.quiet && matches!(self.json, Some(Json::StandardOutput)) {
+            let _ = writeln!(io::stderr(), "{text}");
+        }
+        self.say(text)
+    }
+
     /// Shows on standard error that work goes on, if that is a terminal; until the answer is dropped.
     pub(super) fn progress(&self, doing: &'static str) -> Option<Progress> {
         (!self.quiet && io::stderr().is_terminal()).then(|| Progress::start(doing))

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use tapjoint::effects::{EffectId, Place};
 use tapjoint::study::blind_check::{
-    Answer, Case, Class, Planted, Rate, Truth, Verdict, always_scale, parse_truths, rows, score,
-    shuffled,
+    Answer, Case, Class, Extent, Planted, Rate, Row, Target, Truth, Verdict, always_scale,
+    parse_truths, render_rows, rows, score, shuffled,
 };
 
 fn planted(name: &str, effects: &[EffectId], size: f64) -> Truth {
@@ -178,7 +178,10 @@ fn prop_mutations_lose() {
 fn prop_rates_do_not_depend_on_the_order_of_cases() {
     let (first, mut second) = (cases(), cases());
     second.reverse();
-    for (a, b) in rows(&score(&first)).iter().zip(rows(&score(&second))) {
+    for (a, b) in rows(&score(&first), None)
+        .iter()
+        .zip(rows(&score(&second), None))
+    {
         assert_eq!((a.key, a.counts), (b.key, b.counts));
         // Sums in another order differ in their last digit.
         let difference = a.value.zip(b.value).map_or(0.0, |(a, b)| (a - b).abs());
@@ -188,8 +191,33 @@ fn prop_rates_do_not_depend_on_the_order_of_cases() {
 }
 
 #[test]
+fn limit_one_recording_is_held_against_an_ideal_observer_and_no_target_of_five() {
+    let wrong = answer(Verdict::Named, group(EffectId::LocalCrack), 0.9);
+    let missed: Vec<Case> = vec![(planted("a", &[EffectId::SensorMass], 1.0), wrong)];
+    let with = |extent| rows(&score(&missed), extent);
+    let of = |rows: &[Row], key: &str| rows.iter().find(|row| row.key == key).unwrap().clone();
+    let one = with(Some(Extent::OneRecording));
+    assert_eq!(of(&one, "top_1").target, Target::None);
+    // The study's figure for one configuration and five modes.
+    assert_eq!(of(&one, "top_1").ideal, Some(0.664));
+    let five = with(Some(Extent::FiveRecordings));
+    assert_eq!(of(&five, "top_1").ideal, Some(0.872));
+    assert_eq!(of(&with(None), "top_1").ideal, None);
+    let text = render_rows(&five);
+    assert!(
+        text.contains(">=0.80!") && text.contains("! the target is missed"),
+        "{text}"
+    );
+    assert!(!render_rows(&one).contains('!'));
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 80),
+        "{text}"
+    );
+}
+
+#[test]
 fn limit_no_cases_have_no_figures() {
-    let rows = rows(&score(&[]));
+    let rows = rows(&score(&[]), None);
     assert!(rows.iter().all(|row| row.value.is_none()), "{rows:?}");
 }
 

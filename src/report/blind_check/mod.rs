@@ -12,20 +12,25 @@ use serde_json::{Value, json};
 
 use super::plot::{PictureFormat, render_picture};
 use super::{ReportError, ReportFile};
-use crate::study::blind_check::{Case, Planted, Row, Scores, Target, Truth, rows};
+use crate::study::blind_check::{Case, Conduct, Planted, Row, Scores, Target, Truth, rows};
 
 /// All files: `score.json`, `cases.csv`, `truth.json`, and as PNG and SVG `confusion`, `reliability`,
 /// `closure`.
 ///
 /// # Errors
 /// The first that cannot be made.
-pub fn render_blind_check(cases: &[Case], scores: &Scores) -> Result<Vec<ReportFile>, ReportError> {
+pub fn render_blind_check(
+    cases: &[Case],
+    scores: &Scores,
+    conduct: &Conduct,
+) -> Result<Vec<ReportFile>, ReportError> {
     let truths: Vec<Truth> = cases.iter().map(|(truth, _)| truth.clone()).collect();
     let text = |name: &str, text: String| ReportFile {
         name: name.to_owned(),
         bytes: text.into_bytes(),
     };
-    let score = serde_json::to_string_pretty(&score_json(scores)).map_err(ReportError::Json)?;
+    let score =
+        serde_json::to_string_pretty(&score_json(scores, conduct)).map_err(ReportError::Json)?;
     let mut files = vec![
         text("score.json", score + "\n"),
         text("cases.csv", cases_csv(cases)),
@@ -102,9 +107,10 @@ fn name_of(planted: &Planted) -> &str {
     }
 }
 
-/// The score: every figure with its interval, its counts and what was aimed at.
-pub fn score_json(scores: &Scores) -> Value {
-    let figures: serde_json::Map<String, Value> = rows(scores)
+/// The score: every figure with its interval, its counts, what was aimed at and what an ideal observer reaches; and how
+/// the check was conducted.
+pub fn score_json(scores: &Scores, conduct: &Conduct) -> Value {
+    let figures: serde_json::Map<String, Value> = rows(scores, conduct.extent)
         .iter()
         .map(|row| (row.key.to_owned(), figure_json(row)))
         .collect();
@@ -115,12 +121,22 @@ pub fn score_json(scores: &Scores) -> Value {
         .iter()
         .map(|bin| json!({"from": bin.from, "cases": bin.cases, "stated": bin.stated, "right": bin.right}))
         .collect();
-    json!({
+    let mut score = json!({
         "version": super::document::VERSION,
         "cases": {"none": nulls, "one": singles, "several": several, "outside": outside},
         "figures": figures,
         "reliability": reliability,
-    })
+    });
+    // A plan seals and renames nothing.
+    if *conduct != Conduct::default() {
+        score["commitment"] = json!(conduct.commitment);
+        score["mutations"] = json!({
+            "shuffled_top_1": conduct.shuffled,
+            "always_scale_top_1": conduct.always_scale,
+            "renamed_same_answer": conduct.renamed,
+        });
+    }
+    score
 }
 
 fn figure_json(row: &Row) -> Value {
@@ -137,6 +153,7 @@ fn figure_json(row: &Row) -> Value {
         "hits": row.counts.map(|counts| counts.0),
         "of": row.counts.map(|counts| counts.1),
         "target": target,
+        "ideal": row.ideal,
     })
 }
 

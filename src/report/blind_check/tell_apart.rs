@@ -59,7 +59,9 @@ pub fn tell_apart(cases: &[Case]) -> String {
 
 /// The figures that there are cases for, without targets.
 fn drawn_rows(scores: &Scores) -> Vec<Row> {
-    let drawn = rows(scores).into_iter().filter(|row| row.value.is_some());
+    let drawn = rows(scores, None)
+        .into_iter()
+        .filter(|row| row.value.is_some());
     drawn
         .map(|row| Row {
             target: Target::None,

@@ -5,8 +5,35 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::case::{Answer, Class, Truth, Verdict};
-use super::score::Case;
+use super::draw::Extent;
+use super::score::{Case, score};
 use crate::effects::EffectId;
+
+/// How a check was conducted, and what answers earn that cannot know.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Conduct {
+    /// Recordings of each test; `None` of tests made elsewhere.
+    pub extent: Option<Extent>,
+    /// SHA-256 of the truths, printed before anything was diagnosed; `None` of tests made elsewhere.
+    pub commitment: Option<String>,
+    /// Share of first groups right by answers dealt out to other tests; `None` without a test of one effect.
+    pub shuffled: Option<f64>,
+    /// The same by always answering one common factor on all frequencies.
+    pub always_scale: Option<f64>,
+    /// Tests that were diagnosed again under other names of their files, with the same answer.
+    pub renamed: usize,
+}
+
+impl Conduct {
+    /// With what the answers earn once they are dealt out to other tests, and once they are all the same.
+    pub fn mutated(self, cases: &[Case], seed: u64) -> Self {
+        Conduct {
+            shuffled: score(&shuffled(cases, seed)).top_1.value(),
+            always_scale: score(&always_scale(cases)).top_1.value(),
+            ..self
+        }
+    }
+}
 
 /// The same answers, dealt out to other cases: what is left is what guessing earns.
 pub fn shuffled(cases: &[Case], seed: u64) -> Vec<Case> {

@@ -1,5 +1,7 @@
 //! The score as rows: what each rate means, what was reached, what was aimed at.
 
+use super::draw::Extent;
+use super::ideal::ideal;
 use super::rate::Rate;
 use super::score::Scores;
 
@@ -41,10 +43,24 @@ pub struct Row {
     /// What is aimed at with five recordings (two sensor positions, three tap positions, two
     /// levels, six modes).
     pub target: Target,
+    /// What an ideal observer reaches; `None` where that is not known.
+    pub ideal: Option<f64>,
 }
 
-/// All figures in the order of reading.
-pub fn rows(scores: &Scores) -> Vec<Row> {
+/// All figures in the order of reading, of tests of this extent; of tests made elsewhere (`None`) beside what is aimed
+/// at with five recordings. With one recording nothing is aimed at but what an ideal observer reaches.
+pub fn rows(scores: &Scores, extent: Option<Extent>) -> Vec<Row> {
+    let mut rows = all_rows(scores);
+    for row in &mut rows {
+        row.ideal = extent.and_then(|extent| ideal(row.key, extent));
+        if extent == Some(Extent::OneRecording) && row.key != "no_answer" {
+            row.target = Target::None;
+        }
+    }
+    rows
+}
+
+fn all_rows(scores: &Scores) -> Vec<Row> {
     use Target::{AtLeast, AtMost};
     let s = scores;
     let mut rows = vec![
@@ -214,6 +230,7 @@ fn rate(key: &'static str, meaning: &'static str, rate: Rate, target: Target) ->
         interval: rate.interval(),
         counts: Some((rate.hits, rate.of)),
         target,
+        ideal: None,
     }
 }
 
@@ -225,18 +242,21 @@ fn figure(key: &'static str, meaning: &'static str, value: Option<f64>, target: 
         interval: None,
         counts: None,
         target,
+        ideal: None,
     }
 }
 
-/// The rows as a table for a terminal, 80 columns wide; the targets where there are any.
+/// The rows as a table for a terminal, 80 columns wide; targets and an ideal observer's figures where there are any.
 pub fn render_rows(rows: &[Row]) -> String {
     let aimed_at = rows.iter().any(|row| row.target != Target::None);
+    let compared = rows.iter().any(|row| row.ideal.is_some());
     let head = format!(
-        "{:<36}{:>7}  {:<15}{:>9}  {}",
+        "{:<34}{:>6}  {:<14}{:>8}{:>7}  {}",
         "figure",
         "value",
         "95 % interval",
         "cases",
+        if compared { "ideal" } else { "" },
         if aimed_at { "target" } else { "" }
     );
     let mut text = head.trim_end().to_owned() + "\n";
@@ -250,15 +270,25 @@ pub fn render_rows(rows: &[Row]) -> String {
         let counts = row
             .counts
             .map_or_else(String::new, |(hits, of)| format!("{hits}/{of}"));
+        let ideal = row
+            .ideal
+            .map_or_else(String::new, |ideal| format!("{ideal:.2}"));
         let line = format!(
-            "{:<36}{value:>7}  {interval:<15}{counts:>9}  {}",
+            "{:<34}{value:>6}  {interval:<14}{counts:>8}{ideal:>7}  {}",
             row.meaning,
             target_text(row)
         );
         text.push_str(line.trim_end());
         text.push('\n');
     }
+    if rows.iter().any(is_missed) {
+        text.push_str("! the target is missed\n");
+    }
     text
+}
+
+fn is_missed(row: &Row) -> bool {
+    row.value.is_some_and(|value| !row.target.is_met(value))
 }
 
 fn target_text(row: &Row) -> String {
@@ -267,6 +297,5 @@ fn target_text(row: &Row) -> String {
         Target::AtMost(limit) => ("<=", limit),
         Target::None => return String::new(),
     };
-    let missed = row.value.is_some_and(|value| !row.target.is_met(value));
-    format!("{sign} {limit:.2}{}", if missed { " MISSED" } else { "" })
+    format!("{sign}{limit:.2}{}", if is_missed(row) { "!" } else { "" })
 }

@@ -59,9 +59,12 @@ fn name_of(observations: &Observations, k: usize) -> String {
 const LEAST_PEAKS: usize = 4;
 /// What moved sensors and another level move a frequency by at most (1, relative).
 const MOVED: f64 = 0.05;
+/// What a mass that nobody spoke of, or a joint that was tightened again, moves one by.
+const CHANGED: f64 = 0.15;
 
 /// Refuses configurations of which each has fewer than half of its peaks in common with the other: peaks may be
-/// missing in one, where a sensor sits on nodes, or stray, but then most of the other's are found.
+/// missing in one, where a sensor sits on nodes, or stray, but then most of the other's are found. Where the peaks
+/// follow each other in order, if farther apart, something was changed on one structure: that is for the diagnosis.
 fn same_peaks(observations: &Observations) -> Result<(), GapError> {
     let all = &observations.configurations;
     let peaks: Vec<Vec<f64>> = all.iter().map(peaks_of).collect();
@@ -77,7 +80,8 @@ fn same_peaks(observations: &Observations) -> Result<(), GapError> {
             let most = |strangers: usize, own: usize| {
                 peaks[own].len() >= LEAST_PEAKS && 2 * strangers > peaks[own].len()
             };
-            if most(strangers[0], second) && most(strangers[1], first) {
+            let changed = are_in_order(&peaks[first], &peaks[second]);
+            if !changed && most(strangers[0], second) && most(strangers[1], first) {
                 return Err(GapError::AnotherStructure {
                     first: name_of(observations, first),
                     second: name_of(observations, second),
@@ -91,12 +95,23 @@ fn same_peaks(observations: &Observations) -> Result<(), GapError> {
     Ok(())
 }
 
-/// Frequencies of all its resonances (Hz), with a number or without.
+/// Whether most frequencies of two ascending lists lie in pairs beside each other.
+fn are_in_order(one: &[f64], other: &[f64]) -> bool {
+    let pairs = one.iter().zip(other);
+    let near = pairs
+        .filter(|(a, b)| (*a / *b - 1.0).abs() <= CHANGED)
+        .count();
+    2 * near > one.len().min(other.len())
+}
+
+/// Frequencies of all its resonances (Hz), with a number or without, ascending.
 fn peaks_of(configuration: &Configuration) -> Vec<f64> {
     let resonances = configuration.extra_peaks.iter();
     let extra = resonances.filter(|peak| peak.label == UNPAIRED);
     let modes = configuration.modes.iter().map(|mode| mode.frequency);
-    modes.chain(extra.map(|peak| peak.frequency)).collect()
+    let mut all: Vec<f64> = modes.chain(extra.map(|peak| peak.frequency)).collect();
+    all.sort_by(f64::total_cmp);
+    all
 }
 
 fn one_structure(observations: &Observations) -> Result<(), GapError> {

@@ -71,7 +71,7 @@ fn left(probabilities: &[f64], odds: &[Option<f64>]) -> Option<(usize, Vec<Optio
 }
 
 /// Highest odds against an explanation whose misfit has the probability `p`.
-fn most_against(p: f64) -> f64 {
+pub(super) fn most_against(p: f64) -> f64 {
     use std::f64::consts::E;
     let p = p.clamp(SMALLEST_MISFIT, 1.0 / E);
     -1.0 / (E * p * p.ln())

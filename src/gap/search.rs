@@ -23,8 +23,8 @@ use rayon::prelude::*;
 /// What the hypotheses made of the readings.
 pub(super) struct Competition {
     pub(super) frame: Frame,
-    /// The nominal model as described, only its joint refitted, the same for all recordings: where the gap
-    /// is measured from.
+    /// The nominal model as described, only its joint refitted, for every visit as far as it may drift: where the gap is
+    /// measured from.
     pub(super) described: Fit,
     /// The same with a joint that may drift between recordings: where a cause is looked for along the beam.
     pub(super) baseline: Fit,
@@ -260,7 +260,8 @@ fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     fit_nominal(&exact, settings)
 }
 
-/// The same with a joint that is one and the same in all visits, and with sensors that weigh what was said.
+/// The same with sensors and fastened masses that weigh what was said. Joint and warmth may differ between visits as they
+/// may under every hypothesis: what these explain no effect is credited with.
 fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     let mut exact = frame.clone();
     for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
@@ -268,7 +269,6 @@ fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
             small,
             Small::Scale
                 | Small::Shear
-                | Small::Temperature { .. }
                 | Small::SensorMass { .. }
                 | Small::SensorInertia { .. }
                 | Small::FastenedMass { .. }
@@ -276,11 +276,7 @@ fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
             *std = EXACT;
         }
     }
-    let settings = GapSettings {
-        drift_stds: vec![EXACT],
-        ..settings.clone()
-    };
-    fit_nominal(&exact, &settings)
+    fit_nominal(&exact, settings)
 }
 
 /// Standard deviation (1) of what is taken at its word: far below what any reading shows.

@@ -201,6 +201,19 @@ mod tests {
         }
     }
 
+    /// Two effects at once must not predict worse than none; without withheld readings nothing is said.
+    #[test]
+    fn limit_two_effects_have_to_improve_on_withheld_readings() {
+        for (closure, improves) in [(-7.0, false), (0.1, true)] {
+            assert_eq!(trial(0.5, false, [closure, -9.0]).improves(), improves);
+        }
+        let unknown = Trial {
+            closure: None,
+            ..trial(0.5, false, [0.0; 2])
+        };
+        assert!(unknown.improves());
+    }
+
     #[test]
     fn limit_what_makes_withheld_readings_worse_has_to_predict_them() {
         for (withheld, decides, closure, holds) in [

@@ -1,5 +1,6 @@
 //! From probabilities to an answer, or to none.
 
+use super::doubt::most_against;
 use super::posterior::{APART, Entry, by_group, lead};
 use super::result::{Hypothesis, Verdict};
 use super::trial::Trial;
@@ -17,7 +18,9 @@ pub const SEEN: f64 = 3.0;
 /// The verdict on a ranking.
 pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Trial>) -> Verdict {
     // Many weak hypotheses share out the probability; together they are no effect either.
-    let refuted = none.is_some_and(Trial::refuted);
+    // Nor does a misfit that says less against the nominal model than an effect has to say for itself.
+    let against = none.and_then(Trial::refuting).map_or(1.0, most_against);
+    let refuted = against >= SEEN.exp();
     if !refuted && most_over_none(entries) < SEEN {
         return Verdict::NoGap;
     }
@@ -144,5 +147,48 @@ fn set_of(entries: &[Entry], groups: &[(Vec<usize>, f64)]) -> Verdict {
              would separate them",
             100.0 * SET.0
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::example::{plan, strip};
+    use super::super::frame::Frame;
+    use super::super::hypothesis::fit_nominal;
+    use super::super::settings::GapSettings;
+    use super::super::synthetic::observe;
+    use super::*;
+
+    /// What refutes the nominal model, one block perhaps, gives no name to an effect that explains less.
+    #[test]
+    fn regress_an_effect_without_evidence_is_not_named() {
+        let settings = GapSettings::default();
+        let observations = observe(&plan(&[0.34, 0.19]), &strip(0.004), &[], 3).unwrap();
+        let frame = Frame::new(&observations, &strip(0.004), &settings);
+        let fit = fit_nominal(&frame, &settings).unwrap();
+        let entry = |hypothesis, evidence: f64, probability| {
+            let mut entry = Entry::new(hypothesis, fit.clone());
+            entry.fit.log_evidence = evidence;
+            entry.probability = probability;
+            entry
+        };
+        let fixture = Hypothesis::Effects(vec![EffectId::Fixture]);
+        let answer = |misfit: f64, evidence: f64| {
+            let entries = [
+                entry(fixture.clone(), evidence, 0.99),
+                entry(Hypothesis::None, 0.0, 0.01),
+            ];
+            let stands = Trial::new(&frame, &fit).unwrap();
+            let mut refuted = stands.clone();
+            refuted.goodness = Some(misfit);
+            verdict(&entries, Some(&stands), Some(&refuted))
+        };
+        assert_eq!(answer(1e-6, -3.6), Verdict::Unknown);
+        // One in 110: odds of 8 to 1 at most.
+        assert_eq!(answer(0.009, -3.6), Verdict::NoGap);
+        for misfit in [1e-6, 0.009] {
+            let named = Verdict::Named(vec![EffectId::Fixture]);
+            assert_eq!(answer(misfit, 20.0), named);
+        }
     }
 }

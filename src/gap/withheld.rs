@@ -156,6 +156,24 @@ fn root_mean_square(values: &DVector<f64>) -> f64 {
 mod tests {
     use super::*;
 
+    fn errors(size: f64, std: f64) -> WithheldErrors {
+        let spread = DMatrix::from_diagonal_element(2, 2, std * std);
+        WithheldErrors::from_parts(
+            DVector::from_element(2, size),
+            spread,
+            DVector::from_element(2, std),
+        )
+    }
+
+    /// (0.2^2 - 0.05^2)/(0.2^2 - 0.02^2), and none where the gap is below two floors.
+    #[test]
+    fn val_closure_by_hand() {
+        let found = closure(&errors(0.2, 0.02), &errors(0.05, 0.02), 1).unwrap();
+        assert!((found.value - 0.0375 / 0.0396).abs() < 1e-12, "{found:?}");
+        assert!(found.low <= found.value && found.value <= found.high);
+        assert_eq!(closure(&errors(0.039, 0.02), &errors(0.01, 0.02), 1), None);
+    }
+
     /// A covariance of rank one, and one that rounding has made indefinite.
     #[test]
     fn limit_a_singular_covariance_has_a_root() {

@@ -146,8 +146,8 @@ pub struct MergedMode {
 /// Merges the readings of several recordings, ascending in frequency.
 ///
 /// Readings are the same resonance when they differ by less than their half lines together plus
-/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule; a larger drift lists a
-/// mode twice, which is less harm than two modes taken for one); a fitted
+/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule), or by up to 1.5 % (a joint's
+/// drift of 3 %, where the mode lives in the joint) and no recording shows both; a fitted
 /// one stays before one that is not, of two fits the one with the smaller standard deviation, else the
 /// one with the smaller half line, and among equals the one that stands out most. Two readings of one recording are
 /// never merged.
@@ -180,9 +180,46 @@ pub fn merge_modes(recordings: &[Vec<ModeReading>]) -> Vec<MergedMode> {
             }
         }
     }
+    merge_drifted(&mut merged);
     let mut modes: Vec<MergedMode> = merged.into_iter().map(|(mode, _)| mode).collect();
     modes.sort_by(|a, b| a.reading.frequency.total_cmp(&b.reading.frequency));
     modes
+}
+
+/// Largest relative distance of two readings of a mode that drifted from one recording to another.
+const DRIFTED: f64 = 0.015;
+
+/// Merges resonances that no recording shows side by side, the nearest first.
+fn merge_drifted(merged: &mut Vec<(MergedMode, Vec<usize>)>) {
+    while let Some((first, second)) = nearest_apart(merged) {
+        let (other, seen) = merged.remove(second);
+        let (mode, own) = &mut merged[first];
+        own.extend(seen);
+        if resolves_better(&other.reading, &mode.reading) {
+            *mode = other;
+        }
+    }
+}
+
+/// The two nearest resonances within [`DRIFTED`] that were seen in different recordings.
+fn nearest_apart(merged: &[(MergedMode, Vec<usize>)]) -> Option<(usize, usize)> {
+    let distance = |&(a, b): &(usize, usize)| {
+        let of = |k: usize| merged[k].0.reading.frequency;
+        (of(a) - of(b)).abs() / of(a).max(of(b))
+    };
+    let apart = |&(a, b): &(usize, usize)| {
+        let resonances = [a, b].iter().all(|&k| merged[k].0.reading.label.is_none());
+        resonances
+            && merged[a]
+                .1
+                .iter()
+                .all(|recording| !merged[b].1.contains(recording))
+    };
+    let pairs = (0..merged.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+    pairs
+        .filter(apart)
+        .filter(|pair| distance(pair) <= DRIFTED)
+        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
 }
 
 fn same_resonance(a: &ModeReading, b: &ModeReading) -> bool {

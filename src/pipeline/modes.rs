@@ -333,3 +333,55 @@ fn is_of_another(modes: &[ModeResult], mode: &ModeResult, frequency: f64) -> boo
     let mut peaks = modes.iter().filter(unpaired).filter(apart);
     peaks.any(|peak| (frequency - peak.frequency).abs() < own)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modal::FrequencySource;
+
+    fn reading(frequency: f64) -> ModeReading {
+        ModeReading {
+            frequency,
+            source: FrequencySource::Line,
+            interval: (frequency - 0.1, frequency + 0.1),
+            line_frequency: frequency,
+            half_line: 0.1,
+            interpolated: None,
+            bound: None,
+            std: None,
+            damping_ratio: None,
+            damping_std: None,
+            prominence_db: Some(20.0),
+            above_noise_db: None,
+            label: None,
+            fit: None,
+        }
+    }
+
+    fn mode(number: Option<usize>, frequency: f64) -> ModeResult {
+        ModeResult {
+            mode: number,
+            label: number.is_none().then(|| UNPAIRED.to_owned()),
+            ..from_reading(reading(frequency), None)
+        }
+    }
+
+    /// A torsion mode at 1055 Hz beside a bending mode at 1090 Hz on whose node the sensor sits.
+    #[test]
+    fn regress_a_reading_near_a_peak_without_a_number_is_no_mode() {
+        let modes = [
+            mode(Some(4), 700.0),
+            mode(None, 1055.1),
+            mode(Some(5), 1090.0),
+        ];
+        let numbers = |all: &[f64]| {
+            let readings: Vec<ModeReading> = all.iter().map(|f| reading(*f)).collect();
+            own_numbers(&modes, &readings)
+        };
+        assert_eq!(numbers(&[701.0, 1055.2]), [Some(4), None]);
+        assert_eq!(numbers(&[1055.2, 1085.0]), [None, Some(5)]);
+        // A second pole of the mode's own line takes nothing from it.
+        let split = [mode(None, 1089.0), mode(Some(5), 1090.0)];
+        assert_eq!(own_numbers(&split, &[reading(1089.1)]), [Some(5)]);
+    }
+}

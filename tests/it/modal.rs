@@ -253,6 +253,19 @@ fn prop_each_mode_comes_from_the_recording_that_resolves_it_best() {
 }
 
 #[test]
+fn limit_a_mode_that_drifted_is_one_and_two_modes_are_two() {
+    let at = |frequencies: &[f64]| -> Vec<ModeReading> {
+        frequencies.iter().map(|f| reading(*f, 0.125)).collect()
+    };
+    // A mode of the joint, 0.4 % apart in two recordings.
+    assert_eq!(merge_modes(&[at(&[548.3]), at(&[546.3])]).len(), 1);
+    // Two that one recording shows side by side.
+    assert_eq!(merge_modes(&[at(&[546.3, 548.3]), at(&[546.4])]).len(), 2);
+    // Farther than a joint drifts.
+    assert_eq!(merge_modes(&[at(&[548.3]), at(&[538.3])]).len(), 2);
+}
+
+#[test]
 fn limit_close_modes_of_one_recording_are_never_merged() {
     let pair = vec![reading(125.0, 0.125), reading(125.3, 0.125)];
     assert_eq!(merge_modes(std::slice::from_ref(&pair)).len(), 2);

@@ -7,6 +7,7 @@
 //! by comparison with what is at hand; all planned visits have a drift of the joint of their own.
 
 mod accuracy;
+mod confirm;
 mod direct;
 mod information;
 mod outlooks;
@@ -20,6 +21,7 @@ use super::posterior::Entry;
 use super::result::Verdict;
 use super::search::Competition;
 use super::settings::GapSettings;
+use crate::effects::EffectId;
 use direct::direct;
 use information::{Outlook, distances, information};
 use nalgebra::DMatrix;
@@ -42,12 +44,35 @@ const NAMED: usize = 4;
 /// Standard gravity (m/s2).
 const GRAVITY: f64 = 9.80665;
 
-/// Tests that would tell more, those first that tell most per cost.
+/// Tests that would tell more, those first that tell most per cost; and last how a cause that was named can be seen
+/// directly.
 pub(super) fn advise(
     competition: &Competition,
     verdict: &Verdict,
     settings: &GapSettings,
 ) -> Vec<NextTest> {
+    let mut advised = telling(competition, verdict, settings);
+    if let Verdict::Named(effects) = verdict {
+        advised.truncate(ADVISED - effects.len());
+        advised.extend(effects.iter().map(|effect| confirmation(*effect)));
+    }
+    advised
+}
+
+/// What shows directly whether a named cause is there: it tells nothing that the readings have not told already.
+fn confirmation(effect: EffectId) -> NextTest {
+    let step = Step::Confirm { effect };
+    NextTest {
+        action: step.sentence(),
+        step,
+        separates: vec![effect.name().to_owned()],
+        unpredicted: Vec::new(),
+        bits: 0.0,
+    }
+}
+
+/// Tests that tell hypotheses apart, those first that tell most per cost.
+fn telling(competition: &Competition, verdict: &Verdict, settings: &GapSettings) -> Vec<NextTest> {
     let frame = &competition.frame;
     let weight = GRAVITY * beam_mass(frame);
     let runners = in_the_running(&competition.entries, verdict);

@@ -1,5 +1,8 @@
 //! What could be done next, in plain words and numbers.
 
+use super::confirm::confirming;
+use crate::effects::EffectId;
+
 /// A test that could be made, or a record that could be read again.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
@@ -51,6 +54,11 @@ pub enum Step {
     TurnOver,
     /// Take the beam out of its joint and test it by itself.
     BareBeam,
+    /// See directly whether a cause that was named is there.
+    Confirm {
+        /// Which.
+        effect: EffectId,
+    },
 }
 
 impl Step {
@@ -69,6 +77,7 @@ impl Step {
             Step::Retighten => "retighten",
             Step::TurnOver => "turn-over",
             Step::BareBeam => "bare-beam",
+            Step::Confirm { .. } => "confirm",
         }
     }
 
@@ -83,7 +92,8 @@ impl Step {
             | Step::TapLevel { .. }
             | Step::WeighSensor
             | Step::Calipers
-            | Step::ReferenceTone => 2.0,
+            | Step::ReferenceTone
+            | Step::Confirm { .. } => 2.0,
             Step::MoveSensor { .. } | Step::KnownMass { .. } => 3.0,
             Step::Retighten => 4.0,
             Step::TurnOver => 6.0,
@@ -125,6 +135,7 @@ impl Step {
                  [[recording]] with mass = [{{ position = {position:.3}, mass = \"{0}\" }}]",
                 weight(*mass)
             ),
+            Step::Confirm { effect } => confirming(*effect).into(),
             Step::Retighten => {
                 "loosen the joint, tighten it as before, and repeat the first recording".into()
             }

@@ -1,6 +1,7 @@
 //! Which test to make next, in a sentence and as a table.
 
 use super::super::document::{Document, GapSection, NextTestSection};
+use super::super::format::MISSING;
 use super::{Table, number, words};
 
 /// The test that tells most for its effort; what it is for depends on the answer.
@@ -11,6 +12,9 @@ pub(super) fn next_test(gap: &GapSection) -> Option<String> {
         "unknown" => ("To decide", format!(", {EQUALLY_LIKELY}")),
         _ => ("To decide", String::new()),
     };
+    if test.id == CONFIRM {
+        return Some(format!("{purpose}: {}.", test.action));
+    }
     Some(format!(
         "{purpose}: {} (about {:.2} bit{premise}; it tells {} apart{}).",
         test.action,
@@ -19,6 +23,9 @@ pub(super) fn next_test(gap: &GapSection) -> Option<String> {
         not_predicted(test, "; it could not be predicted for ")
     ))
 }
+
+/// How a step is called that tells nothing new about which hypothesis holds.
+const CONFIRM: &str = "confirm";
 
 /// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
 fn not_predicted(test: &NextTestSection, lead: &str) -> String {
@@ -45,7 +52,10 @@ pub fn next_tests(document: &Document) -> Option<Table> {
     let row = |test: &NextTestSection| {
         vec![
             test.action.clone() + &not_predicted(test, "; could not be predicted for "),
-            format!("{:.2}", test.bits),
+            match test.id.as_str() {
+                CONFIRM => MISSING.to_owned(),
+                _ => format!("{:.2}", test.bits),
+            },
             format!("{:.0}", test.effort),
             test.separates.join(", "),
         ]

@@ -11,6 +11,7 @@
 //!                          left_out    what it predicts of each recording from the others
 //!                          trial       what all of this says of one explanation
 //!                          verdict     an answer, or the reason why there is none
+//!                          unplaced    the model without sensors that sat nobody knows where
 //!                          decay_law   the joint's law that explains changes along the decays
 //!                          decay_finding  what the decays say by themselves
 //!                          advisor     which test would tell more
@@ -18,7 +19,7 @@
 //!
 //! Every hypothesis is the nominal model, one effect of the catalogue added to it, or "something else";
 //! under each, the joint's stiffnesses and all small unknowns (geometry's common scale, the joint's
-//! drift between visits, masses and places of sensors, calibration) are fitted and integrated over. The
+//! drift and the warmth between visits, masses, inertias and places of sensors, calibration) are fitted and integrated over. The
 //! uncertainty of the readings comes from the measurement, never from a residual. This module cannot
 //! reach the simulator, so that its answers to virtual tests are answers.
 

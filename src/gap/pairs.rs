@@ -2,6 +2,7 @@
 
 use super::afar::{Rough, Start, unexplained};
 use super::catalogue::{Candidate, PlaceKind};
+use super::forward::Layout;
 use super::frame::Frame;
 use super::hypothesis::{Fit, Search};
 use super::posterior::{Entry, set_probabilities};
@@ -61,7 +62,7 @@ pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
         .collect();
     let pairs = distinct(found.into_iter().flatten().collect());
     competition.entries.extend(pairs);
-    spread_over_the_beam(&mut competition.entries);
+    spread_over_the_beam(&competition.frame, &mut competition.entries);
     set_probabilities(&mut competition.entries, tried);
 }
 
@@ -71,14 +72,35 @@ fn is_local(candidate: &Candidate) -> bool {
     place.is_some_and(|place| place.kind == PlaceKind::Position)
 }
 
+/// Whether a fit has as many parameters of its own choice as a change that is spread over the beam: all its effects
+/// choose their places, or a frequency that no peak states.
+fn is_flexible(frame: &Frame, fit: &Fit) -> bool {
+    let layout = Layout::new(frame, &fit.effects);
+    let is_free = |k: usize| {
+        let place = layout.place(k);
+        // Where a peak states it nothing is left of its prior.
+        place.is_some_and(|place| fit.branch.knowledge[place].std.is_finite())
+    };
+    let chooses = |k: usize| {
+        let place = fit.effects[k].place.as_ref();
+        place.is_some_and(|place| match place.kind {
+            PlaceKind::Position => true,
+            PlaceKind::FixtureFrequency => is_free(k),
+            PlaceKind::Exponent | PlaceKind::Gyration => false,
+        })
+    };
+    fit.effects.iter().any(is_local) && (0..fit.effects.len()).all(chooses)
+}
+
 /// What is unknown may be spread over a part of the beam. Two changes at places of their own imitate every
 /// such change, with as many parameters as its place, extent, mass and stiffness: it explains what they
-/// explain, and from these readings nobody can tell which it was. Two of the same kind are no hypothesis of
+/// explain, and from these readings nobody can tell which it was; and so does one beside a fixture at a frequency of
+/// its choice. Two of the same kind are no hypothesis of
 /// their own: they are one way of being unknown.
-fn spread_over_the_beam(entries: &mut Vec<Entry>) {
+fn spread_over_the_beam(frame: &Frame, entries: &mut Vec<Entry>) {
     let most = entries
         .iter()
-        .filter(|entry| entry.effects().len() > 1 && entry.fit.effects.iter().all(is_local))
+        .filter(|entry| entry.effects().len() > 1 && is_flexible(frame, &entry.fit))
         .map(|entry| entry.fit.log_evidence)
         .fold(f64::NEG_INFINITY, f64::max);
     let mut all = entries.iter_mut();

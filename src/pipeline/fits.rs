@@ -189,6 +189,14 @@ impl Candidates<'_> {
         ends.is_some_and(|(first, last)| (*first..=*last).contains(&fit.frequency.value))
     }
 
+    /// Whether a fit belongs to the peak on this line (Hz): a damped mode among others peaks beside its frequency, by its
+    /// half-power width at most. What lies farther off is another mode, or none.
+    fn is_at(&self, fit: &ModeFit, line: f64) -> bool {
+        let width = 2.0 * fit.damping_ratio.value * fit.frequency.value;
+        let reach = 2.0 * self.lines.half_line() + width;
+        (fit.frequency.value - line).abs() <= reach
+    }
+
     /// Whether a fit without a peak may be a mode at all: well within the band, and no more damped than what
     /// proposes modes lets pass. At the ends of a band poles stand for what lies beyond it.
     fn may_be_added(&self, fit: &ModeFit) -> bool {
@@ -219,7 +227,9 @@ impl Candidates<'_> {
 
     /// The fit of a peak; one that was no clear resonance becomes one where its fit is clear.
     fn adopt(&self, reading: &mut ModeReading, fit: Option<&ModeFit>) {
-        let Some(fit) = fit.filter(|fit| self.is_within(fit)) else {
+        let of_peak =
+            |fit: &&ModeFit| self.is_within(fit) && self.is_at(fit, reading.line_frequency);
+        let Some(fit) = fit.filter(of_peak) else {
             return;
         };
         if reading.label == Some(PeakLabel::NoResonance) {

@@ -136,6 +136,28 @@ fn val_eight_taps_on_a_guitar() {
     }
     // Published per tap: air resonance 87.20 to 87.26 Hz, top plate 163.99 to 164.16 Hz.
     assert_has(&analysis, &[87.2, 164.0], 0.4);
+    // What a fit says of a peak lies at that peak: two half lines and the half-power width away at most.
+    let readings = analysis
+        .recordings
+        .iter()
+        .flat_map(|r| &r.measurement.spectra);
+    for reading in readings.flat_map(|spectra| &spectra.readings) {
+        let Some(fit) = reading
+            .fit
+            .as_ref()
+            .filter(|_| reading.prominence_db.is_some())
+        else {
+            continue;
+        };
+        let (frequency, damping) = (fit.mode.frequency.value, fit.mode.damping_ratio.value);
+        let off = (frequency - reading.line_frequency).abs();
+        let allowed = 2.0 * reading.half_line + 2.0 * damping * frequency;
+        assert!(
+            off <= allowed,
+            "{frequency} Hz on {} Hz",
+            reading.line_frequency
+        );
+    }
 }
 
 const BOLTED: &str = "brb_bolted_beam/DERIVED_HammerImpact_3acc_float32.wav";

@@ -88,6 +88,8 @@ pub fn render_run(
             Shelf::Cloud => page.cloud.push(inline),
         }
     }
+    // Before a figure that takes a page of its own, half of a page would stay empty.
+    page.spectra.sort_by_key(|figure| figure.tall);
     let mut words = vec![
         ("report.html", render_html(document, &page)?),
         ("report.json", json?),
@@ -157,6 +159,7 @@ fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), Report
     let inline = InlineFigure {
         caption: picture.caption.clone(),
         svg: render_svg(&picture.drawing)?,
+        tall: picture.drawing.height > picture.drawing.width,
         live: picture
             .live
             .as_ref()

@@ -14,6 +14,22 @@ function digits(value) {
   return text.replace(/-/g, "−");
 }
 
+// Names of an axis's ticks, all in one style: plain, or all with powers of ten where one of them needs it.
+function tickNames(splits) {
+  var sizes = splits.map(Math.abs).filter(function (size) { return size > 0; });
+  var least = sizes.length > 1 ? Math.min.apply(null, sizes) : sizes[0], most = Math.max.apply(null, sizes);
+  if (!(least < 1e-3 || most >= 1e6)) return splits.map(tickWords);
+  return splits.map(function (value) {
+    if (value === 0) return "0";
+    var parts = (+value.toPrecision(8)).toExponential().split("e"), power = "10" + raised(+parts[1]);
+    return (parts[0] === "1" ? power : parts[0] === "-1" ? "-" + power : parts[0] + "·" + power).replace(/-/g, "−");
+  });
+}
+
+function raised(exponent) {
+  return String(exponent).split("").map(function (sign) { return sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign]; }).join("");
+}
+
 function tickWords(value) {
   var size = Math.abs(value);
   return (size !== 0 && (size < 1e-3 || size >= 1e6) ? value.toExponential() : String(+value.toPrecision(8))).replace(/-/g, "−");
@@ -61,11 +77,14 @@ function drawMarks(plot, top) {
   };
 }
 
-// Taps: dots for used ones, crosses for rejected ones.
+// Taps: dots for used ones, crosses for rejected ones, with their numbers where there is room.
 function drawTaps(plot, state) {
   return function (u) {
-    var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1;
+    var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, free = -Infinity;
     c.save();
+    c.font = 12 * ratio + "px system-ui, sans-serif";
+    c.textAlign = "center";
+    c.textBaseline = "middle";
     plot.taps.forEach(function (tap, index) {
       var x = u.valToPos(tap.at, "x", true);
       if (tap.peak == null || x < box.left || x > box.left + box.width) return;
@@ -82,9 +101,37 @@ function drawTaps(plot, state) {
         c.moveTo(x - size, y + size); c.lineTo(x + size, y - size);
         c.stroke();
       }
+      var number = String(index + 1), half = c.measureText(number).width / 2 + 2 * ratio;
+      if (index !== state.tap && x - half < free) return;
+      free = x + half;
+      c.fillText(number, x, y + (tap.peak < 0 ? 1 : -1) * (size + 9 * ratio));
     });
     c.restore();
   };
+}
+
+// The samples about a chosen tap, below the recording: one panel for the force, one for the response.
+function closeUp(figure, tap) {
+  var near = tap && tap.close_up;
+  (figure.near || []).forEach(function (u) { u.destroy(); });
+  figure.near = [];
+  figure.nearHost.textContent = "";
+  if (!near) return false;
+  var x = near.curves[0].values.map(function (part, i) { return near.start + i * near.step; });
+  figure.near = near.curves.map(function (curve, index) {
+    var values = curve.values.map(function (part) { return part * curve.part; });
+    var last = index === near.curves.length - 1, panel = { label: curve.label, unit: curve.unit, scale: "linear" };
+    return new uPlot({
+      width: Math.max(figure.nearHost.clientWidth, 240), height: 190 + (last ? 36 : 0), padding: [8, 30, 0, 0],
+      axes: axes({ x: { label: "time from the trigger of " + tap.name, unit: "ms" } }, panel, last),
+      scales: { x: { time: false }, y: vertical(panel) },
+      series: [{ label: "time", value: function (u, v) { return v == null ? "–" : digits(v) + " ms"; } },
+        { label: curve.label, stroke: color("--c" + (index ? 0 : 5)), width: 1.5, value: function (u, v) { return digits(v) + (v == null ? "" : unit(curve.unit)); } }],
+      cursor: { sync: { key: figure.key + "near", scales: ["x", null] }, drag: { x: true, y: false } }
+    }, [x, values], figure.nearHost);
+  });
+  if (near.note) figure.nearHost.appendChild(element("p", "note", near.note));
+  return true;
 }
 
 function axes(plot, panel, last) {
@@ -93,10 +140,10 @@ function axes(plot, panel, last) {
   var narrow = innerWidth < 600;
   return [
     Object.assign({}, common, { label: last ? plot.x.label + " (" + plot.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
-      values: function (u, splits) { return last ? splits.map(digits) : []; } }),
+      values: function (u, splits) { return last ? tickNames(splits) : []; } }),
     Object.assign({}, common, {
       label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 56 : 62, space: 28,
-      values: function (u, splits) { return splits.map(tickWords); }
+      values: function (u, splits) { return tickNames(splits); }
     }, panel.scale !== "logarithmic" ? {} : {
       splits: function (u, index, low, high) { return ticks(low, high, true); },
       filter: function (u, splits) { return splits; }
@@ -148,6 +195,7 @@ function zoom(figure, low, high) {
 function whole(figure) { zoom(figure, -Infinity, Infinity); }
 
 function build(figure) {
+  closeUp(figure, figure.tap >= 0 && figure.plot.taps[figure.tap]);
   if (figure.plot.kind === "points") return buildPoints(figure);
   figure.panels.forEach(function (u) { u.destroy(); });
   figure.panels = figure.plot.panels.map(function (panel, index) {
@@ -169,7 +217,9 @@ function chosen(figure, index) {
   var tap = figure.plot.taps[index], x = figure.x, reach = Math.max(20 * figure.plot.x.step, 0.02 * x[x.length - 1]);
   figure.tap = index;
   figure.said.textContent = tap.name + ": " + tap.words;
-  zoom(figure, tap.at - 0.25 * reach, tap.at + reach);
+  // The recording stays whole where the samples themselves are shown below it.
+  if (closeUp(figure, tap)) whole(figure);
+  else zoom(figure, tap.at - 0.25 * reach, tap.at + reach);
 }
 
 function chips(figure) {
@@ -187,7 +237,7 @@ function chips(figure) {
 }
 
 function curveChips(figure, chip) {
-  chip("whole range", "reset", function () { figure.tap = -1; figure.said.textContent = ""; whole(figure); });
+  chip("whole range", "reset", function () { figure.tap = -1; figure.said.textContent = ""; closeUp(figure, null); whole(figure); });
   figure.plot.marks.forEach(function (mark) {
     chip(mark.name + ", " + mark.words, mark.mode ? "mode" : "other", function () {
       var reach = Math.max(40 * mark.half, 10 * figure.plot.x.step);
@@ -226,6 +276,8 @@ function start(node, index) {
   live.appendChild(chips(figure));
   live.appendChild(figure.host);
   live.appendChild(figure.said);
+  figure.nearHost = element("div", "host near");
+  live.appendChild(figure.nearHost);
   live.appendChild(element("p", "note", "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + (figure.plot.note || "")));
   node.insertBefore(live, node.firstChild);
   node.classList.add("live");
@@ -237,7 +289,7 @@ function start(node, index) {
 document.querySelectorAll("figure.curves").forEach(start);
 addEventListener("resize", function () {
   all.forEach(function (figure) {
-    figure.panels.forEach(function (u) {
+    figure.panels.concat(figure.near || []).forEach(function (u) {
       var width = Math.max(u.root.parentNode.clientWidth, 240);
       if (u.width !== width) u.setSize({ width: width, height: u.height });
     });

@@ -189,7 +189,7 @@ function pointOptions(figure, panel, holder) {
         return at ? at.filter(function (place) { return place >= low && place <= high; }) : ticks(low, high, logarithmic(panel[key]));
       },
       filter: function (u, splits) { return splits; },
-      values: function (u, splits) { return splits.map(at ? function (place) { return panel[key].names[at.indexOf(place)]; } : tickWords); }
+      values: function (u, splits) { return at ? splits.map(function (place) { return panel[key].names[at.indexOf(place)]; }) : tickNames(splits); }
     };
   }
   return {

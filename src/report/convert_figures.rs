@@ -8,6 +8,7 @@ use super::figures::{
 };
 use super::format::unit_words;
 use super::plot::amplitude::AmplitudeFigure;
+use super::short_names::ends_of_paths;
 use crate::description::SensorKind;
 use crate::modal::amplitude::AmplitudeCurve;
 use crate::modal::polyreference::BandSearch;
@@ -19,10 +20,15 @@ use crate::spectral::FrfEstimator;
 
 /// One set of pictures for each recording.
 pub fn figures(analysis: &Analysis) -> Vec<RecordingFigure> {
-    analysis.recordings.iter().map(recording_figure).collect()
+    let files = analysis.recordings.iter().map(|one| one.file.as_str());
+    let names = ends_of_paths(&files.collect::<Vec<_>>());
+    let named = analysis.recordings.iter().zip(&names);
+    named
+        .map(|(recording, name)| recording_figure(recording, name))
+        .collect()
 }
 
-fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
+fn recording_figure(recording: &RecordingResult, name: &str) -> RecordingFigure {
     let taps = recording
         .measurement
         .taps
@@ -32,6 +38,7 @@ fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
             time: tap.time,
             peak: tap.peak,
             rejected: tap.rejection.as_ref().map(ToString::to_string),
+            close_up: None,
         })
         .collect();
     let label = match recording.responses.first() {
@@ -40,7 +47,7 @@ fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
         None => "response".to_string(),
     };
     RecordingFigure {
-        file: recording.file.clone(),
+        file: name.to_owned(),
         overview: recording.overview.as_ref().map(|overview| TimeOverview {
             label,
             step: overview.step,
@@ -58,7 +65,7 @@ fn recording_figure(recording: &RecordingResult) -> RecordingFigure {
             .spectra
             .as_ref()
             .and_then(|spectra| stabilisation_figure(&spectra.stabilisation.searches)),
-        amplitude: amplitude_figure(recording),
+        amplitude: amplitude_figure(recording, name),
     }
 }
 
@@ -85,7 +92,7 @@ fn stabilisation_figure(searches: &[BandSearch]) -> Option<StabilisationFigure> 
 }
 
 /// The curves of all numbered modes; `None` where none of them changes enough to matter.
-fn amplitude_figure(recording: &RecordingResult) -> Option<AmplitudeFigure> {
+fn amplitude_figure(recording: &RecordingResult, name: &str) -> Option<AmplitudeFigure> {
     let spectra = recording.measurement.spectra.as_ref()?;
     let numbered = || spectra.readings.iter().zip(&recording.mode_numbers);
     numbered().find(|(reading, mode)| {
@@ -97,7 +104,7 @@ fn amplitude_figure(recording: &RecordingResult) -> Option<AmplitudeFigure> {
         })
         .collect();
     Some(AmplitudeFigure {
-        file: recording.file.clone(),
+        file: name.to_owned(),
         amplitude: amplitude_words(recording, &modes),
         modes,
     })
@@ -170,7 +177,8 @@ fn spectra_figure(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Spe
 
 /// The recording's pictures with these frequency response functions, all estimators shown.
 pub fn frf_figure(recording: &RecordingResult, frfs: &[Frf]) -> RecordingFigure {
-    let mut figure = recording_figure(recording);
+    let names = ends_of_paths(&[&recording.file]);
+    let mut figure = recording_figure(recording, &names.concat());
     if let Some(spectra) = &mut figure.spectra {
         spectra.frfs = frfs
             .iter()

@@ -7,7 +7,7 @@ use crate::spectral::Lines;
 /// What the pictures of one recording need.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingFigure {
-    /// File as the description names it.
+    /// Its file, by as much of the end of its path as tells it from the others.
     pub file: String,
     /// Envelope over time of the channel on which taps were found; `None` where there are no samples.
     pub overview: Option<TimeOverview>,
@@ -76,6 +76,30 @@ pub struct TapMark {
     pub peak: f64,
     /// Why it was rejected; `None` = accepted.
     pub rejected: Option<String>,
+    /// The samples about it; `None` where they were not kept.
+    pub close_up: Option<TapCloseUp>,
+}
+
+/// The samples about a tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapCloseUp {
+    /// First sample (s from the trigger).
+    pub start: f64,
+    /// Distance of the samples (s).
+    pub step: f64,
+    /// The force, where there is one, and the first response.
+    pub curves: Vec<TapCurve>,
+}
+
+/// A channel about a tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapCurve {
+    /// "force" or "response A".
+    pub label: String,
+    /// Its unit: "N".
+    pub unit: String,
+    /// Every sample (unit), the channel's mean taken out.
+    pub values: Vec<f64>,
 }
 
 /// Magnitudes over the lines.

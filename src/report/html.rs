@@ -17,6 +17,8 @@ pub struct InlineFigure {
     pub svg: String,
     /// The same curves for the page's script, as JSON that may stand in a `script` element.
     pub live: Option<String>,
+    /// Whether it is so high that in print it takes a page of its own.
+    pub tall: bool,
 }
 
 /// The plotting library, its style and the page's own script, all inside the page: a report opens

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::figures::{FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TimeOverview};
 use super::format::significant;
+use super::live_close_up::{LiveCloseUp, live_close_up};
 
 /// Most points of a curve: two for each pixel of the page's width, so that zooming finds more than the whole
 /// view shows, while five long recordings stay below the page's limit of 3 MB.
@@ -100,6 +101,9 @@ pub struct LiveTap {
     pub words: String,
     /// Whether it was used.
     pub used: bool,
+    /// The samples about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub close_up: Option<LiveCloseUp>,
 }
 
 /// The averaged spectra of a recording; `None` where there are none.
@@ -187,11 +191,19 @@ pub fn live_taps(figure: &RecordingFigure) -> Option<LivePlot> {
         panels: vec![panel],
         marks: Vec::new(),
         taps: live_tap_marks(overview, unit),
-        note: format!(
-            "Each point is the smallest and largest value of {} s.",
-            significant(overview.step, 2)
-        ),
+        note: taps_note(overview),
     })
+}
+
+fn taps_note(overview: &TimeOverview) -> String {
+    let step = significant(overview.step, 2);
+    let kept = overview.taps.iter().any(|tap| tap.close_up.is_some());
+    let click = if kept {
+        " Click a tap for its samples."
+    } else {
+        ""
+    };
+    format!("Each point is the smallest and largest value of {step} s.{click}")
 }
 
 fn live_tap_marks(overview: &TimeOverview, unit: &str) -> Vec<LiveTap> {
@@ -207,6 +219,7 @@ fn live_tap_marks(overview: &TimeOverview, unit: &str) -> Vec<LiveTap> {
                 Some(reason) => format!("rejected, {place}: {reason}"),
             },
             used: tap.rejected.is_none(),
+            close_up: tap.close_up.as_ref().and_then(live_close_up),
         }
     })
     .collect()

@@ -6,7 +6,7 @@ use super::format::{rounded, rounded_to, signed_percent, significant};
 use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointRule, PointSet};
 use super::plot::axis::Axis;
 use super::plot::comparison::{Error, errors, frequencies_words, panel};
-use super::plot::gap::{MOST_BARS, abscissa, errors_panel};
+use super::plot::gap::{Explanation, MOST_BARS, abscissa, errors_panel};
 use super::plot::place_map::map_panel;
 use super::plot::shapes::{Places, displacement, joint_of, places, shown};
 use super::tables::place_of;
@@ -105,51 +105,61 @@ fn error_set(errors: &[Error<'_>], used: bool, belongs: impl Fn(&Error<'_>) -> b
     set
 }
 
-/// Errors before and after the best hypothesis, and how probable each hypothesis is; `None` without a
-/// diagnosis.
+/// Errors with the described model and with the effect that is held for the cause, and how probable each
+/// hypothesis is; `None` without a diagnosis.
 pub fn live_gap(document: &Document) -> Option<LivePoints> {
     let gap = document.gap.as_ref()?;
     let pulls = &gap.place.as_ref()?.modes;
     if pulls.is_empty() {
         return None;
     }
-    Some(together(vec![pulls_panel(pulls), odds_panel(gap)]))
+    Some(together(vec![pulls_panel(gap, pulls), odds_panel(gap)]))
 }
 
-fn pulls_panel(pulls: &[PullSection]) -> PointPanel {
-    let axes = errors_panel(pulls);
+fn pulls_panel(gap: &GapSection, pulls: &[PullSection]) -> PointPanel {
+    let axes = errors_panel(gap, pulls);
     let last = pulls.iter().map(|pull| pull.mode).max().unwrap_or(1);
     let numbers = (1..=last).map(|mode| (mode as f64, mode.to_string()));
     let x = PointAxis::of(&axes.x, "mode", "").named(numbers);
     let y = PointAxis::of(&axes.y, "error of the frequency", "%");
-    let of = |(name, color, mark), value: fn(&PullSection) -> (f64, f64)| {
-        let points = pulls
-            .iter()
-            .map(|pull| (abscissa(pulls, pull), coarse(value(pull).0)));
-        let mut set = PointSet::new(name, color, mark, points);
-        set.extra = pulls.iter().map(|pull| coarse(value(pull).1)).collect();
-        let words = pulls
-            .iter()
-            .map(|pull| format!("mode {} in {}", pull.mode, place_of(pull)));
-        set.words = words.collect();
-        let said = pulls
-            .iter()
-            .map(|pull| signed_percent(Some(value(pull).0)) + " %");
-        set.said = said.collect();
-        set
-    };
     let before = ("described model, joint fitted", "c1", ("ring", 4.5));
-    let after = ("with the effect", "c0", ("dot", 4.0));
-    let sets = vec![
+    let mut sets = vec![
         zero(&x),
-        of(before, |pull| (pull.error_percent, pull.z)),
-        of(after, |pull| (pull.error_percent_after, pull.z_after)),
+        pulls_set(before, pulls, |pull| (pull.error_percent, pull.z)),
     ];
+    if let Some(effect) = Explanation::of(gap).effect() {
+        let name = format!("with {effect}");
+        let after = (name.as_str(), "c0", ("dot", 4.0));
+        let left = |pull: &PullSection| (pull.error_percent_after, pull.z_after);
+        sets.push(pulls_set(after, pulls, left));
+    }
     PointPanel {
         title: "errors of the frequencies".to_owned(),
         extra: Some(["that is", "standard deviations"]),
         ..panel_of(x, y, sets)
     }
+}
+
+/// The errors of all frequencies with one model, each in percent and in standard deviations.
+fn pulls_set(
+    (name, color, mark): (&str, &str, (&'static str, f64)),
+    pulls: &[PullSection],
+    value: impl Fn(&PullSection) -> (f64, f64),
+) -> PointSet {
+    let points = pulls
+        .iter()
+        .map(|pull| (abscissa(pulls, pull), coarse(value(pull).0)));
+    let mut set = PointSet::new(name, color, mark, points);
+    set.extra = pulls.iter().map(|pull| coarse(value(pull).1)).collect();
+    let words = pulls
+        .iter()
+        .map(|pull| format!("mode {} in {}", pull.mode, place_of(pull)));
+    set.words = words.collect();
+    let said = pulls
+        .iter()
+        .map(|pull| signed_percent(Some(value(pull).0)) + " %");
+    set.said = said.collect();
+    set
 }
 
 fn odds_panel(gap: &GapSection) -> PointPanel {

@@ -29,6 +29,7 @@ mod gap_text;
 pub mod html;
 pub mod live;
 pub mod live_amplitude;
+pub mod live_close_up;
 pub mod live_model;
 pub mod live_points;
 pub mod plot;

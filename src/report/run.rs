@@ -14,7 +14,7 @@ use super::plot::amplitude::draw_amplitude;
 use super::plot::cloud::draw_cloud;
 use super::plot::comparison::draw_frequencies;
 use super::plot::frf::draw_frf;
-use super::plot::gap::draw_gap;
+use super::plot::gap::{draw_gap, gap_caption};
 use super::plot::place_map::draw_place_map;
 use super::plot::shapes::draw_shapes;
 use super::plot::spectrum::draw_spectrum;
@@ -88,6 +88,8 @@ pub fn render_run(
             Shelf::Cloud => page.cloud.push(inline),
         }
     }
+    // Before a figure that takes a page of its own, half of a page would stay empty.
+    page.spectra.sort_by_key(|figure| figure.tall);
     let mut words = vec![
         ("report.html", render_html(document, &page)?),
         ("report.json", json?),
@@ -157,6 +159,7 @@ fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), Report
     let inline = InlineFigure {
         caption: picture.caption.clone(),
         svg: render_svg(&picture.drawing)?,
+        tall: picture.drawing.height > picture.drawing.width,
         live: picture
             .live
             .as_ref()
@@ -219,25 +222,26 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
             "gap",
             draw_gap(document),
             live_gap(document),
-            "The gap: every frequency's error with the described model and with the best hypothesis, and \
-             how probable each hypothesis is.",
+            gap_caption(document),
         ),
         (
             "gap-place",
             draw_place_map(document),
             live_place_map(document),
-            "Where along the beam a local change of stiffness or of mass would explain the errors.",
+            "Where along the beam a local change of stiffness or of mass would explain the errors."
+                .to_owned(),
         ),
     ];
-    let picture = |(name, drawing, live, caption): (&str, Option<_>, Option<LivePoints>, &str)| {
-        Some(Picture {
-            shelf: Shelf::Gap,
-            name: name.to_owned(),
-            caption: caption.to_owned(),
-            drawing: drawing?,
-            live: live.map(Live::Points),
-        })
-    };
+    let picture =
+        |(name, drawing, live, caption): (&str, Option<_>, Option<LivePoints>, String)| {
+            Some(Picture {
+                shelf: Shelf::Gap,
+                name: name.to_owned(),
+                caption,
+                drawing: drawing?,
+                live: live.map(Live::Points),
+            })
+        };
     kinds.into_iter().filter_map(picture).collect()
 }
 

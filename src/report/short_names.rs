@@ -23,6 +23,28 @@ pub fn ways(names: &[String]) -> Vec<Vec<String>> {
     ways
 }
 
+/// Files by the ends of their paths, each as long as it takes to tell it from the others: names for titles.
+pub fn ends_of_paths(files: &[&str]) -> Vec<String> {
+    files.iter().map(|file| end_of_path(file, files)).collect()
+}
+
+fn end_of_path(file: &str, files: &[&str]) -> String {
+    let others = || files.iter().filter(|other| **other != file);
+    let folders = file.char_indices().rev();
+    let ends = folders
+        .filter(|(_, letter)| matches!(letter, '/' | '\\'))
+        .map(|(place, _)| &file[place + 1..]);
+    let apart = |end: &&str| others().all(|other| !is_end(end, other));
+    let mut ends = ends.filter(|end| !end.is_empty());
+    ends.find(apart).unwrap_or(file).to_owned()
+}
+
+/// Whether a path is this or ends in a folder's separator and this.
+fn is_end(end: &str, path: &str) -> bool {
+    let before = path.strip_suffix(end);
+    before.is_some_and(|before| before.is_empty() || before.ends_with(['/', '\\']))
+}
+
 fn without_folder(names: &[String]) -> Vec<String> {
     let folder = |name: &str| name.rfind(['/', '\\']).map_or(0, |place| place + 1);
     let first = names.first().map_or("", |name| &name[..folder(name)]);
@@ -158,6 +180,30 @@ mod tests {
         ];
         for (names, width, expected) in cases {
             assert_eq!(shortest_that_fit(names, width), expected, "{names:?}");
+        }
+    }
+
+    #[test]
+    fn val_titles_name_files_by_the_shortest_ends_that_differ() {
+        let cases: [(&[&str], &[&str]); 5] = [
+            (&["low.wav", "high.wav"], &["low.wav", "high.wav"]),
+            (&["/home/a/visit/low.wav"], &["low.wav"]),
+            (
+                &[
+                    "/data/monday/low.wav",
+                    "/data/tuesday/low.wav",
+                    "/data/monday/high.wav",
+                ],
+                &["monday/low.wav", "tuesday/low.wav", "high.wav"],
+            ),
+            (&["low.wav", "soft/low.wav"], &["low.wav", "soft/low.wav"]),
+            (
+                &["C:\\a\\low.wav", "C:\\a\\below.wav"],
+                &["low.wav", "below.wav"],
+            ),
+        ];
+        for (files, expected) in cases {
+            assert_eq!(ends_of_paths(files), expected, "{files:?}");
         }
     }
 

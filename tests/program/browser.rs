@@ -51,6 +51,15 @@ const VISITOR: &str = r#"
   }
   function words(figure) { return Array.from(figure.querySelectorAll(".u-legend .u-value")).map(function (v) { return v.textContent; }); }
   function wait(milliseconds) { return new Promise(function (done) { setTimeout(done, milliseconds); }); }
+  // What is written on canvases from now on, and the numbers of taps, which stand in the middle of their place.
+  var draw = CanvasRenderingContext2D.prototype.fillText;
+  seen.written = {};
+  seen.numbers = {};
+  CanvasRenderingContext2D.prototype.fillText = function (words) {
+    seen.written[words] = true;
+    if (this.textBaseline === "middle" && this.textAlign === "center") seen.numbers[words] = true;
+    return draw.apply(this, arguments);
+  };
   async function visit() {
     await wait(200);
     var figures = document.querySelectorAll("figure.curves");
@@ -115,6 +124,9 @@ const VISITOR: &str = r#"
     var taps = Array.from(figures).filter(function (figure) { return /● tap 1/.test(figure.textContent); })[0];
     Array.from(taps.querySelectorAll(".chips button")).filter(function (b) { return /tap 2/.test(b.textContent); })[0].click();
     seen.tap = taps.querySelector(".said").textContent;
+    await wait(100);
+    seen.near = taps.querySelectorAll(".near canvas").length;
+    seen.nearest = Array.from(taps.querySelectorAll(".near .u-label")).map(function (label) { return label.textContent; });
     var written = document.createElement("pre");
     written.id = "seen";
     written.textContent = JSON.stringify(seen);
@@ -281,7 +293,20 @@ fn regress_the_page_works_in_a_browser() {
             "{case}: {}",
             seen["tap"]
         );
+        axes_have_one_style(&seen["written"], &case);
+        for number in ["1", "5"] {
+            assert_eq!(seen["numbers"][number], true, "{case}: {}", seen["numbers"]);
+        }
     }
+}
+
+/// Ticks are written with powers of ten or plainly, never as a computer does.
+fn axes_have_one_style(written: &Value, case: &str) {
+    let words: Vec<&String> = written.as_object().unwrap().keys().collect();
+    let powers = words.iter().filter(|words| words.starts_with("10\u{207b}"));
+    assert!(powers.count() > 1, "{case}: {words:?}");
+    let tiny = |words: &&&String| words.contains("e\u{2212}") || words.contains("e-");
+    assert_eq!(words.iter().find(tiny), None, "{case}");
 }
 
 /// What the figures of points say of a point, by what they show, and how many there are.
@@ -377,7 +402,7 @@ fn titles_say_values(titles: &Value, case: &str) {
         &[
             "mode 2 in low.wav: error ",
             " % with the described model, ",
-            " % with the effect",
+            " % with sensor-mass",
         ],
         &["sensor-mass: probability 99.", " %"],
         &["at ", " mm: bending stiffness ", " ± ", " %, mass "],
@@ -386,6 +411,43 @@ fn titles_say_values(titles: &Value, case: &str) {
         let says = |title: &&str| parts.iter().all(|part| title.contains(part));
         assert!(titles.iter().any(says), "{case}: {parts:?} in {titles:?}");
     }
+}
+
+/// Pages of a PDF, which Chromium lists without compression.
+fn pages(pdf: &[u8]) -> usize {
+    let words = String::from_utf8_lossy(pdf);
+    words.matches("/Type /Page\n").count()
+}
+
+#[test]
+fn regress_two_figures_share_a_printed_page() {
+    let Some(chromium) = chromium() else { return };
+    let folder = samples();
+    let test = "recordings/lap-joint/test.toml";
+    tapjoint(folder.path(), &["run", test, "--out", "report"], 0);
+    let page = folder.path().join("report/report.html");
+    let printed = |html: &str| {
+        std::fs::write(&page, html).unwrap();
+        let profile = tempfile::tempdir().unwrap();
+        let pdf = folder.path().join("report.pdf");
+        let status = Command::new(&chromium)
+            .args(["--headless=new", "--no-sandbox", "--disable-gpu"])
+            .args(["--no-pdf-header-footer", "--virtual-time-budget=20000"])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg(format!("--print-to-pdf={}", pdf.display()))
+            .arg(format!("file://{}", page.display()))
+            .output()
+            .unwrap();
+        assert!(status.status.success());
+        pages(&std::fs::read(pdf).unwrap())
+    };
+    let html = std::fs::read_to_string(&page).unwrap();
+    let (head, tail) = html.split_once("max-height: 116mm").unwrap();
+    let (shared, alone) = (printed(&html), printed(&format!("{head}{tail}")));
+    assert!(
+        shared > 2 && shared < alone,
+        "{shared} pages, {alone} without"
+    );
 }
 
 #[test]

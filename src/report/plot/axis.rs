@@ -153,7 +153,10 @@ fn written(value: f64, step: f64, decimals: usize) -> String {
     } else {
         value
     };
-    let text = if value != 0.0 && !(1e-4..1e5).contains(&step) {
+    let powers = !(1e-4..1e5).contains(&step);
+    let text = if powers && value == 0.0 {
+        "0".to_owned()
+    } else if powers {
         let exponent = value.abs().log10().floor();
         let mantissa = value / 10f64.powf(exponent);
         let digits = (exponent - step.log10().floor()).clamp(0.0, 6.0) as usize;

@@ -91,6 +91,27 @@ pub fn fitted(text: &str, size: f64, width: f64) -> String {
     String::new()
 }
 
+/// Letters at the end of a text that stay when it is shortened before them.
+const KEPT: usize = 16;
+
+/// Shortens a text with "…" before its last letters until it fits `width` (pixels).
+pub fn fitted_before_end(text: &str, (size, weight): (f64, Weight), width: f64) -> String {
+    let letters: Vec<char> = text.chars().collect();
+    let fits = |text: &str| text_width(text, size, weight) <= width;
+    if fits(text) || letters.len() <= KEPT {
+        return text.to_owned();
+    }
+    let (head, tail) = letters.split_at(letters.len() - KEPT);
+    let tail: String = tail.iter().collect();
+    let shortened = |kept: usize| {
+        let head: String = head[..kept].iter().collect();
+        format!("{}\u{2026}{tail}", head.trim_end())
+    };
+    let candidates = (0..head.len()).rev().map(shortened);
+    let mut fitting = candidates.filter(|candidate| fits(candidate));
+    fitting.next().unwrap_or(tail)
+}
+
 /// Calls `paint(x, y, coverage)` for every pixel of a text.
 pub fn cover(text: &Text, mut paint: impl FnMut(i32, i32, f64)) {
     let Some(face) = face(text.weight) else {
@@ -128,5 +149,26 @@ pub fn cover(text: &Text, mut paint: impl FnMut(i32, i32, f64)) {
             });
         }
         pen += scaled.h_advance(id);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_a_title_that_is_too_long_keeps_its_beginning_and_its_end() {
+        let bold = (18.0, Weight::Bold);
+        let title = |folders: usize| {
+            let path = "measurements of the year/".repeat(folders);
+            format!("Frequency and damping against amplitude, {path}visit-11.wav")
+        };
+        assert_eq!(fitted_before_end(&title(1), bold, 1160.0), title(1));
+        let short = fitted_before_end(&title(9), bold, 1160.0);
+        assert!(text_width(&short, 18.0, Weight::Bold) <= 1160.0, "{short}");
+        assert!(short.starts_with("Frequency and damping against amplitude, meas"));
+        assert!(short.ends_with("\u{2026}ear/visit-11.wav"), "{short}");
+        // As much is kept as fits.
+        assert!(text_width(&short, 18.0, Weight::Bold) > 1130.0, "{short}");
     }
 }

@@ -1,4 +1,5 @@
-//! The picture of the gap: errors before and after the best hypothesis, and the odds.
+//! The picture of the gap: errors with the described model and with the effect that is held for the cause, and
+//! the odds.
 
 use super::super::document::{Document, GapSection, PullSection};
 use super::super::format::{probability, signed_percent};
@@ -20,6 +21,61 @@ pub const MOST_BARS: usize = 9;
 /// The axis reaches at least this far to either side of zero (%).
 const LEAST_SPAN: f64 = 0.02;
 
+/// What stands beside the errors of the described model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Explanation<'a> {
+    /// The errors that this effect leaves: the most probable one of those that the verdict names.
+    Effect(&'a str),
+    /// Nothing, because of this: what nobody holds for the cause explains nothing.
+    Nothing(&'static str),
+}
+
+impl<'a> Explanation<'a> {
+    /// What the verdict lets a picture show.
+    pub fn of(gap: &'a GapSection) -> Explanation<'a> {
+        match gap.verdict.kind.as_str() {
+            "named" | "group" | "set" => leader(gap).map_or(
+                Explanation::Nothing("no effect is more probable than none"),
+                Explanation::Effect,
+            ),
+            "no-gap" => Explanation::Nothing("nothing is missing"),
+            "unknown" => Explanation::Nothing("nothing in the catalogue explains the rest"),
+            _ => Explanation::Nothing("these data do not decide what is missing"),
+        }
+    }
+
+    /// The effect, where there is one.
+    pub fn effect(self) -> Option<&'a str> {
+        match self {
+            Explanation::Effect(name) => Some(name),
+            Explanation::Nothing(_) => None,
+        }
+    }
+
+    /// "with the described model, and with sensor-mass", or why there is nothing to compare it with.
+    fn words(self) -> String {
+        match self {
+            Explanation::Effect(name) => format!("with the described model, and with {name}"),
+            Explanation::Nothing(why) => format!("with the described model ({why})"),
+        }
+    }
+}
+
+/// The hypothesis whose errors the diagnosis gives: the most probable one that predicts anything. `None` where
+/// that is the described model itself.
+fn leader(gap: &GapSection) -> Option<&str> {
+    let mut predicting = gap.hypotheses.iter().map(|found| found.effect.as_str());
+    let first = predicting.find(|effect| *effect != "unknown");
+    first.filter(|effect| *effect != "none")
+}
+
+/// What the picture shows, for the page.
+pub fn gap_caption(document: &Document) -> String {
+    let gap = document.gap.as_ref();
+    let shown = gap.map_or_else(String::new, |gap| Explanation::of(gap).words());
+    format!("The gap: every frequency's error {shown}; and how probable each hypothesis is.")
+}
+
 /// Errors and odds; `None` without a diagnosis.
 pub fn draw_gap(document: &Document) -> Option<Drawing> {
     let gap = document.gap.as_ref()?;
@@ -27,22 +83,13 @@ pub fn draw_gap(document: &Document) -> Option<Drawing> {
     if pulls.is_empty() {
         return None;
     }
-    let mut drawing = Drawing::new(
-        "The gap before and after the best hypothesis",
-        WIDTH,
-        HEIGHT,
-    );
-    let best = gap
-        .hypotheses
-        .iter()
-        .find(|found| !matches!(found.effect.as_str(), "none" | "unknown"))
-        .map_or("the best hypothesis", |found| found.effect.as_str());
+    let shown = Explanation::of(gap).words();
+    let description = format!("The gap: errors of the frequencies {shown}");
+    let mut drawing = Drawing::new(description, WIDTH, HEIGHT);
     draw_title(
         &mut drawing,
         "Gap between model and measurement",
-        &format!(
-            "left: every frequency of every recording, without and with {best}; right: what may be missing"
-        ),
+        &format!("left: every frequency of every recording {shown}; right: what may be missing"),
     );
     draw_errors(&mut drawing, gap, pulls);
     draw_odds(&mut drawing, gap);
@@ -50,7 +97,7 @@ pub fn draw_gap(document: &Document) -> Option<Drawing> {
 }
 
 fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
-    let panel = errors_panel(pulls);
+    let panel = errors_panel(gap, pulls);
     let last = last_mode(pulls);
     panel.draw_y_ticks(drawing, &panel.y.ticks(36.0));
     let y = crisp(panel.y.place(0.0));
@@ -59,52 +106,75 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
         Stroke::new(INK, 1.0),
     );
     panel.draw_frame(drawing);
+    let effect = Explanation::of(gap).effect();
     for pull in pulls {
-        let x = abscissa(pulls, pull);
-        let before = panel.place(x, pull.error_percent);
-        let after = panel.place(x, pull.error_percent_after);
-        drawing.ring(before, 4.5, VERMILION);
-        drawing.dot(after, 4.0, BLUE);
-        let words = format!(
-            "mode {} in {}: error {} % with the described model, {} % with the effect",
-            pull.mode,
-            place_of(pull),
-            signed_percent(Some(pull.error_percent)),
-            signed_percent(Some(pull.error_percent_after))
-        );
-        let (top, bottom) = (before.1.min(after.1), before.1.max(after.1));
-        drawing.note(
-            (before.0 - 6.0, top - 7.0),
-            (before.0 + 6.0, bottom + 7.0),
-            words,
-        );
+        draw_pull(drawing, &panel, (pulls, pull), effect);
     }
     for mode in 1..=last {
         let at = (panel.x.place(mode as f64), BOTTOM + 18.0);
         drawing.text(Text::new(format!("mode {mode}"), at, TICK_SIZE).aligned(Align::Middle));
     }
     panel.draw_y_title(drawing, "error of the frequency (%)");
+    draw_legend(drawing, (LEFT, 88.0), ERRORS_RIGHT, &legend(gap, last));
+}
+
+fn legend(gap: &GapSection, last: usize) -> Vec<(Sample, String)> {
     let withheld = gap
         .fitted_modes
         .filter(|fitted| *fitted < last)
         .map_or_else(String::new, |fitted| {
             format!("; modes above {fitted} took no part")
         });
-    let legend = [
-        (
-            Sample::Ring(VERMILION),
-            "described model, joint fitted".to_owned(),
-        ),
-        (Sample::Dot(BLUE), format!("with the effect{withheld}")),
-    ];
-    draw_legend(drawing, (LEFT, 88.0), ERRORS_RIGHT, &legend);
+    let described = "described model, joint fitted";
+    match Explanation::of(gap) {
+        Explanation::Effect(name) => vec![
+            (Sample::Ring(VERMILION), described.to_owned()),
+            (Sample::Dot(BLUE), format!("with {name}{withheld}")),
+        ],
+        Explanation::Nothing(_) => {
+            vec![(Sample::Ring(VERMILION), format!("{described}{withheld}"))]
+        }
+    }
+}
+
+/// The errors of one frequency, and what they are in words.
+fn draw_pull(
+    drawing: &mut Drawing,
+    panel: &Panel,
+    (pulls, pull): (&[PullSection], &PullSection),
+    effect: Option<&str>,
+) {
+    let x = abscissa(pulls, pull);
+    let before = panel.place(x, pull.error_percent);
+    drawing.ring(before, 4.5, VERMILION);
+    let mut words = format!(
+        "mode {} in {}: error {} % with the described model",
+        pull.mode,
+        place_of(pull),
+        signed_percent(Some(pull.error_percent))
+    );
+    let mut after = before;
+    if let Some(effect) = effect {
+        after = panel.place(x, pull.error_percent_after);
+        drawing.dot(after, 4.0, BLUE);
+        let left = signed_percent(Some(pull.error_percent_after));
+        words.push_str(&format!(", {left} % with {effect}"));
+    }
+    let (top, bottom) = (before.1.min(after.1), before.1.max(after.1));
+    drawing.note(
+        (before.0 - 6.0, top - 7.0),
+        (before.0 + 6.0, bottom + 7.0),
+        words,
+    );
 }
 
 /// The axes: mode numbers, and errors of their frequencies (%).
-pub fn errors_panel(pulls: &[PullSection]) -> Panel {
+pub fn errors_panel(gap: &GapSection, pulls: &[PullSection]) -> Panel {
+    let explained = Explanation::of(gap).effect().is_some();
+    let after = |pull: &PullSection| explained.then_some(pull.error_percent_after);
     let ends = pulls
         .iter()
-        .flat_map(|pull| [pull.error_percent, pull.error_percent_after, 0.0]);
+        .flat_map(|pull| [pull.error_percent, after(pull).unwrap_or(0.0), 0.0]);
     let (low, high) = extent(ends).unwrap_or((-1.0, 1.0));
     let last = last_mode(pulls) as f64 + 0.6;
     Panel {

@@ -3,6 +3,7 @@
 use super::axis::{Axis, Tick};
 use super::decimate::decimate;
 use super::drawing::{Align, Drawing, Point, Stroke, Text};
+use super::font::{Weight, fitted, fitted_before_end};
 use super::palette::{Color, GRID, INK, SOFT};
 
 /// Size of tick labels (pixels per em).
@@ -137,8 +138,12 @@ pub fn crisp(position: f64) -> f64 {
     position.floor() + 0.5
 }
 
-/// A picture's title and the line beneath it.
+/// A picture's title and the line beneath it, shortened where they are too long for it. A title ends in the name
+/// of a file, whose own end often tells it from others: that is kept.
 pub fn draw_title(drawing: &mut Drawing, title: &str, below: &str) {
+    let room = f64::from(drawing.width) - 40.0;
+    let title = fitted_before_end(title, (18.0, Weight::Bold), room);
+    let below = fitted(below, LABEL_SIZE, room);
     drawing.text(Text::new(title, (20.0, 24.0), 18.0).bold());
     drawing.text(Text::new(below, (20.0, 48.0), LABEL_SIZE).colored(SOFT));
 }

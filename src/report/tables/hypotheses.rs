@@ -1,6 +1,6 @@
 //! What may be missing in the model, as a table.
 
-use super::super::document::{Document, HypothesisSection, ParameterSection};
+use super::super::document::{Document, GapSection, HypothesisSection, ParameterSection};
 use super::super::format::{MISSING, probability, significant};
 use super::{Table, number, words};
 
@@ -36,16 +36,45 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
             words("Looks like").on_page(),
         ],
         rows: listed.collect(),
-        note: format!(
-            "Fitted, withheld: errors of the frequencies left (rms); of the described model {} %{}. Size \u{b1} \
-             one standard deviation.",
-            percent(gap.hypotheses[0].gap_before),
-            match gap.hypotheses[0].withheld_before {
-                Some(before) => format!(" and {} %", significant(before, 2)),
-                None => String::new(),
-            }
-        ),
+        note: note(document, gap),
     })
+}
+
+/// What the columns are, why even the hypothesis that nothing is missing leaves less than the described model,
+/// and why the errors are not those of the estimate.
+fn note(document: &Document, gap: &GapSection) -> String {
+    let described = percent(gap.hypotheses[0].gap_before);
+    let withheld = gap.hypotheses[0].withheld_before;
+    let withheld = withheld.map_or_else(String::new, |before| {
+        format!(" and {} %", significant(before, 2))
+    });
+    let free = document.test.as_ref().and_then(|test| test.kind.as_deref()) == Some("free");
+    let (one_joint, drift) = if free || recordings(gap) < 2 {
+        ("", "")
+    } else {
+        (
+            "one joint for all recordings and ",
+            "lets the joint differ a little from recording to recording, and ",
+        )
+    };
+    let part = gap
+        .fitted_modes
+        .map_or_else(String::new, |last| format!(" (modes up to {last})"));
+    format!(
+        "Fitted, withheld: errors of the frequencies left (rms); of the described model {described} %{withheld}. \
+         The described model has {one_joint}geometry, shear and masses exactly as described; every hypothesis, none \
+         too, {drift}lets these move within their uncertainty, and so leaves less. All are errors of fits to the \
+         readings that take part in the diagnosis{part}; those of the estimate, which weighs all modes, may differ. \
+         Size \u{b1} one standard deviation."
+    )
+}
+
+/// How many recordings the diagnosis compares.
+fn recordings(gap: &GapSection) -> usize {
+    let pulls = gap.place.iter().flat_map(|place| &place.modes);
+    let files: std::collections::BTreeSet<&str> =
+        pulls.map(|pull| pull.recording.as_str()).collect();
+    files.len()
 }
 
 fn row(found: &HypothesisSection) -> Vec<String> {

@@ -1,7 +1,7 @@
 //! Tables of verdicts on how well a test was made.
 
 use super::super::document::{Document, VerdictSection};
-use super::super::format::{MISSING, significant};
+use super::super::format::{MISSING, significant, trimmed};
 use super::{Column, Table, number, words};
 
 /// Outcomes from the worst to the best.
@@ -79,10 +79,10 @@ fn summary_row(verdicts: &[VerdictSection], check: &str) -> Option<Vec<String>> 
         worst.outcome.clone(),
         count,
         value(worst),
-        significant(worst.limit, 3),
+        limit(worst),
         unit(worst),
         worst.subject.clone(),
-        worst.text.clone(),
+        with_minus_signs(&worst.text),
     ])
 }
 
@@ -141,24 +141,64 @@ fn row(verdict: &VerdictSection) -> Vec<String> {
         verdict.outcome.clone(),
         verdict.subject.clone(),
         value(verdict),
-        significant(verdict.limit, 3),
+        limit(verdict),
         unit(verdict),
-        verdict.text.clone(),
+        with_minus_signs(&verdict.text),
     ]
 }
 
-fn value(verdict: &VerdictSection) -> String {
-    verdict
-        .value
-        .map_or(MISSING.to_owned(), |value| significant(value, 3))
+/// How a ratio is said: the factor to what is written, and its unit.
+///
+/// A share is said in percent and a multiple with a times sign, as the sentences say them. What agrees best at 1
+/// is known to everyone as it is.
+fn scale(verdict: &VerdictSection) -> (f64, &str) {
+    match (verdict.unit.as_str(), verdict.check.as_str()) {
+        ("1", "tap-levels" | "weak-tap") => (1.0, "\u{d7}"),
+        ("1", "coherence" | "reciprocity") => (1.0, "1"),
+        ("1", "linearity" | "mass-loading") => (1.0, "standard deviations"),
+        ("1", _) => (100.0, "%"),
+        (unit, _) => (1.0, unit),
+    }
 }
 
-/// The unit; nothing for a ratio.
-fn unit(verdict: &VerdictSection) -> String {
-    match verdict.unit.as_str() {
-        "1" => String::new(),
-        unit => unit.to_owned(),
+fn value(verdict: &VerdictSection) -> String {
+    let (factor, unit) = scale(verdict);
+    match verdict.value.map(|value| factor * value) {
+        None => MISSING.to_owned(),
+        Some(value) if unit == "%" && value != 0.0 && value.abs() < LEAST_PERCENT => {
+            format!("<{LEAST_PERCENT}")
+        }
+        // A count has no digits behind the point.
+        Some(value) if value.fract() == 0.0 => trimmed(value, 3),
+        Some(value) => significant(value, 3),
     }
+}
+
+/// Percentages below this (%) are said to be so: no limit is near them.
+const LEAST_PERCENT: f64 = 0.001;
+
+/// Limits are round numbers, whose zeros say nothing; a computed one has three digits.
+fn limit(verdict: &VerdictSection) -> String {
+    trimmed(scale(verdict).0 * verdict.limit, 3)
+}
+
+fn unit(verdict: &VerdictSection) -> String {
+    scale(verdict).1.to_owned()
+}
+
+/// A sentence in which every hyphen that begins a number is a minus sign.
+fn with_minus_signs(text: &str) -> String {
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    let mut written = String::with_capacity(text.len());
+    while let Some(letter) = letters.next() {
+        let begins = before.is_whitespace() || before == '(';
+        let number = letters.peek().is_some_and(char::is_ascii_digit);
+        let minus = letter == '-' && begins && number;
+        written.push(if minus { '\u{2212}' } else { letter });
+        before = letter;
+    }
+    written
 }
 
 #[cfg(test)]
@@ -197,7 +237,7 @@ mod tests {
         let whole = document(&verdicts);
         let table = quality(&whole).expect("two checks");
         assert_eq!(table.rows.len(), 2);
-        assert_eq!(table.rows[0][..4], ["double-hit", "bad", "1 of 3", "0.300"]);
+        assert_eq!(table.rows[0][..4], ["double-hit", "bad", "1 of 3", "30.0"]);
         assert_eq!(
             table.rows[1][..3],
             ["force-fall", "not applicable", MISSING]
@@ -224,5 +264,32 @@ mod tests {
         assert_eq!(quality_doubts(&document(&verdicts[..1])), None);
         assert_eq!(quality(&document(&[])), None);
         assert_eq!(quality_count(&document(&verdicts[3..])), None);
+    }
+
+    #[test]
+    fn regress_ratios_are_said_as_their_sentences_say_them() {
+        let cases = [
+            (Check::DoubleHit, 0.3, ["30.0", "10", "%"]),
+            (Check::FrequencyScatter, 7.74e-5, ["0.00774", "10", "%"]),
+            (Check::FrequencyScatter, 3.5e-7, ["<0.001", "10", "%"]),
+            (Check::TapLevels, 1.116, ["1.12", "0.1", "\u{d7}"]),
+            (Check::Coherence, 0.98, ["0.980", "0.1", "1"]),
+            (
+                Check::Linearity,
+                -22.8,
+                ["\u{2212}22.8", "0.1", "standard deviations"],
+            ),
+            (Check::ForceFall, 3.63, ["3.63", "0.1", "dB"]),
+            (Check::Averages, 5.0, ["5", "0.1", "taps"]),
+        ];
+        for (check, value, expected) in cases {
+            let mut section = verdict(check, Outcome::Bad, value);
+            section.text = "It moves by -0.299 % (of -1 to 3-5) in run-2.wav.".to_owned();
+            let whole = document(&[section]);
+            let table = quality_all(&whole).expect("one verdict");
+            assert_eq!(table.rows[0][3..6], expected);
+            let said = "It moves by \u{2212}0.299 % (of \u{2212}1 to 3-5) in run-2.wav.";
+            assert_eq!(table.rows[0][6], said);
+        }
     }
 }

@@ -415,6 +415,38 @@ fn frf(name: &str, shape: &[f64; 5], lines: &Lines, random: &mut ChaCha8Rng) -> 
     }
 }
 
+/// A half sine of 1 ms and the response that it leaves.
+fn close_up(peak: f64) -> TapCloseUp {
+    let rate = 20_000.0;
+    let curve = |label: &str, unit: &str, value: &dyn Fn(f64) -> f64| TapCurve {
+        label: label.into(),
+        unit: unit.into(),
+        values: (0..640)
+            .map(|k| value(f64::from(k) / rate - 0.002))
+            .collect(),
+    };
+    let pulse = |time: f64| {
+        let inside = (0.0..0.001).contains(&time);
+        if inside {
+            peak * (std::f64::consts::PI * time / 0.001).sin()
+        } else {
+            0.0
+        }
+    };
+    let ringing = |time: f64| {
+        let rings = 12.0 * (600.0 * time).sin() * (-40.0 * time).exp();
+        if time < 0.0 { 0.0 } else { rings }
+    };
+    TapCloseUp {
+        start: -0.002,
+        step: 1.0 / rate,
+        curves: vec![
+            curve("force", "N", &pulse),
+            curve("response A", "m/s\u{b2}", &ringing),
+        ],
+    }
+}
+
 fn overview() -> TimeOverview {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let pieces = 4096;
@@ -444,6 +476,7 @@ fn overview() -> TimeOverview {
                 time: tap.time,
                 peak: tap.peak_force.unwrap_or(1.0),
                 rejected: tap.reason.clone(),
+                close_up: Some(close_up(tap.peak_force.unwrap_or(1.0))),
             })
             .collect(),
     }

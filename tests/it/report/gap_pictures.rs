@@ -5,7 +5,7 @@ use tapjoint::report::document::{
 };
 use tapjoint::report::live_model::{live_gap, live_place_map};
 use tapjoint::report::live_points::PointSet;
-use tapjoint::report::plot::gap::draw_gap;
+use tapjoint::report::plot::gap::{draw_gap, gap_caption};
 use tapjoint::report::plot::render_svg;
 
 fn document(gap: GapSection) -> Document {
@@ -60,6 +60,67 @@ fn regress_two_levels_of_one_recording_stand_apart_and_are_told_apart() {
     let svg = render_svg(&draw_gap(&document).unwrap()).unwrap();
     for words in words {
         assert_eq!(svg.matches(&format!("{words}:")).count(), 1, "{words}");
+    }
+}
+
+/// Two levels, with an effect or none at the head of the hypotheses.
+fn with_verdict(kind: &str, hypotheses: &[&str]) -> Document {
+    let mut document = of_three_levels();
+    let gap = document.gap.as_mut().unwrap();
+    gap.verdict.kind = kind.into();
+    for pull in &mut gap.place.as_mut().unwrap().modes {
+        pull.error_percent_after = 99.0;
+    }
+    let found = hypotheses.iter().map(|effect| HypothesisSection {
+        effect: (*effect).into(),
+        ..HypothesisSection::default()
+    });
+    gap.hypotheses = found.collect();
+    document
+}
+
+#[test]
+fn regress_an_effect_that_nobody_holds_for_the_cause_is_not_shown() {
+    let cases: [(&str, &[&str], &str); 6] = [
+        ("named", &["sensor-mass", "none"], "and with sensor-mass"),
+        (
+            "group",
+            &["unknown", "modulus", "length"],
+            "and with modulus",
+        ),
+        ("set", &["local-crack", "none"], "and with local-crack"),
+        ("no-gap", &["joint-damping", "none"], "(nothing is missing)"),
+        (
+            "unknown",
+            &["modulus", "unknown"],
+            "(nothing in the catalogue explains the rest)",
+        ),
+        (
+            "not-enough-data",
+            &["modulus", "none"],
+            "(these data do not decide what is missing)",
+        ),
+    ];
+    for (kind, hypotheses, words) in cases {
+        let document = with_verdict(kind, hypotheses);
+        let live = live_gap(&document).unwrap();
+        let panel = &live.views[0].panels[0];
+        let shown: Vec<&str> = panel.sets.iter().map(|set| set.name.as_str()).collect();
+        let svg = render_svg(&draw_gap(&document).unwrap()).unwrap();
+        assert!(svg.contains(words), "{kind}");
+        assert!(gap_caption(&document).contains(words), "{kind}");
+        match words.strip_prefix("and ") {
+            Some(name) => {
+                assert_eq!(shown.last(), Some(&name), "{kind}");
+                assert!(svg.contains(&format!("+99 % {name}")), "{kind}");
+            }
+            None => {
+                assert_eq!(shown.len(), 2, "{kind}: {shown:?}");
+                assert!(!svg.contains("+99 %"), "{kind}");
+                // Nor does it stretch the axis.
+                assert!(panel.y.range[1] < 20.0, "{kind}: {:?}", panel.y.range);
+            }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use tapjoint::report::document::{
     GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection, PullSection,
 };
 use tapjoint::report::render_text;
-use tapjoint::report::tables::{gap_story, next_tests};
+use tapjoint::report::tables::{gap_story, hypotheses, next_tests};
 
 #[test]
 fn val_the_odds_of_a_group_are_those_of_its_members_together() {
@@ -156,6 +156,26 @@ fn regress_a_change_as_large_as_is_looked_for_is_a_bound() {
     };
     assert!(told(true).contains("by 70 % or more"), "{}", told(true));
     assert!(told(false).contains("\u{b1} 1.0 %"), "{}", told(false));
+}
+
+#[test]
+fn regress_the_table_says_why_none_leaves_less_than_the_described_model() {
+    let mut document = gap_with("set");
+    let note = |document: &Document| hypotheses(document).unwrap().note;
+    assert!(note(&document).contains("geometry, shear and masses exactly as described"));
+    assert!(note(&document).contains("the estimate, which weighs all modes, may differ"));
+    // With one recording there is no other for the joint to differ from.
+    let drift = "differ a little from recording to recording";
+    assert!(!note(&document).contains(drift));
+    let gap = document.gap.as_mut().unwrap();
+    gap.fitted_modes = Some(5);
+    let pulls = &mut gap.place.as_mut().unwrap().modes;
+    pulls.push(PullSection {
+        recording: "low.wav".into(),
+        ..pulls[0].clone()
+    });
+    assert!(note(&document).contains(drift));
+    assert!(note(&document).contains("(modes up to 5)"));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use proptest::prelude::*;
 use tapjoint::report::figures::PeakMark;
-use tapjoint::report::plot::axis::{Axis, nice_step};
+use tapjoint::report::plot::axis::{Axis, Tick, nice_step};
 use tapjoint::report::plot::cloud::draw_cloud;
 use tapjoint::report::plot::comparison::draw_frequencies;
 use tapjoint::report::plot::decimate::decimate;
@@ -428,4 +428,27 @@ fn prop_labels_in_the_cloud_cover_nothing() {
             assert!(apart, "labels at {a:?} and {b:?} overlap");
         }
     }
+}
+
+#[test]
+fn regress_ticks_of_one_axis_are_written_in_one_style() {
+    let labels = |low: f64, high: f64| -> Vec<String> {
+        let ticks = Axis::linear((low, high), (0.0, 400.0)).ticks(80.0);
+        let label = |tick: Tick| tick.label;
+        ticks.into_iter().filter_map(label).collect()
+    };
+    assert_eq!(
+        labels(-2e-5, 2e-5),
+        [
+            "\u{2212}2\u{b7}10\u{207b}\u{2075}",
+            "\u{2212}1\u{b7}10\u{207b}\u{2075}",
+            "0",
+            "1\u{b7}10\u{207b}\u{2075}",
+            "2\u{b7}10\u{207b}\u{2075}"
+        ]
+    );
+    assert_eq!(
+        labels(0.0, 0.002),
+        ["0.0000", "0.0005", "0.0010", "0.0015", "0.0020"]
+    );
 }

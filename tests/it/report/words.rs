@@ -66,6 +66,22 @@ fn prop_page_needs_nothing_from_elsewhere() {
 }
 
 #[test]
+fn regress_print_keeps_short_tables_whole_and_opens_results() {
+    let html = page(&fixture::document());
+    let parameters = html.split("Estimated parameters").next().unwrap();
+    let (_, table) = parameters.rsplit_once("<div class=\"").unwrap();
+    assert!(table.starts_with("table short\""), "{table}");
+    let modes = html.split("id=\"modes\"").nth(1).unwrap();
+    let modes = modes.split("</section>").next().unwrap();
+    let folded = modes.matches("<details").count();
+    assert!(folded > 0);
+    assert_eq!(
+        modes.matches("<details class=\"table result\"").count(),
+        folded
+    );
+}
+
+#[test]
 fn prop_page_escapes_what_users_write() {
     let mut document = fixture::document();
     let attack = "<script>alert('x')</script>&\"";

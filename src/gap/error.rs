@@ -42,7 +42,7 @@ pub enum GapError {
     /// Nothing was seen because every sensor sits where nothing moves.
     #[error(
         "every sensor sits within {percent} % of the largest displacement of zero in all observed modes: \
-         move one at least {distance} m away"
+         move one at least {distance:.3} m away"
     )]
     SensorsAtNodes {
         /// Largest displacement at a sensor over that of the mode (%).

@@ -199,7 +199,9 @@ fn described_joint(file: &TestFile, structure: &TestedStructure) -> anyhow::Resu
     if file.test.measured.is_none() && file.test.recordings.is_empty() {
         return Err(missing(""));
     }
-    let found = file.analyse(&IdentifySettings::unperturbed())?.identification;
+    let found = file
+        .analyse(&IdentifySettings::unperturbed())?
+        .identification;
     let found = found.ok_or_else(|| missing(""))?;
     let joint = found.beam_and_joint(structure).map(|(_, joint)| joint);
     joint.ok_or_else(|| {

@@ -17,6 +17,7 @@ use tapjoint::pipeline::{
 use tapjoint::report::deck::{
     DeckError, DeckSource, deck_of, render_abaqus, render_nastran, source_of,
 };
+use tapjoint::report::document_of;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, JointStiffness};
 
@@ -68,6 +69,13 @@ pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Re
         Some(path) => Ok(reported(path, &file.test)?),
         None => estimated(&file, &terminal)?,
     };
+    if let Some(doubts) = source.as_ref().ok().map(|source| source.doubts.join("; "))
+        && doubts.contains(MISSES)
+    {
+        terminal.warn(&format!(
+            "{doubts}; the springs of the deck are no better known than that"
+        ));
+    }
     let deck = match source.and_then(|source| deck_of(&file.test.name, &source)) {
         Ok(deck) => deck,
         Err(problem) => {
@@ -80,7 +88,11 @@ pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Re
         DeckFormat::Abaqus => render_abaqus(&deck),
     };
     match output {
-        Some(output) => output.write(text.as_bytes())?,
+        Some(output) => {
+            output.write(text.as_bytes())?;
+            let name = arguments.out.as_deref().unwrap_or(Path::new(""));
+            terminal.say(&format!("Deck  {}", name.display()))?;
+        }
         None => terminal.say(&text)?,
     }
     terminal.write_json(&serde_json::json!({ "version": 1, "deck": text }))?;
@@ -97,7 +109,52 @@ fn estimated(
     let progress = terminal.progress("estimating the joint");
     let analysis = file.analyse(&IdentifySettings::unperturbed())?;
     drop(progress);
-    Ok(source_of(&file.test, &analysis))
+    let report = serde_json::to_value(document_of(&analysis))?;
+    Ok(source_of(&file.test, &analysis).map(|source| DeckSource {
+        doubts: doubts_of(&report),
+        ..source
+    }))
+}
+
+/// How a sentence on the misfit begins.
+const MISSES: &str = "the model misses";
+
+/// How far the model of a report misses the frequencies, if it does, and the limits of its joint.
+fn doubts_of(report: &Value) -> Vec<String> {
+    let warnings = report["warnings"].as_array().into_iter().flatten();
+    let texts = warnings
+        .filter(|warning| warning["code"] == "misfit")
+        .filter_map(|warning| warning["text"].as_str());
+    // What follows are limits of non-dimensional stiffnesses.
+    let misfit = texts.filter_map(|text| text.split(';').next());
+    let misfit = misfit.filter(|text| text.starts_with(MISSES));
+    let estimate = &report["estimate"];
+    let scaled = ["kt", "kr"].map(|key| estimate[key]["low_scaled"].is_number());
+    let how = match scaled.contains(&true) {
+        true => " scaled by the misfit",
+        false => "",
+    };
+    let units = [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")];
+    let limits = units.map(|(key, unit)| limits(&estimate[key], key, unit));
+    let limits: Vec<String> = limits.into_iter().flatten().collect();
+    let limits = (!limits.is_empty()).then(|| format!("95 % limits{how}: {}", limits.join(", ")));
+    misfit.map(str::to_owned).chain(limits).collect()
+}
+
+/// "kt 1.590e6 to 1.990e6 N/m"; `None` where nothing bounds it.
+fn limits(found: &Value, key: &str, unit: &str) -> Option<String> {
+    let scaled = (&found["low_scaled"], &found["high_scaled"]);
+    let (low, high) = match (scaled.0.as_f64(), scaled.1.as_f64()) {
+        (None, None) => (found["low"].as_f64(), found["high"].as_f64()),
+        limits => limits,
+    };
+    let words = match (low, high) {
+        (Some(low), Some(high)) => format!("{low:.3e} to {high:.3e}"),
+        (Some(low), None) => format!("above {low:.3e}"),
+        (None, Some(high)) => format!("below {high:.3e}"),
+        (None, None) => return None,
+    };
+    Some(format!("{key} {words} {unit}"))
 }
 
 /// The joint of a report with the beam that belongs to it.
@@ -132,6 +189,7 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
         structure,
         joint,
         origin: format!("from {name}"),
+        doubts: doubts_of(&report),
     })
 }
 

@@ -118,8 +118,17 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
          not known that well{intervals}",
         Rounded(percent),
         times(root_mean_square(&standardised)),
-        Rounded(goodness.probability.unwrap_or(0.0))
+        chance(goodness.probability.unwrap_or(0.0))
     ))
+}
+
+/// A probability in two digits: none is nothing, however small.
+fn chance(probability: f64) -> String {
+    if probability < 0.001 {
+        "<0.001".to_owned()
+    } else {
+        Rounded(probability).to_string()
+    }
 }
 
 /// A number in two digits, with an exponent only where it is very small.
@@ -151,10 +160,19 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
     Some(format!(
         "95 % interval of {} from the frequencies' uncertainty alone \u{b1}{} %, scaled by the misfit \u{b1}{} %",
-        quantity.quantity.name(),
+        symbol(quantity.quantity),
         Rounded(PERCENT_95 * std / value.abs()),
         Rounded(50.0 * (high - low) / value.abs())
     ))
+}
+
+/// As tables write it.
+fn symbol(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Kx => "Kx",
+        Quantity::Ky => "Ky",
+        other => other.name(),
+    }
 }
 
 /// A value at the end of its range, or an interval without an end.
@@ -179,4 +197,17 @@ fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
         .map(|most| format!("the frequencies say only that {name} is at most {most:.4e} (95 %)"));
     let parts: Vec<String> = [limit, least, most].into_iter().flatten().collect();
     (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_no_probability_is_nothing() {
+        assert_eq!(chance(0.0), "<0.001");
+        assert_eq!(chance(3e-7), "<0.001");
+        assert_eq!(chance(0.0042), "4.2e-3");
+        assert_eq!(symbol(Quantity::Kx), "Kx");
+    }
 }

@@ -14,21 +14,35 @@ pub(super) fn of_neglect(
     method: EstimateMethod,
 ) -> Vec<Warning> {
     let consistent = method == EstimateMethod::Consistent;
-    let mut texts = Vec::new();
-    texts.extend(of_masses(test, structure, method));
-    texts.extend(of_fastened(test, structure, method));
+    let mut warnings = Vec::new();
+    warnings.extend(of_masses(test, structure, method));
+    warnings.extend(of_fastened(test, structure, method));
     if structure.regression.is_some() {
-        texts.extend(of_regression(test, structure, method));
+        let texts = of_regression(test, structure, method);
+        warnings.extend(texts.into_iter().map(by_pairs));
     }
     if consistent {
-        texts.extend(of_fit(test, structure));
+        warnings.extend(of_fit(test, structure).into_iter().map(by_estimate));
     } else {
-        texts.extend(of_unused_settings(test));
+        warnings.extend(of_unused_settings(test).map(by_pairs));
     }
-    texts
-        .into_iter()
-        .map(|text| Warning::Neglected { text })
-        .collect()
+    warnings
+}
+
+/// What only the pair regression leaves out.
+fn by_pairs(text: String) -> Warning {
+    Warning::Neglected {
+        text,
+        of_pairs: true,
+    }
+}
+
+/// What the estimate leaves out, or takes otherwise than may have been meant.
+fn by_estimate(text: String) -> Warning {
+    Warning::Neglected {
+        text,
+        of_pairs: false,
+    }
 }
 
 /// What the pair regression cannot take into account.
@@ -119,7 +133,7 @@ fn of_masses(
     test: &TestDescription,
     structure: &TestedStructure,
     method: EstimateMethod,
-) -> Option<String> {
+) -> Option<Warning> {
     let loading = || {
         test.sensors
             .iter()
@@ -138,18 +152,18 @@ fn of_masses(
     let included = method == EstimateMethod::Consistent && test.analysis.sensor_mass;
     let unplaced = loading().any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
     match (included, unplaced, structure.regression) {
-        (true, true, _) => Some(format!(
+        (true, true, _) => Some(by_estimate(format!(
             "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
-        )),
-        (true, false, None) => Some(format!(
+        ))),
+        (true, false, None) => Some(by_estimate(format!(
             "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
-        )),
-        (true, false, Some(_)) => Some(format!(
+        ))),
+        (true, false, Some(_)) => Some(by_pairs(format!(
             "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
-        )),
-        (false, ..) => Some(format!(
+        ))),
+        (false, ..) => Some(by_estimate(format!(
             "{size} is in neither the estimate nor the prediction; {lowers}"
-        )),
+        ))),
     }
 }
 
@@ -158,7 +172,7 @@ fn of_fastened(
     test: &TestDescription,
     structure: &TestedStructure,
     method: EstimateMethod,
-) -> Option<String> {
+) -> Option<Warning> {
     let first = test.recordings.first()?;
     let mass: f64 = first.masses.iter().map(|fastened| fastened.mass).sum();
     if mass <= 0.0 {
@@ -170,17 +184,17 @@ fn of_fastened(
         grams(mass),
         100.0 * mass / structure.beam.mass()
     );
-    let closed = match structure.regression {
-        None => "closed form",
-        Some(_) => "pair regression",
-    };
-    Some(match method {
-        EstimateMethod::Consistent => format!(
-            "{size} is in the prediction and the consistent estimate; the {closed} beside it neglects it"
-        ),
-        EstimateMethod::Pairs => format!(
+    let included = "is in the prediction and the consistent estimate;";
+    Some(match (method, structure.regression) {
+        (EstimateMethod::Consistent, None) => by_estimate(format!(
+            "{size} {included} the closed form beside it neglects it"
+        )),
+        (EstimateMethod::Consistent, Some(_)) => by_pairs(format!(
+            "{size} {included} the pair regression beside it neglects it"
+        )),
+        (EstimateMethod::Pairs, _) => by_estimate(format!(
             "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
-        ),
+        )),
     })
 }
 

@@ -179,7 +179,12 @@ pub fn measure_bare(
     let (source, named) = bare_source(&recording, hammer)?;
     let mut settings = MeasureSettings::new(source);
     adjust(&mut settings);
-    finish(recording, settings, named)
+    let mut result = finish(recording, settings, named)?;
+    if hammer.is_none() {
+        let forgotten = super::warning::of_hammer_by_name(&result);
+        result.measurement.warnings.extend(forgotten);
+    }
+    Ok(result)
 }
 
 /// Unit of the hammer channel, where there is one, and the responses.

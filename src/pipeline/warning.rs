@@ -11,6 +11,7 @@ pub(super) use amplitude::of_amplitude;
 pub(super) use groups::of_quality;
 pub use groups::together;
 
+use super::analysis::RecordingResult;
 use super::measure::MeasuredSpectra;
 use crate::modal::PeakLabel;
 use crate::recording::Recording;
@@ -137,6 +138,8 @@ pub enum Warning {
     Neglected {
         /// What and with what effect.
         text: String,
+        /// Whether only the pair regression leaves it out.
+        of_pairs: bool,
     },
 }
 
@@ -166,12 +169,23 @@ impl Warning {
     }
 }
 
+impl Warning {
+    /// Whether it concerns the pair regression alone.
+    pub fn is_of_pairs(&self) -> bool {
+        match self {
+            Warning::Closure { .. } => true,
+            Warning::Neglected { of_pairs, .. } => *of_pairs,
+            _ => false,
+        }
+    }
+}
+
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Warning::Recording { file, text, .. } => write!(f, "{file}: {text}"),
             Warning::Description { text }
-            | Warning::Neglected { text }
+            | Warning::Neglected { text, .. }
             | Warning::Estimate { text, .. }
             | Warning::Quality { text, .. } => f.write_str(text),
             Warning::RejectedTaps {
@@ -180,7 +194,8 @@ impl fmt::Display for Warning {
                 total,
             } => write!(
                 f,
-                "{file}: {rejected} of {total} taps were rejected; the list of taps says why"
+                "{file}: {rejected} of {total} taps {} rejected; the list of taps says why",
+                if *rejected == 1 { "was" } else { "were" }
             ),
             Warning::TapsTooShort { file, problem } => {
                 write!(f, "{file}: the taps leave no spectrum: {problem}")
@@ -220,7 +235,12 @@ impl fmt::Display for Warning {
                 write_others(f, others, hertz)
             }
             Warning::Unpaired { count, text } => {
-                write!(f, "{count} peak(s) belong to no mode: {text}")
+                let belong = if *count == 1 {
+                    "peak belongs"
+                } else {
+                    "peaks belong"
+                };
+                write!(f, "{count} {belong} to no mode: {text}")
             }
             Warning::AmplitudeDependent { file, changes } => {
                 amplitude::write_dependence(f, file, changes)
@@ -308,6 +328,29 @@ pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
     warnings
 }
 
+/// A channel that is taken for a response, though its name says that it is the hammer's.
+pub(super) fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
+    let is_hammers = |name: &str| {
+        let name = name.to_lowercase();
+        name.contains("hammer") || name.contains("force")
+    };
+    let mut names = recording.responses.iter().map(|response| &response.name);
+    let name = names.find(|name| is_hammers(name))?;
+    let argument = match name.contains(char::is_whitespace) {
+        true => format!("\"{name}\""),
+        false => name.clone(),
+    };
+    Some(Warning::Recording {
+        code: "hammer-channel",
+        file: recording.file.clone(),
+        text: format!(
+            "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
+             say --hammer {argument}: taps are then judged by their force, and there are frequency \
+             response functions"
+        ),
+    })
+}
+
 /// Doubts about a recording's spectra.
 pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
     let mut warnings = Vec::new();
@@ -336,4 +379,30 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
         }
     }
     warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_one_is_not_many() {
+        let rejected = |rejected: usize| Warning::RejectedTaps {
+            file: "a.wav".into(),
+            rejected,
+            total: 5,
+        };
+        assert!(rejected(1).to_string().contains("1 of 5 taps was rejected"));
+        assert!(
+            rejected(2)
+                .to_string()
+                .contains("2 of 5 taps were rejected")
+        );
+        let unpaired = |count: usize| Warning::Unpaired {
+            count,
+            text: String::new(),
+        };
+        assert!(unpaired(1).to_string().starts_with("1 peak belongs to"));
+        assert!(unpaired(4).to_string().starts_with("4 peaks belong to"));
+    }
 }

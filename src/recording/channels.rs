@@ -71,7 +71,10 @@ impl Recording {
         let nearest = names
             .map(|name| {
                 let (name_lower, wanted) = (name.to_lowercase(), wanted.to_lowercase());
-                (strsim::jaro_winkler(&name_lower, &wanted), name)
+                // "force" means "ch1_force_V", however long that is.
+                let within = wanted.len() > 2 && name_lower.contains(&wanted);
+                let similarity = strsim::jaro_winkler(&name_lower, &wanted);
+                (similarity + f64::from(u8::from(within)), name)
             })
             .filter(|(similarity, _)| *similarity >= NEAR)
             .max_by(|a, b| a.0.total_cmp(&b.0));

@@ -2,7 +2,7 @@
 
 use super::document::Document;
 use super::format::{signed_or_below, significant};
-use super::summary::{channels, most_missed};
+use super::summary::{channels, described, most_missed};
 use super::tables::{Parameter, estimated, quality_count};
 
 /// At most five lines, each with what it is about; what was not computed has none.
@@ -13,6 +13,7 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
         ("Joint", joint(document)),
         ("Model", model(document)),
         ("Doubts", doubts(document)),
+        ("Next", described(document)),
     ];
     lines
         .into_iter()
@@ -76,15 +77,23 @@ fn joint(document: &Document) -> Option<String> {
     let physical: Vec<String> = estimated(estimate)
         .iter()
         .filter(|parameter| parameter.unit != "1")
-        .map(with_std)
+        .map(with_bounds)
         .collect();
     (!physical.is_empty()).then(|| physical.join(", "))
 }
 
-/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two.
-fn with_std(parameter: &Parameter<'_>) -> String {
+/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
+/// gives limits these are said, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
+fn with_bounds(parameter: &Parameter<'_>) -> String {
     let [value, _, _, _, unit] = parameter.written();
     let rounded = parameter.written_together();
+    if let Some([low, high]) = parameter.written_scaled_limits() {
+        let own = format!("{} = {} {unit}", parameter.symbol, rounded.value);
+        let limits = format!("(95 %: {low} to {high})");
+        return [own, limits]
+            .map(|part| part.replace(' ', "\u{a0}"))
+            .join(" ");
+    }
     let shown = if rounded.uncertainty.is_some() {
         rounded.joined()
     } else {
@@ -109,7 +118,7 @@ fn model(document: &Document) -> Option<String> {
 }
 
 fn doubts(document: &Document) -> Option<String> {
-    let warnings = match document.warnings.len() {
+    let warnings = match document.main_warnings().count() {
         0 => "no warnings".to_owned(),
         1 => "1 warning, see above".to_owned(),
         count => format!("{count} warnings, see above"),

@@ -11,8 +11,8 @@ use super::document::{
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::{FrequencySource, ModeReading};
 use crate::pipeline::{
-    AmplitudeChange, Analysis, MeasuredSpectra, ModeResult, RecordingResult, TestedStructure,
-    Warning, sampled_shapes,
+    AmplitudeChange, Analysis, Identification, MeasuredSpectra, ModeResult, RecordingResult,
+    TestedStructure, Warning, sampled_shapes,
 };
 use crate::recording::{Format, Separator, UffCoding};
 use crate::spectral::Window;
@@ -42,7 +42,7 @@ pub fn document(analysis: &Analysis) -> Document {
         mode_shapes: shapes(analysis),
         quality: (!analysis.verdicts.is_empty())
             .then(|| analysis.verdicts.iter().map(verdict_section).collect()),
-        warnings: analysis.warnings.iter().map(warning_section).collect(),
+        warnings: warning_sections(&analysis.warnings, identification),
         ..Document::default()
     };
     match identification {
@@ -69,7 +69,7 @@ pub fn inspection(recordings: &[RecordingResult], warnings: &[Warning]) -> Docum
     Document {
         version: VERSION,
         recordings: Some(recordings.iter().map(recording_section).collect()),
-        warnings: warnings.iter().map(warning_section).collect(),
+        warnings: warning_sections(warnings, None),
         ..Default::default()
     }
 }
@@ -328,9 +328,16 @@ fn mode_section(mode: &ModeResult, recordings: &[RecordingResult]) -> ModeSectio
     }
 }
 
-fn warning_section(warning: &Warning) -> WarningSection {
-    WarningSection {
+/// Doubts about the pair regression concern the result only where it is the estimate.
+fn warning_sections(
+    warnings: &[Warning],
+    identification: Option<&Identification>,
+) -> Vec<WarningSection> {
+    let has_better = identification.is_some_and(|found| found.consistent.is_some());
+    let section = |warning: &Warning| WarningSection {
         code: warning.code().to_string(),
         text: warning.to_string(),
-    }
+        beside: has_better && warning.is_of_pairs(),
+    };
+    warnings.iter().map(section).collect()
 }

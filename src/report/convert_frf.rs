@@ -41,6 +41,7 @@ pub fn frf_document(analysis: &Analysis, frfs: &[Frf]) -> Document {
             .map(|warning| WarningSection {
                 code: warning.code().to_string(),
                 text: warning.to_string(),
+                beside: false,
             })
             .collect(),
         ..Document::default()

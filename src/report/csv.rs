@@ -6,7 +6,18 @@ use super::document::{
 };
 
 /// Columns of `parameters.csv`.
-const PARAMETER_COLUMNS: [&str; 7] = ["parameter", "method", "unit", "value", "std", "low", "high"];
+const PARAMETER_COLUMNS: [&str; 10] = [
+    "parameter",
+    "method",
+    "unit",
+    "value",
+    "std",
+    "low",
+    "high",
+    "std_scaled",
+    "low_scaled",
+    "high_scaled",
+];
 
 /// Columns of `modes.csv`.
 const MODE_COLUMNS: [&str; 15] = [
@@ -119,6 +130,9 @@ fn parameter_row(name: &str, method: &str, unit: &str, value: &ValueSection) -> 
         number(value.std),
         number(value.low),
         number(value.high),
+        number(value.std_scaled),
+        number(value.low_scaled),
+        number(value.high_scaled),
     ]
 }
 

@@ -368,4 +368,23 @@ pub struct WarningSection {
     pub code: String,
     /// What happened, why it might be, what helps.
     pub text: String,
+    /// Whether it concerns only the pair regression that stands beside the estimate, and not the estimate.
+    pub beside: bool,
+}
+
+/// Those of some warnings that concern the result itself.
+pub fn of_the_result(warnings: &[WarningSection]) -> Vec<&WarningSection> {
+    warnings.iter().filter(|warning| !warning.beside).collect()
+}
+
+impl Document {
+    /// The warnings that concern the result itself.
+    pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
+        of_the_result(&self.warnings).into_iter()
+    }
+
+    /// Those that concern only the pair regression beside it.
+    pub fn warnings_beside(&self) -> impl Iterator<Item = &WarningSection> {
+        self.warnings.iter().filter(|warning| warning.beside)
+    }
 }

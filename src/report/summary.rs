@@ -15,12 +15,27 @@ pub fn sentences(document: &Document) -> Vec<String> {
         misfit(document),
         gap_story(document).into_iter().next(),
         resolution(document),
+        described(document),
     ];
     let first = first.into_iter().flatten();
     first
         .chain(amplitudes(document))
         .chain(rest.into_iter().flatten())
         .collect()
+}
+
+/// What a description would add to a bare recording; `None` where there is one, and of what was not analysed.
+pub(super) fn described(document: &Document) -> Option<String> {
+    let bare = document
+        .test
+        .as_ref()
+        .is_some_and(|test| test.kind.is_none());
+    let analysed = document.recordings.is_some() && document.modes.is_some();
+    (bare && analysed && document.frfs.is_none()).then(|| {
+        "A description of the beam (tapjoint\u{a0}init\u{a0}>\u{a0}test.toml) would add mode numbers, measured \
+         beside predicted frequencies, the joint's stiffness and the diagnosis of the gap."
+            .to_owned()
+    })
 }
 
 /// One sentence for each mode that changes with the amplitude.
@@ -228,7 +243,7 @@ fn estimate(document: &Document) -> Option<String> {
     Some(format!("{}.{doubt}", capital(&physical.join("; "))))
 }
 
-fn capital(text: &str) -> String {
+pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string());
     first.unwrap_or_default() + letters.as_str()

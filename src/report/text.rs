@@ -110,6 +110,10 @@ pub fn estimate(document: &Document) -> String {
                 );
                 text.push_str(&wrapped(&words, 0));
             }
+            for warning in document.warnings_beside() {
+                let note = format!("note ({}): {}", warning.code, warning.text);
+                text.push_str(&wrapped(&note, 2));
+            }
             text
         }
     }
@@ -143,11 +147,10 @@ pub fn quality(document: &Document) -> String {
     table_or_nothing(tables::quality_doubts(document))
 }
 
-/// The warnings; empty without any.
+/// The warnings that concern the result; empty without any. Those of the pair regression stand with it.
 pub fn warnings(document: &Document) -> String {
     document
-        .warnings
-        .iter()
+        .main_warnings()
         .map(|warning| wrapped(&format!("warning ({}): {}", warning.code, warning.text), 2))
         .collect()
 }

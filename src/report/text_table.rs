@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::format::MISSING;
 use super::short_names::ways;
-use super::tables::{Kind, Place, Table};
+use super::tables::{Column, Kind, Place, Table};
 use super::text::{WIDTH, wrapped};
 
 /// Space between columns (characters).
@@ -27,25 +27,60 @@ struct Layout {
 }
 
 /// A table with its caption, in 80 columns. Heads go to two lines where one has no room, names of files
-/// are shortened so that they stay apart, columns that can be had elsewhere are left out, and at last
-/// words that do not fit go on below.
+/// are shortened so that they stay apart, columns that can be had elsewhere are left out, then words that do
+/// not fit go on below, and at last columns do. Numbers are never cut.
 pub fn render_table(table: &Table) -> String {
     let layout = layout(table);
-    let Layout { table, widths, .. } = &layout;
-    let mut text = wrapped(&table.caption, 0);
-    text.push_str(&row(&layout, &layout.heads));
-    let total = widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1);
-    text.push_str(&"-".repeat(total.min(WIDTH)));
-    text.push('\n');
-    for cells in table.rows.iter().take(MOST_ROWS) {
-        let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
-        text.push_str(&row(&layout, &cells));
+    let mut text = wrapped(&layout.table.caption, 0);
+    for part in parts(&layout) {
+        text.push_str(&render_part(&part));
     }
     let more = table.rows.len().saturating_sub(MOST_ROWS);
     if more > 0 {
         text.push_str(&format!("... and {more} more\n"));
     }
     text
+}
+
+fn render_part(layout: &Layout) -> String {
+    let mut text = row(layout, &layout.heads);
+    text.push_str(&"-".repeat(total(&layout.widths).min(WIDTH)));
+    text.push('\n');
+    for cells in layout.table.rows.iter().take(MOST_ROWS) {
+        let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
+        text.push_str(&row(layout, &cells));
+    }
+    text
+}
+
+/// Width of columns with the space between them.
+fn total(widths: &[usize]) -> usize {
+    widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1)
+}
+
+/// The columns in as many parts as have room side by side, each with the first column, which says what a row is.
+fn parts(layout: &Layout) -> Vec<Layout> {
+    let mut parts: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
+    for (index, width) in layout.shown.iter().zip(&layout.widths) {
+        match parts.last_mut() {
+            Some((shown, widths)) if total(widths) + GAP + width <= WIDTH => {
+                shown.push(*index);
+                widths.push(*width);
+            }
+            None => parts.push((vec![*index], vec![*width])),
+            Some(_) => parts.push((
+                vec![layout.shown[0], *index],
+                vec![layout.widths[0], *width],
+            )),
+        }
+    }
+    let part = |(shown, widths)| Layout {
+        table: layout.table.clone(),
+        shown,
+        heads: layout.heads.clone(),
+        widths,
+    };
+    parts.into_iter().map(part).collect()
 }
 
 /// The first layout that has room, in the order of what it costs.
@@ -75,7 +110,7 @@ fn layout(table: &Table) -> Layout {
         }
     }
     let shown = shown(&last, &[Place::Everywhere]);
-    let heads = heads(&last).pop().unwrap_or_default();
+    let heads = narrow_heads(&last);
     let widths = natural_widths(&last, &shown, &heads);
     let widths = fitted_widths(&last, &shown, widths);
     Layout {
@@ -91,6 +126,22 @@ fn heads(table: &Table) -> Vec<Vec<Vec<String>>> {
     let single = table.columns.iter().map(|c| vec![c.name.clone()]);
     let double = table.columns.iter().map(|c| two_lines(&c.name));
     vec![single.collect(), double.collect()]
+}
+
+/// Heads no wider than the cells below them, as far as their words allow, all on as many lines.
+fn narrow_heads(table: &Table) -> Vec<Vec<String>> {
+    let narrow = |(index, column): (usize, &Column)| {
+        let cells = table.rows.iter().filter_map(|row| row.get(index));
+        let words = column.name.split(' ').map(length);
+        let width = cells.map(|cell| length(cell)).chain(words).max();
+        broken(&column.name, width.unwrap_or(0))
+    };
+    let mut heads: Vec<Vec<String>> = table.columns.iter().enumerate().map(narrow).collect();
+    let lines = heads.iter().map(Vec::len).max().unwrap_or(0);
+    for head in &mut heads {
+        head.splice(..0, vec![String::new(); lines - head.len()]);
+    }
+    heads
 }
 
 fn shown(table: &Table, places: &[Place]) -> Vec<usize> {
@@ -215,7 +266,7 @@ fn row(layout: &Layout, cells: &[Vec<String>]) -> String {
             if is_words(table, *index) {
                 cell.flat_map(|text| broken(text, *width)).collect()
             } else {
-                cell.map(|text| cut(text, *width)).collect()
+                cell.cloned().collect()
             }
         })
         .collect();
@@ -235,7 +286,7 @@ fn row(layout: &Layout, cells: &[Vec<String>]) -> String {
                     }
                 })
                 .collect();
-            cut(padded.join("  ").trim_end(), WIDTH) + "\n"
+            padded.join("  ").trim_end().to_owned() + "\n"
         })
         .collect()
 }
@@ -273,4 +324,36 @@ pub(super) fn cut(text: &str, width: usize) -> String {
     }
     let kept: String = text.chars().take(width.saturating_sub(1)).collect();
     kept + "\u{2026}"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_numbers_are_never_cut() {
+        let column = |index: usize| Column {
+            name: format!("0\u{2013}10000 Hz: spacing {index} (Hz)"),
+            kind: Kind::Number,
+            place: Place::Everywhere,
+        };
+        // Few enough for narrow heads, and too many for any.
+        for count in [5, 9, 14] {
+            let cell = |index: usize| format!("0.123456{index}");
+            let table = Table {
+                caption: "Wide".into(),
+                columns: (10..10 + count).map(column).collect(),
+                rows: vec![(10..10 + count).map(cell).collect()],
+                note: String::new(),
+            };
+            let text = render_table(&table);
+            assert!(!text.contains('\u{2026}'), "{text}");
+            for index in 10..10 + count {
+                assert!(text.contains(&cell(index)), "{index} of {count}:\n{text}");
+            }
+            for line in text.lines() {
+                assert!(line.chars().count() <= 80, "{line}");
+            }
+        }
+    }
 }

@@ -126,6 +126,9 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
     text.push_str(&line("thickness", beam.thickness));
     text.push_str(&line("modulus", beam.modulus));
     // The common factor s on all frequencies that the geometry's tolerance left open: f ~ rho^-1/2.
+    if found.scale != 0.0 {
+        text.push_str(&scaled_density(beam.density, found.scale));
+    }
     text.push_str(&line("density", beam.density * (-2.0 * found.scale).exp()));
     let poisson = beam.poisson.map(|poisson| line("poisson", poisson));
     text.push_str(&poisson.unwrap_or_default());
@@ -137,6 +140,15 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         text.push_str("\n[analysis]\nsensor_mass = false\n");
     }
     text
+}
+
+/// Why the density is not the described one.
+fn scaled_density(described: f64, scale: f64) -> String {
+    format!(
+        "# Described: {described}. What the dimensions' tolerance leaves open moves all frequencies by a common\n\
+         # factor, here {:+.2e} % as the readings ask for; a description says that by its density.\n",
+        100.0 * scale.exp_m1()
+    )
 }
 
 fn right_half(test: &TestDescription, scale: f64) -> String {

@@ -444,6 +444,14 @@ fn regress_sensors_that_see_nothing_are_refused() {
     rigid.specimen.joint = SpecimenJoint::RIGID;
     let error = diagnose(&observed, &rigid, &GapSettings::default()).unwrap_err();
     assert!(matches!(error, GapError::SensorsAtNodes { .. }), "{error}");
+    let told = error.to_string();
+    let distance = told
+        .split_once("at least ")
+        .and_then(|(_, rest)| rest.split_once(" m "));
+    assert!(
+        distance.is_some_and(|(digits, _)| digits.len() <= 5),
+        "{told}"
+    );
 }
 
 // ---------------------------------------------------------------------------------------------

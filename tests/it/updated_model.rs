@@ -54,6 +54,29 @@ fn regress_what_was_fastened_is_written_as_known_and_can_be_read_again() {
 }
 
 #[test]
+fn regress_a_density_that_is_not_the_described_one_says_why() {
+    let nominal = strip_on_springs(1.0, Some(0.004));
+    let observed = observe(&five_recordings(), &nominal, &[], 401).unwrap();
+    let mut diagnosis = diagnose(&observed, &nominal, &GapSettings::default()).unwrap();
+    let test = described(SPRINGS, "").unwrap();
+    let mut text = |scale: f64| {
+        for found in &mut diagnosis.hypotheses {
+            found.scale = scale;
+        }
+        updated_model(&test, &diagnosis).unwrap().text
+    };
+    assert!(!text(0.0).contains("# Described:"));
+    let text = text(2e-5);
+    let comment = format!(
+        "# Described: {}. What the dimensions' tolerance",
+        test.beam.density
+    );
+    assert!(text.contains(&comment), "{text}");
+    assert!(text.contains("here +2.00e-3 %"), "{text}");
+    TestDescription::parse(&text, "updated-model.toml").unwrap();
+}
+
+#[test]
 fn limit_a_mass_may_be_as_heavy_as_an_effect_as_it_may_be_when_fastened() {
     for (mass, possible) in [(1e3, true), (1001.0, false)] {
         let fastened = format!(

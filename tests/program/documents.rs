@@ -56,6 +56,48 @@ fn prop_every_command_in_the_documents_runs_as_printed() {
     assert!(tried >= 20, "only {tried} commands were found");
 }
 
+/// The number behind the first of these words after another, such as "Kt = 1.790" MN/m.
+fn figure(text: &str, after: &str, word: &str) -> f64 {
+    let rest = text.split_once(after).unwrap().1;
+    let rest = rest.split_once(word).unwrap().1.trim_start();
+    let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.');
+    rest[..end.unwrap_or(rest.len())]
+        .trim_end_matches('.')
+        .parse()
+        .unwrap()
+}
+
+#[test]
+fn val_the_first_figures_of_the_documents_are_those_of_the_run() {
+    let folder = samples();
+    let run = ["run", "recordings/cantilever/test.toml", "--json", "-"];
+    let report: serde_json::Value =
+        serde_json::from_str(&super::tapjoint(folder.path(), &run, 0)).unwrap();
+    let found = |key: &str| report["estimate"][key]["value"].as_f64().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let first = readme.split_once("It finds ten taps").unwrap().1;
+    let kt = figure(first, "five modes", "Kt = ");
+    let kr = figure(first, "five modes", "Kr = ");
+    // As many digits as are printed.
+    assert!((1e6 * kt - found("kt")).abs() < 0.0006e6, "Kt {kt}");
+    assert!((1e3 * kr - found("kr")).abs() < 0.0006e3, "Kr {kr}");
+    let truth = first.split_once("the truth is ").unwrap().1;
+    let truth: Vec<f64> = truth
+        .split([' ', ')'])
+        .filter_map(|word| word.parse().ok())
+        .take(2)
+        .collect();
+    let text = std::fs::read_to_string(root.join("recordings/README.md")).unwrap();
+    let percent = figure(&text, "on the first it finds", "one that is ");
+    let soft = 100.0 * (1.0 - found("kt") / (1e6 * truth[0]));
+    assert!((percent - soft).abs() < 0.6, "{percent} % is {soft} %");
+    let taps = report["recordings"].as_array().unwrap().iter();
+    let taps = taps.flat_map(|one| one["taps"].as_array().unwrap());
+    assert_eq!(taps.count(), 10);
+    assert_eq!(report["modes"].as_array().unwrap().len(), 5);
+}
+
 #[test]
 fn prop_links_between_documents_lead_somewhere() {
     for document in documents() {

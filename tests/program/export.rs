@@ -67,6 +67,56 @@ fn recover_two_springs_as_they_were_estimated() {
 }
 
 #[test]
+fn regress_a_deck_of_a_model_that_misses_says_so() {
+    let folder = samples();
+    let arguments = [
+        "export",
+        "recordings/cantilever/test.toml",
+        "--out",
+        "joint.bdf",
+    ];
+    let run = std::process::Command::new(super::program())
+        .current_dir(folder.path())
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert_eq!(run.status.code(), Some(0));
+    let (out, error) = (
+        String::from_utf8(run.stdout).unwrap(),
+        String::from_utf8(run.stderr).unwrap(),
+    );
+    assert!(out.contains("joint.bdf"), "{out}");
+    let deck = std::fs::read_to_string(folder.path().join("joint.bdf")).unwrap();
+    let head: Vec<&str> = deck
+        .lines()
+        .take_while(|line| line.starts_with('$'))
+        .collect();
+    let head = head.join(" ").replace(" $ ", " ");
+    for told in [&error, &head] {
+        assert!(
+            told.contains("the model misses the frequencies by 0.55 % rms"),
+            "{told}"
+        );
+        assert!(
+            told.contains("95 % limits scaled by the misfit: kt 1.5"),
+            "{told}"
+        );
+    }
+    assert!(deck.is_ascii());
+    // A model that holds is no reason for a warning.
+    let arguments = [
+        "export",
+        "recordings/lap-joint/test.toml",
+        "--out",
+        "lap.bdf",
+        "--quiet",
+    ];
+    assert_eq!(tapjoint(folder.path(), &arguments, 0), "");
+    let deck = std::fs::read_to_string(folder.path().join("lap.bdf")).unwrap();
+    assert!(!deck.contains("the model misses") && deck.contains("95 % limits: kt "));
+}
+
+#[test]
 fn recover_three_springs_are_the_inverse_of_the_compliance() {
     let folder = tempfile::tempdir().unwrap();
     let text = tapjoint(folder.path(), &["init"], 0).replace("model = \"2p\"", "model = \"3p\"");

@@ -111,6 +111,33 @@ fn regress_a_template_of_recordings_names_them() {
 }
 
 #[test]
+fn regress_a_hammer_that_is_named_or_forgotten_is_suggested() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("time,ch1_force_V,ch2_acc_V\n");
+    for index in 0..8000 {
+        let after = f64::from(index % 4000 - 500);
+        let force = (-(after / 3.0).powi(2)).exp();
+        let rings = if after > 0.0 {
+            (-after / 400.0).exp() * (0.3 * after).sin()
+        } else {
+            0.0
+        };
+        text.push_str(&format!(
+            "{},{force:.5},{rings:.5}\n",
+            f64::from(index) / 1e4
+        ));
+    }
+    std::fs::write(folder.path().join("x.csv"), text).unwrap();
+    let (_, error) = told(folder.path(), &["run", "x.csv", "--hammer", "force"], 2);
+    assert!(error.contains("did you mean \"ch1_force_V\"?"), "{error}");
+    let (text, _) = told(folder.path(), &["run", "x.csv"], 0);
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("say --hammer ch1_force_V"), "{text}");
+    let (text, _) = told(folder.path(), &["spectrum", "x.csv", "--hammer", "1"], 0);
+    assert!(!text.contains("hammer-channel"), "{text}");
+}
+
+#[test]
 fn prop_completions_of_every_shell_name_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let names = commands(folder.path());

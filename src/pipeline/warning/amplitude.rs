@@ -1,5 +1,6 @@
 //! Modes whose frequency or damping changes with the amplitude.
 
+use std::cmp::Ordering;
 use std::fmt;
 
 use super::Warning;
@@ -105,7 +106,7 @@ impl fmt::Display for AmplitudeChange {
             f,
             "{} Hz and its damping {} % as the amplitude falls from {} to {} {}",
             moves(self.frequency, self.frequency_bound),
-            moves(percent(self.damping_ratio), percent(self.damping_bound)),
+            damping_moves(percent(self.damping_ratio), percent(self.damping_bound)),
             two_digits(self.amplitude[0]),
             two_digits(self.amplitude[1]),
             unit.replace("m/s2", "m/s\u{b2}")
@@ -123,6 +124,75 @@ fn moves([first, last]: [f64; 2], bounds: [f64; 2]) -> String {
     let decimals = decimals(last - first);
     let verb = if last > first { "rises" } else { "falls" };
     format!("{verb} from {first:.decimals$} to {last:.decimals$}")
+}
+
+/// The same of a damping, which is never negative, whatever noise makes of it: "stays below 0.02".
+fn damping_moves(values: [f64; 2], bounds: [f64; 2]) -> String {
+    if differs(values, bounds) {
+        return moves(values.map(|value| value.max(0.0)), bounds);
+    }
+    let (mean, bound) = (0.5 * (values[0] + values[1]), bounds[0].max(bounds[1]));
+    if mean > bound {
+        moves(values, bounds)
+    } else {
+        format!("stays below {}", two_digits(mean.max(0.0) + bound))
+    }
+}
+
+/// Which way a mode goes with the amplitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// Softer, or more damped, the harder it is driven.
+    Slips,
+    /// Stiffer the harder it is driven.
+    Stiffens,
+    /// Less damped the harder it is driven.
+    Rubs,
+    /// Softer and less damped: no single one of these.
+    Mixed,
+}
+
+impl AmplitudeChange {
+    /// By the signs of what changes beyond its bounds.
+    fn way(&self) -> Way {
+        let sign = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
+            true => values[0].total_cmp(&values[1]),
+            false => Ordering::Equal,
+        };
+        let frequency = sign(self.frequency, self.frequency_bound);
+        let damping = sign(self.damping_ratio, self.damping_bound);
+        match (frequency, damping) {
+            (Ordering::Greater, _) => Way::Stiffens,
+            (Ordering::Less, Ordering::Less) => Way::Mixed,
+            (Ordering::Equal, Ordering::Less) => Way::Rubs,
+            _ => Way::Slips,
+        }
+    }
+}
+
+impl Way {
+    /// What makes a mode go so.
+    fn cause(self) -> &'static str {
+        match self {
+            Way::Slips => {
+                "a joint or support that slips softens and damps more the harder it is driven, and so may a \
+                 sensor or cable that sits loose"
+            }
+            Way::Stiffens => {
+                "it stiffens the harder it is driven, which slip does not do: a contact that closes, a \
+                 support that tightens, or a beam held at both ends does"
+            }
+            Way::Rubs => {
+                "it is damped less the harder it is driven, which slip that only begins does not do: dry friction of a \
+                 constant force (a cable or support that rubs) does, and a decay that ends in noise or in another \
+                 mode looks like it"
+            }
+            Way::Mixed => {
+                "it softens but is damped less the harder it is driven, which slip that only begins does not do: a \
+                 contact that slides all the way, or another mode nearby, may"
+            }
+        }
+    }
 }
 
 fn two_digits(value: f64) -> String {
@@ -170,10 +240,15 @@ pub(super) fn write_dependence(
         };
         write!(f, "; {more} more {modes} with it")?;
     }
-    f.write_str(
-        "; a joint or support that slips softens and damps more the harder it is driven, and so may a \
-         sensor or cable that sits loose; a recording at a second tap level would confirm it, and \
-         frequencies should be stated with their amplitude, or taken from softer taps",
+    // Of several modes with the same cause it is said of all; what differs is said of the first alone.
+    let way = changes
+        .first()
+        .map_or(Way::Slips, |(_, change)| change.way());
+    write!(
+        f,
+        "; {}; a recording at a second tap level would confirm it, and frequencies should be stated with \
+         their amplitude, or taken from softer taps",
+        way.cause()
     )
 }
 
@@ -202,5 +277,43 @@ mod tests {
             ..change
         };
         assert!(plain(&steady).contains("its damping stays near 0.2 %"));
+        let undamped = AmplitudeChange {
+            damping_ratio: [-0.000_12, -0.000_05],
+            damping_bound: [0.0002, 0.0002],
+            ..steady
+        };
+        assert!(plain(&undamped).contains("its damping stays below 0.020 %"));
+    }
+
+    /// A change of frequency and damping as the amplitude falls.
+    fn change(frequency: [f64; 2], damping_ratio: [f64; 2]) -> AmplitudeChange {
+        AmplitudeChange {
+            amplitude: [10.0, 1.0],
+            unit: None,
+            frequency,
+            frequency_bound: [0.01, 0.01],
+            damping_ratio,
+            damping_bound: [0.0001, 0.0001],
+        }
+    }
+
+    #[test]
+    fn regress_the_cause_follows_the_sign_of_the_change() {
+        let steady = [0.002, 0.002];
+        let cases = [
+            ([80.0, 80.5], steady, "softens and damps more"),
+            ([80.0, 80.0], [0.004, 0.002], "softens and damps more"),
+            ([80.5, 80.0], steady, "stiffens the harder"),
+            ([80.0, 80.0], [0.002, 0.004], "damped less the harder"),
+            ([80.0, 80.5], [0.002, 0.004], "softens but is damped less"),
+        ];
+        for (frequency, damping, cause) in cases {
+            let warning = Warning::AmplitudeDependent {
+                file: "a.wav".into(),
+                changes: vec![(1, change(frequency, damping))],
+            };
+            let text = warning.to_string();
+            assert!(text.contains(cause), "{frequency:?} {damping:?}: {text}");
+        }
     }
 }

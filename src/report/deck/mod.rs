@@ -29,6 +29,8 @@ pub struct Deck {
     pub name: String,
     /// Where the numbers of the joint come from.
     pub origin: String,
+    /// What has to be known of the joint's numbers: how far the model misses, and their limits.
+    pub doubts: Vec<String>,
     /// Theory of bending.
     pub theory: BeamTheory,
     /// Runs of nodes with their beam: one, or of a lap joint two.
@@ -105,6 +107,8 @@ pub struct DeckSource {
     pub joint: JointStiffness,
     /// Where it is from.
     pub origin: String,
+    /// What has to be known of its numbers.
+    pub doubts: Vec<String>,
     /// Frequencies (Hz) that both together predict.
     pub frequencies: Vec<f64>,
 }
@@ -137,6 +141,7 @@ pub fn source_of(test: &TestDescription, analysis: &Analysis) -> Result<DeckSour
         },
         joint,
         origin: origin.to_owned(),
+        doubts: Vec::new(),
         frequencies: found.prediction.iter().map(|mode| mode.predicted).collect(),
     })
 }
@@ -150,6 +155,7 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
     let mut deck = Deck {
         name: name.to_owned(),
         origin: source.origin.clone(),
+        doubts: source.doubts.clone(),
         theory: structure.theory,
         pieces: Vec::new(),
         nodes: Vec::new(),
@@ -245,9 +251,12 @@ impl Deck {
                 plain(&self.name)
             ),
             format!("joint: {}", self.origin),
+        ];
+        lines.extend(self.doubts.iter().flat_map(|doubt| short_lines(doubt)));
+        lines.push(
             "units: m, kg, s, N, rad; the beam lies along x, w is along y, theta about z"
                 .to_owned(),
-        ];
+        );
         if self.joint.is_some_and(|joint| joint.cross != 0.0) {
             lines.push(
                 "the spring between w and theta couples metres and radians: in other units invert the"
@@ -269,16 +278,33 @@ impl Deck {
     }
 }
 
-/// Printable ASCII, as old input formats want it.
-fn plain(text: &str) -> String {
-    text.chars()
-        .map(|letter| {
-            if letter == ' ' || letter.is_ascii_graphic() {
-                letter
-            } else {
-                '?'
+/// A remark in lines that old input formats take.
+fn short_lines(text: &str) -> Vec<String> {
+    const LONGEST: usize = 72;
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(word),
+            Some(line) if line.len() + 1 + word.len() <= LONGEST => {
+                line.push(' ');
+                line.push_str(word);
             }
-        })
-        .take(40)
-        .collect()
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines.iter().map(|line| ascii(line)).collect()
+}
+
+/// A name as old input formats want it.
+fn plain(text: &str) -> String {
+    ascii(text).chars().take(40).collect()
+}
+
+/// Printable ASCII.
+fn ascii(text: &str) -> String {
+    let printable = |letter: char| match letter == ' ' || letter.is_ascii_graphic() {
+        true => letter,
+        false => '?',
+    };
+    text.chars().map(printable).collect()
 }

@@ -1,9 +1,11 @@
 //! The gap between model and measurement, in sentences.
 
+use std::collections::BTreeMap;
+
 use super::super::document::{
     ClosureSection, Document, GapSection, HypothesisSection, PullSection,
 };
-use super::super::format::{probability, trimmed};
+use super::super::format::{RIGID, prefix, probability, signed_percent, significant, trimmed};
 use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
 use super::next_tests::next_test;
 use crate::gap::{MISFIT, SEEN};
@@ -14,8 +16,8 @@ pub fn gap_story(document: &Document) -> Vec<String> {
     let Some(gap) = &document.gap else {
         return Vec::new();
     };
-    let mut story = vec![verdict(gap)];
-    story.extend(place(gap));
+    let mut story = vec![verdict(gap, has_joint(document))];
+    story.extend(place(document, gap));
     story.extend(how_far(gap));
     story.extend(price(gap));
     story.extend(along_decays(gap));
@@ -23,7 +25,13 @@ pub fn gap_story(document: &Document) -> Vec<String> {
     story
 }
 
-fn verdict(gap: &GapSection) -> String {
+/// Whether a joint is sought: a free beam has none.
+fn has_joint(document: &Document) -> bool {
+    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
+    kind != Some("free")
+}
+
+fn verdict(gap: &GapSection, has_joint: bool) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));
     let effects = gap.verdict.effects.join(", ");
     match gap.verdict.kind.as_str() {
@@ -44,13 +52,13 @@ fn verdict(gap: &GapSection) -> String {
              is not held for the cause."
         ),
         "set" => format!("The cause is most likely one of {effects}; these data do not decide."),
-        "unknown" => unknown(gap),
-        _ => undecided(gap),
+        "unknown" => unknown(gap, has_joint),
+        _ => undecided(gap, has_joint),
     }
 }
 
 /// That the cause has no name, and what it looks like where two local changes would explain it.
-fn unknown(gap: &GapSection) -> String {
+fn unknown(gap: &GapSection, has_joint: bool) -> String {
     let likeness = |found: &&HypothesisSection| {
         matches!(
             found.effect.as_str(),
@@ -69,9 +77,14 @@ fn unknown(gap: &GapSection) -> String {
                 sizes(found)
             )
         });
+    let estimated = if has_joint {
+        "the joint's stiffness"
+    } else {
+        "what is estimated"
+    };
     format!(
-        "Something is missing in the model, and nothing in the catalogue explains it alone: do not trust the \
-         joint's stiffness beyond the misfit.{likeness}"
+        "Something is missing in the model, and nothing in the catalogue explains it alone: do not trust \
+         {estimated} beyond the misfit.{likeness}"
     )
 }
 
@@ -92,7 +105,7 @@ fn no_gap(gap: &GapSection) -> String {
 const GAP: f64 = 0.1;
 
 /// That there is no answer, and what is known all the same.
-fn undecided(gap: &GapSection) -> String {
+fn undecided(gap: &GapSection, has_joint: bool) -> String {
     let reason = gap.verdict.reason.as_deref().unwrap_or("too few data");
     let of = |name: &str| gap.hypotheses.iter().find(|found| found.effect == name);
     let Some(none) = of("none") else {
@@ -113,16 +126,21 @@ fn undecided(gap: &GapSection) -> String {
         )
     } else if none.probability < GAP {
         format!(
-            "There is a gap ({}): the described model with its joint refitted misses the frequencies by \
-             {} % (rms), where their uncertainty is {} %. These data cannot say what causes it: {reason}.",
+            "There is a gap ({}): the described model{} misses the frequencies by {} % (rms), where their \
+             uncertainty is {} %. These data cannot say what causes it: {reason}.",
             probability(1.0 - none.probability),
+            if has_joint {
+                " with its joint refitted"
+            } else {
+                ""
+            },
             percent(none.gap_before),
             percent(gap.noise_floor),
         )
     } else {
         format!("These data do not decide whether there is a gap, nor what causes it: {reason}.")
     };
-    if let Some(coupling) = of("cross-coupling") {
+    if let Some(coupling) = of("cross-coupling").filter(|_| has_joint) {
         text.push_str(&format!(
             " A cross-coupling of the joint is not established ({}).",
             probability(coupling.probability)
@@ -155,7 +173,7 @@ fn named(gap: &GapSection) -> Option<&HypothesisSection> {
 }
 
 /// Where, unless there is no gap.
-fn place(gap: &GapSection) -> Option<String> {
+fn place(document: &Document, gap: &GapSection) -> Option<String> {
     if matches!(gap.verdict.kind.as_str(), "no-gap" | "not-enough-data") {
         return None;
     }
@@ -166,7 +184,7 @@ fn place(gap: &GapSection) -> Option<String> {
         .iter()
         .take(3)
         .filter(|(_, p)| **p >= 0.01)
-        .map(|(name, p)| format!("{name} {}", probability(**p)))
+        .map(|(name, p)| format!("{name}{} {}", sensors_at(document, name), probability(**p)))
         .collect();
     let worst = place
         .modes
@@ -180,6 +198,28 @@ fn place(gap: &GapSection) -> Option<String> {
         change(worst.error_percent, 3),
         times(worst.z)
     ))
+}
+
+/// " (A at 338 mm)" behind the place "sensor", without the position of one that moves; nothing behind other
+/// places, and where too many sensors may be meant.
+fn sensors_at(document: &Document, place: &str) -> String {
+    const MOST: usize = 3;
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let mut sensors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (name, position) in recordings.iter().flat_map(|one| &one.sensor_positions) {
+        sensors.entry(name).or_default().push(*position);
+    }
+    if place != "sensor" || sensors.is_empty() || sensors.len() > MOST {
+        return String::new();
+    }
+    let named = sensors.iter().map(|(name, places)| {
+        let first = places[0];
+        match places.iter().all(|place| *place == first) {
+            true => format!("{name} at {} mm", trimmed(1e3 * first, 4)),
+            false => format!("{name}, which was moved"),
+        }
+    });
+    format!(" ({})", named.collect::<Vec<_>>().join("; "))
 }
 
 /// "high.wav", or "high.wav (level 0.73)" where its taps were softer than the hardest.
@@ -307,7 +347,9 @@ fn along_decays(gap: &GapSection) -> Option<String> {
 /// What ignoring the effect costs; `None` where none is named.
 fn price(gap: &GapSection) -> Option<String> {
     let found = named(gap).filter(|found| found.effect != "none")?;
-    let part = |name: &str, shift: Option<f64>| Some(format!("{name} by {} %", change(shift?, 2)));
+    let part = |name: &str, shift: Option<f64>| {
+        Some(format!("{name} by {} %", signed_percent(Some(shift?))))
+    };
     let parts: Vec<String> = [
         part("Kx", found.joint_shift.kx_percent),
         part("Ky", found.joint_shift.ky_percent),
@@ -315,5 +357,25 @@ fn price(gap: &GapSection) -> Option<String> {
     .into_iter()
     .flatten()
     .collect();
-    (!parts.is_empty()).then(|| format!("Adding it moves the joint: {}.", parts.join(", ")))
+    if parts.is_empty() {
+        return None;
+    }
+    let moves = parts.join(", ");
+    Some(match found.joint {
+        Some([kt, kr]) => format!(
+            "With it the joint is Kt = {}, Kr = {} ({moves} against the joint without it).",
+            stiffness(kt, "N/m"),
+            stiffness(kr, "N\u{a0}m/rad")
+        ),
+        None => format!("Adding it moves the joint: {moves}."),
+    })
+}
+
+/// "1.995 MN/m", on one line.
+fn stiffness(value: f64, unit: &str) -> String {
+    if value.is_infinite() {
+        return RIGID.to_owned();
+    }
+    let (factor, letter) = prefix(value);
+    format!("{}\u{a0}{letter}{unit}", significant(factor * value, 4))
 }

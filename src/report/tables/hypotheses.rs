@@ -1,13 +1,15 @@
 //! What may be missing in the model, as a table.
 
 use super::super::document::{Document, GapSection, HypothesisSection, ParameterSection};
-use super::super::format::{MISSING, probability, significant};
+use super::super::format::{MISSING, probability, rounded, significant};
 use super::{Table, number, words};
 
 /// Hypotheses less probable than this are not listed.
 pub(super) const LEAST_PROBABILITY: f64 = 0.005;
 /// At least so many hypotheses are listed.
 const LEAST_LISTED: usize = 4;
+/// What a search leaves of a size at zero, in the unit it is read in: by rounding alone.
+const NOTHING: f64 = 1e-9;
 
 /// The hypotheses, the most probable first; `None` without a diagnosis.
 pub fn hypotheses(document: &Document) -> Option<Table> {
@@ -86,7 +88,7 @@ fn row(found: &HypothesisSection) -> Vec<String> {
     ]
 }
 
-/// "mass 24.1 ± 0.3 g".
+/// "mass 24.10 ± 0.30 g".
 pub(super) fn sizes(found: &HypothesisSection) -> String {
     let parts: Vec<String> = found
         .parameters
@@ -98,11 +100,14 @@ pub(super) fn sizes(found: &HypothesisSection) -> String {
 
 fn size(name: &str, parameter: &ParameterSection) -> String {
     let (unit, factor) = unit_of(name);
-    let value = significant(factor * parameter.value, 3);
-    let std = parameter.std.map_or_else(String::new, |std| {
-        format!(" \u{b1} {}", significant(factor * std, 2))
-    });
-    format!("{} {value}{std}{unit}", name.replace('_', " "))
+    let value = factor * parameter.value;
+    let known = parameter.std.map(|std| factor * std);
+    let size = match known.filter(|std| std.is_finite() && *std > 0.0) {
+        Some(std) => rounded(value, Some(std)).joined(),
+        None if value.abs() < NOTHING => "0".to_owned(),
+        None => significant(value, 3),
+    };
+    format!("{} {size}{unit}", name.replace('_', " "))
 }
 
 /// The unit a parameter is read in, and how many of it one SI unit is.
@@ -114,6 +119,8 @@ fn unit_of(name: &str) -> (&'static str, f64) {
         "stiffness" => (" N/m", 1.0),
         "frequency" | "offset" => (" Hz", 1.0),
         "force" => (" N", 1.0),
+        // A hinge's rotational compliance times E I/L.
+        "compliance" => (" L/EI", 1.0),
         "relative" | "ratio" | "std" | "loss_factor" => (" %", 1e2),
         _ => ("", 1.0),
     }

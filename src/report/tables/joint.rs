@@ -5,6 +5,7 @@ use super::super::format::{
     MISSING, RIGID, Rounded, bound_percent, last_place, optional, prefix, rounded_to,
     signed_percent, significant, with_decimals_of,
 };
+use super::super::summary::capital;
 use super::modes::reading;
 use super::{Table, bound_of, mode_of, number, words};
 
@@ -301,10 +302,18 @@ pub fn pairs(document: &Document) -> Option<Table> {
                 vec![name.to_owned(), value, unit.to_owned()]
             })
             .collect(),
-        note:
+        note: std::iter::once(
             "Closure: the product of stiffnesses that the regression implies against the product \
-               of its own estimates; far from 0 the model does not fit."
+             of its own estimates; far from 0 the model does not fit."
                 .to_owned(),
+        )
+        .chain(
+            document
+                .warnings_beside()
+                .map(|warning| capital(&warning.text) + "."),
+        )
+        .collect::<Vec<_>>()
+        .join(" "),
     })
 }
 

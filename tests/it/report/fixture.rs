@@ -40,10 +40,12 @@ pub fn document() -> Document {
             WarningSection {
                 code: "closure".into(),
                 text: "the pair regression does not close: its product is 8.2 % off its own estimates; a mode may be misnumbered or the joint needs the third stiffness; try model = \"3p\"".into(),
+                ..WarningSection::default()
             },
             WarningSection {
                 code: "force-bandwidth".into(),
                 text: "full.wav: the force falls by 24 dB over the band; a harder hammer tip reaches higher".into(),
+                ..WarningSection::default()
             },
         ],
     }

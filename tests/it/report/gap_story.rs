@@ -2,7 +2,8 @@
 
 use tapjoint::report::document::{
     AlongDecaysSection, DecayChangeSection, Document, GapPlaceSection, GapSection,
-    GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection, PullSection,
+    GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection, ParameterSection,
+    PullSection, RecordingSection, TestSection,
 };
 use tapjoint::report::render_text;
 use tapjoint::report::tables::{gap_story, hypotheses, next_tests};
@@ -131,6 +132,86 @@ fn regress_what_two_local_changes_explain_is_said_to_be_spread() {
         gap.hypotheses[0].goodness_of_fit = Some(1e-4);
     }
     assert!(!gap_story(&document)[0].contains(spread));
+}
+
+/// What is said of the size of the effect that is named.
+fn size_of(name: &str, value: f64, std: Option<f64>) -> String {
+    let mut document = gap_with("named");
+    if let Some(gap) = &mut document.gap {
+        gap.verdict.effects = vec!["joint-damping".into()];
+        let parameter = ParameterSection {
+            value,
+            std,
+            ..ParameterSection::default()
+        };
+        gap.hypotheses[0].parameters = [(name.to_owned(), parameter)].into();
+    }
+    let said = gap_story(&document).remove(0);
+    said.rsplit_once("): ").unwrap().1.to_owned()
+}
+
+#[test]
+fn regress_digits_of_a_size_follow_its_uncertainty() {
+    let cases = [
+        (
+            size_of("mass", 0.024, Some(0.000_62)),
+            "mass 24.00 ± 0.62 g.",
+        ),
+        (size_of("ratio", 4.34e-19, Some(0.15)), "ratio 0 ± 15 %."),
+        (size_of("ratio", 4.34e-19, None), "ratio 0 %."),
+        (size_of("mass", 0.0241, None), "mass 24.1 g."),
+        (
+            size_of("compliance", 0.0414, Some(0.0035)),
+            "compliance 0.0414 ± 0.0035 L/EI.",
+        ),
+    ];
+    for (said, wanted) in cases {
+        assert_eq!(said, wanted);
+    }
+}
+
+#[test]
+fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
+    let mut document = gap_with("named");
+    let sensor = RecordingSection {
+        sensor_positions: [("A".to_owned(), 0.338)].into(),
+        ..RecordingSection::default()
+    };
+    document.recordings = Some(vec![sensor.clone(), sensor]);
+    if let Some(gap) = &mut document.gap {
+        gap.verdict.effects = vec!["joint-damping".into()];
+        gap.hypotheses[0].joint = Some([1.9954e6, 1222.6]);
+        gap.hypotheses[0].joint_shift.kx_percent = Some(11.46);
+        if let Some(place) = &mut gap.place {
+            place.probability = [("sensor".to_owned(), 0.997)].into();
+        }
+    }
+    let story = gap_story(&document).join("\n").replace('\u{a0}', " ");
+    assert!(
+        story.contains("With it the joint is Kt = 1.995 MN/m, Kr = 1.223 kN m/rad (Kx by +11 %"),
+        "{story}"
+    );
+    assert!(story.contains("sensor (A at 338 mm) 99.7 %"), "{story}");
+    if let Some(recordings) = &mut document.recordings {
+        recordings[1].sensor_positions = [("A".to_owned(), 0.2)].into();
+    }
+    let story = gap_story(&document).join("\n");
+    assert!(story.contains("sensor (A, which was moved)"), "{story}");
+}
+
+#[test]
+fn regress_of_a_free_beam_no_joint_is_said_to_be_refitted() {
+    let mut document = gap_with("not-enough-data");
+    if let Some(gap) = &mut document.gap {
+        gap.hypotheses[1].probability = 0.01;
+    }
+    let refitted = "with its joint refitted";
+    assert!(gap_story(&document)[0].contains(refitted));
+    document.test = Some(TestSection {
+        kind: Some("free".into()),
+        ..TestSection::default()
+    });
+    assert!(!gap_story(&document)[0].contains("joint"));
 }
 
 #[test]

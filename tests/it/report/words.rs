@@ -91,6 +91,7 @@ fn prop_page_escapes_what_users_write() {
     document.warnings.push(WarningSection {
         code: "odd".into(),
         text: attack.into(),
+        ..WarningSection::default()
     });
     for recording in document.recordings.iter_mut().flatten() {
         recording.file = attack.into();
@@ -196,7 +197,7 @@ fn val_parameters_csv() {
     let mut lines = csv.lines();
     assert_eq!(
         lines.next(),
-        Some("parameter,method,unit,value,std,low,high")
+        Some("parameter,method,unit,value,std,low,high,std_scaled,low_scaled,high_scaled")
     );
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     let named: Vec<[&str; 4]> = rows
@@ -214,7 +215,58 @@ fn val_parameters_csv() {
     let std: f64 = rows[0][4].parse().expect("a number");
     // Written with all digits: only the fixture's own product rounds.
     assert!((std - 0.041 * 970.5).abs() < 1e-12, "std {std}");
-    assert_eq!(rows[4][4..], ["", "", ""], "unknown cells are empty");
+    assert_eq!(rows[4][4..], [""; 6], "unknown cells are empty");
+}
+
+/// The fixture with a misfit that leaves Kt uneven limits.
+fn misfitting() -> Document {
+    let mut document = fixture::document();
+    let estimate = document.estimate.as_mut().and_then(Option::as_mut);
+    let kt = estimate.and_then(|e| e.kt.as_mut()).unwrap();
+    kt.std_scaled = Some(0.08e6);
+    (kt.low_scaled, kt.high_scaled) = (Some(0.034e6), Some(4.91e6));
+    document
+}
+
+#[test]
+fn regress_limits_scaled_by_the_misfit_reach_the_table_and_the_ending() {
+    let csv = render_parameters_csv(&misfitting()).unwrap();
+    let row = csv.lines().find(|line| line.starts_with("kt,")).unwrap();
+    assert!(row.ends_with(",80000,34000,4910000"), "{row}");
+    let text = render_text(&misfitting()).replace('\n', " ");
+    assert!(text.contains("Kt = 1.382 MN/m"), "{text}");
+    assert!(text.contains("(95 %: 0.034 to 4.910)"), "{text}");
+}
+
+#[test]
+fn regress_doubts_about_the_regression_stand_with_it() {
+    let mut document = fixture::document();
+    document.warnings[0].beside = true;
+    let text = render_text(&document);
+    assert!(text.contains("note (closure)"), "{text}");
+    assert!(!text.contains("warning (closure)"), "{text}");
+    assert!(text.contains("1 warning, see above"), "{text}");
+    let html = page(&document);
+    assert!(html.contains("<h2>1 warning</h2>"), "the page counts it");
+    let own = html.split("<h3>Pair regression</h3>").nth(1).unwrap();
+    let own = own.split("</div>\n</div>").next().unwrap_or(own);
+    assert!(own.contains("The pair regression does not close"), "{own}");
+}
+
+#[test]
+fn regress_a_bare_recording_is_told_what_a_description_adds() {
+    let told = "tapjoint init > test.toml";
+    let said = |document: &Document| {
+        let sentences = summary::sentences(document)
+            .join(" ")
+            .replace('\u{a0}', " ");
+        (
+            sentences.contains(told),
+            render_text(document).contains(told),
+        )
+    };
+    assert_eq!(said(&bare()), (true, true));
+    assert_eq!(said(&fixture::document()), (false, false));
 }
 
 #[test]
@@ -249,6 +301,7 @@ fn prop_terminal_lines_fit_80_columns() {
     document.warnings.push(WarningSection {
         code: "long".into(),
         text: "x".repeat(300),
+        ..WarningSection::default()
     });
     for (case, document) in [("whole", fixture::document()), ("long", document)] {
         for line in render_text(&document).lines() {
@@ -697,6 +750,8 @@ fn val_peaks_that_are_no_modes_are_named_and_not_counted() {
 #[test]
 fn regress_pages_leave_out_what_was_not_asked_for() {
     let html = text_of(&rendered(&bare(), &[]), "report.html");
+    // What a description would add is told, and nothing else of it.
+    let html = html.replace("the joint&#39;s stiffness and the diagnosis", "");
     for unwanted in ["id=\"joint\"", "id=\"uncertainty\"", "stiffness", "λ"] {
         assert!(
             !html.contains(unwanted),

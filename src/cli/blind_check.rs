@@ -20,7 +20,7 @@ use tapjoint::description::TestDescription;
 use tapjoint::gap::{Diagnosis, GapSettings};
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::{WavFormat, encode_wav};
-use tapjoint::report::blind_check::render_blind_check;
+use tapjoint::report::blind_check::{render_blind_check, score_json};
 use tapjoint::study::blind_check::{
     Answer, Campaign, Case, Conduct, DrawnTest, Extent, RecordedTest, Truth, TruthFile, commitment,
     parse_truths, render_rows, rows, score,
@@ -143,9 +143,7 @@ pub(super) fn run(
     }
     let folder = output.publish()?;
     terminal.say(&format!("Results: {}", folder.display()))?;
-    terminal.write_json(&tapjoint::report::blind_check::score_json(
-        &scores, &conduct,
-    ))?;
+    terminal.write_json(&score_json(&scores, &conduct))?;
     Ok(Outcome::Answered)
 }
 

@@ -127,6 +127,8 @@ const VISITOR: &str = r#"
     await wait(100);
     seen.near = taps.querySelectorAll(".near canvas").length;
     seen.nearest = Array.from(taps.querySelectorAll(".near .u-label")).map(function (label) { return label.textContent; });
+    taps.querySelector(".chips .reset").click();
+    await wait(100);
     var written = document.createElement("pre");
     written.id = "seen";
     written.textContent = JSON.stringify(seen);
@@ -137,6 +139,19 @@ const VISITOR: &str = r#"
 })();
 </script>
 "#;
+
+/// Makes the spectra of the first recording ten thousand times smaller before the page draws them.
+const TINY: &str = r#"<script>
+(function () {
+  var figures = Array.from(document.querySelectorAll("figure.curves > script"));
+  var first = figures.filter(function (script) { return JSON.parse(script.textContent).kind === "spectrum"; })[0];
+  var plot = JSON.parse(first.textContent);
+  plot.panels.forEach(function (panel) {
+    panel.series.forEach(function (one) { one.values = one.values.map(function (v) { return v === null ? v : v * 1e-4; }); });
+  });
+  first.textContent = JSON.stringify(plot);
+})();
+</script>"#;
 
 /// A page that shows the report in a frame, because a browser's window has a least width.
 const FRAME: &str = r#"<!DOCTYPE html><meta name="color-scheme" content="light dark"><body>
@@ -216,6 +231,7 @@ fn page_with_visitor() -> (tempfile::TempDir, PathBuf) {
     );
     let file = folder.path().join("report/report.html");
     let html = std::fs::read_to_string(&file).unwrap();
+    let html = html.replace("</main>", &format!("</main>{TINY}"));
     let (head, tail) = html.rsplit_once("</body>").unwrap();
     std::fs::write(&file, format!("{head}{VISITOR}</body>{tail}")).unwrap();
     (folder, file)
@@ -423,7 +439,7 @@ fn pages(pdf: &[u8]) -> usize {
 fn regress_two_figures_share_a_printed_page() {
     let Some(chromium) = chromium() else { return };
     let folder = samples();
-    let test = "recordings/lap-joint/test.toml";
+    let test = "recordings/cantilever/test.toml";
     tapjoint(folder.path(), &["run", test, "--out", "report"], 0);
     let page = folder.path().join("report/report.html");
     let printed = |html: &str| {

@@ -169,7 +169,7 @@ fn value(verdict: &VerdictSection) -> String {
             format!("<{LEAST_PERCENT}")
         }
         // A count has no digits behind the point.
-        Some(value) if value.fract() == 0.0 => trimmed(value, 3),
+        Some(value) if verdict.unit != "1" && value.fract() == 0.0 => trimmed(value, 3),
         Some(value) => significant(value, 3),
     }
 }

@@ -21,6 +21,8 @@ const OVER_NOISE: f64 = 6.0;
 const OVER_DOWNWARD: f64 = 1.5;
 /// Least distance of the two crests, in widths at half height: nearer, their flanks overlap.
 const LEAST_DELAY: f64 = 3.0;
+/// A pulse narrower at half height than this (samples) does not show its height.
+const FORM_SHOWS: f64 = 3.0;
 /// Most candidates that are compared with the pulse; the rest of a noisy channel is no hit.
 const MOST_CANDIDATES: usize = 24;
 /// An excursion that is wider or narrower than the pulse by this factor is no blow of the same
@@ -32,7 +34,8 @@ const OTHER_WIDTH: f64 = 3.0;
 pub struct SecondHit {
     /// Time between the two crests (s).
     pub delay: f64,
-    /// The smaller peak over the larger.
+    /// The smaller peak over the larger; of pulses too short to show their height, the smaller impulse over the
+    /// larger.
     pub ratio: f64,
 }
 
@@ -80,7 +83,7 @@ pub(super) fn second_hit(
         .filter(|copy| copy.ratio >= settings.double_hit_warning)
         .map(|copy| SecondHit {
             delay: (copy.place - main.crest as f64).abs() / force.rate,
-            ratio: copy.ratio,
+            ratio: main.size_of(&copy),
         })
 }
 
@@ -101,6 +104,35 @@ impl<'a> Pulse<'a> {
             peak: samples.get(crest).copied().unwrap_or(0.0),
             width: half_width(samples, crest).max(1.0),
         }
+    }
+
+    /// A second hit's size, by what the samples tell of it. Of a pulse two samples wide the height between them is
+    /// anybody's guess (a narrower and higher copy fits as well), but an anti-alias filter keeps its impulse, which
+    /// is also what the spectrum ripples by.
+    fn size_of(&self, copy: &PulseCopy) -> f64 {
+        if self.width >= FORM_SHOWS {
+            return copy.ratio;
+        }
+        let place = copy.place.round().max(0.0) as usize;
+        // An anti-alias filter rings for some samples about each pulse; half the way to the other is its own.
+        let reach = (3 * reach(self.width)).min(self.crest.abs_diff(place) / 2);
+        let ratio = self.impulse(place, reach) / self.impulse(self.crest, reach);
+        // Beyond that something else lies beside one of the two.
+        let is_alike = (0.5..=2.0).contains(&(ratio / copy.ratio));
+        if is_alike { ratio } else { copy.ratio }
+    }
+
+    /// Sum of the samples within the reach of a crest, above the median of as many beyond it; those at its ends
+    /// count half, so that a ringing from sample to sample leaves nothing.
+    fn impulse(&self, crest: usize, reach: usize) -> f64 {
+        let last = self.samples.len().saturating_sub(1);
+        let sample = |index: usize| self.samples.get(index.min(last)).copied().unwrap_or(0.0);
+        let pair = |step: usize| [sample(crest.saturating_sub(step)), sample(crest + step)];
+        let mut beyond: Vec<f64> = (reach + 1..=2 * reach).flat_map(pair).collect();
+        let base = median(&mut beyond);
+        let height = |step: usize| pair(step).iter().map(|x| x - base).sum::<f64>();
+        let inside: f64 = (1..reach).map(height).sum();
+        sample(crest) - base + inside + 0.5 * height(reach)
     }
 
     fn is_clear(&self, index: usize) -> bool {

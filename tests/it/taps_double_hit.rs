@@ -1,12 +1,14 @@
 //! Second hits against what only looks like one, on the signals of the study `double_hits`.
 
+use std::f64::consts::PI;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 #[path = "../../examples/double_hits/signals.rs"]
 mod signals;
 
-use signals::{DISTURBANCES, Disturbance, Found, Record, SHAPES, found};
+use signals::{DISTURBANCES, Disturbance, Found, Record, SHAPES, Shape, found};
 
 fn random(seed: usize) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed as u64)
@@ -82,6 +84,48 @@ fn recover_second_hits_with_ratio_and_delay() {
             // A fraction of a sample; of wide pulses, noise moves a weak crest by 1 % of the width.
             let bound = 0.5 / record.rate + 0.02 * record.width;
             assert!((hit.delay - truth).abs() < bound, "{case}: {hit:?}");
+        }
+    }
+}
+
+/// An impulse at a place between samples, as an anti-alias filter leaves it: two samples wide.
+fn filtered_impulse(offset: f64) -> f64 {
+    const CUTOFF: f64 = 0.39;
+    let angle = 2.0 * PI * CUTOFF * offset;
+    let sinc = if angle == 0.0 {
+        1.0
+    } else {
+        angle.sin() / angle
+    };
+    let taper = if offset.abs() < 24.0 {
+        0.5 + 0.5 * (PI * offset / 24.0).cos()
+    } else {
+        0.0
+    };
+    sinc * taper
+}
+
+#[test]
+fn regress_the_size_of_a_second_hit_two_samples_wide_is_that_of_its_impulse() {
+    let rate = 1900.0;
+    for step in 0..100 {
+        let (first, second) = (0.1 * f64::from(step % 10), 0.1 * f64::from(step / 10));
+        let samples = (0..4096).map(|index| {
+            let main = filtered_impulse(f64::from(index) - 400.0 - first);
+            main + 0.6 * filtered_impulse(f64::from(index) - 466.0 - second)
+        });
+        let record = Record {
+            rate,
+            samples: samples.collect(),
+            shape: Shape::HalfSine,
+            begin: 399.0 / rate,
+            width: 2.0 / rate,
+        };
+        match found(&record) {
+            Found::Rejected(hit) => {
+                assert!((hit.ratio - 0.6).abs() < 0.02, "{first} {second}: {hit:?}");
+            }
+            other => panic!("{first} {second}: {other:?}"),
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::between::BetweenRecordings;
+use super::close_ups::CloseUp;
 use super::measure::Measurement;
 use super::model::TestedStructure;
 use super::warning::Warning;
@@ -105,6 +106,8 @@ pub struct Overview {
     pub low: Vec<f64>,
     /// Largest value of each piece.
     pub high: Vec<f64>,
+    /// The samples about each tap.
+    pub close_ups: Vec<CloseUp>,
 }
 
 /// One resonance.

@@ -11,6 +11,7 @@
 
 mod analysis;
 mod between;
+mod close_ups;
 mod consistent;
 mod decays;
 mod doubts;
@@ -46,6 +47,7 @@ pub use analysis::{
     Perturbation, RecordingResult, Response,
 };
 pub use between::BetweenRecordings;
+pub use close_ups::CloseUp;
 pub use consistent::{
     StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
     structure_details,

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::analysis::{Conditions, Overview, RecordingResult, Response};
+use super::close_ups::close_ups;
 use super::error::PipelineError;
 use super::functions::{FunctionSettings, form_of_description, measure_functions};
 use super::measure::{MeasureError, MeasureSettings, Measurement, measure};
@@ -312,7 +313,10 @@ fn result(
         },
         responses,
         band: settings.band,
-        overview: Some(overview(recording, shown)?),
+        overview: Some(Overview {
+            close_ups: close_ups(recording, &settings.source, &measurement.taps)?,
+            ..overview(recording, shown)?
+        }),
         measurement,
         mode_numbers: vec![None; readings],
     })
@@ -354,5 +358,6 @@ fn overview(recording: &Recording, channel: usize) -> Result<Overview, Recording
         step: piece as f64 / recording.sample_rate(),
         low,
         high,
+        close_ups: Vec::new(),
     })
 }

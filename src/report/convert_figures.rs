@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::figures::{
     Curve, FrfCurve, PeakMark, PoleMark, RecordingFigure, SpectraFigure, StabilisationBand,
-    StabilisationFigure, TapMark, TimeOverview,
+    StabilisationFigure, TapCloseUp, TapCurve, TapMark, TimeOverview,
 };
 use super::format::unit_words;
 use super::plot::amplitude::AmplitudeFigure;
@@ -13,8 +13,8 @@ use crate::description::SensorKind;
 use crate::modal::amplitude::AmplitudeCurve;
 use crate::modal::polyreference::BandSearch;
 use crate::pipeline::{
-    AmplitudeChange, Analysis, Frf, FrfSettings, MeasuredSpectra, RecordingResult, Response,
-    frfs_of,
+    AmplitudeChange, Analysis, CloseUp, Frf, FrfSettings, MeasuredSpectra, RecordingResult,
+    Response, frfs_of,
 };
 use crate::spectral::FrfEstimator;
 
@@ -29,6 +29,8 @@ pub fn figures(analysis: &Analysis) -> Vec<RecordingFigure> {
 }
 
 fn recording_figure(recording: &RecordingResult, name: &str) -> RecordingFigure {
+    let close_ups = recording.overview.iter().flat_map(|all| &all.close_ups);
+    let mut close_ups = close_ups.map(|one| close_up(recording, one));
     let taps = recording
         .measurement
         .taps
@@ -38,7 +40,7 @@ fn recording_figure(recording: &RecordingResult, name: &str) -> RecordingFigure 
             time: tap.time,
             peak: tap.peak,
             rejected: tap.rejection.as_ref().map(ToString::to_string),
-            close_up: None,
+            close_up: close_ups.next(),
         })
         .collect();
     let label = match recording.responses.first() {
@@ -66,6 +68,28 @@ fn recording_figure(recording: &RecordingResult, name: &str) -> RecordingFigure 
             .as_ref()
             .and_then(|spectra| stabilisation_figure(&spectra.stabilisation.searches)),
         amplitude: amplitude_figure(recording, name),
+    }
+}
+
+/// The samples about a tap with the names of their channels.
+fn close_up(recording: &RecordingResult, found: &CloseUp) -> TapCloseUp {
+    let curve = |label: String, unit: &Option<String>, values: &Option<Vec<f64>>| {
+        Some(TapCurve {
+            label,
+            unit: words_of(unit),
+            values: values.clone()?,
+        })
+    };
+    let force = curve("force".to_owned(), &recording.tap_unit, &found.force);
+    let first = recording.responses.first();
+    let response = first.and_then(|first| {
+        let label = format!("response {}", first.name);
+        curve(label, &first.unit, &found.response)
+    });
+    TapCloseUp {
+        start: found.start,
+        step: found.step,
+        curves: force.into_iter().chain(response).collect(),
     }
 }
 

@@ -309,6 +309,10 @@ fn regress_the_page_works_in_a_browser() {
             "{case}: {}",
             seen["tap"]
         );
+        assert_eq!(
+            seen["near"], 2,
+            "{case}: the force's samples and the response's"
+        );
         axes_have_one_style(&seen["written"], &case);
         for number in ["1", "5"] {
             assert_eq!(seen["numbers"][number], true, "{case}: {}", seen["numbers"]);

@@ -63,9 +63,9 @@ fn note(document: &Document, gap: &GapSection) -> String {
     format!(
         "Fitted, withheld: errors of the frequencies left (rms); of the described model {described} %{withheld}. \
          The described model has geometry, shear and masses exactly as described{drift}; every hypothesis, none \
-         too, lets these move within their uncertainty, and so leaves less. All are errors of fits to the \
-         readings that take part in the diagnosis{part}; those of the estimate, which weighs all modes, may differ. \
-         Size \u{b1} one standard deviation."
+         too, lets these, sensors' inertias and a recording's warmth move within their uncertainty, and so leaves \
+         less. All are errors of fits to the readings that take part in the diagnosis{part}; those of the estimate, \
+         which weighs all modes, may differ. Size \u{b1} one standard deviation."
     )
 }
 

@@ -124,8 +124,8 @@ impl<'a> Context<'a> {
             competition,
             settings,
             before: Residuals::new(&competition.frame, &competition.described),
-            withheld_before: WithheldErrors::new(&competition.frame, &competition.described),
-            left_out_before: LeftOutErrors::new(&competition.frame, &competition.described),
+            withheld_before: WithheldErrors::new(&competition.frame, &competition.drifting),
+            left_out_before: LeftOutErrors::new(&competition.frame, &competition.drifting),
         }
     }
 

@@ -114,13 +114,14 @@ pub struct HypothesisResult {
     pub confounded_with: Vec<EffectId>,
     /// Values of its parameters.
     pub parameters: Vec<ParameterValue>,
-    /// Root mean square of the fitted frequencies' errors of the nominal model (%).
+    /// Root mean square of the fitted frequencies' errors of the nominal model with one joint for all recordings (%).
     pub gap_before: f64,
     /// The same under this hypothesis; `None` of `unknown`, which predicts nothing.
     pub gap_after: Option<f64>,
     /// The same with each mode predicted from the others (%), this hypothesis.
     pub left_out_after: Option<f64>,
-    /// Root mean square of the withheld frequencies' errors of the nominal model (%).
+    /// Root mean square of the withheld frequencies' errors of the nominal model, its joint free to drift between
+    /// recordings as under every hypothesis (%).
     pub withheld_before: Option<f64>,
     /// The same under this hypothesis.
     pub withheld_after: Option<f64>,

@@ -23,9 +23,12 @@ use rayon::prelude::*;
 /// What the hypotheses made of the readings.
 pub(super) struct Competition {
     pub(super) frame: Frame,
-    /// The nominal model as described, only its joint refitted, for every visit as far as it may drift: where the gap is
+    /// The nominal model as described, only its joint refitted, one and the same in all visits: where the gap is
     /// measured from.
     pub(super) described: Fit,
+    /// The same with a joint and a warmth that may differ between visits, as they may under every hypothesis: what
+    /// these explain no effect is credited with on readings that took no part.
+    pub(super) drifting: Fit,
     /// The same with a joint that may drift between recordings: where a cause is looked for along the beam.
     pub(super) baseline: Fit,
     /// The most probable first.
@@ -214,11 +217,13 @@ fn compete_once(
         entries.push(Entry::new(Hypothesis::Unknown, fit));
     }
     let baseline = fit_baseline(&frame, settings).unwrap_or_else(|| none.clone());
-    let described = fit_described(&frame, settings).unwrap_or_else(|| baseline.clone());
+    let drifting = fit_described(&frame, settings).unwrap_or_else(|| baseline.clone());
+    let described = fit_unmoved(&frame, settings).unwrap_or_else(|| drifting.clone());
     entries.push(Entry::new(Hypothesis::None, none));
     Some(Competition {
         frame,
         described,
+        drifting,
         baseline,
         entries,
     })
@@ -251,32 +256,46 @@ fn seek_from_afar(search: &Search<'_>, candidates: &[Candidate], entries: &mut V
 
 /// The nominal model whose geometry is taken at its word.
 fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
-    let mut exact = frame.clone();
-    for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
-        if matches!(small, Small::Scale | Small::Shear) {
-            *std = EXACT;
-        }
-    }
-    fit_nominal(&exact, settings)
+    fit_nominal(&at_their_word(frame, is_geometry), settings)
 }
 
-/// The same with sensors and fastened masses that weigh what was said. Joint and warmth may differ between visits as they
-/// may under every hypothesis: what these explain no effect is credited with.
+/// The same with sensors and fastened masses that weigh what was said.
 fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+    fit_nominal(&at_their_word(frame, is_described), settings)
+}
+
+/// The same with a joint and a warmth that are one and the same in all visits.
+fn fit_unmoved(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+    let stays = |small: &Small| is_described(small) || matches!(small, Small::Temperature { .. });
+    let settings = GapSettings {
+        drift_stds: vec![EXACT],
+        ..settings.clone()
+    };
+    fit_nominal(&at_their_word(frame, stays), &settings)
+}
+
+/// Whether a small unknown is of what a description states.
+fn is_described(small: &Small) -> bool {
+    is_geometry(small)
+        || matches!(
+            small,
+            Small::SensorMass { .. } | Small::SensorInertia { .. } | Small::FastenedMass { .. }
+        )
+}
+
+fn is_geometry(small: &Small) -> bool {
+    matches!(small, Small::Scale | Small::Shear)
+}
+
+/// The frame with these small unknowns taken at their word.
+fn at_their_word(frame: &Frame, stays: impl Fn(&Small) -> bool) -> Frame {
     let mut exact = frame.clone();
     for (small, std) in exact.smalls.iter().zip(&mut exact.small_stds) {
-        if matches!(
-            small,
-            Small::Scale
-                | Small::Shear
-                | Small::SensorMass { .. }
-                | Small::SensorInertia { .. }
-                | Small::FastenedMass { .. }
-        ) {
+        if stays(small) {
             *std = EXACT;
         }
     }
-    fit_nominal(&exact, settings)
+    exact
 }
 
 /// Standard deviation (1) of what is taken at its word: far below what any reading shows.

@@ -6,6 +6,7 @@ use super::frame::Row;
 use super::joint_energy::joint_shares;
 use super::small_unknowns::Small;
 use super::solved::Solved;
+use crate::effects::SensorPlace;
 use nalgebra::DMatrix;
 
 impl Forward<'_> {
@@ -118,6 +119,14 @@ impl Forward<'_> {
             return 0.0;
         };
         let displacement = |x: f64| one.modes().displacement(index, x);
+        let slope = |x: f64| one.modes().slope(index, x);
+        // The sum over the sensors with this name or place.
+        let over = |keys: &[usize], wanted: usize, part: &dyn Fn(&SensorPlace) -> f64| -> f64 {
+            let own = keys.iter().zip(&setup.sensors);
+            own.filter(|(key, _)| **key == wanted)
+                .map(|(_, sensor)| part(sensor))
+                .sum()
+        };
         match *small {
             Small::Scale => 1.0,
             Small::Shear => self.frame.shear_slope(mode),
@@ -130,35 +139,17 @@ impl Forward<'_> {
                 0.5 * joint_shares(one, index)[direction]
             }
             // d ln f/d m = -phi^2/2 for a mass-normalised shape.
-            Small::SensorMass { name } => setup
-                .names
-                .iter()
-                .zip(&setup.sensors)
-                .filter(|(own, _)| **own == name)
-                .map(|(_, sensor)| -0.5 * sensor.mass * displacement(sensor.position).powi(2))
-                .sum(),
+            Small::SensorMass { name } => over(&setup.names, name, &|sensor| {
+                -0.5 * sensor.mass * displacement(sensor.position).powi(2)
+            }),
             // d ln f/d J = -(phi')^2/2.
-            Small::SensorInertia { name } => setup
-                .names
-                .iter()
-                .zip(&setup.sensors)
-                .filter(|(own, _)| **own == name)
-                .map(|(_, sensor)| {
-                    let inertia = sensor.mass * self.frame.sensor_radius.powi(2);
-                    -0.5 * inertia * one.modes().slope(index, sensor.position).powi(2)
-                })
-                .sum(),
-            Small::SensorPlace { place } => setup
-                .places
-                .iter()
-                .zip(&setup.sensors)
-                .filter(|(own, _)| **own == place)
-                .map(|(_, sensor)| {
-                    -sensor.mass
-                        * displacement(sensor.position)
-                        * one.modes().slope(index, sensor.position)
-                })
-                .sum(),
+            Small::SensorInertia { name } => over(&setup.names, name, &|sensor| {
+                let inertia = sensor.mass * self.frame.sensor_radius.powi(2);
+                -0.5 * inertia * slope(sensor.position).powi(2)
+            }),
+            Small::SensorPlace { place } => over(&setup.places, place, &|sensor| {
+                -sensor.mass * displacement(sensor.position) * slope(sensor.position)
+            }),
             _ => fastened_slope(small, setup, (one, index)),
         }
     }

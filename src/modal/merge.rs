@@ -50,6 +50,28 @@ pub enum FrequencySource {
 }
 
 impl ModeReading {
+    /// A frequency read on a spectral line (Hz) and known to half a line (Hz), of which nothing else is known.
+    pub fn on_line(frequency: f64, half_line: f64) -> Self {
+        let mut reading = ModeReading {
+            frequency,
+            source: FrequencySource::Line,
+            interval: (frequency, frequency),
+            line_frequency: frequency,
+            half_line,
+            interpolated: None,
+            bound: None,
+            std: None,
+            damping_ratio: None,
+            damping_std: None,
+            prominence_db: None,
+            above_noise_db: None,
+            label: None,
+            fit: None,
+        };
+        reading.prefer(FrequencySource::Line);
+        reading
+    }
+
     /// Takes as the best frequency what `wanted` gives, or the next best that there is: fit, between
     /// the lines, line. The damping stays that of the fit, or of the reading between the lines.
     pub fn prefer(&mut self, wanted: FrequencySource) {

@@ -96,20 +96,14 @@ fn reading(
     let sharp = between.filter(|found| found.bound < half_line.max(half_width(found)));
     let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
     let mut reading = ModeReading {
-        frequency: lines.frequency(line),
-        source: FrequencySource::Line,
-        interval: (0.0, 0.0),
-        line_frequency: lines.frequency(line),
-        half_line,
         interpolated: sharp.map(|found| found.frequency),
         bound: sharp.map(|found| found.bound),
-        std: None,
         damping_ratio: sharp.and_then(|found| found.damping_ratio),
         damping_std: sharp.and_then(|found| found.damping_ratio.map(|_| found.damping_std)),
         prominence_db: Some(peak.prominence_db),
         above_noise_db: peak.above_noise_db,
         label,
-        fit: None,
+        ..ModeReading::on_line(lines.frequency(line), half_line)
     };
     reading.prefer(FrequencySource::BetweenLines);
     reading

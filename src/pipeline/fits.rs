@@ -244,22 +244,14 @@ impl Candidates<'_> {
     /// The reading of a mode that makes no peak.
     fn reading_of(&self, fit: ModeFit, proposal: &PolyreferenceMode) -> ModeReading {
         let line = self.lines.nearest(fit.frequency.value);
-        let half_line = self.lines.half_line();
         ModeReading {
             frequency: fit.frequency.value,
             source: FrequencySource::Fit,
             interval: (fit.frequency.low, fit.frequency.high),
-            line_frequency: self.lines.frequency(line),
-            half_line,
-            interpolated: None,
-            bound: None,
             std: Some(fit.frequency.std),
-            damping_ratio: None,
-            damping_std: None,
-            prominence_db: None,
             above_noise_db: Some(proposal.above_noise_db),
-            label: None,
             fit: Some(Box::new(FittedReading::new(fit))),
+            ..ModeReading::on_line(self.lines.frequency(line), self.lines.half_line())
         }
     }
 }

@@ -337,25 +337,9 @@ fn is_of_another(modes: &[ModeResult], mode: &ModeResult, frequency: f64) -> boo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modal::FrequencySource;
 
     fn reading(frequency: f64) -> ModeReading {
-        ModeReading {
-            frequency,
-            source: FrequencySource::Line,
-            interval: (frequency - 0.1, frequency + 0.1),
-            line_frequency: frequency,
-            half_line: 0.1,
-            interpolated: None,
-            bound: None,
-            std: None,
-            damping_ratio: None,
-            damping_std: None,
-            prominence_db: Some(20.0),
-            above_noise_db: None,
-            label: None,
-            fit: None,
-        }
+        ModeReading::on_line(frequency, 0.1)
     }
 
     fn mode(number: Option<usize>, frequency: f64) -> ModeResult {

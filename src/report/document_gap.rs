@@ -167,13 +167,14 @@ pub struct HypothesisSection {
     pub confounded_with: Vec<String>,
     /// Its parameters (SI), by name; of two effects "effect.name".
     pub parameters: BTreeMap<String, ParameterSection>,
-    /// Errors of the fitted frequencies with the nominal model (%, rms).
+    /// Errors of the fitted frequencies with the nominal model, one joint for all recordings (%, rms).
     pub gap_before: Option<f64>,
     /// The same with this hypothesis.
     pub gap_after: Option<f64>,
     /// The same with each mode predicted from the others.
     pub left_out_after: Option<f64>,
-    /// Errors of frequencies that took no part, with the nominal model (%, rms).
+    /// Errors of frequencies that took no part, with the nominal model, its joint free to drift between recordings as
+    /// under every hypothesis (%, rms).
     pub withheld_before: Option<f64>,
     /// The same with this hypothesis.
     pub withheld_after: Option<f64>,

@@ -6,8 +6,8 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tapjoint::modal::{
-    CompositeLevel, FrequencySource, LineAmplitudes, MainsSettings, ModeReading, PeakLabel,
-    PeakSettings, find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
+    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings,
+    find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
 };
 use tapjoint::spectral::{Lines, Window, transform_block};
 
@@ -220,20 +220,8 @@ fn limit_mains_must_be_near_a_multiple_and_there_before_the_tap() {
 
 fn reading(frequency: f64, half_line: f64) -> ModeReading {
     ModeReading {
-        frequency,
-        line_frequency: frequency,
-        half_line,
-        interpolated: None,
-        bound: None,
-        std: None,
-        damping_ratio: None,
-        damping_std: None,
         prominence_db: Some(20.0),
-        above_noise_db: None,
-        label: None,
-        source: FrequencySource::Line,
-        interval: (frequency - half_line, frequency + half_line),
-        fit: None,
+        ..ModeReading::on_line(frequency, half_line)
     }
 }
 

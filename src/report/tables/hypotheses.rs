@@ -51,20 +51,21 @@ fn note(document: &Document, gap: &GapSection) -> String {
         format!(" and {} %", significant(before, 2))
     });
     let free = document.test.as_ref().and_then(|test| test.kind.as_deref()) == Some("free");
-    let drift = match free || recordings(gap) < 2 {
-        true => "",
-        false => {
-            ", with a joint that may differ a little from recording to recording as under every hypothesis"
-        }
+    let (one_joint, drift) = match free || recordings(gap) < 2 {
+        true => ("", ""),
+        false => (
+            "one joint for all recordings and ",
+            "lets the joint and the warmth differ a little from recording to recording (so does the described model \
+             on withheld ones), and ",
+        ),
     };
     let part = gap
         .fitted_modes
         .map_or_else(String::new, |last| format!(" (modes up to {last})"));
     format!(
         "Fitted, withheld: errors of the frequencies left (rms); of the described model {described} %{withheld}. \
-         The described model has geometry, shear and masses exactly as described{drift}; every hypothesis, none \
-         too, lets these, sensors' inertias and a recording's warmth move within their uncertainty, and so leaves \
-         less. All are errors of fits to the readings that take part in the diagnosis{part}; those of the estimate, \
+         The described model has {one_joint}geometry, shear and masses exactly as described; every hypothesis, none \
+         too, {drift}lets these and sensors' inertias move within their uncertainty, and so leaves less. All are errors of fits to the readings that take part in the diagnosis{part}; those of the estimate, \
          which weighs all modes, may differ. Size \u{b1} one standard deviation."
     )
 }

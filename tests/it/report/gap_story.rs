@@ -240,6 +240,17 @@ fn regress_a_change_as_large_as_is_looked_for_is_a_bound() {
 }
 
 #[test]
+fn regress_what_drift_explains_is_said_beside_what_an_effect_does() {
+    let mut document = gap_with("set");
+    let told = |document: &Document| gap_story(document).join(" ");
+    let drift = "where a joint that drifts and the tolerances leave 0.050 %";
+    assert!(told(&document).contains(drift), "{}", told(&document));
+    // Less than half of the gap is not worth a word.
+    document.gap.as_mut().unwrap().hypotheses[1].gap_after = Some(1.5);
+    assert!(!told(&document).contains("that drifts"));
+}
+
+#[test]
 fn regress_the_table_says_why_none_leaves_less_than_the_described_model() {
     let mut document = gap_with("set");
     let note = |document: &Document| hypotheses(document).unwrap().note;

@@ -176,7 +176,13 @@ fn log_evidence(
     optimum: &Optimum,
 ) -> f64 {
     let free = free(known);
-    let Some(factor) = factor_of(&optimum.curvature, &free) else {
+    let places = free_places(layout, known);
+    // Next to nothing of an effect may lie anywhere, but not outside the range: as broad a Gaussian at most.
+    let mut curvature = optimum.curvature.clone();
+    for &(place, range) in &places {
+        curvature[(place, place)] += 2.0 * PI / (range * range);
+    }
+    let Some(factor) = factor_of(&curvature, &free) else {
         return f64::NEG_INFINITY;
     };
     let log_det = log_determinant(&factor);
@@ -194,13 +200,8 @@ fn log_evidence(
             log -= 0.5 * (2.0 * PI).ln() + known[k].std.ln();
         }
     }
+    log -= places.iter().map(|(_, range)| range.ln()).sum::<f64>();
     for effect in 0..layout.effects.len() {
-        if let Some(place) = layout.place(effect)
-            && known[place].low < known[place].high
-            && let Some(range) = &layout.effects[effect].place
-        {
-            log -= (range.inward(range.high) - range.inward(range.low)).ln();
-        }
         let size = layout.size(effect);
         let Some(position) = free.iter().position(|&k| k == size) else {
             continue;
@@ -221,6 +222,18 @@ fn log_evidence(
         );
     }
     log.min(log_likelihood(readings, optimum))
+}
+
+/// The parameters that are places and free, each with the length of its range.
+fn free_places(layout: &Layout, known: &[Knowledge]) -> Vec<(usize, f64)> {
+    let place = |effect: usize| {
+        let at = layout
+            .place(effect)
+            .filter(|&at| known[at].low < known[at].high)?;
+        let range = layout.effects[effect].place.as_ref()?;
+        Some((at, range.inward(range.high) - range.inward(range.low)))
+    };
+    (0..layout.effects.len()).filter_map(place).collect()
 }
 
 /// Logarithm of the likelihood alone. No average of a likelihood over a prior exceeds its largest value.
@@ -317,7 +330,7 @@ pub(super) fn covariance(known: &[Knowledge], optimum: &Optimum) -> Option<DMatr
 
 #[cfg(test)]
 mod tests {
-    use super::super::catalogue::Candidate;
+    use super::super::catalogue::{Candidate, PlaceKind, PlaceRange};
     use super::super::least_squares::Linearised;
     use super::*;
     use crate::effects::EffectId;
@@ -472,5 +485,67 @@ mod tests {
         // evidence is judged by factors of 3 and more.
         let (laplace, force) = (case.by_laplace(), case.by_force());
         assert!((laplace - force).abs() < 0.2, "{laplace} {force}");
+    }
+    /// The same beside a place that changes next to nothing.
+    struct Placed(Small);
+
+    impl Model for Placed {
+        type Rest = ();
+
+        fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
+            self.0.predict(parameters)
+        }
+
+        fn complete(
+            &self,
+            parameters: &[f64],
+            known: &[Knowledge],
+            rest: (Vec<f64>, ()),
+        ) -> Option<Linearised> {
+            let own = self.0.complete(parameters, known, rest)?;
+            let slopes = own.slopes.insert_column(2, 1e-5);
+            Some(Linearised { slopes, ..own })
+        }
+    }
+
+    #[test]
+    fn limit_a_place_that_changes_nothing_tells_nothing() {
+        let case = Small {
+            readings: readings(&[0.3, 0.5, 0.1, -0.1], 0.2, f64::INFINITY),
+            size: size(0.0),
+            model: linear,
+        };
+        let without = case.by_laplace();
+        let placed = Placed(case);
+        let layout = Layout {
+            joint: vec![0],
+            effects: vec![Candidate {
+                effect: EffectId::AddedMass,
+                size: size(0.0),
+                place: Some(PlaceRange {
+                    kind: PlaceKind::Position,
+                    low: 0.0,
+                    high: 0.4,
+                    nodes: 5,
+                }),
+            }],
+        };
+        let size = Knowledge {
+            low: 0.0,
+            high: 8.0,
+            ..Knowledge::normal(0.0, 3.0)
+        };
+        let place = Knowledge {
+            centre: 0.2,
+            std: f64::INFINITY,
+            low: 0.0,
+            high: 0.4,
+        };
+        let known = [Knowledge::normal(0.0, 1.5), size, place];
+        let readings = &placed.0.readings;
+        let optimum = maximise(readings, &known, &[0.0, 0.1, 0.2], &placed).unwrap();
+        let with = log_evidence(readings, &layout, &known, &optimum);
+        // The same integral over size and stiffness; where the effect lies is the prior's affair alone.
+        assert!((with - without).abs() < 1e-6, "{with} {without}");
     }
 }

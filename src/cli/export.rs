@@ -128,26 +128,34 @@ fn doubts_of(report: &Value) -> Vec<String> {
     // What follows are limits of non-dimensional stiffnesses.
     let misfit = texts.filter_map(|text| text.split(';').next());
     let misfit = misfit.filter(|text| text.starts_with(MISSES));
-    let estimate = &report["estimate"];
-    let scaled = ["kt", "kr"].map(|key| estimate[key]["low_scaled"].is_number());
-    let how = match scaled.contains(&true) {
-        true => " scaled by the misfit",
-        false => "",
-    };
-    let units = [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")];
-    let limits = units.map(|(key, unit)| limits(&estimate[key], key, unit));
-    let limits: Vec<String> = limits.into_iter().flatten().collect();
-    let limits = (!limits.is_empty()).then(|| format!("95 % limits{how}: {}", limits.join(", ")));
+    let limits = all_limits(&report["estimate"]);
     misfit.map(str::to_owned).chain(limits).collect()
 }
 
-/// "kt 1.590e6 to 1.990e6 N/m"; `None` where nothing bounds it.
-fn limits(found: &Value, key: &str, unit: &str) -> Option<String> {
-    let scaled = (&found["low_scaled"], &found["high_scaled"]);
-    let (low, high) = match (scaled.0.as_f64(), scaled.1.as_f64()) {
-        (None, None) => (found["low"].as_f64(), found["high"].as_f64()),
-        limits => limits,
+/// The limits of all stiffnesses: those that are scaled by the misfit, and those that are not.
+fn all_limits(estimate: &Value) -> Vec<String> {
+    let units = [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")];
+    let is_scaled = |key: &str| {
+        let ends = ["low_scaled", "high_scaled"];
+        ends.iter().any(|end| estimate[key][*end].is_number())
     };
+    let ways = [
+        (true, " scaled by the misfit", ["low_scaled", "high_scaled"]),
+        (false, "", ["low", "high"]),
+    ];
+    let of = |(scaled, how, ends): (bool, &str, [&str; 2])| {
+        let own = units.iter().filter(|(key, _)| is_scaled(key) == scaled);
+        let all: Vec<String> = own
+            .filter_map(|(key, unit)| limits(&estimate[*key], (key, unit), ends))
+            .collect();
+        (!all.is_empty()).then(|| format!("95 % limits{how}: {}", all.join(", ")))
+    };
+    ways.into_iter().filter_map(of).collect()
+}
+
+/// "kt 1.590e6 to 1.990e6 N/m"; `None` where nothing bounds it.
+fn limits(found: &Value, (key, unit): (&str, &str), ends: [&str; 2]) -> Option<String> {
+    let [low, high] = ends.map(|end| found[end].as_f64());
     let words = match (low, high) {
         (Some(low), Some(high)) => format!("{low:.3e} to {high:.3e}"),
         (Some(low), None) => format!("above {low:.3e}"),

@@ -78,8 +78,8 @@ fn is_flexible(frame: &Frame, fit: &Fit) -> bool {
     let layout = Layout::new(frame, &fit.effects);
     let is_free = |k: usize| {
         let place = layout.place(k);
-        // Where a peak states it nothing is left of its prior.
-        place.is_some_and(|place| fit.branch.knowledge[place].std.is_finite())
+        // What a peak states is known to a standard deviation; else only its range is.
+        place.is_some_and(|place| !fit.branch.knowledge[place].std.is_finite())
     };
     let chooses = |k: usize| {
         let place = fit.effects[k].place.as_ref();

@@ -29,7 +29,7 @@ pub(super) struct Competition {
     /// The same with a joint and a warmth that may differ between visits, as they may under every hypothesis: what
     /// these explain no effect is credited with on readings that took no part.
     pub(super) drifting: Fit,
-    /// The same with a joint that may drift between recordings: where a cause is looked for along the beam.
+    /// The same, and masses that may differ from what was said: where a cause is looked for along the beam.
     pub(super) baseline: Fit,
     /// The most probable first.
     pub(super) entries: Vec<Entry>,
@@ -217,8 +217,8 @@ fn compete_once(
         entries.push(Entry::new(Hypothesis::Unknown, fit));
     }
     let baseline = fit_baseline(&frame, settings).unwrap_or_else(|| none.clone());
-    let drifting = fit_described(&frame, settings).unwrap_or_else(|| baseline.clone());
-    let described = fit_unmoved(&frame, settings).unwrap_or_else(|| drifting.clone());
+    let drifting = fit_drifting(&frame, settings).unwrap_or_else(|| baseline.clone());
+    let described = fit_described(&frame, settings).unwrap_or_else(|| drifting.clone());
     entries.push(Entry::new(Hypothesis::None, none));
     Some(Competition {
         frame,
@@ -260,12 +260,12 @@ fn fit_baseline(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
 }
 
 /// The same with sensors and fastened masses that weigh what was said.
-fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+fn fit_drifting(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     fit_nominal(&at_their_word(frame, is_described), settings)
 }
 
 /// The same with a joint and a warmth that are one and the same in all visits.
-fn fit_unmoved(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
+fn fit_described(frame: &Frame, settings: &GapSettings) -> Option<Fit> {
     let stays = |small: &Small| is_described(small) || matches!(small, Small::Temperature { .. });
     let settings = GapSettings {
         drift_stds: vec![EXACT],

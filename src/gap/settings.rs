@@ -16,8 +16,8 @@ pub struct GapSettings {
     /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
     /// the shear coefficient used here, 5/6, and Cowper's (1966) 10 (1 + nu)/(12 + 11 nu) differ for metals.
     pub shear_std: f64,
-    /// Standard deviation of a common factor on the frequencies of one visit (1): 0.02 %, a kelvin more or less on
-    /// steel.
+    /// Standard deviation of a common factor on the frequencies of one visit (1): 0.02 %, about what a kelvin does
+    /// (0.015 % of steel, 0.025 % of aluminium).
     pub temperature_std: f64,
     /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
     pub frequency_floor: f64,

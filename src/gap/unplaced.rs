@@ -27,7 +27,7 @@ impl Unplaced {
     }
 }
 
-/// Fits the nominal model without the masses whose place nobody said; `None` where every place is known.
+/// Fits the nominal model without the masses whose place nobody said of any recording; `None` where there are none.
 pub(super) fn unplaced(
     observations: &Observations,
     nominal: &Nominal,
@@ -36,8 +36,11 @@ pub(super) fn unplaced(
     let observations = filled(observations, nominal);
     let open = |name: &str| {
         let sensors = observations.configurations.iter().flat_map(|c| &c.sensors);
-        let mut own = sensors.filter(|sensor| sensor.name == name);
-        own.any(|sensor| sensor.position.is_none())
+        let mut places = sensors
+            .filter(|sensor| sensor.name == name)
+            .map(|sensor| sensor.position)
+            .peekable();
+        places.peek().is_some() && places.all(|place| place.is_none())
     };
     let mut without = nominal.clone();
     let (mut sensors, mut mass) = (Vec::new(), 0.0);

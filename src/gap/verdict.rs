@@ -34,9 +34,14 @@ pub(super) fn verdict(entries: &[Entry], trial: Option<&Trial>, none: Option<&Tr
     if first.hypothesis == Hypothesis::None {
         return Verdict::NoGap;
     }
-    // What refutes the nominal model makes no effect probable that explains the readings less well.
+    // What refutes the nominal model makes no effect probable that explains the readings less well; where
+    // it stands, what alone would have shown has been refuted itself.
     if evidence_over_none(entries, first) < SEEN {
-        return Verdict::Unknown;
+        return if refuted {
+            Verdict::Unknown
+        } else {
+            Verdict::NoGap
+        };
     }
     // With as many unknowns as readings everything fits.
     let Some(trial) = trial.filter(|trial| trial.goodness.is_some()) else {
@@ -173,9 +178,11 @@ mod tests {
             entry
         };
         let fixture = Hypothesis::Effects(vec![EffectId::Fixture]);
-        let answer = |misfit: f64, evidence: f64| {
+        let mass = Hypothesis::Effects(vec![EffectId::AddedMass]);
+        let answer_beside = |misfit: f64, evidence: f64, other: f64| {
             let entries = [
-                entry(fixture.clone(), evidence, 0.99),
+                entry(fixture.clone(), evidence, 0.98),
+                entry(mass.clone(), other, 0.01),
                 entry(Hypothesis::None, 0.0, 0.01),
             ];
             let stands = Trial::new(&frame, &fit).unwrap();
@@ -183,7 +190,11 @@ mod tests {
             refuted.goodness = Some(misfit);
             verdict(&entries, Some(&stands), Some(&refuted))
         };
+        let answer = |misfit, evidence| answer_beside(misfit, evidence, -5.0);
         assert_eq!(answer(1e-6, -3.6), Verdict::Unknown);
+        // What shows, were it not refuted itself, makes a model that stands no unknown one.
+        assert_eq!(answer_beside(1e-6, 2.5, 6.0), Verdict::Unknown);
+        assert_eq!(answer_beside(0.009, 2.5, 6.0), Verdict::NoGap);
         // One in 110: odds of 8 to 1 at most.
         assert_eq!(answer(0.009, -3.6), Verdict::NoGap);
         for misfit in [1e-6, 0.009] {

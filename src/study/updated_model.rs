@@ -2,7 +2,7 @@
 //! natural frequencies. What the diagnosis leaves open of shear and rotary inertia, 2 %, has no place in a description
 //! and stays out.
 
-use crate::description::{FastenedMass, JointKind, SensorKind, TestDescription};
+use crate::description::{FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription};
 use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
@@ -42,9 +42,12 @@ pub enum EffectCause {
 }
 
 /// The model that a diagnosis makes of the described one: with what it names, else with the most probable
-/// hypothesis that predicts anything. `None` where nothing predicts, and where the diagnosis has refused all
-/// that does.
+/// hypothesis that predicts anything. `None` where nothing predicts, where the diagnosis has refused all that does,
+/// and where a mass counts of which nobody said where it sits.
 pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<UpdatedModel> {
+    if test.sensors.iter().any(|sensor| is_unplaced(test, sensor)) {
+        return None;
+    }
     let wanted = match &diagnosis.verdict {
         Verdict::NoGap => Some(Hypothesis::None),
         Verdict::Named(effects) => Some(Hypothesis::Effects(effects.clone())),
@@ -67,6 +70,11 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
         hypothesis: found.hypothesis.name(),
         text,
     })
+}
+
+fn is_unplaced(test: &TestDescription, sensor: &SensorDescription) -> bool {
+    let loads = sensor.kind != SensorKind::Sound && sensor.mass.is_some_and(|mass| mass > 0.0);
+    loads && test.place_of(sensor).is_none()
 }
 
 /// A coupling that the joint's own model has stands among the effects: descriptions have none.

@@ -99,7 +99,7 @@ fn nothing_missing(change: impl Fn(usize, &mut Configuration), seed: u64) -> Dia
 
 #[test]
 fn limit_a_kelvin_between_recordings_is_no_gap() {
-    // Steel loses 0.02 % of its frequencies with a kelvin.
+    // With a kelvin steel loses 0.015 % of its frequencies, aluminium 0.025 %.
     let warmer = |k: usize, one: &mut Configuration| {
         for mode in &mut one.modes {
             mode.frequency *= 1.0 - 2e-4 * k as f64;

@@ -60,6 +60,25 @@ fn recover_a_fixture_by_its_own_peak() {
     }
 }
 
+fn mass(grams: f64, position: f64) -> Effect {
+    let pairs = [("mass", 1e-3 * grams), ("position", position)];
+    Effect::from_pairs(EffectId::AddedMass, &pairs).unwrap()
+}
+
+#[test]
+fn recover_a_fixture_that_a_peak_shows_beside_a_mass() {
+    let tests = [(290.0, 0.06, 25.0, 0.21, 9), (80.0, 0.1, 8.0, 0.3, 10)];
+    for (frequency, ratio, grams, position, seed) in tests {
+        let truth = [fixture(frequency, ratio), mass(grams, position)];
+        let verdict = diagnosed(&observed(&truth, seed)).verdict;
+        let Verdict::Named(mut effects) = verdict else {
+            panic!("{frequency} Hz: {verdict:?}");
+        };
+        effects.sort();
+        assert_eq!(effects, [EffectId::Fixture, EffectId::AddedMass]);
+    }
+}
+
 #[test]
 fn limit_a_fixture_that_ought_to_be_seen_and_is_not_gets_no_name() {
     let mut observed = observed(&[fixture(90.0, 0.06)], 4);

@@ -1,13 +1,15 @@
 //! What shows directly whether a cause that was named is there.
 
+use super::step::Step;
 use crate::effects::EffectId;
 
 /// In one sentence, without its full stop.
-pub(super) fn confirming(effect: EffectId) -> &'static str {
-    match effect {
-        EffectId::SensorMass => {
-            "weigh each sensor with its mounting and the cable that hangs on it, and state its mass"
-        }
+pub(super) fn confirming(effect: EffectId) -> String {
+    let sentence = match effect {
+        // These tests tell causes apart as well.
+        EffectId::SensorMass => return Step::WeighSensor.sentence(),
+        EffectId::Modulus | EffectId::Length => return Step::Calipers.sentence(),
+        EffectId::Timebase => return Step::ReferenceTone.sentence(),
         EffectId::SensorCable => {
             "lead the sensor's cable another way or take its support off, the joint untouched, and tap again"
         }
@@ -29,12 +31,6 @@ pub(super) fn confirming(effect: EffectId) -> &'static str {
         EffectId::Fixture => {
             "put a sensor on the base and tap the base: it has to show a mode at that frequency"
         }
-        EffectId::Modulus | EffectId::Length => {
-            "weigh the beam to 0.1 %, measure its thickness to 0.01 mm and its free length to 0.2 mm"
-        }
-        EffectId::Timebase => {
-            "record a tone of known frequency beside the taps and compare the clocks to 20 ppm"
-        }
         EffectId::AddedMass => {
             "look at the place that was found, take off what is fastened there, and tap again"
         }
@@ -45,8 +41,9 @@ pub(super) fn confirming(effect: EffectId) -> &'static str {
             "free the beam of what pulls or presses it along its axis, or turn the set-up over, and tap again"
         }
         EffectId::ShearRotary => {
-            "describe the beam with shear and rotary inertia (theory = \"timoshenko\"), and diagnose again"
+            "describe the beam with shear and rotary inertia (beam = \"timoshenko\" in [joint]), and diagnose again"
         }
         EffectId::Resolution => "read the frequencies by a curve fit, or on closer lines",
-    }
+    };
+    sentence.into()
 }

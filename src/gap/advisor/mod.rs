@@ -45,7 +45,7 @@ const NAMED: usize = 4;
 const GRAVITY: f64 = 9.80665;
 
 /// Tests that would tell more, those first that tell most per cost; and last how a cause that was named can be seen
-/// directly.
+/// directly, where none of these shows it as well.
 pub(super) fn advise(
     competition: &Competition,
     verdict: &Verdict,
@@ -54,7 +54,10 @@ pub(super) fn advise(
     let mut advised = telling(competition, verdict, settings);
     if let Verdict::Named(effects) = verdict {
         advised.truncate(ADVISED - effects.len());
-        advised.extend(effects.iter().map(|effect| confirmation(*effect)));
+        for confirming in effects.iter().map(|effect| confirmation(*effect)) {
+            let is_new = advised.iter().all(|test| test.action != confirming.action);
+            advised.extend(is_new.then_some(confirming));
+        }
     }
     advised
 }

@@ -120,7 +120,9 @@ impl Step {
             Step::TapLevel { level } => {
                 format!("tap {level:.0} times as hard, everything else untouched")
             }
-            Step::WeighSensor => "weigh the sensor with its mounting to 0.5 g, and state its mass".into(),
+            Step::WeighSensor => {
+                "weigh each sensor with its mounting and the cable that hangs on it to 0.5 g, and state its mass".into()
+            }
             Step::Calipers => {
                 "weigh the beam to 0.1 %, measure its thickness to 0.01 mm and its free length to 0.2 mm".into()
             }
@@ -135,7 +137,7 @@ impl Step {
                  [[recording]] with mass = [{{ position = {position:.3}, mass = \"{0}\" }}]",
                 weight(*mass)
             ),
-            Step::Confirm { effect } => confirming(*effect).into(),
+            Step::Confirm { effect } => confirming(*effect),
             Step::Retighten => {
                 "loosen the joint, tighten it as before, and repeat the first recording".into()
             }

@@ -1,10 +1,11 @@
 //! `tapjoint export`: the beam with its identified joint for a finite-element program.
 
 use super::Outcome;
-use super::input::{TestFile, read_test};
+use super::input::{TestFile, read_model};
 use super::output::OutputFile;
 use super::terminal::Terminal;
-use anyhow::Context;
+use super::updated_model::effect_at;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -15,19 +16,22 @@ use tapjoint::pipeline::{
     tested_structure,
 };
 use tapjoint::report::deck::{
-    DeckError, DeckSource, deck_of, render_abaqus, render_nastran, source_of,
+    Deck, DeckError, DeckSource, deck_of, deck_with_effects, render_abaqus, render_nastran,
+    source_of,
 };
 use tapjoint::report::document_of;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, JointStiffness};
+use tapjoint::study::updated_model::described_structure;
 
 /// Write the updated beam with its joint for a finite-element program.
 ///
 /// The joint is estimated from the test's data, or taken from a report that was made of it; where it is
-/// known, that is written. Springs with cross coupling are the inverse of the joint's compliance.
+/// known, that is written. Springs with cross coupling are the inverse of the joint's compliance. Of a model
+/// with effects, as `run` and `diagnose --model` write it, masses, springs, dimensions and cracks are written.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  tapjoint export test.toml --format nastran --out joint.bdf\n  tapjoint export test.toml --report test-report/report.json --format abaqus > joint.inp"
+    after_help = "Examples:\n  tapjoint export test.toml --format nastran --out joint.bdf\n  tapjoint export test.toml --report test-report/report.json --format abaqus > joint.inp\n  tapjoint export test-report/updated-model.toml --out model.bdf"
 )]
 pub(super) struct ExportArguments {
     /// A test description (.toml)
@@ -59,24 +63,17 @@ enum DeckFormat {
 }
 
 pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let file = read_test(&arguments.test, &terminal)?;
+    let file = read_model(&arguments.test, &terminal)?;
     let output = arguments
         .out
         .as_deref()
         .map(OutputFile::prepare)
         .transpose()?;
-    let source = match &arguments.report {
-        Some(path) => Ok(reported(path, &file.test)?),
-        None => estimated(&file, &terminal)?,
+    let deck = match file.test.effects.is_empty() {
+        true => deck_of_test(&file, arguments.report.as_deref(), &terminal)?,
+        false => deck_of_model(&file, arguments.report.as_deref())?,
     };
-    if let Some(doubts) = source.as_ref().ok().map(|source| source.doubts.join("; "))
-        && doubts.contains(MISSES)
-    {
-        terminal.warn(&format!(
-            "{doubts}; the springs of the deck are no better known than that"
-        ));
-    }
-    let deck = match source.and_then(|source| deck_of(&file.test.name, &source)) {
+    let deck = match deck {
         Ok(deck) => deck,
         Err(problem) => {
             terminal.warn(&problem.to_string());
@@ -97,6 +94,56 @@ pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Re
     }
     terminal.write_json(&serde_json::json!({ "version": 1, "deck": text }))?;
     Ok(Outcome::Answered)
+}
+
+/// The deck of a test whose joint is estimated or reported.
+fn deck_of_test(
+    file: &TestFile,
+    report: Option<&Path>,
+    terminal: &Terminal,
+) -> anyhow::Result<Result<Deck, DeckError>> {
+    let source = match report {
+        Some(path) => Ok(reported(path, &file.test)?),
+        None => estimated(file, terminal)?,
+    };
+    if let Some(doubts) = source.as_ref().ok().map(|source| source.doubts.join("; "))
+        && doubts.contains(MISSES)
+    {
+        terminal.warn(&format!(
+            "{doubts}; the springs of the deck are no better known than that"
+        ));
+    }
+    Ok(source.and_then(|source| deck_of(&file.test.name, &source)))
+}
+
+/// The deck of a description with effects, which is a model already: its joint is the described one.
+fn deck_of_model(
+    file: &TestFile,
+    report: Option<&Path>,
+) -> anyhow::Result<Result<Deck, DeckError>> {
+    let (test, name) = (&file.test, &file.name);
+    if let Some((report, effect)) = report.zip(test.effects.first()) {
+        bail!(
+            "{name}:{}: [[effect]] belongs to models, whose joint is described; leave --report {} out",
+            effect.line,
+            report.display()
+        );
+    }
+    let structure = tested_structure(test);
+    if structure.assembly != Assembly::Free && structure.known.over(None).is_none() {
+        return Ok(Err(DeckError::NoJoint {
+            reason: "a description with [[effect]] has to state kt and kr in [joint]".to_owned(),
+        }));
+    }
+    let (seen, frequencies) =
+        described_structure(test, USUAL_MODES).map_err(|error| effect_at(name, &error))?;
+    let effects: Vec<&str> = test.effects.iter().map(|one| one.id.as_str()).collect();
+    let origin = format!("described, with {}", effects.join(", "));
+    Ok(deck_with_effects(
+        (&test.name, &origin),
+        &seen.specimen,
+        &frequencies,
+    ))
 }
 
 /// The joint of the test's own data.

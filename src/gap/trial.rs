@@ -12,7 +12,8 @@ use super::setup::Setup;
 use super::withheld::WithheldErrors;
 use crate::effects::EffectId;
 
-/// Goodness of fit below which an explanation is refused: by chance one in a hundred.
+/// Goodness of fit below which an explanation is refused: by chance one in a hundred. The nominal model is given up
+/// for something unknown only from 20 to 1 against it ([`super::SEEN`]), of which 1 in 300 is the least.
 pub const MISFIT: f64 = 0.01;
 /// The same for the worst of many blocks, some ten of which together are wrong as often.
 const BLOCK_MISFIT: f64 = 0.001;

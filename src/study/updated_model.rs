@@ -3,7 +3,7 @@
 //! and stays out.
 
 use crate::description::{FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription};
-use crate::effects::{Circumstances, Effect, EffectError, EffectId, SensorPlace, apply};
+use crate::effects::{Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply};
 use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use crate::identify::observation::effective_share;
 use crate::pipeline::{fastened_masses, nominal_with};
@@ -291,10 +291,23 @@ pub fn described_frequencies(
     test: &TestDescription,
     count: usize,
 ) -> Result<Vec<f64>, DescribedEffectError> {
+    let (seen, frequencies) = described_structure(test, count)?;
+    Ok(frequencies.into_iter().map(|one| seen.read(one)).collect())
+}
+
+/// A described structure with the effects that it describes and with its sensors on it, and the lowest natural
+/// frequencies (Hz) that it has, however they would be read.
+///
+/// # Errors
+/// As [`described_frequencies`].
+pub fn described_structure(
+    test: &TestDescription,
+    count: usize,
+) -> Result<(Seen, Vec<f64>), DescribedEffectError> {
     let effects = described_effects(test)?;
-    frequencies_with(test, &effects, count).map_err(|error| {
+    structure_with(test, &effects, count).map_err(|error| {
         // The first effect with which there is no such structure is the one to be mended.
-        let cause = |held: usize| frequencies_with(test, &effects[..held], count).err();
+        let cause = |held: usize| structure_with(test, &effects[..held], count).err();
         let first = (0..=effects.len()).find_map(|held| Some((held, cause(held)?)));
         let (held, error) = first.unwrap_or((effects.len(), error));
         let described = held
@@ -307,16 +320,16 @@ pub fn described_frequencies(
     })
 }
 
-/// The lowest natural frequencies (Hz), as they would be read, of a described structure with these effects
-/// and with its sensors on it. A fixture's own mode does not count.
+/// A described structure with these effects and with its sensors on it, and its lowest natural frequencies (Hz). A
+/// fixture's own mode does not count.
 ///
 /// # Errors
 /// [`StructureError`] where there is no such structure.
-fn frequencies_with(
+fn structure_with(
     test: &TestDescription,
     effects: &[Effect],
     count: usize,
-) -> Result<Vec<f64>, StructureError> {
+) -> Result<(Seen, Vec<f64>), StructureError> {
     let nominal = nominal_with(test, None);
     let mut specimen = nominal.specimen.clone();
     let places: Vec<SensorPlace> = test
@@ -348,9 +361,7 @@ fn frequencies_with(
     };
     let seen = apply(effects, &specimen, &circumstances);
     let own = seen.specimen.beam_modes(count, Mesh::SIMULATION)?;
-    let frequencies = own
-        .numbers
-        .iter()
-        .map(|&mode| own.modes.frequencies()[mode]);
-    Ok(frequencies.map(|frequency| seen.read(frequency)).collect())
+    let all = own.modes.frequencies();
+    let frequencies = own.numbers.iter().map(|&mode| all[mode]).collect();
+    Ok((seen, frequencies))
 }

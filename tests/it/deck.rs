@@ -52,9 +52,9 @@ fn rebuilt(deck: &Deck) -> (JointedStructure, JointStiffness) {
         right: Some(right.beam),
         overlap: None,
     };
-    let masses = deck.masses.iter().map(|&(node, size)| PointAttachment {
-        position: deck.nodes[node],
-        size,
+    let masses = deck.masses.iter().map(|own| PointAttachment {
+        position: deck.nodes[own.node],
+        size: own.mass,
     });
     structure.masses = masses.collect();
     let (joint, units) = (deck.joint.unwrap(), StiffnessUnits::of(&beam));

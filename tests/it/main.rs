@@ -8,6 +8,7 @@ mod blind_check_draw;
 mod cli;
 mod cli_frf;
 mod deck;
+mod deck_with_effects;
 mod description;
 mod effects;
 mod errors;

@@ -2,12 +2,15 @@
 
 use std::fmt::Write as _;
 
-use super::{Deck, DeckJoint};
+use super::{Deck, DeckJoint, DeckMass};
 use crate::structure::BeamTheory;
 
 /// w and theta of a plane beam.
 const W: usize = 2;
 const THETA: usize = 6;
+
+/// Numbers of elements that a joint or a hinge may take.
+const SPRINGS: usize = 3;
 
 /// The deck as an Abaqus input file.
 pub fn render_abaqus(deck: &Deck) -> String {
@@ -33,16 +36,26 @@ pub fn render_abaqus(deck: &Deck) -> String {
         }
         section(&mut text, deck, index, &set);
     }
-    for (index, (node, mass)) in deck.masses.iter().enumerate() {
-        element += 1;
-        let (set, node) = (format!("MASS{}", index + 1), node + 1);
-        let _ = writeln!(text, "*ELEMENT, TYPE=MASS, ELSET={set}\n{element}, {node}");
-        let _ = writeln!(text, "*MASS, ELSET={set}\n{mass:.10e}");
+    for (index, own) in deck.masses.iter().enumerate() {
+        element = mass(&mut text, (element, index + 1), own);
     }
     // A plane beam still stretches: it is held along x.
     text.push_str("*BOUNDARY\nALL, 1, 1\n");
-    if let Some(joint) = &deck.joint {
-        springs(&mut text, joint, element);
+    for (index, joint) in deck.joint.iter().chain(&deck.hinges).enumerate() {
+        let is_joint = index == 0 && deck.joint.is_some();
+        let hinge = format!("HINGE{}", index + 1);
+        let set = if is_joint { "SPRING" } else { &hinge };
+        springs(&mut text, joint, (element, set));
+        element += SPRINGS;
+    }
+    for (index, (node, stiffness)) in deck.springs.iter().enumerate() {
+        let (id, set) = (element + index + 1, format!("GROUND{}", index + 1));
+        let _ = writeln!(
+            text,
+            "*ELEMENT, TYPE=SPRING1, ELSET={set}\n{id}, {}",
+            node + 1
+        );
+        let _ = writeln!(text, "*SPRING, ELSET={set}\n{W}\n{stiffness:.10e}");
     }
     let modes = deck.frequencies.len().max(5);
     // Rigid-body motions of a structure that is not held lie below 1 Hz.
@@ -82,7 +95,34 @@ fn section(text: &mut String, deck: &Deck, index: usize, set: &str) {
     );
 }
 
-fn springs(text: &mut String, joint: &DeckJoint, elements: usize) {
+/// A mass and its moment of inertia, after so many elements; how many there are with it.
+fn mass(text: &mut String, (elements, number): (usize, usize), own: &DeckMass) -> usize {
+    let node = own.node + 1;
+    let mut element = elements;
+    if own.mass != 0.0 {
+        element += 1;
+        let set = format!("MASS{number}");
+        let _ = writeln!(text, "*ELEMENT, TYPE=MASS, ELSET={set}\n{element}, {node}");
+        let _ = writeln!(text, "*MASS, ELSET={set}\n{:.10e}", own.mass);
+    }
+    if own.inertia != 0.0 {
+        element += 1;
+        let set = format!("INERTIA{number}");
+        let _ = writeln!(
+            text,
+            "*ELEMENT, TYPE=ROTARYI, ELSET={set}\n{element}, {node}"
+        );
+        // Of a plane model only that about z counts.
+        let _ = writeln!(
+            text,
+            "*ROTARY INERTIA, ELSET={set}\n0., 0., {:.10e}",
+            own.inertia
+        );
+    }
+    element
+}
+
+fn springs(text: &mut String, joint: &DeckJoint, (elements, name): (usize, &str)) {
     let node = joint.node + 1;
     let mut id = elements;
     for (stiffness, direction) in [(joint.translation, W), (joint.rotation, THETA)] {
@@ -100,7 +140,7 @@ fn springs(text: &mut String, joint: &DeckJoint, elements: usize) {
             }
             (0.0, _) => {}
             (k, other) => {
-                let set = format!("SPRING{direction}");
+                let set = format!("{name}{direction}");
                 match other.map(|other| other + 1) {
                     None => {
                         let _ = writeln!(text, "*ELEMENT, TYPE=SPRING1, ELSET={set}\n{id}, {node}");

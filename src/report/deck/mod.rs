@@ -6,16 +6,17 @@
 
 mod abaqus;
 mod nastran;
+mod with_effects;
 
 use crate::description::TestDescription;
 use crate::identify::consistent::JointedStructure;
 use crate::pipeline::{Analysis, jointed_structure, structure_details, tested_structure};
-use crate::structure::finite_elements::PointAttachment;
 use crate::structure::joint::StiffnessUnits;
 use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 
 pub use abaqus::render_abaqus;
 pub use nastran::render_nastran;
+pub use with_effects::deck_with_effects;
 
 /// Elements along the beam: with cubic elements and consistent mass ten modes are then right to 1e-5.
 const ELEMENTS: usize = 120;
@@ -33,14 +34,18 @@ pub struct Deck {
     pub doubts: Vec<String>,
     /// Theory of bending.
     pub theory: BeamTheory,
-    /// Runs of nodes with their beam: one, or of a lap joint two.
+    /// Runs of nodes with their beam: one, of a lap joint two, and one more for every crack.
     pub pieces: Vec<DeckPiece>,
-    /// Nodes' places (m) along the beam; of a lap joint two nodes lie at the joint.
+    /// Nodes' places (m) along the beam; two nodes lie at the joint of a lap joint, and at every crack.
     pub nodes: Vec<f64>,
-    /// Masses (kg) on nodes, by the node's index.
-    pub masses: Vec<(usize, f64)>,
+    /// Masses on nodes.
+    pub masses: Vec<DeckMass>,
     /// The joint; `None` for a free beam.
     pub joint: Option<DeckJoint>,
+    /// Cracks: hinges between two nodes.
+    pub hinges: Vec<DeckJoint>,
+    /// Springs on w between a node, by its index, and the ground (N/m).
+    pub springs: Vec<(usize, f64)>,
     /// Frequencies (Hz) that are predicted with what the deck says.
     pub frequencies: Vec<f64>,
 }
@@ -54,6 +59,17 @@ pub struct DeckPiece {
     pub last: usize,
     /// Its length, section and material.
     pub beam: Beam,
+}
+
+/// A mass on a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeckMass {
+    /// The node's index.
+    pub node: usize,
+    /// Mass (kg).
+    pub mass: f64,
+    /// Moment of inertia about z (kg m2).
+    pub inertia: f64,
 }
 
 /// Springs between two nodes, or a node and the ground.
@@ -93,6 +109,14 @@ pub enum DeckError {
         "a joint with cross coupling that is rigid in one direction is no spring; give finite kt and kr"
     )]
     RigidAndCoupled,
+    /// An effect without elements of its own.
+    #[error(
+        "a deck has no elements for {what}; take that [[effect]] out, or predict with the description itself"
+    )]
+    NoElement {
+        /// What it changes.
+        what: &'static str,
+    },
     /// A beam or a lap joint that cannot exist.
     #[error(transparent)]
     Structure(#[from] StructureError),
@@ -161,9 +185,16 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
         nodes: Vec::new(),
         masses: Vec::new(),
         joint: None,
+        hinges: Vec::new(),
+        springs: Vec::new(),
         frequencies: source.frequencies.clone(),
     };
-    deck.mesh(&structure.pieces()?, &structure.all_masses());
+    let masses = structure.all_masses();
+    let places: Vec<f64> = masses.iter().map(|mass| mass.position).collect();
+    deck.mesh(&structure.pieces()?, &places);
+    for mass in masses {
+        deck.add_mass(mass.position, mass.size, 0.0);
+    }
     let (beam, joint) = (&structure.beam, &source.joint);
     deck.joint = match structure.assembly {
         Assembly::Free => None,
@@ -185,7 +216,20 @@ fn springs(
     (node, other): (usize, Option<usize>),
 ) -> Result<DeckJoint, DeckError> {
     let units = StiffnessUnits::of(beam);
-    let (kt, kr) = (joint.kx * units.kt, joint.ky * units.kr);
+    let stiffnesses = (joint.kx * units.kt, joint.ky * units.kr);
+    scalar_springs(
+        stiffnesses,
+        joint.cross_compliance / units.ktr,
+        (node, other),
+    )
+}
+
+/// The same from Kt (N/m), Kr (N m/rad) and 1/Ktr (rad/N).
+fn scalar_springs(
+    (kt, kr): (f64, f64),
+    cross: f64,
+    (node, other): (usize, Option<usize>),
+) -> Result<DeckJoint, DeckError> {
     let plain = DeckJoint {
         node,
         other,
@@ -193,13 +237,12 @@ fn springs(
         rotation: kr,
         cross: 0.0,
     };
-    if joint.cross_compliance == 0.0 {
+    if cross == 0.0 {
         return Ok(plain);
     }
     if !(kt.is_finite() && kr.is_finite()) {
         return Err(DeckError::RigidAndCoupled);
     }
-    let cross = joint.cross_compliance / units.ktr;
     let determinant = 1.0 / (kt * kr) - cross * cross;
     let coupling = cross / determinant;
     Ok(DeckJoint {
@@ -211,8 +254,8 @@ fn springs(
 }
 
 impl Deck {
-    /// Nodes at equal distances and at every mass; elements of each beam between its own nodes.
-    fn mesh(&mut self, beams: &[Beam], masses: &[PointAttachment]) {
+    /// Nodes at equal distances and at these places; elements of each beam between its own nodes.
+    fn mesh(&mut self, beams: &[Beam], at: &[f64]) {
         let length: f64 = beams.iter().map(|beam| beam.length).sum();
         let mut from = 0.0;
         for beam in beams {
@@ -221,8 +264,7 @@ impl Deck {
             let mut places: Vec<f64> = (0..=count)
                 .map(|index| from + beam.length * index as f64 / count as f64)
                 .collect();
-            let inside = masses.iter().map(|mass| mass.position);
-            places.extend(inside.filter(|place| (from..=to).contains(place)));
+            places.extend(at.iter().filter(|place| (from..=to).contains(*place)));
             places.sort_by(f64::total_cmp);
             places.dedup_by(|a, b| (*a - *b).abs() < SAME * length);
             let first = self.nodes.len();
@@ -234,13 +276,24 @@ impl Deck {
             });
             from = to;
         }
-        for mass in masses {
-            let distance = |node: &(usize, &f64)| (node.1 - mass.position).abs();
-            let nodes = self.nodes.iter().enumerate();
-            let nearest = nodes.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            self.masses
-                .extend(nearest.map(|(node, _)| (node, mass.size)));
-        }
+    }
+
+    /// The node at a place (m).
+    fn node_at(&self, place: f64) -> Option<usize> {
+        let distance = |node: &(usize, &f64)| (node.1 - place).abs();
+        let nodes = self.nodes.iter().enumerate();
+        let nearest = nodes.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.map(|(node, _)| node)
+    }
+
+    fn add_mass(&mut self, place: f64, mass: f64, inertia: f64) {
+        let node = self.node_at(place);
+        let mass = |node| DeckMass {
+            node,
+            mass,
+            inertia,
+        };
+        self.masses.extend(node.map(mass));
     }
 
     /// What both formats say at their head.

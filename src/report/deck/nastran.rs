@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Deck, DeckJoint, DeckPiece};
+use super::{Deck, DeckJoint, DeckMass, DeckPiece};
 use crate::structure::BeamTheory;
 
 /// Degrees of freedom that a plane beam has not: along it, out of its plane, twist.
@@ -10,6 +10,9 @@ const HELD: &str = "1345";
 /// w and theta.
 const W: usize = 2;
 const THETA: usize = 6;
+
+/// Numbers of elements that a joint or a hinge may take.
+const SPRINGS: usize = 3;
 
 /// The deck as a Nastran input file.
 pub fn render_nastran(deck: &Deck) -> String {
@@ -48,8 +51,14 @@ pub fn render_nastran(deck: &Deck) -> String {
         }
     }
     masses(&mut text, deck, element);
-    if let Some(joint) = &deck.joint {
-        springs(&mut text, joint, element + 2 * deck.nodes.len());
+    let mut first = element + deck.masses.len() + deck.nodes.len();
+    for joint in deck.joint.iter().chain(&deck.hinges) {
+        springs(&mut text, joint, first);
+        first += SPRINGS;
+    }
+    for (index, (node, stiffness)) in deck.springs.iter().enumerate() {
+        let (id, k, node) = (first + index + 1, number(*stiffness), node + 1);
+        let _ = writeln!(text, "CELAS2*,{id},{k},{node},{W}\n*");
     }
     text.push_str("ENDDATA\n");
     text
@@ -86,22 +95,34 @@ fn properties(text: &mut String, theory: BeamTheory, piece: &DeckPiece, id: usiz
 
 /// Point masses, and by Timoshenko's theory the sections' rotary inertia, which a bar element lacks.
 fn masses(text: &mut String, deck: &Deck, elements: usize) {
-    for (index, (node, mass)) in deck.masses.iter().enumerate() {
-        let id = elements + 1 + index;
-        let _ = writeln!(text, "CONM2*,{id},{},,{}\n*", node + 1, number(*mass));
+    for (index, own) in deck.masses.iter().enumerate() {
+        mass(text, elements + 1 + index, own);
     }
     if deck.theory == BeamTheory::Euler {
         return;
     }
     let first = elements + 1 + deck.masses.len();
     for (node, inertia) in rotary_inertia(deck).into_iter().enumerate() {
-        let (id, grid) = (first + node, node + 1);
-        let _ = writeln!(
-            text,
-            "CONM2*,{id},{grid},,0.\n*,,,,\n*,,,,\n*,,{}",
-            number(inertia)
-        );
+        let own = DeckMass {
+            node,
+            mass: 0.0,
+            inertia,
+        };
+        mass(text, first + node, &own);
     }
+}
+
+fn mass(text: &mut String, id: usize, own: &DeckMass) {
+    let mass = match own.mass {
+        0.0 => "0.".to_owned(),
+        mass => number(mass),
+    };
+    let _ = write!(text, "CONM2*,{id},{},,{mass}\n*", own.node + 1);
+    if own.inertia != 0.0 {
+        // I33 is the second field of the fourth line.
+        let _ = write!(text, ",,,,\n*,,,,\n*,,{}", number(own.inertia));
+    }
+    text.push('\n');
 }
 
 /// Each node's share of the sections' inertia (kg m2): half of the elements beside it.

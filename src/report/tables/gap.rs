@@ -98,7 +98,18 @@ fn no_gap(gap: &GapSection) -> String {
         ),
         None => String::new(),
     };
-    format!("No gap: the described model explains the frequencies within their uncertainty.{open}")
+    let of_none = gap.hypotheses.iter().find(|found| found.effect == "none");
+    let misfit = of_none.and_then(|none| none.goodness_of_fit.filter(|p| *p < MISFIT));
+    match misfit {
+        Some(p) => format!(
+            "No gap is established: the described model misses the frequencies by more than their uncertainty, as \
+             chance would in {} of tests, but nothing else explains them better.{open}",
+            probability(p)
+        ),
+        None => format!(
+            "No gap: the described model explains the frequencies within their uncertainty.{open}"
+        ),
+    }
 }
 
 /// Probability of `none` below which a gap counts as there.

@@ -278,3 +278,27 @@ fn regress_a_terminal_explains_the_columns_of_the_diagnosis() {
         assert!(said.contains(part), "{part} is missing in:\n{said}");
     }
 }
+
+#[test]
+fn regress_no_gap_beside_a_misfit_says_so() {
+    let story = |goodness: f64| {
+        let mut told = gap_with("no-gap");
+        let gap = told.gap.as_mut().unwrap();
+        gap.hypotheses.push(HypothesisSection {
+            effect: "none".into(),
+            goodness_of_fit: Some(goodness),
+            ..HypothesisSection::default()
+        });
+        gap_story(&told)[0].clone()
+    };
+    assert!(
+        story(0.005).contains("chance would in 0.5 % of tests"),
+        "{}",
+        story(0.005)
+    );
+    assert!(
+        story(0.2).contains("within their uncertainty"),
+        "{}",
+        story(0.2)
+    );
+}

@@ -66,10 +66,10 @@ fn draw_panel(drawing: &mut Drawing, panel: &Panel, cloud: &Cloud) {
     }
     let corners = cloud.ellipse.iter().map(|(x, y)| panel.place(*x, *y));
     drawing.line(corners.collect(), Stroke::new(VERMILION, 2.0));
-    let estimate = cloud.estimate.map(|(x, y)| panel.place(x, y));
-    dots.extend(estimate);
-    draw_shifted(drawing, panel, (&cloud.shifted, estimate), &dots);
-    if let Some(at) = estimate {
+    dots.extend(cloud.estimate.map(|(x, y)| panel.place(x, y)));
+    draw_shifted(drawing, panel, &cloud.shifted, &dots);
+    if let Some((x, y)) = cloud.estimate {
+        let at = panel.place(x, y);
         drawing.dot(at, 7.0, WHITE);
         drawing.dot(at, 5.5, BLUE);
     }
@@ -117,12 +117,7 @@ fn below(document: &Document, clouds: &[Cloud]) -> String {
 
 /// Crosses with their percentage, on the side where the words cover nothing; words without such a
 /// side are left out, the table has them.
-fn draw_shifted(
-    drawing: &mut Drawing,
-    panel: &Panel,
-    (shifted, estimate): (&[(f64, Point)], Option<Point>),
-    dots: &[Point],
-) {
+fn draw_shifted(drawing: &mut Drawing, panel: &Panel, shifted: &[(f64, Point)], dots: &[Point]) {
     let mut crosses: Vec<(f64, Point)> = shifted
         .iter()
         .map(|(percent, (x, y))| (*percent, panel.place(*x, *y)))
@@ -136,10 +131,6 @@ fn draw_shifted(
     crosses.sort_by(|(a, _), (b, _)| b.abs().total_cmp(&a.abs()));
     for (percent, at) in crosses {
         drawing.cross(at, 6.0, Stroke::new(ORANGE, 2.5));
-        // Changes that move nothing: their words would crowd about the dot.
-        if estimate.is_some_and(|own| (own.0 - at.0).hypot(own.1 - at.1) < NEAR_ESTIMATE) {
-            continue;
-        }
         let words = format!("{} %", signed(percent));
         let half = text_width(&words, TICK_SIZE, Weight::Regular) / 2.0;
         let free = SIDES.iter().find_map(|(across, down)| {
@@ -155,9 +146,6 @@ fn draw_shifted(
         }
     }
 }
-
-/// Crosses nearer to the estimate than this lie under its dot and have no words (pixels).
-const NEAR_ESTIMATE: f64 = 8.0;
 
 /// Where words may stand beside a cross: shares of their half width across and of a line down.
 const SIDES: [Point; 8] = [

@@ -274,7 +274,7 @@ mod tests {
             (
                 Check::Linearity,
                 -22.8,
-                ["\u{2212}22.8", "0.100", "standard deviations"],
+                ["\u{2212}22.8", "0.1", "standard deviations"],
             ),
             (Check::ForceFall, 3.63, ["3.63", "0.1", "dB"]),
             (Check::Averages, 5.0, ["5", "0.1", "taps"]),

@@ -5,13 +5,17 @@ var reach = 24; // pixels within which a point answers the pointer
 
 function logarithmic(axis) { return axis.scale === "logarithmic"; }
 
-function named(axis) { return axis.label + (axis.unit ? " (" + axis.unit + ")" : ""); }
+// A title of at most `room` pixels: its words give way at their end, its unit stays.
+function named(axis, room) {
+  var unit = axis.unit ? " (" + axis.unit + ")" : "", most = Math.max(Math.floor(room / 7) - unit.length, 8);
+  return (axis.label.length > most ? axis.label.slice(0, most - 1).trim() + "…" : axis.label) + unit;
+}
 
-// Powers of ten with 2 and 5 where there are several, else equal steps.
-function ticks(low, high, log) {
+// Powers of ten with 2 and 5 where there are several and room for them, else equal steps.
+function ticks(low, high, log, narrow) {
   var found = [];
   if (log && high / low > 8) {
-    var parts = high / low > 2000 ? [1] : [1, 2, 5];
+    var parts = high / low > (narrow ? 100 : 2000) ? [1] : [1, 2, 5];
     for (var e = Math.floor(Math.log10(low)); e <= Math.log10(high); e++) {
       parts.forEach(function (part) {
         var value = +(part + "e" + e);
@@ -183,10 +187,10 @@ function pointOptions(figure, panel, holder) {
   function axis(key) {
     var at = panel[key].at;
     return {
-      label: named(panel[key]), labelSize: 20, size: key === "x" ? 32 : room(panel.y), stroke: color("--ink"),
+      label: named(panel[key], key === "x" ? holder.clientWidth - room(panel.y) : panel.height), labelSize: 20, size: key === "x" ? 32 : room(panel.y), stroke: color("--ink"),
       grid: { stroke: color("--rule"), width: 1 }, ticks: { stroke: color("--rule"), width: 1 },
       splits: function (u, index, low, high) {
-        return at ? at.filter(function (place) { return place >= low && place <= high; }) : ticks(low, high, logarithmic(panel[key]));
+        return at ? at.filter(function (place) { return place >= low && place <= high; }) : ticks(low, high, logarithmic(panel[key]), key === "x" && innerWidth < 600);
       },
       filter: function (u, splits) { return splits; },
       values: function (u, splits) { return at ? splits.map(function (place) { return panel[key].names[at.indexOf(place)]; }) : tickNames(splits); }

@@ -33,10 +33,10 @@ pub(super) struct IdentifyArguments {
 #[derive(Debug, Args)]
 pub(super) struct FrequencyArguments {
     /// Natural frequencies of modes 1, 2, ... (Hz); they replace what TEST says, its bounds included
-    #[arg(long, value_name = "HZ,HZ,...")]
+    #[arg(long, value_name = "HZ,HZ,...", allow_negative_numbers = true)]
     frequencies: Option<FrequencyList>,
     /// Half of the line spacing, one number or one for each frequency (Hz)
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     half_line: Option<HalfLines>,
 }
 

@@ -25,6 +25,9 @@ pub struct Analysis {
     pub structure: Option<TestedStructure>,
     /// The recordings, in the order of the description.
     pub recordings: Vec<RecordingResult>,
+    /// Of each recording how it differs from the first, "8.8 times its tap level", so that modes and estimate leave
+    /// it out; `None` where they do not.
+    pub aside: Vec<Option<String>>,
     /// Resonances of the reference configuration, ascending: the first recording and all others
     /// with its sensor positions and tap level.
     pub modes: Vec<ModeResult>,

@@ -4,16 +4,18 @@ use super::analysis::ModeResult;
 use super::between::differ;
 use super::model::TestedStructure;
 use super::warning::Warning;
-use crate::identify::consistent::goodness::{DOUBTFUL, NOTABLE_MISFIT};
+use crate::identify::consistent::goodness::NOTABLE_MISFIT;
 use crate::identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
 };
-use crate::stats::{root_mean_square, times};
+use crate::stats::times;
 
 /// What else may be behind a misfit where modes come from several recordings.
 const BETWEEN: &str = "; recordings taken one after the other differ by more than \
-                       single readings: the diagnosis of what is missing allows for a joint that drifts \
-                       between them";
+                       single readings";
+/// What is done about it where there is a joint.
+const ALLOWED: &str =
+    ": the diagnosis of what is missing allows for a joint that drifts between them";
 
 /// Everything that a reader of the estimate has to know.
 pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
@@ -21,8 +23,12 @@ pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) ->
     let mut add =
         |code: &'static str, text: String| warnings.push(Warning::Estimate { code, text });
     if let Some(text) = misfit(found) {
-        let drift = if differ(modes) { BETWEEN } else { "" };
-        add("misfit", text + drift);
+        let drift = match (differ(modes), has_joint(found)) {
+            (false, _) => String::new(),
+            (true, false) => BETWEEN.to_owned(),
+            (true, true) => format!("{BETWEEN}{ALLOWED}"),
+        };
+        add("misfit", text + &drift);
     }
     if found.goodness.verdict == Verdict::Untestable {
         add("untestable", found.goodness.words());
@@ -95,8 +101,15 @@ fn coupling_is_open(found: &ConsistentEstimate) -> bool {
     })
 }
 
-/// The model against the readings: how far it misses, how often the readings' own uncertainty that
-/// is, and what either leaves of the intervals.
+/// Whether a joint's stiffness was sought: of a free beam its properties alone are.
+fn has_joint(found: &ConsistentEstimate) -> bool {
+    [Quantity::Kx, Quantity::Ky]
+        .into_iter()
+        .any(|stiffness| found.quantity(stiffness).is_some())
+}
+
+/// The model against the readings: how far it misses, how many times larger uncertainties would allow that, and
+/// what either leaves of the intervals.
 fn misfit(found: &ConsistentEstimate) -> Option<String> {
     let goodness = &found.goodness;
     let percent = 100.0 * goodness.relative_misfit;
@@ -104,8 +117,11 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
         let doubtful = matches!(goodness.verdict, Verdict::Doubtful | Verdict::CannotExplain);
         return doubtful.then(|| goodness.words());
     }
-    goodness.probability.filter(|p| *p < DOUBTFUL)?;
-    let standardised: Vec<f64> = found.modes.iter().filter_map(|m| m.standardised).collect();
+    let factor = goodness.uncertainty_factor()?;
+    let sought = match has_joint(found) {
+        true => "the joint",
+        false => "the beam's modulus",
+    };
     let intervals: Vec<String> = found.quantities.iter().filter_map(two_intervals).collect();
     let intervals = if intervals.is_empty() {
         String::new()
@@ -113,11 +129,11 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
         format!("; {}", intervals.join("; "))
     };
     Some(format!(
-        "the model misses the frequencies by {} % rms, {} times their uncertainty \
-         (goodness of fit {}); std and 95 % limits stand for the frequencies' uncertainty alone, and the joint is \
+        "the model misses the frequencies by {} % rms; uncertainties that would allow that are {} times the stated \
+         ones (goodness of fit {}); std and 95 % limits stand for the frequencies' uncertainty alone, and {sought} is \
          not known that well{intervals}",
         Rounded(percent),
-        times(root_mean_square(&standardised)),
+        times(factor),
         chance(goodness.probability.unwrap_or(0.0))
     ))
 }
@@ -159,11 +175,20 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     let value = quantity.value.filter(|value| told && *value != 0.0)?;
     let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
     Some(format!(
-        "95 % interval of {} from the frequencies' uncertainty alone \u{b1}{} %, scaled by the misfit \u{b1}{} %",
+        "95 % interval of {} from the frequencies' uncertainty alone \u{b1}{} %, scaled by the misfit {}",
         symbol(quantity.quantity),
         Rounded(PERCENT_95 * std / value.abs()),
-        Rounded(50.0 * (high - low) / value.abs())
+        within(50.0 * (high - low) / value.abs())
     ))
+}
+
+/// A half width (%): one beyond the value itself determines nothing.
+fn within(percent: f64) -> String {
+    if percent > 100.0 {
+        "not determined (beyond \u{b1}100 %)".to_owned()
+    } else {
+        format!("\u{b1}{} %", Rounded(percent))
+    }
 }
 
 /// As tables write it.
@@ -209,5 +234,11 @@ mod tests {
         assert_eq!(chance(3e-7), "<0.001");
         assert_eq!(chance(0.0042), "4.2e-3");
         assert_eq!(symbol(Quantity::Kx), "Kx");
+    }
+
+    #[test]
+    fn regress_a_half_width_beyond_the_value_is_none() {
+        assert_eq!(within(8.8), "\u{b1}8.8 %");
+        assert_eq!(within(30659.0), "not determined (beyond \u{b1}100 %)");
     }
 }

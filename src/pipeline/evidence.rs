@@ -37,8 +37,12 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
     let resonances = spectra
         .readings
         .iter()
-        .filter(|reading| reading.label.is_none())
-        .map(|reading| resonance(reading, spectra))
+        .enumerate()
+        .filter(|(_, reading)| reading.label.is_none())
+        .map(|(index, reading)| ResonanceEvidence {
+            is_mode: is_mode(recording, index),
+            ..resonance(reading, spectra)
+        })
         .collect();
     let masses = recording.conditions.masses.iter();
     let fastened = masses.map(|mass| (mass.position, mass.mass));
@@ -60,6 +64,13 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
         decay: spectra.decay,
         window: spectra.window,
     })
+}
+
+/// Whether a reading is a mode: it has a number, or none has.
+fn is_mode(recording: &RecordingResult, index: usize) -> bool {
+    let numbers = &recording.mode_numbers;
+    let own = numbers.get(index).copied().flatten();
+    own.is_some() || numbers.iter().all(Option::is_none)
 }
 
 fn sensors(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<SensorEvidence> {
@@ -95,6 +106,7 @@ fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvide
     let mut stds: Vec<f64> = taps.iter().map(|tap| tap.frequency_std).collect();
     ResonanceEvidence {
         frequency: reading.frequency,
+        is_mode: true,
         std: reading.std,
         apparent_damping_ratio: reading.damping_ratio.map(|own| own + added),
         damping_from: match reading.fit {

@@ -106,10 +106,12 @@ pub fn run_test(
             .iter()
             .flat_map(|r| r.measurement.warnings.iter().cloned()),
     );
+    let mut aside = vec![None; recordings.len()];
     let modes = match &test.measured {
         Some(measured) => modes_of_measured(measured, &structure),
         None => {
-            let reference = modes::reference_configuration(test, &recordings);
+            aside = modes::set_aside(test, &recordings);
+            let reference = modes::reference_configuration(&aside);
             let known = (&structure, &details);
             let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
@@ -138,6 +140,7 @@ pub fn run_test(
     Ok(Analysis {
         name: test.name.clone(),
         structure: Some(structure),
+        aside,
         recordings,
         modes,
         identification: Some(identification),

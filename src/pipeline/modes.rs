@@ -10,6 +10,7 @@ use crate::description::{MeasuredFrequencies, TestDescription};
 use crate::identify::observation::UNPAIRED;
 use crate::identify::{WeightedPeak, pair_by_ratio};
 use crate::modal::{ModeReading, merge_modes};
+use crate::stats::times;
 use crate::structure::{Assembly, JointStiffness, natural_frequencies};
 
 /// Recordings count as tapped at the same level when their median peak forces differ by less than
@@ -34,27 +35,39 @@ const FREE_BEAM_MODES: usize = 30;
 
 /// Indices of the recordings of the reference configuration: the first, and all others with its
 /// sensor positions, fastened masses and tap level.
-pub(super) fn reference_configuration(
+pub(super) fn reference_configuration(aside: &[Option<String>]) -> Vec<usize> {
+    (0..aside.len())
+        .filter(|&index| aside[index].is_none())
+        .collect()
+}
+
+/// Of each recording how it differs from the first, so that it is left out of the list of modes; `None` where it does
+/// not.
+pub(super) fn set_aside(
     test: &TestDescription,
     recordings: &[RecordingResult],
-) -> Vec<usize> {
-    let level = |recording: &RecordingResult| median_force(recording);
+) -> Vec<Option<String>> {
     let Some(first) = recordings.first() else {
         return Vec::new();
     };
-    (0..recordings.len())
-        .filter(|&index| {
-            let same_places = match (test.recordings.first(), test.recordings.get(index)) {
-                (Some(a), Some(b)) => a.at == b.at && a.masses == b.masses,
-                _ => true,
-            };
-            let same_level = match (level(first), level(&recordings[index])) {
-                (Some(a), Some(b)) => (a / b).max(b / a) < SAME_LEVEL,
-                _ => true,
-            };
-            same_places && same_level
-        })
-        .collect()
+    let described = test.recordings.first();
+    let differs = |(index, own): (usize, &RecordingResult)| {
+        let both = described.zip(test.recordings.get(index));
+        let level = median_force(own)
+            .zip(median_force(first))
+            .map(|(own, first)| own / first)
+            .filter(|ratio| ratio.max(1.0 / ratio) >= SAME_LEVEL);
+        let words = [
+            level.map(|ratio| format!("{} times its tap level", times(ratio))),
+            both.filter(|(a, b)| a.at != b.at)
+                .map(|_| "sensors elsewhere".to_owned()),
+            both.filter(|(a, b)| a.masses != b.masses)
+                .map(|_| "other masses fastened".to_owned()),
+        ];
+        let words: Vec<String> = words.into_iter().flatten().collect();
+        (!words.is_empty()).then(|| words.join(", "))
+    };
+    recordings.iter().enumerate().map(differs).collect()
 }
 
 /// Median peak force of the accepted taps; `None` without a hammer or tap.

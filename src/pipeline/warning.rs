@@ -173,7 +173,7 @@ impl Warning {
     /// Whether it concerns the pair regression alone.
     pub fn is_of_pairs(&self) -> bool {
         match self {
-            Warning::Closure { .. } => true,
+            Warning::Closure { .. } | Warning::UnphysicalEstimate { .. } => true,
             Warning::Neglected { of_pairs, .. } => *of_pairs,
             _ => false,
         }

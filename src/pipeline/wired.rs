@@ -63,6 +63,7 @@ pub(super) fn analysis_of(mut recording: RecordingResult) -> Analysis {
     Analysis {
         name: recording.file.clone(),
         structure: None,
+        aside: vec![None],
         verdicts,
         warnings: together(warnings),
         modes,

@@ -233,21 +233,24 @@ fn shifts(
         let shift = 100.0 * (other.frequency / mode.frequency - 1.0);
         let (Some(a), Some(b)) = (mode.std, other.std) else {
             return Some(verdict.missing(&format!(
-                "Not applicable: {what} ({}) it moves by {shift:+.3} %, and its uncertainty is not known.",
-                second.file
+                "Not applicable: {what} ({}) it moves by {} %, and its uncertainty is not known.",
+                second.file,
+                signed(shift)
             )));
         };
         let deviations =
             (other.frequency - mode.frequency).abs() / a.hypot(b).max(f64::MIN_POSITIVE);
         let happened = format!(
-            "It moves by {shift:+.3} % {what} ({}), {} standard deviations (limit {:.0}).",
+            "It moves by {} % {what} ({}), {} standard deviations (limit {:.0}).",
+            signed(shift),
             second.file,
             times(deviations),
             settings.deviations
         );
         // Time, and mounting a sensor anew, move a frequency too, but seldom in the order of the levels.
         let usual = 0.01 * shift.abs() <= settings.drift;
-        let (outcome, more) = match order(mode) {
+        let follows = order(mode);
+        let (outcome, more) = match &follows {
             _ if deviations <= settings.deviations => (Outcome::Good, String::new()),
             Some(order) => (Outcome::Doubtful, order.words()),
             None if usual => (
@@ -260,9 +263,21 @@ fn shifts(
             None => (Outcome::Doubtful, String::new()),
         };
         let happened = happened + &more;
-        Some(verdict.found(deviations, outcome, happened))
+        // What decides is shown: beyond chance the usual drift, unless the frequency follows the levels.
+        let by_drift = deviations > settings.deviations && follows.is_none();
+        Some(if by_drift {
+            let verdict = verdict.against(settings.drift, "1");
+            verdict.found(0.01 * shift.abs(), outcome, happened)
+        } else {
+            verdict.found(deviations, outcome, happened)
+        })
     };
     first.resonances.iter().filter_map(of_pair).collect()
+}
+
+/// A change (%) with its sign, a minus sign for a hyphen.
+fn signed(percent: f64) -> String {
+    format!("{percent:+.3}").replace('-', "\u{2212}")
 }
 
 /// A frequency that follows the order of the tap levels.

@@ -153,10 +153,19 @@ pub fn check_frequency_scatter(
             mode.tap_frequencies.len(),
             100.0 * limit
         );
-        verdict.found(relative, outcome, happened)
+        // What decides is shown: a doubt comes of the noise's share, not of the limit.
+        match excess.filter(|_| outcome == Outcome::Doubtful) {
+            Some(excess) => verdict
+                .against(largest, TIMES_NOISE)
+                .found(excess, outcome, happened),
+            None => verdict.found(relative, outcome, happened),
+        }
     };
     recording.resonances.iter().map(of_mode).collect()
 }
+
+/// Unit of a scatter held against what noise explains.
+const TIMES_NOISE: &str = "times noise";
 
 /// Sample standard deviation; `None` of fewer than two.
 fn deviation(values: &[f64]) -> Option<f64> {
@@ -185,6 +194,7 @@ pub(super) fn of_mode(
     let subject = Subject::Mode {
         file: recording.file.clone(),
         frequency: mode.frequency,
+        is_mode: mode.is_mode,
     };
     Verdict::new(check, subject, limit)
 }

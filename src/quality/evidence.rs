@@ -67,6 +67,8 @@ pub enum DampingSource {
 pub struct ResonanceEvidence {
     /// Its frequency (Hz).
     pub frequency: f64,
+    /// Whether it is a mode: `false` for a peak without a number among others that have theirs.
+    pub is_mode: bool,
     /// Standard deviation of that (Hz); `None` where it is not known.
     pub std: Option<f64>,
     /// Damping ratio as the spectra show it, the window's share in it.

@@ -12,6 +12,7 @@ mod evidence;
 mod force;
 mod levels;
 mod settings;
+mod subject;
 mod tap;
 mod verdict;
 
@@ -25,8 +26,9 @@ pub use evidence::{
 pub use force::{check_force_fall, check_force_noise};
 pub use levels::check_tap_levels;
 pub use settings::QualitySettings;
+pub use subject::Subject;
 pub use tap::{check_double_hit, check_force_ripple, check_overload, check_weak};
-pub use verdict::{Check, Outcome, Subject, Verdict};
+pub use verdict::{Check, Outcome, Verdict};
 
 /// All checks of one recording.
 pub fn judge_recording(recording: &RecordingEvidence, settings: &QualitySettings) -> Vec<Verdict> {

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::subject::Subject;
+
 /// What is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Check {
@@ -45,6 +47,9 @@ pub enum Check {
     MassLoading,
 }
 
+/// Unit of a difference held against its uncertainty.
+const DEVIATIONS: &str = "standard deviations";
+
 /// Code, unit of value and limit, likely cause, remedy.
 type Words = (&'static str, &'static str, &'static str, &'static str);
 
@@ -54,7 +59,7 @@ impl Check {
         self.words().0
     }
 
-    /// Unit of value and limit; "1" for a ratio.
+    /// Unit of value and limit, where a verdict has no other; "1" for a ratio.
     pub fn unit(self) -> &'static str {
         self.words().1
     }
@@ -205,74 +210,16 @@ impl Check {
             ),
             Check::Linearity => (
                 "linearity",
-                "1",
+                DEVIATIONS,
                 "The joint changed between the recordings: it slips or opens with the level, it drifted, or it was touched.",
                 "Tap softly and hard within one recording, where a joint has no time to drift; if it is the level, state it with every frequency, and identify the joint at the lowest one that rises clear of the noise.",
             ),
             _ => (
                 "mass-loading",
-                "1",
+                DEVIATIONS,
                 "The sensor's mass lowers the modes that move where it sits, or the joint changed between the recordings.",
                 "State the sensor's mass in the description so that the model carries it, take a lighter sensor, or place it near the joint.",
             ),
-        }
-    }
-}
-
-/// What a verdict is about.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Subject {
-    /// A recording.
-    Recording {
-        /// Its name.
-        file: String,
-    },
-    /// A tap.
-    Tap {
-        /// The recording.
-        file: String,
-        /// Its number, from 1.
-        tap: usize,
-    },
-    /// A mode.
-    Mode {
-        /// The recording.
-        file: String,
-        /// Its frequency (Hz).
-        frequency: f64,
-    },
-    /// A sensor.
-    Sensor {
-        /// The recording.
-        file: String,
-        /// Its name.
-        sensor: String,
-    },
-    /// The test as a whole.
-    Test,
-}
-
-impl Subject {
-    /// The recording it belongs to; `None` of the test as a whole.
-    pub fn file(&self) -> Option<&str> {
-        match self {
-            Subject::Recording { file }
-            | Subject::Tap { file, .. }
-            | Subject::Mode { file, .. }
-            | Subject::Sensor { file, .. } => Some(file),
-            Subject::Test => None,
-        }
-    }
-}
-
-impl fmt::Display for Subject {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Subject::Recording { file } => f.write_str(file),
-            Subject::Tap { file, tap } => write!(f, "{file}, tap {tap}"),
-            Subject::Mode { file, frequency } => write!(f, "{file}, {frequency:.2} Hz"),
-            Subject::Sensor { file, sensor } => write!(f, "{file}, sensor {sensor}"),
-            Subject::Test => f.write_str("test"),
         }
     }
 }
@@ -332,6 +279,13 @@ impl Verdict {
             outcome: Outcome::NotApplicable,
             happened: String::new(),
         }
+    }
+
+    /// Held against another limit of the check, in its own unit.
+    pub(super) fn against(mut self, limit: f64, unit: &'static str) -> Self {
+        self.limit = limit;
+        self.unit = unit;
+        self
     }
 
     /// With its value, what came out, and what happened.

@@ -3,14 +3,17 @@
 use super::document::Document;
 use super::format::{signed_or_below, significant};
 use super::summary::{channels, described, most_missed};
-use super::tables::{Parameter, estimated, quality_count};
+use super::tables::{Parameter, estimated, has_joint, quality_count};
 
 /// At most five lines, each with what it is about; what was not computed has none.
 pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
     let lines = [
         ("Taps", taps(document)),
         ("Modes", modes(document)),
-        ("Joint", joint(document)),
+        (
+            if has_joint(document) { "Joint" } else { "Beam" },
+            joint(document),
+        ),
         ("Model", model(document)),
         ("Doubts", doubts(document)),
         ("Next", described(document)),

@@ -8,6 +8,7 @@ use super::document::{
     ChannelSection, Document, FastenedMassSection, ModeSection, ModeShapeSection,
     PredictionSection, RecordingSection, TapSection, TestSection, VERSION, WarningSection,
 };
+use super::format::with_minus_signs;
 use crate::identify::{PairsModel, PredictedMode};
 use crate::modal::{FrequencySource, ModeReading};
 use crate::pipeline::{
@@ -26,7 +27,7 @@ pub fn document(analysis: &Analysis) -> Document {
     let document = Document {
         version: VERSION,
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
-        recordings: (!given).then(|| analysis.recordings.iter().map(recording_section).collect()),
+        recordings: (!given).then(|| recordings(analysis)),
         modes: Some(
             analysis
                 .modes
@@ -132,6 +133,19 @@ fn theory_name(theory: BeamTheory) -> &'static str {
     }
 }
 
+fn recordings(analysis: &Analysis) -> Vec<RecordingSection> {
+    let section = |(index, recording): (usize, &RecordingResult)| RecordingSection {
+        aside: analysis.aside.get(index).cloned().flatten(),
+        ..recording_section(recording)
+    };
+    analysis
+        .recordings
+        .iter()
+        .enumerate()
+        .map(section)
+        .collect()
+}
+
 fn recording_section(recording: &RecordingResult) -> RecordingSection {
     let spectra = recording.measurement.spectra.as_ref();
     let lines = spectra.map(|spectra| spectra.averages.lines);
@@ -149,6 +163,7 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
             .collect()
     });
     RecordingSection {
+        aside: None,
         file: recording.file.clone(),
         format: format_words(recording.format),
         sample_rate: recording.sample_rate,
@@ -336,7 +351,7 @@ fn warning_sections(
     let has_better = identification.is_some_and(|found| found.consistent.is_some());
     let section = |warning: &Warning| WarningSection {
         code: warning.code().to_string(),
-        text: warning.to_string(),
+        text: with_minus_signs(&warning.to_string()),
         beside: has_better && warning.is_of_pairs(),
     };
     warnings.iter().map(section).collect()

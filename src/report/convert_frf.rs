@@ -6,7 +6,9 @@ use super::ReportError;
 use super::convert::document;
 use super::csv::write;
 use super::document::{Document, FrfResonanceSection, FrfSection, WarningSection};
-use crate::pipeline::{Analysis, Frf, FrfResonance};
+use super::format::with_minus_signs;
+use crate::pipeline::{Analysis, Frf, FrfResonance, Warning};
+use crate::quality::Check;
 use crate::spectral::Window;
 
 /// Columns of the table of frequency response functions.
@@ -30,7 +32,14 @@ const COLUMNS: [&str; 13] = [
 pub fn frf_document(analysis: &Analysis, frfs: &[Frf]) -> Document {
     let whole = document(analysis);
     let measured = analysis.recordings.iter();
-    let warnings = measured.flat_map(|recording| &recording.measurement.warnings);
+    let warnings = measured
+        .flat_map(|recording| &recording.measurement.warnings)
+        .chain(
+            analysis
+                .warnings
+                .iter()
+                .filter(|warning| is_of_function(warning)),
+        );
     Document {
         version: whole.version,
         test: whole.test,
@@ -40,12 +49,24 @@ pub fn frf_document(analysis: &Analysis, frfs: &[Frf]) -> Document {
         warnings: warnings
             .map(|warning| WarningSection {
                 code: warning.code().to_string(),
-                text: warning.to_string(),
+                text: with_minus_signs(&warning.to_string()),
                 beside: false,
             })
             .collect(),
         ..Document::default()
     }
+}
+
+/// Checks of good practice that a function stands on: of the force and of the averages on its lines.
+const OF_FUNCTION: [Check; 4] = [
+    Check::ForceFall,
+    Check::ForceNoise,
+    Check::Coherence,
+    Check::RandomError,
+];
+
+fn is_of_function(warning: &Warning) -> bool {
+    matches!(warning, Warning::Quality { code, .. } if OF_FUNCTION.iter().any(|check| check.code() == *code))
 }
 
 fn section(frf: &Frf) -> FrfSection {
@@ -114,4 +135,22 @@ fn rows(frf: &Frf) -> impl Iterator<Item = Vec<String>> {
 
 fn number(value: Option<f64>) -> String {
     value.map_or(String::new(), |value| value.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_a_function_carries_the_doubts_that_it_stands_on() {
+        let told = |check: Check| {
+            is_of_function(&Warning::Quality {
+                code: check.code(),
+                text: String::new(),
+            })
+        };
+        assert!(told(Check::ForceFall) && told(Check::ForceNoise) && told(Check::Coherence));
+        assert!(!told(Check::Linearity) && !told(Check::TapLevels));
+        assert!(!is_of_function(&Warning::NumberedInOrder));
+    }
 }

@@ -27,5 +27,6 @@ pub(super) fn verdict_section(verdict: &Verdict) -> VerdictSection {
         text: verdict.happened.clone(),
         cause: of_doubt(verdict.check.cause()),
         remedy: of_doubt(verdict.check.remedy()),
+        severity: verdict.severity(),
     }
 }

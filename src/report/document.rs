@@ -121,6 +121,9 @@ pub struct FastenedMassSection {
 pub struct RecordingSection {
     /// File as the description names it.
     pub file: String,
+    /// How it differs from the first recording, so that modes and estimate leave it out: "8.8 times its tap level";
+    /// null where they do not.
+    pub aside: Option<String>,
     /// Format in words: "WAV, 24-bit integer".
     pub format: String,
     /// Sample rate (Hz); null of frequency response functions from a file.

@@ -32,4 +32,7 @@ pub struct VerdictSection {
     pub cause: Option<String>,
     /// Of a doubt what helps; else null.
     pub remedy: Option<String>,
+    /// How far off it is, in its limit: tells the worst of one check.
+    #[serde(skip)]
+    pub severity: f64,
 }

@@ -283,3 +283,18 @@ fn typographic(number: &str) -> String {
         None => number.to_owned(),
     }
 }
+
+/// A sentence in which every hyphen that begins a number is a minus sign.
+pub fn with_minus_signs(text: &str) -> String {
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    let mut written = String::with_capacity(text.len());
+    while let Some(letter) = letters.next() {
+        let begins = before.is_whitespace() || before == '(';
+        let number = letters.peek().is_some_and(char::is_ascii_digit);
+        let minus = letter == '-' && begins && number;
+        written.push(if minus { '\u{2212}' } else { letter });
+        before = letter;
+    }
+    written
+}

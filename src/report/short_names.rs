@@ -135,6 +135,11 @@ fn middle_out(name: &str, width: usize) -> String {
     if letters.len() <= width {
         return name.to_owned();
     }
+    // What all share is left out already, and the end tells most: "\u{2026}00001" and not "\u{2026}0\u{2026}1".
+    if letters.first() == Some(&LEFT_OUT) && letters.last() != Some(&LEFT_OUT) {
+        let end = letters.iter().skip(letters.len() + 1 - width.max(1));
+        return std::iter::once(&LEFT_OUT).chain(end).collect();
+    }
     let kept = width.saturating_sub(1);
     let (head, tail) = (kept - kept / 2, kept / 2);
     let first = letters.iter().take(head);
@@ -156,7 +161,7 @@ mod tests {
 
     #[test]
     fn val_names_lose_first_what_they_share() {
-        let cases: [(&[&str], usize, &[&str]); 8] = [
+        let cases: [(&[&str], usize, &[&str]); 9] = [
             (&["a.wav", "b.wav"], 8, &["a.wav", "b.wav"]),
             (&["first.wav", "moved.wav"], 8, &["first", "moved"]),
             (&["low.wav", "low.csv"], 5, &["…wav", "…csv"]),
@@ -172,6 +177,7 @@ mod tests {
                 8,
                 &["…north…", "…south…"],
             ),
+            (&["Hxysv00001.txt", "Hxysv00005.txt"], 4, &["…001", "…005"]),
             (
                 &["measurement_before_noon.wav", "another.wav"],
                 8,

@@ -218,12 +218,14 @@ fn estimate(document: &Document) -> Option<String> {
             let limits = limits.map_or(String::new(), |[low, high]| format!(", 95 %: {low} to {high}"));
             let interval = match parameter.value.std_scaled {
                 Some(_) if parameter.value.std.is_some() => format!(
-                    "{interval}, from the frequencies' uncertainty alone; standard deviation scaled by the misfit {}{limits}",
-                    parameter.written_scaled()
+                    "{interval}, from the frequencies' uncertainty alone; standard deviation scaled by the misfit {}\u{a0}{}{limits}",
+                    parameter.written_scaled(),
+                    unit.replace(' ', "\u{a0}")
                 ),
                 Some(_) => format!(
-                    " (standard deviation from the misfit {}{limits})",
-                    parameter.written_scaled()
+                    " (standard deviation from the misfit {}\u{a0}{}{limits})",
+                    parameter.written_scaled(),
+                    unit.replace(' ', "\u{a0}")
                 ),
                 None => interval,
             };

@@ -1,7 +1,7 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
 use super::brief::brief;
-use super::document::Document;
+use super::document::{Document, ModeSection};
 use super::format::signed_percent;
 use super::tables::{self, Table};
 use super::text_table::cut;
@@ -69,15 +69,30 @@ pub fn modes(document: &Document) -> String {
     let fitted = modes.iter().any(|mode| mode.method == "fit");
     let note = if fitted {
         let note = format!(
-            "Frequency: fit of {}, \u{b1} half the 95 % interval; line: the highest spectral line \
+            "Frequency: fit of {}, \u{b1} half the 95 % interval{}; line: the highest spectral line \
              \u{b1} half line; damping \u{b1} one standard deviation.",
-            tables::fitted_to(document)
+            tables::fitted_to(document),
+            not_fitted(modes)
         );
         wrapped(&note, 0)
     } else {
         String::new()
     };
-    render_table(&table) + &note
+    let from = tables::modes_from(document).map_or(String::new(), |from| wrapped(&from, 0));
+    render_table(&table) + &note + &from
+}
+
+/// " (mode 3: interpolated; mode 4: line)": the numbered modes without a fit; empty where all have one.
+fn not_fitted(modes: &[ModeSection]) -> String {
+    let others: Vec<String> = modes
+        .iter()
+        .filter(|mode| mode.method != "fit")
+        .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, mode.method)))
+        .collect();
+    match others.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", others.join("; ")),
+    }
 }
 
 /// The resonances on the frequency response functions; empty where those were not asked for.
@@ -189,7 +204,7 @@ fn is_gap(c: char) -> bool {
 }
 
 /// A text broken into lines of at most 80 characters; lines after the first are indented.
-pub(super) fn wrapped(text: &str, indent: usize) -> String {
+pub fn wrapped(text: &str, indent: usize) -> String {
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split(is_gap).filter(|word| !word.is_empty()) {
         let word = cut(word, WIDTH - indent);

@@ -153,6 +153,10 @@ fn regress_bad_usage_is_explained() {
             &["identify", "test.toml", "--half-line", "1"],
             &["--half-line needs frequencies"],
         ),
+        (
+            &["identify", "test.toml", "--half-line", "-1"],
+            &["half of the line spacing in Hz such as 0.125"],
+        ),
         (&["identify", "test.toml", "--method", "guess"], &["pairs"]),
         (
             &["identify", "test.toml"],

@@ -98,6 +98,7 @@ fn observed(recordings: Vec<RecordingResult>) -> Observations {
     observations(&Analysis {
         name: "virtual".to_string(),
         structure: Some(tested_structure(&description)),
+        aside: vec![None; recordings.len()],
         recordings,
         modes: Vec::new(),
         identification: None,

@@ -55,10 +55,22 @@ fn sensor(name: &str, position: f64, residues: [f64; 3]) -> SensorEvidence {
     }
 }
 
+/// Value and limit to 1 %, as the sentence rounds them, in the unit.
+fn assert_shown(verdict: &Verdict, [value, limit]: [f64; 2], unit: &str) {
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-2;
+    assert!(
+        verdict.value.is_some_and(|own| near(own, value)),
+        "{verdict:?}"
+    );
+    assert!(near(verdict.limit, limit), "{verdict:?}");
+    assert_eq!(verdict.unit, unit, "{verdict:?}");
+}
+
 fn resonance(frequency: f64) -> ResonanceEvidence {
     let scatter = [-1.0, 0.5, 0.0, -0.5, 1.0];
     ResonanceEvidence {
         frequency,
+        is_mode: true,
         std: Some(1e-5 * frequency),
         apparent_damping_ratio: Some(DAMPING),
         damping_from: DampingSource::Spectra,
@@ -338,6 +350,8 @@ fn val_scatter_beside_what_noise_explains() {
     assert!(warm.happened.contains("up to 0.005 %"), "{warm}");
     let more = judged(&spread(5.5e-5), Check::FrequencyScatter);
     assert_eq!(more.outcome, Outcome::Doubtful, "{more}");
+    let chance = (13.277 / 4.0_f64).sqrt();
+    assert_shown(&more, [2.75, chance], "times noise");
     assert_doubt(
         &judged(&spread(0.02), Check::FrequencyScatter),
         Outcome::Bad,
@@ -550,23 +564,29 @@ fn val_two_levels_and_a_moved_sensor() {
         Outcome::Doubtful,
         &[
             "40.00 Hz",
-            "-1.000 %",
+            "\u{2212}1.000 %",
             "3.00 times",
             "707 standard",
             "limit 3",
         ],
     );
-    let same = judge(shifted(2e-5, harder), Check::Linearity);
-    assert_eq!(same.outcome, Outcome::Good, "{same}");
-    let verdicts = judge_test(&[good(), shifted(-1e-3, harder)], &settings());
+    // No order of levels to follow: what decides is the drift, 0.5 %.
+    assert_shown(&soft, [1e-2, 5e-3], "1");
     let moved_mode =
         |v: &&Verdict| v.check == Check::Linearity && v.to_string().contains("40.00 Hz");
+    let same = judge(shifted(2e-5, harder), Check::Linearity);
+    assert_eq!(same.outcome, Outcome::Good, "{same}");
+    let verdicts = judge_test(&[good(), shifted(2e-5, harder)], &settings());
+    let same = verdicts.iter().find(moved_mode).expect("the mode");
+    assert_shown(same, [2.0 / f64::sqrt(2.0), 3.0], "standard deviations");
+    let verdicts = judge_test(&[good(), shifted(-1e-3, harder)], &settings());
     let drifted = verdicts
         .iter()
         .find(moved_mode)
         .expect("the mode that moves");
     assert_eq!(drifted.outcome, Outcome::Good, "{drifted}");
     assert!(drifted.happened.contains("usual drift"), "{drifted}");
+    assert_shown(drifted, [1e-3, 5e-3], "1");
     assert_missing(
         &judge(shifted(1e-4, |_| {}), Check::Linearity),
         "tap level alone",
@@ -577,7 +597,7 @@ fn val_two_levels_and_a_moved_sensor() {
     assert_doubt(
         &loaded,
         Outcome::Doubtful,
-        &["-0.800 %", "c.wav", "limit 3", "sensor's mass"],
+        &["\u{2212}0.800 %", "c.wav", "limit 3", "sensor's mass"],
     );
     assert_eq!(
         judge(shifted(-2e-3, moved), Check::MassLoading).outcome,

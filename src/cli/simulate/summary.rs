@@ -2,6 +2,9 @@
 
 use std::fmt::Write;
 use std::path::Path;
+use tapjoint::effects::EffectId;
+use tapjoint::report::format::with_minus_signs;
+use tapjoint::report::text::wrapped;
 use tapjoint::simulate::{
     AntiAlias, Damping, HammerSettings, JointTruth, Laboratory, RecorderSettings, RecordingTruth,
     SensorSettings, Truth, VirtualTest,
@@ -15,14 +18,12 @@ pub(super) fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> Strin
         folder.display()
     );
     for (recording, made) in truth.recordings.iter().zip(&test.recordings) {
-        let _ = writeln!(
-            text,
-            "  {}",
-            of_recording(recording, made.take.taps.pulse.0)
-        );
+        let line = of_recording(recording, made.take.taps.pulse.0);
+        text.push_str(&wrapped(&line, 2));
     }
     if let Some(joint) = &truth.joint {
-        let _ = writeln!(text, "\nJoint: {}", of_joint(joint));
+        text.push('\n');
+        text.push_str(&wrapped(&format!("Joint: {}", of_joint(joint)), 2));
     }
     match &truth.effects[..] {
         [] => text.push_str("Nothing planted: the description is the truth\n"),
@@ -31,15 +32,24 @@ pub(super) fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> Strin
                 let values: Vec<String> = effect
                     .parameters
                     .iter()
-                    .map(|(name, value)| format!("{name} {value}"))
+                    .map(|(name, value)| of_parameter(effect.effect, name, *value))
                     .collect();
-                let _ = writeln!(text, "Planted: {} ({})", effect.effect, values.join(", "));
+                let line = format!("Planted: {} ({})", effect.effect, values.join(", "));
+                text.push_str(&with_minus_signs(&wrapped(&line, 2)));
             }
         }
     }
     text.push_str("\nLaboratory\n");
     text.push_str(&of_laboratory(&truth.laboratory));
     text
+}
+
+/// "mass 0.024 kg".
+fn of_parameter(effect: &str, name: &str, value: f64) -> String {
+    let id = EffectId::ALL.iter().find(|id| id.name() == effect);
+    let info = id.and_then(|id| id.parameters().iter().find(|info| info.name == name));
+    let unit = info.map_or("", |info| info.dimension.unit());
+    format!("{name} {value} {unit}").trim_end().to_owned()
 }
 
 fn of_recording(recording: &RecordingTruth, pulse: f64) -> String {

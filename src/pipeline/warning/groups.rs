@@ -67,33 +67,61 @@ fn words(doubts: &[&Verdict]) -> Option<String> {
 
 /// Where the others are: modes with their recordings, recordings that share their modes together.
 fn places(doubts: &[&Verdict], worst: &Verdict) -> Vec<String> {
-    let mut modes: Vec<(f64, Vec<&str>)> = Vec::new();
+    let mut modes: Vec<Place<'_>> = Vec::new();
     let mut others: Vec<String> = Vec::new();
     for doubt in doubts.iter().filter(|doubt| doubt.subject != worst.subject) {
-        let Subject::Mode { file, frequency } = &doubt.subject else {
+        let Subject::Mode {
+            file,
+            frequency,
+            is_mode,
+        } = &doubt.subject
+        else {
             others.push(doubt.subject.to_string());
             continue;
         };
-        match modes.iter_mut().find(|mode| is_same(mode.0, *frequency)) {
-            Some((_, files)) => files.push(file),
-            None => modes.push((*frequency, vec![file])),
+        // Two peaks of one recording are two, however near.
+        let same = modes
+            .iter_mut()
+            .filter(|place| place.is_mode == *is_mode && is_same(place.frequency, *frequency))
+            .find(|place| !place.files.contains(&file.as_str()));
+        match same {
+            Some(place) => place.files.push(file),
+            None => modes.push(Place {
+                frequency: *frequency,
+                is_mode: *is_mode,
+                files: vec![file],
+            }),
         }
     }
-    modes.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut listed: Vec<(Vec<&str>, Vec<String>)> = Vec::new();
-    for (frequency, mut files) in modes {
-        files.dedup();
-        let frequency = format!("{frequency:.2}");
-        match listed.iter_mut().find(|one| one.0 == files) {
-            Some((_, frequencies)) => frequencies.push(frequency),
-            None => listed.push((files, vec![frequency])),
+    modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    let mut listed: Vec<(Vec<&str>, bool, Vec<String>)> = Vec::new();
+    for place in modes {
+        let frequency = format!("{:.2}", place.frequency);
+        let same = |one: &&mut (Vec<&str>, bool, Vec<String>)| {
+            one.0 == place.files && one.1 == place.is_mode
+        };
+        match listed.iter_mut().find(same) {
+            Some((_, _, frequencies)) => frequencies.push(frequency),
+            None => listed.push((place.files, place.is_mode, vec![frequency])),
         }
     }
-    let modes = listed.into_iter().map(|(files, frequencies)| {
-        format!("{} Hz in {}", frequencies.join(", "), files.join(", "))
+    let modes = listed.into_iter().map(|(files, is_mode, frequencies)| {
+        let what = if is_mode { "" } else { " (no mode)" };
+        format!(
+            "{} Hz{what} in {}",
+            frequencies.join(", "),
+            files.join(", ")
+        )
     });
     others.dedup();
     modes.chain(others).collect()
+}
+
+/// A mode, or a peak that is none, and the recordings that have it.
+struct Place<'a> {
+    frequency: f64,
+    is_mode: bool,
+    files: Vec<&'a str>,
 }
 
 fn is_same(first: f64, second: f64) -> bool {
@@ -164,6 +192,7 @@ mod tests {
             subject: Subject::Mode {
                 file: file.to_owned(),
                 frequency,
+                is_mode: true,
             },
             value: Some(value),
             limit: 0.9,
@@ -191,6 +220,24 @@ mod tests {
         let places = "(The worst of 4; also 15.50 Hz in a.wav, c.wav; 240.00 Hz in a.wav.";
         assert!(text.contains(places), "{text}");
         assert!(!warnings[1].to_string().contains("worst"), "{warnings:?}");
+    }
+
+    #[test]
+    fn regress_neighbours_of_one_recording_are_two_places() {
+        let of = |place| doubt(Check::Coherence, place, 0.8);
+        let mut verdicts = [
+            of(("a.wav", 15.5)),
+            of(("a.wav", 400.0)),
+            of(("a.wav", 408.0)),
+            of(("b.wav", 400.1)),
+        ];
+        verdicts[0].value = Some(0.1);
+        if let Subject::Mode { is_mode, .. } = &mut verdicts[2].subject {
+            *is_mode = false;
+        }
+        let text = of_quality(&verdicts)[0].to_string();
+        let places = "also 400.00 Hz in a.wav, b.wav; 408.00 Hz (no mode) in a.wav.";
+        assert!(text.contains(places), "{text}");
     }
 
     #[test]

@@ -6,7 +6,8 @@ use super::super::document::{
     ClosureSection, Document, GapSection, HypothesisSection, PullSection,
 };
 use super::super::format::{RIGID, prefix, probability, signed_percent, significant, trimmed};
-use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
+use super::has_joint;
+use super::hypotheses::{LEAST_PROBABILITY, left, percent, sizes};
 use super::next_tests::next_test;
 use crate::gap::{MISFIT, SEEN};
 use crate::stats::times;
@@ -18,17 +19,11 @@ pub fn gap_story(document: &Document) -> Vec<String> {
     };
     let mut story = vec![verdict(gap, has_joint(document))];
     story.extend(place(document, gap));
-    story.extend(how_far(gap));
+    story.extend(how_far(gap, has_joint(document)));
     story.extend(price(gap));
     story.extend(along_decays(gap));
     story.extend(next_test(gap));
     story
-}
-
-/// Whether a joint is sought: a free beam has none.
-fn has_joint(document: &Document) -> bool {
-    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
-    kind != Some("free")
 }
 
 fn verdict(gap: &GapSection, has_joint: bool) -> String {
@@ -183,7 +178,7 @@ fn named(gap: &GapSection) -> Option<&HypothesisSection> {
     gap.hypotheses.iter().find(|found| found.effect == name)
 }
 
-/// Where, unless there is no gap.
+/// Where, unless there is no gap; the probabilities take for granted that something is missing.
 fn place(document: &Document, gap: &GapSection) -> Option<String> {
     if matches!(gap.verdict.kind.as_str(), "no-gap" | "not-enough-data") {
         return None;
@@ -202,7 +197,7 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
         .iter()
         .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))?;
     Some(format!(
-        "Where: {}. Largest misfit before: mode {} in {}, {} % ({} standard deviations).",
+        "Where, if something is missing: {}. Largest misfit for its uncertainty: mode {} in {}, {} % ({} standard deviations).",
         listed.join(", "),
         worst.mode,
         place_of(worst),
@@ -247,7 +242,7 @@ fn change(value: f64, decimals: usize) -> String {
 }
 
 /// How far the errors shrink, where an effect is held for the cause.
-fn how_far(gap: &GapSection) -> Option<String> {
+fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     let kind = gap.verdict.kind.as_str();
     if matches!(kind, "no-gap" | "unknown" | "not-enough-data") {
         return None;
@@ -265,14 +260,14 @@ fn how_far(gap: &GapSection) -> Option<String> {
         "How far: with {} the errors {shrink} from {} to {} % (rms over fitted frequencies)",
         found.effect,
         percent(found.gap_before),
-        percent(found.gap_after),
+        left(found.gap_after, gap.noise_floor),
     );
-    text.push_str(&by_drift(gap, found));
+    text.push_str(&by_drift(gap, found, has_joint));
     if let Some((before, after)) = found.withheld_before.zip(found.withheld_after) {
         text.push_str(&format!(
             "; on frequencies that took no part from {} to {} %",
             percent(Some(before)),
-            percent(Some(after))
+            left(Some(after), gap.noise_floor)
         ));
     }
     if let Some(closure) = &found.closure {
@@ -282,7 +277,7 @@ fn how_far(gap: &GapSection) -> Option<String> {
         text.push_str(&format!(
             "; on recordings predicted from the others from {} to {} %",
             percent(Some(left_out.before)),
-            percent(Some(left_out.after))
+            left(Some(left_out.after), gap.noise_floor)
         ));
         if let Some(closure) = &left_out.closure {
             text.push_str(&share(closure));
@@ -298,15 +293,20 @@ fn how_far(gap: &GapSection) -> Option<String> {
     })
 }
 
-/// What is left where nothing is added, if the joint's drift between recordings and the tolerances explain half of the
+/// What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of the
 /// errors.
-fn by_drift(gap: &GapSection, found: &HypothesisSection) -> String {
+fn by_drift(gap: &GapSection, found: &HypothesisSection, has_joint: bool) -> String {
     let none = gap.hypotheses.iter().find(|one| one.effect == "none");
-    let left = none.and_then(|none| none.gap_after);
-    match left.zip(found.gap_before) {
-        Some((left, before)) if left < 0.5 * before => format!(
-            ", where a joint that drifts and the tolerances leave {} %",
-            percent(Some(left))
+    let remains = none.and_then(|none| none.gap_after);
+    match remains.zip(found.gap_before) {
+        Some((remains, before)) if remains < 0.5 * before => format!(
+            ", where {}the tolerances leave {} %",
+            if has_joint {
+                "a joint that drifts and "
+            } else {
+                ""
+            },
+            left(Some(remains), gap.noise_floor)
         ),
         _ => String::new(),
     }

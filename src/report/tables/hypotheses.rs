@@ -2,7 +2,7 @@
 
 use super::super::document::{Document, GapSection, HypothesisSection, ParameterSection};
 use super::super::format::{MISSING, probability, rounded, significant};
-use super::{Table, number, words};
+use super::{Table, has_joint, number, words};
 
 /// Hypotheses less probable than this are not listed.
 pub(super) const LEAST_PROBABILITY: f64 = 0.005;
@@ -26,7 +26,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
                 || found.probability >= LEAST_PROBABILITY
                 || matches!(found.effect.as_str(), "none" | "unknown")
         })
-        .map(|(_, found)| row(found));
+        .map(|(_, found)| row(found, gap.noise_floor));
     Some(Table {
         caption: "What may be missing".to_owned(),
         columns: vec![
@@ -42,7 +42,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
     })
 }
 
-/// What the columns are, why even the hypothesis that nothing is missing leaves less than the described model,
+/// What the columns are, why even the hypothesis that nothing is missing mostly leaves less than the described model,
 /// and why the errors are not those of the estimate.
 fn note(document: &Document, gap: &GapSection) -> String {
     let described = percent(gap.hypotheses[0].gap_before);
@@ -50,8 +50,7 @@ fn note(document: &Document, gap: &GapSection) -> String {
     let withheld = withheld.map_or_else(String::new, |before| {
         format!(" and {} %", significant(before, 2))
     });
-    let free = document.test.as_ref().and_then(|test| test.kind.as_deref()) == Some("free");
-    let (one_joint, drift) = match free || recordings(gap) < 2 {
+    let (one_joint, drift) = match !has_joint(document) || recordings(gap) < 2 {
         true => ("", ""),
         false => (
             "one joint for all recordings and ",
@@ -65,8 +64,9 @@ fn note(document: &Document, gap: &GapSection) -> String {
     format!(
         "Fitted, withheld: errors of the frequencies left (rms); of the described model {described} %{withheld}. \
          The described model has {one_joint}geometry, shear and masses exactly as described; every hypothesis, none \
-         too, {drift}lets these and sensors' inertias move within their uncertainty, and so leaves less. All are errors of fits to the readings that take part in the diagnosis{part}; those of the estimate, \
-         which weighs all modes, may differ. Size \u{b1} one standard deviation."
+         too, {drift}lets these and sensors' inertias move within their uncertainty, and so usually leaves less; the fit \
+         weighs each reading by its uncertainty, so that a plain rms may also be larger. All are errors of fits to the \
+         readings that take part in the diagnosis{part}; those of the estimate, which weighs all modes, may differ. Size \u{b1} one standard deviation."
     )
 }
 
@@ -78,12 +78,12 @@ fn recordings(gap: &GapSection) -> usize {
     files.len()
 }
 
-fn row(found: &HypothesisSection) -> Vec<String> {
+fn row(found: &HypothesisSection, floor: Option<f64>) -> Vec<String> {
     vec![
         found.effect.clone(),
         probability(found.probability),
-        percent(found.gap_after),
-        percent(found.withheld_after),
+        left(found.gap_after, floor),
+        left(found.withheld_after, floor),
         sizes(found),
         found.confounded_with.join(", "),
     ]
@@ -127,7 +127,30 @@ fn unit_of(name: &str) -> (&'static str, f64) {
     }
 }
 
+/// An error that is left (%). Far below what noise leaves (%) it says nothing but that.
+pub(super) fn left(error: Option<f64>, noise: Option<f64>) -> String {
+    const FAR_BELOW: f64 = 0.2;
+    let least = noise.map(|noise| FAR_BELOW * noise);
+    match error.zip(least) {
+        Some((error, least)) if error < least => format!("<{}", significant(least, 1)),
+        _ => percent(error),
+    }
+}
+
 /// A value in percent with two digits.
 pub(super) fn percent(value: Option<f64>) -> String {
     value.map_or_else(|| MISSING.to_owned(), |value| significant(value, 2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_an_error_far_below_the_noise_has_no_digits() {
+        assert_eq!(left(Some(3.5e-6), Some(0.0052)), "<0.001");
+        assert_eq!(left(Some(0.0011), Some(0.0052)), "0.0011");
+        assert_eq!(left(Some(3.5e-6), None), "0.0000035");
+        assert_eq!(left(None, Some(0.0052)), MISSING);
+    }
 }

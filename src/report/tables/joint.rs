@@ -1,13 +1,11 @@
-//! Tables of the joint: parameters, the pair regression, predicted frequencies.
+//! Tables of the joint: parameters, the pair regression.
 
-use super::super::document::{Document, EstimateSection, PredictionSection, ValueSection};
+use super::super::document::{Document, EstimateSection, ValueSection};
 use super::super::format::{
-    MISSING, RIGID, Rounded, bound_percent, last_place, optional, prefix, rounded_to,
-    signed_percent, significant, with_decimals_of,
+    MISSING, RIGID, Rounded, last_place, optional, prefix, rounded_to, signed_percent, significant,
 };
 use super::super::summary::capital;
-use super::modes::reading;
-use super::{Table, bound_of, mode_of, number, words};
+use super::{Table, number, words};
 
 /// Most significant digits of an estimate.
 const MOST_DIGITS: i32 = 5;
@@ -104,7 +102,12 @@ impl Parameter<'_> {
         let value = factor * self.value.value;
         let (low, high) = self.value.low_scaled.zip(self.value.high_scaled)?;
         let std = self.value.std_scaled.map(|std| factor * std);
-        let written = |limit: f64| rounded_to(factor * limit, std, self.finest_place(value)).value;
+        // Ends farther apart than the value is large share no digit: each has its own two.
+        let wide = factor * (high - low) > value.abs();
+        let written = |limit: f64| match wide {
+            true => significant(factor * limit, 2),
+            false => rounded_to(factor * limit, std, self.finest_place(value)).value,
+        };
         Some([written(low), written(high)])
     }
 
@@ -129,22 +132,26 @@ impl Parameter<'_> {
 /// The estimate's parameters; `None` without an estimate.
 pub fn parameters(document: &Document) -> Option<Table> {
     let estimate = document.estimate.as_ref()?.as_ref()?;
-    let rows: Vec<Vec<String>> = estimated(estimate)
+    let list = estimated(estimate);
+    let misses = list.iter().any(|p| p.value.std_scaled.is_some());
+    let stated = !misses || list.iter().any(|p| p.value.std.is_some());
+    let rows: Vec<Vec<String>> = list
         .iter()
         .map(|parameter| {
-            let [value, std, low, high, unit] = parameter.written();
+            let [value, std, mut low, mut high, unit] = parameter.written();
             let name = parameter.symbol.to_owned();
             let meaning = parameter.meaning.to_owned();
             let scaled = parameter.written_scaled();
             let limits = parameter.written_scaled_limits();
             let [from, to] = limits.unwrap_or_else(|| [MISSING.to_owned(), MISSING.to_owned()]);
+            // Without any uncertainty of the frequencies these are the limits that there are.
+            if !stated {
+                (low, high) = (from.clone(), to.clone());
+            }
             vec![name, meaning, value, unit, std, scaled, low, high, from, to]
         })
         .collect();
     let modes: Vec<String> = estimate.modes_used.iter().map(usize::to_string).collect();
-    let misses = estimated(estimate)
-        .iter()
-        .any(|parameter| parameter.value.std_scaled.is_some());
     let table = Table {
         caption: format!("Estimated parameters, method: {}", estimate.method),
         columns: vec![
@@ -167,13 +174,11 @@ pub fn parameters(document: &Document) -> Option<Table> {
             scaled_note(estimate)
         ),
     };
-    Some(if misses {
-        table
-    } else {
-        table
-            .without_column("Scaled std")
-            .without_column("Scaled low")
-            .without_column("Scaled high")
+    let limits = ["Scaled low", "Scaled high"];
+    Some(match (misses, stated) {
+        (false, _) => table.without_columns(|name| name == "Scaled std" || limits.contains(&name)),
+        (true, false) => table.without_columns(|name| limits.contains(&name)),
+        (true, true) => table,
     })
 }
 
@@ -189,7 +194,7 @@ fn scaled_note(estimate: &EstimateSection) -> String {
                          misfit for it, and so do the scaled 95 % limits, by Student's distribution."
             .to_owned(),
         (true, false) => " Not every frequency has an uncertainty, so that all weigh alike: the scaled std takes the \
-                          misfit for it."
+                          misfit for it, and so do the 95 % limits, by Student's distribution."
             .to_owned(),
     }
 }
@@ -315,80 +320,4 @@ pub fn pairs(document: &Document) -> Option<Table> {
         .collect::<Vec<_>>()
         .join(" "),
     })
-}
-
-/// Measured beside predicted frequencies; `None` where nothing was predicted.
-pub fn prediction(document: &Document) -> Option<Table> {
-    let rows = document.prediction.as_deref().filter(|p| !p.is_empty())?;
-    let compared = rows.iter().any(|row| row.measured.is_some());
-    let used = |used: bool| if used { "yes" } else { "no" }.to_owned();
-    let cells = rows
-        .iter()
-        .map(|row| {
-            let [measured, predicted, reading] = compared_frequencies(document, row);
-            vec![
-                row.mode.to_string(),
-                measured,
-                predicted,
-                signed_percent(row.error_percent),
-                reading,
-                optional(row.lambda, 6),
-                if compared {
-                    used(row.used)
-                } else {
-                    String::new()
-                },
-            ]
-        })
-        .collect();
-    let (caption, note) = if compared {
-        (
-            "Measured and predicted frequencies",
-            "Error = 100 (predicted \u{2212} measured)/measured. Reading: bound of the measured \
-             frequency. Used: the mode entered the estimate; the others are true predictions.",
-        )
-    } else {
-        (
-            "Predicted frequencies",
-            "\u{3bb}: non-dimensional frequency, \u{3bb}\u{2074} = (2\u{3c0}f)\u{b2} \u{3c1}A \
-             L\u{2074}/(EI).",
-        )
-    };
-    let table = Table {
-        caption: caption.to_owned(),
-        columns: vec![
-            number("Mode"),
-            number("Measured (Hz)"),
-            number("Predicted (Hz)"),
-            number("Error (%)"),
-            number("Reading (%)"),
-            number("\u{3bb} (1)"),
-            words("Used"),
-        ],
-        rows: cells,
-        note: note.to_owned(),
-    };
-    Some(table.without_empty_columns())
-}
-
-/// Measured and predicted frequency to the same digit, and the bound of the reading in percent.
-fn compared_frequencies(document: &Document, row: &PredictionSection) -> [String; 3] {
-    let mode = mode_of(document, row.mode);
-    let bound = mode.and_then(bound_of);
-    // The digits of the list of modes, so that the same frequency reads the same.
-    let listed = mode
-        .filter(|_| bound.is_some())
-        .map(|mode| reading(mode).value);
-    let hertz = |value: Option<f64>| match (value, &listed) {
-        (Some(value), Some(listed)) => with_decimals_of(value, listed),
-        _ => optional(value, 6),
-    };
-    let percent = bound
-        .zip(row.measured)
-        .map(|(bound, hz)| 100.0 * bound / hz);
-    [
-        hertz(row.measured),
-        hertz(row.predicted),
-        percent.map_or(MISSING.into(), bound_percent),
-    ]
 }

@@ -91,7 +91,11 @@ fn recording_row(recording: &RecordingSection) -> Vec<String> {
             .seconds
             .map_or(MISSING.into(), |seconds| trimmed(seconds, 4)),
         recording.channels.to_string(),
-        format!("{used} of {}", recording.taps.len()),
+        match (recording.sample_rate, recording.taps.len()) {
+            // Functions from a file: of their taps nothing is known.
+            (None, 0) => MISSING.to_owned(),
+            (_, all) => format!("{used} of {all}"),
+        },
         count(recording.block),
         count(recording.lines),
         band(recording.band),

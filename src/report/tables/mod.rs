@@ -8,6 +8,7 @@ mod joint;
 mod measured;
 mod modes;
 mod next_tests;
+mod prediction;
 mod quality;
 mod resolution;
 mod taps;
@@ -17,10 +18,11 @@ pub use datasets::datasets;
 pub use frfs::frfs;
 pub use gap::{gap_story, place_of};
 pub use hypotheses::hypotheses;
-pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters, prediction};
+pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};
 pub use measured::{channels, conditions, recordings};
-pub use modes::{fitted_to, mode_details, modes, reading_details, readings};
+pub use modes::{fitted_to, mode_details, modes, modes_from, reading_details, readings};
 pub use next_tests::next_tests;
+pub use prediction::prediction;
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use resolution::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
@@ -29,6 +31,12 @@ pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 use super::document::{Document, ModeSection};
 use super::format::MISSING;
 use crate::identify::observation::UNPAIRED;
+
+/// Whether a joint is sought: a free beam has none.
+pub fn has_joint(document: &Document) -> bool {
+    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
+    kind != Some("free")
+}
 
 /// A table of words.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -139,9 +147,18 @@ impl Table {
 }
 
 impl Column {
-    /// Whether its cells hold sentences, which need several lines.
+    /// Whether its cells hold sentences or lists, which need several lines.
     pub fn is_long(&self) -> bool {
-        const LONG: [&str; 4] = ["Reason", "What happened", "Why it might be", "What helps"];
+        const LONG: [&str; 8] = [
+            "Reason",
+            "What happened",
+            "Why it might be",
+            "What helps",
+            "Size",
+            "Looks like",
+            "Test",
+            "Tells apart",
+        ];
         LONG.contains(&self.name.as_str())
     }
 

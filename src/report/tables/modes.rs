@@ -26,8 +26,40 @@ pub fn modes(document: &Document) -> Option<Table> {
         true => "Frequency: as it was given, with its bound.".to_owned(),
         false => note(document, modes, described),
     };
+    let note = match modes_from(document) {
+        Some(from) => format!("{from} {note}"),
+        None => note,
+    };
     let table = table(caption, modes.iter().map(row).collect(), &note);
     Some(without(table, &DETAILS))
+}
+
+/// "From soft.wav; hard.wav (8.8 times its tap level) enters the diagnosis alone."; `None` where every recording
+/// gives the list.
+pub fn modes_from(document: &Document) -> Option<String> {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let named = |aside: bool| {
+        let mut names: Vec<String> = recordings
+            .iter()
+            .filter(|recording| recording.aside.is_some() == aside)
+            .map(|recording| match &recording.aside {
+                Some(how) => format!("{} ({how})", recording.file),
+                None => recording.file.clone(),
+            })
+            .collect();
+        // A file may be read in several bands.
+        names.dedup();
+        names
+    };
+    let (from, aside) = (named(false), named(true));
+    let enter = if aside.len() == 1 { "enters" } else { "enter" };
+    (!aside.is_empty()).then(|| {
+        format!(
+            "From {}; {} {enter} the diagnosis alone.",
+            from.join(", "),
+            aside.join(", ")
+        )
+    })
 }
 
 /// How each resonance of the merged list was read, for who doubts it; `None` where nothing is known

@@ -1,7 +1,7 @@
 //! Tables of verdicts on how well a test was made.
 
 use super::super::document::{Document, VerdictSection};
-use super::super::format::{MISSING, significant, trimmed};
+use super::super::format::{MISSING, significant, trimmed, with_minus_signs};
 use super::{Column, Table, number, words};
 
 /// Outcomes from the worst to the best.
@@ -67,7 +67,11 @@ pub fn quality(document: &Document) -> Option<Table> {
 
 fn summary_row(verdicts: &[VerdictSection], check: &str) -> Option<Vec<String>> {
     let of_check = || verdicts.iter().filter(move |v| v.check == check);
-    let worst = of_check().min_by_key(|verdict| rank(verdict))?;
+    let worse = |a: &&VerdictSection, b: &&VerdictSection| {
+        let by_size = b.severity.total_cmp(&a.severity);
+        rank(a).cmp(&rank(b)).then(by_size)
+    };
+    let worst = of_check().min_by(worse)?;
     let good = of_check().filter(|v| v.outcome == "good").count();
     let apply = of_check().filter(|v| v.outcome != "not applicable");
     let count = match apply.count() {
@@ -115,11 +119,19 @@ pub fn quality_doubts(document: &Document) -> Option<Table> {
 pub fn quality_all(document: &Document) -> Option<Table> {
     let mut all: Vec<&VerdictSection> = verdicts(document).iter().collect();
     all.sort_by_key(|verdict| rank(verdict));
+    let apart = all.iter().filter(|v| v.outcome == "not applicable").count();
+    let note = match apart {
+        0 => String::new(),
+        count => format!(
+            "{count} of {} do not apply, and count as no outcome.",
+            all.len()
+        ),
+    };
     (!all.is_empty()).then(|| Table {
         caption: "All checks".to_owned(),
         columns: columns(),
         rows: all.iter().map(|verdict| row(verdict)).collect(),
-        note: String::new(),
+        note,
     })
 }
 
@@ -155,7 +167,6 @@ fn scale(verdict: &VerdictSection) -> (f64, &str) {
     match (verdict.unit.as_str(), verdict.check.as_str()) {
         ("1", "tap-levels" | "weak-tap") => (1.0, "\u{d7}"),
         ("1", "coherence" | "reciprocity") => (1.0, "1"),
-        ("1", "linearity" | "mass-loading") => (1.0, "standard deviations"),
         ("1", _) => (100.0, "%"),
         (unit, _) => (1.0, unit),
     }
@@ -184,21 +195,6 @@ fn limit(verdict: &VerdictSection) -> String {
 
 fn unit(verdict: &VerdictSection) -> String {
     scale(verdict).1.to_owned()
-}
-
-/// A sentence in which every hyphen that begins a number is a minus sign.
-fn with_minus_signs(text: &str) -> String {
-    let mut before = ' ';
-    let mut letters = text.chars().peekable();
-    let mut written = String::with_capacity(text.len());
-    while let Some(letter) = letters.next() {
-        let begins = before.is_whitespace() || before == '(';
-        let number = letters.peek().is_some_and(char::is_ascii_digit);
-        let minus = letter == '-' && begins && number;
-        written.push(if minus { '\u{2212}' } else { letter });
-        before = letter;
-    }
-    written
 }
 
 #[cfg(test)]
@@ -247,6 +243,7 @@ mod tests {
         assert_eq!(found, ["found 0.3", "found 0.06"]);
         assert_eq!(doubts.rows[0][8], Check::DoubleHit.remedy());
         let all = quality_all(&whole).expect("four verdicts");
+        assert!(all.note.starts_with("1 of 4 do not apply"), "{}", all.note);
         let outcomes: Vec<&str> = all.rows.iter().map(|row| row[1].as_str()).collect();
         assert_eq!(outcomes, ["bad", "doubtful", "good", "not applicable"]);
         for table in [&table, &doubts, &all] {

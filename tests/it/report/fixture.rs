@@ -96,6 +96,7 @@ pub fn lines(band: [f64; 2]) -> Lines {
 fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingSection {
     let lines = lines(band);
     RecordingSection {
+        aside: None,
         tap: Some(0.04),
         sensor_positions: [("A".to_owned(), 0.338)].into(),
         torque: Some(12.0),

@@ -245,6 +245,18 @@ fn regress_what_drift_explains_is_said_beside_what_an_effect_does() {
     let told = |document: &Document| gap_story(document).join(" ");
     let drift = "where a joint that drifts and the tolerances leave 0.050 %";
     assert!(told(&document).contains(drift), "{}", told(&document));
+    // The probabilities of places, and a misfit by its uncertainty.
+    assert!(told(&document).contains("Where, if something is missing: "));
+    let mut free = document.clone();
+    free.test = Some(TestSection {
+        kind: Some("free".into()),
+        ..TestSection::default()
+    });
+    assert!(
+        told(&free).contains("where the tolerances leave 0.050 %"),
+        "{}",
+        told(&free)
+    );
     // Less than half of the gap is not worth a word.
     document.gap.as_mut().unwrap().hypotheses[1].gap_after = Some(1.5);
     assert!(!told(&document).contains("that drifts"));

@@ -5,6 +5,7 @@ use tapjoint::report::document::{
     AverageSection, ChannelSection, Document, ModeSection, MonteCarloSection, PredictionSection,
     TapSection, ValueSection, WarningSection,
 };
+use tapjoint::report::tables::parameters;
 use tapjoint::report::{
     render_json, render_modes_csv, render_parameters_csv, render_text, summary,
 };
@@ -235,7 +236,38 @@ fn regress_limits_scaled_by_the_misfit_reach_the_table_and_the_ending() {
     assert!(row.ends_with(",80000,34000,4910000"), "{row}");
     let text = render_text(&misfitting()).replace('\n', " ");
     assert!(text.contains("Kt = 1.382 MN/m"), "{text}");
-    assert!(text.contains("(95 %: 0.034 to 4.910)"), "{text}");
+    assert!(text.contains("(95 %: 0.034 to 4.9)"), "{text}");
+    let said = summary::sentences(&misfitting())
+        .join(" ")
+        .replace('\u{a0}', " ");
+    assert!(said.contains("scaled by the misfit 0.080 MN/m"), "{said}");
+}
+
+#[test]
+fn regress_without_stated_uncertainties_the_misfit_gives_the_limits() {
+    let mut document = misfitting();
+    let estimate = document.estimate.as_mut().and_then(Option::as_mut).unwrap();
+    let values = [
+        &mut estimate.kt,
+        &mut estimate.kr,
+        &mut estimate.ktr,
+        &mut estimate.kx,
+        &mut estimate.ky,
+        &mut estimate.kz,
+        &mut estimate.coupling,
+    ];
+    for value in values.into_iter().flatten() {
+        (value.std, value.low, value.high) = (None, None, None);
+    }
+    let table = parameters(&document).expect("an estimate");
+    let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names[6..], ["95 % low", "95 % high"]);
+    assert_eq!(table.rows[0][6..], ["0.034", "4.9"]);
+    assert!(
+        table.note.contains("and so do the 95 % limits"),
+        "{}",
+        table.note
+    );
 }
 
 #[test]
@@ -770,4 +802,46 @@ fn regress_pages_leave_out_what_was_not_asked_for() {
             "a page without recordings has {unwanted}"
         );
     }
+}
+
+#[test]
+fn regress_what_the_estimate_leaves_out_is_said_under_the_modes() {
+    let mut document = fixture::document();
+    let whole = "enters the diagnosis alone";
+    assert!(!render_text(&document).contains(whole));
+    let recordings = document.recordings.as_mut().expect("recordings");
+    let last = recordings.last_mut().expect("a recording");
+    last.aside = Some("8.8 times its tap level".to_owned());
+    let said = format!("{} (8.8 times its tap level) {whole}", last.file);
+    let text = render_text(&document).replace('\n', " ");
+    assert!(text.contains(&said), "{text}");
+    assert!(page(&document).contains(&said));
+}
+
+#[test]
+fn regress_a_mode_without_a_fit_is_named_in_the_note() {
+    let mut document = fixture::document();
+    let modes = document.modes.as_mut().expect("modes");
+    let numbered = modes.iter_mut().filter(|mode| mode.mode.is_some());
+    for (index, mode) in numbered.enumerate() {
+        mode.method = if index == 1 { "interpolated" } else { "fit" }.to_owned();
+    }
+    let text = render_text(&document).replace('\n', " ");
+    assert!(
+        text.contains("interval (mode 2: interpolated); line"),
+        "{text}"
+    );
+}
+
+#[test]
+fn regress_a_free_beam_has_no_joint_line() {
+    let mut document = fixture::document();
+    assert!(render_text(&document).contains("\nJoint   "));
+    let test = document.test.as_mut().expect("a test");
+    test.kind = Some("free".to_owned());
+    let text = render_text(&document);
+    assert!(
+        text.contains("\nBeam    ") && !text.contains("\nJoint   "),
+        "{text}"
+    );
 }

@@ -133,10 +133,13 @@ pub(super) fn run(
         |share: Option<f64>| share.map_or("-".to_owned(), |p| format!("{:.0} %", 100.0 * p));
     terminal.say(&format!(
         "\nFirst group right by answers dealt out to other tests: {}; by always\n\
-         answering one common factor: {}. Files renamed: same answers ({} tests).",
+         answering one common factor: {}. Files renamed: {}.",
         percent(conduct.shuffled),
         percent(conduct.always_scale),
-        conduct.renamed
+        match conduct.renamed {
+            0 => "in no test".to_owned(),
+            tests => format!("same answers ({tests} tests)"),
+        }
     ))?;
     for file in render_blind_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
@@ -354,17 +357,30 @@ fn elsewhere(
     });
     let cases: Vec<Case> = cases.collect();
     let conduct = Conduct {
-        renamed: check_names_elsewhere(folder, &cases)?,
+        renamed: check_names_elsewhere(folder, &cases, terminal)?,
         ..Conduct::default()
     };
     Ok((cases, conduct))
 }
 
-/// The first of the tests made elsewhere again, with their recordings under other names.
-fn check_names_elsewhere(folder: &Path, cases: &[Case]) -> anyhow::Result<usize> {
+/// The first of the tests made elsewhere again, with their recordings under other names, as far as these can be
+/// exchanged. Returns how many there were.
+fn check_names_elsewhere(
+    folder: &Path,
+    cases: &[Case],
+    terminal: &Terminal,
+) -> anyhow::Result<usize> {
     let mut again = 0;
-    for (truth, answer) in cases.iter().take(AGAIN) {
-        let Some(copy) = renamed(&folder.join(&truth.name))? else {
+    for (truth, answer) in cases {
+        if again == AGAIN {
+            break;
+        }
+        let place = folder.join(&truth.name);
+        let copy = renamed(&place).unwrap_or_else(|error| {
+            terminal.warn(&format!("{}: not renamed: {error:#}", place.display()));
+            None
+        });
+        let Some(copy) = copy else {
             continue;
         };
         let text = fs::read_to_string(copy.path().join("test.toml"))?;

@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::input::{TestFile, read_test};
 use super::output::{OutputError, OutputFolder};
-use super::renamed::renamed;
+use super::renamed::check_names_elsewhere;
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -223,7 +223,7 @@ fn new_folder(name: &Path) -> anyhow::Result<OutputFolder> {
 }
 
 /// How many tests are diagnosed again under other names.
-const AGAIN: usize = 3;
+pub(super) const AGAIN: usize = 3;
 
 /// The first tests again under other names: the answers must not change. Returns how many there were.
 fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
@@ -283,7 +283,7 @@ fn diagnose_recorded(
 }
 
 /// A test that cannot be analysed or diagnosed has no answer, which is counted apart.
-fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
+pub(super) fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
     let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::none(), |d| Answer::of(&d));
     (truth.clone(), answer)
 }
@@ -361,39 +361,6 @@ fn elsewhere(
         ..Conduct::default()
     };
     Ok((cases, conduct))
-}
-
-/// The first of the tests made elsewhere again, with their recordings under other names, as far as these can be
-/// exchanged. Returns how many there were.
-fn check_names_elsewhere(
-    folder: &Path,
-    cases: &[Case],
-    terminal: &Terminal,
-) -> anyhow::Result<usize> {
-    let mut again = 0;
-    for (truth, answer) in cases {
-        if again == AGAIN {
-            break;
-        }
-        let place = folder.join(&truth.name);
-        let copy = renamed(&place).unwrap_or_else(|error| {
-            terminal.warn(&format!("{}: not renamed: {error:#}", place.display()));
-            None
-        });
-        let Some(copy) = copy else {
-            continue;
-        };
-        let text = fs::read_to_string(copy.path().join("test.toml"))?;
-        let test = TestDescription::parse(&text, "test.toml")?;
-        if case_of(&test, copy.path(), truth).1 != *answer {
-            bail!(
-                "the answer to {} depends on the names of its files",
-                truth.name
-            );
-        }
-        again += 1;
-    }
-    Ok(again)
 }
 
 /// Folders with a test of which the truths do not speak, in order.

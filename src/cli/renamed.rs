@@ -1,14 +1,50 @@
 //! A test whose recordings have other names: what a diagnosis must not depend on.
 
-use anyhow::Context;
+use super::blind_check::{AGAIN, case_of};
+use super::terminal::Terminal;
+use anyhow::{Context, bail};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use tapjoint::description::TestDescription;
+use tapjoint::study::blind_check::Case;
+
+/// The first of the tests made elsewhere again, with their recordings under other names, as far as these can be
+/// exchanged. Returns how many there were.
+pub(super) fn check_names_elsewhere(
+    folder: &Path,
+    cases: &[Case],
+    terminal: &Terminal,
+) -> anyhow::Result<usize> {
+    let mut again = 0;
+    for (truth, answer) in cases {
+        if again == AGAIN {
+            break;
+        }
+        let place = folder.join(&truth.name);
+        let copy = renamed(&place).unwrap_or_else(|error| {
+            terminal.warn(&format!("{}: not renamed: {error:#}", place.display()));
+            None
+        });
+        let Some(copy) = copy else {
+            continue;
+        };
+        let text = fs::read_to_string(copy.path().join("test.toml"))?;
+        let test = TestDescription::parse(&text, "test.toml")?;
+        if case_of(&test, copy.path(), truth).1 != *answer {
+            bail!(
+                "the answer to {} depends on the names of its files",
+                truth.name
+            );
+        }
+        again += 1;
+    }
+    Ok(again)
+}
 
 /// A copy of a test with its recordings under other names; `None` where it has no recordings, one lies in another
 /// folder, or the description names one in a way that cannot be exchanged.
-pub(super) fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
+fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
     let Ok(text) = fs::read_to_string(folder.join("test.toml")) else {
         return Ok(None);
     };

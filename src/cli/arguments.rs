@@ -16,7 +16,7 @@ pub(super) struct CommonArguments {
     /// printed
     #[arg(long, global = true, value_name = "FILE")]
     pub(super) json: Option<JsonDestination>,
-    /// Print nothing but errors
+    /// Print nothing but errors (and the seal of a blind check)
     #[arg(long, short, global = true)]
     pub(super) quiet: bool,
     /// Seed of everything random: the same seed gives the same numbers

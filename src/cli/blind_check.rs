@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::input::{TestFile, read_test};
 use super::output::{OutputError, OutputFolder};
-use super::renamed::renamed;
+use super::renamed::check_names_elsewhere;
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -133,10 +133,13 @@ pub(super) fn run(
         |share: Option<f64>| share.map_or("-".to_owned(), |p| format!("{:.0} %", 100.0 * p));
     terminal.say(&format!(
         "\nFirst group right by answers dealt out to other tests: {}; by always\n\
-         answering one common factor: {}. Files renamed: same answers ({} tests).",
+         answering one common factor: {}. Files renamed: {}.",
         percent(conduct.shuffled),
         percent(conduct.always_scale),
-        conduct.renamed
+        match conduct.renamed {
+            0 => "in no test".to_owned(),
+            tests => format!("same answers ({tests} tests)"),
+        }
     ))?;
     for file in render_blind_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
@@ -220,7 +223,7 @@ fn new_folder(name: &Path) -> anyhow::Result<OutputFolder> {
 }
 
 /// How many tests are diagnosed again under other names.
-const AGAIN: usize = 3;
+pub(super) const AGAIN: usize = 3;
 
 /// The first tests again under other names: the answers must not change. Returns how many there were.
 fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
@@ -280,7 +283,7 @@ fn diagnose_recorded(
 }
 
 /// A test that cannot be analysed or diagnosed has no answer, which is counted apart.
-fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
+pub(super) fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
     let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::none(), |d| Answer::of(&d));
     (truth.clone(), answer)
 }
@@ -354,30 +357,10 @@ fn elsewhere(
     });
     let cases: Vec<Case> = cases.collect();
     let conduct = Conduct {
-        renamed: check_names_elsewhere(folder, &cases)?,
+        renamed: check_names_elsewhere(folder, &cases, terminal)?,
         ..Conduct::default()
     };
     Ok((cases, conduct))
-}
-
-/// The first of the tests made elsewhere again, with their recordings under other names.
-fn check_names_elsewhere(folder: &Path, cases: &[Case]) -> anyhow::Result<usize> {
-    let mut again = 0;
-    for (truth, answer) in cases.iter().take(AGAIN) {
-        let Some(copy) = renamed(&folder.join(&truth.name))? else {
-            continue;
-        };
-        let text = fs::read_to_string(copy.path().join("test.toml"))?;
-        let test = TestDescription::parse(&text, "test.toml")?;
-        if case_of(&test, copy.path(), truth).1 != *answer {
-            bail!(
-                "the answer to {} depends on the names of its files",
-                truth.name
-            );
-        }
-        again += 1;
-    }
-    Ok(again)
 }
 
 /// Folders with a test of which the truths do not speak, in order.

@@ -48,9 +48,10 @@ impl Terminal {
         print(text)
     }
 
-    /// Prints what has to be said before the work begins: on standard error where standard output belongs to JSON.
+    /// Prints what has to be said before the work begins, or else was not said: on standard error where standard output
+    /// belongs to JSON or is to stay quiet.
     pub(super) fn seal(&self, text: &str) -> io::Result<()> {
-        if !self.quiet && matches!(self.json, Some(Json::StandardOutput)) {
+        if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
             let _ = writeln!(io::stderr(), "{text}");
         }
         self.say(text)

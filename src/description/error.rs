@@ -260,7 +260,7 @@ impl fmt::Display for Doubt {
             }
             Self::Unplaced => out.write_str(
                 "acts where the sensor sits, and `position` is missing: the diagnosis tries places along the beam, \
-                 prediction and estimate leave the mass out; add `position` (m along the beam) if it is known",
+                 prediction and estimate leave the mass out where no place is said; add `position` (m along the beam) if it is known",
             ),
             Self::NoMeaning { reason } => write!(out, "has no effect; {reason}"),
         }

@@ -9,7 +9,7 @@ use super::keys;
 use super::measured::read_measured;
 use super::reader::{Entry, Source, Table};
 use super::recordings::{Surroundings, read_recording};
-use super::sensors::{read_hammer, read_sensors};
+use super::sensors::{check_places, read_hammer, read_sensors};
 use super::{
     ChannelRef, HammerDescription, RecordingDescription, SensorDescription, TestDescription,
 };
@@ -65,8 +65,9 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
     let right = beam_table.get("right");
     let joint = read_joint(&joint_table, right.as_ref(), beam.length, &mut warnings)?;
     let (hammer, hammer_channel) = hammer(top)?;
-    let sensors = array_of_tables(top, "sensor", "[[sensor]]")?;
-    let sensors = read_sensors(&sensors, hammer_channel.as_ref(), &beam, &mut warnings)?;
+    let sensor_tables = array_of_tables(top, "sensor", "[[sensor]]")?;
+    let channel = hammer_channel.as_ref();
+    let sensors = read_sensors(&sensor_tables, channel, &beam, &mut warnings)?;
     let surroundings = Surroundings {
         beam: &beam,
         sensors: &sensors,
@@ -75,6 +76,7 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
         .iter()
         .map(|entry| read_recording(entry, &surroundings, &mut warnings))
         .collect::<Result<Vec<_>, _>>()?;
+    check_places(&sensor_tables, &sensors, &recordings, &mut warnings)?;
     let measured = measured(top, &recordings, &mut warnings)?;
     let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;
     let analysis = read_analysis(analysis.as_ref(), &joint)?;

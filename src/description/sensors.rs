@@ -6,8 +6,8 @@ use super::keys;
 use super::limits::Limits;
 use super::reader::{Entry, Table};
 use super::{
-    BeamDescription, ChannelPlace, ChannelRef, HammerDescription, Scale, SensorDescription,
-    SensorKind,
+    BeamDescription, ChannelPlace, ChannelRef, HammerDescription, RecordingDescription, Scale,
+    SensorDescription, SensorKind,
 };
 use crate::quantity::Dimension;
 
@@ -159,7 +159,28 @@ fn read_position(
     }
 }
 
-/// A mass acts on the beam at the place where it sits; without a place only the diagnosis has a use for it.
+/// Warns of masses that some recording leaves without a place, or the description where there is no recording: a mass
+/// acts on the beam where it sits, and without a place only the diagnosis has a use for it.
+pub(super) fn check_places(
+    entries: &[Entry<'_>],
+    sensors: &[SensorDescription],
+    recordings: &[RecordingDescription],
+    warnings: &mut Vec<DescriptionWarning>,
+) -> Result<(), DescriptionError> {
+    for (entry, sensor) in entries.iter().zip(sensors) {
+        let is_placed = match recordings {
+            [] => sensor.position.is_some(),
+            all => all.iter().all(|one| one.place_of(sensor).is_some()),
+        };
+        let mass = entry.table(&keys::SENSOR)?.get("mass");
+        if let Some(mass) = mass.filter(|_| !is_placed && sensor.kind != SensorKind::Sound) {
+            warnings.push(mass.warning(Doubt::Unplaced));
+        }
+    }
+    Ok(())
+}
+
+/// What is doubtful about a mass wherever it sits.
 fn check_mass(
     table: &Table<'_>,
     sensor: &SensorDescription,
@@ -173,9 +194,6 @@ fn check_mass(
         let reason = "a microphone does not sit on the beam; remove `mass`";
         warnings.push(entry.warning(Doubt::NoMeaning { reason }));
         return Ok(());
-    }
-    if sensor.position.is_none() {
-        warnings.push(entry.warning(Doubt::Unplaced));
     }
     let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
     if mass > beam_mass {

@@ -1,5 +1,6 @@
 //! What must hold before there is anything to diagnose.
 
+use super::common_modes::{highest_mode, up_to};
 use super::error::GapError;
 use super::nominal::Nominal;
 use crate::identify::observation::{Configuration, Observations, UNPAIRED};
@@ -15,8 +16,9 @@ const NODE: f64 = 0.01;
 /// Refuses observations that answer nothing.
 pub(super) fn check(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
     nominal.specimen.check()?;
-    enough_modes(observations, nominal)?;
-    let known = observations
+    let tested = up_to(highest_mode(observations), observations);
+    enough_modes(&tested, nominal)?;
+    let known = tested
         .configurations
         .iter()
         .flat_map(|c| &c.modes)
@@ -62,37 +64,64 @@ const MOVED: f64 = 0.05;
 /// What a mass that nobody spoke of, or a joint that was tightened again, moves one by.
 const CHANGED: f64 = 0.15;
 
-/// Refuses configurations of which each has fewer than half of its peaks in common with the other: peaks may be
-/// missing in one, where a sensor sits on nodes, or stray, but then most of the other's are found. Where the peaks
+/// Refuses configurations of which each has fewer than half of its peaks in common with the other, where the bands of
+/// both reach: peaks may be missing in one, where a sensor sits on nodes, or stray, but then most of the other's are
+/// found. Where the peaks
 /// follow each other in order, if farther apart, something was changed on one structure: that is for the diagnosis.
 fn same_peaks(observations: &Observations) -> Result<(), GapError> {
     let all = &observations.configurations;
     let peaks: Vec<Vec<f64>> = all.iter().map(peaks_of).collect();
     for second in 0..all.len() {
         for first in (0..second).filter(|&first| all[first].masses == all[second].masses) {
-            let strangers = [(second, first), (first, second)].map(|(own, other)| {
-                let strange = |own: &&f64| {
-                    let near = |other: &f64| (*own / other - 1.0).abs() <= MOVED;
-                    !peaks[other].iter().any(near)
-                };
-                peaks[own].iter().filter(strange).count()
-            });
-            let most = |strangers: usize, own: usize| {
-                peaks[own].len() >= LEAST_PEAKS && 2 * strangers > peaks[own].len()
-            };
-            let changed = are_in_order(&peaks[first], &peaks[second]);
-            if !changed && most(strangers[0], second) && most(strangers[1], first) {
+            let within = overlap(&all[second], &all[first]);
+            let one = Peaks::new(&peaks[second], &peaks[first], within);
+            let other = Peaks::new(&peaks[first], &peaks[second], within);
+            let changed = are_in_order(&other.shared, &one.shared);
+            if !changed && one.are_most_strange() && other.are_most_strange() {
                 return Err(GapError::AnotherStructure {
                     first: name_of(observations, first),
                     second: name_of(observations, second),
-                    strangers: strangers[0],
-                    peaks: peaks[second].len(),
+                    strangers: one.strangers,
+                    peaks: one.shared.len(),
                     percent: 100.0 * MOVED,
                 });
             }
         }
     }
     Ok(())
+}
+
+/// The peaks of one configuration where another looked too.
+struct Peaks {
+    /// Their frequencies (Hz), ascending.
+    shared: Vec<f64>,
+    /// How many of them the other does not have.
+    strangers: usize,
+}
+
+impl Peaks {
+    fn new(own: &[f64], other: &[f64], (low, high): (f64, f64)) -> Self {
+        let shared = own.iter().filter(|&&own| low <= own && own <= high);
+        let shared: Vec<f64> = shared.copied().collect();
+        let strange = |own: &&f64| {
+            let near = |other: &f64| (*own / other - 1.0).abs() <= MOVED;
+            !other.iter().any(near)
+        };
+        let strangers = shared.iter().filter(strange).count();
+        Peaks { shared, strangers }
+    }
+
+    fn are_most_strange(&self) -> bool {
+        self.shared.len() >= LEAST_PEAKS && 2 * self.strangers > self.shared.len()
+    }
+}
+
+/// Frequencies that both bands reach (Hz), less what a peak near an end may have moved across it by.
+fn overlap(one: &Configuration, other: &Configuration) -> (f64, f64) {
+    let bands = [one, other].map(|one| one.band.unwrap_or((0.0, f64::INFINITY)));
+    let low = bands[0].0.max(bands[1].0);
+    let high = bands[0].1.min(bands[1].1);
+    (low * (1.0 + MOVED), high * (1.0 - MOVED))
 }
 
 /// Whether most frequencies of two ascending lists lie in pairs beside each other.

@@ -1,6 +1,7 @@
 //! What was observed, in the order in which it is compared: readings (rows) and small unknowns
 //! (columns) that every hypothesis shares.
 
+use super::common_modes::{highest_mode, up_to};
 use super::decay_readings::{average_std, bent_std, widen};
 use super::lone_peaks::Peaks;
 use super::noise::{self, Reading};
@@ -302,27 +303,4 @@ pub(super) fn reading_of(value: f64, std: f64, freedom: f64) -> Reading {
 fn root_mean_square(readings: &[(Row, Reading)]) -> f64 {
     let values: Vec<f64> = readings.iter().map(|(_, reading)| reading.value).collect();
     crate::stats::root_mean_square(&values)
-}
-
-/// The highest mode that half of the configurations show: by what one among many shows, a stray peak at the end of
-/// its band perhaps, nothing is tested.
-fn highest_mode(observations: &Observations) -> usize {
-    let all = &observations.configurations;
-    let seen = |mode: usize| all.iter().filter(|one| one.mode(mode).is_some()).count();
-    let modes = all
-        .iter()
-        .flat_map(|c| c.modes.iter().map(|mode| mode.mode));
-    modes
-        .filter(|&mode| 2 * seen(mode) >= all.len())
-        .max()
-        .unwrap_or(0)
-}
-
-/// The observations without modes above this one.
-fn up_to(highest: usize, observations: &Observations) -> Observations {
-    let mut kept = observations.clone();
-    for one in &mut kept.configurations {
-        one.modes.retain(|mode| mode.mode <= highest);
-    }
-    kept
 }

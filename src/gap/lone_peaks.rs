@@ -6,7 +6,7 @@ use crate::identify::observation::{Configuration, Observations, UNPAIRED};
 /// The peaks of a test that belong to no mode, and where such peaks can be told.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Peaks {
-    /// Those that at least half of the recordings show.
+    /// Those that at least half of the recordings show, of which the band reaches to them.
     pub(super) all: Vec<Peak>,
     /// Logarithms of the lowest and the highest frequency of a mode; `None` where nobody looked for peaks.
     pub(super) band: Option<(f64, f64)>,
@@ -91,13 +91,19 @@ fn weakest_of(one: &Configuration) -> Option<f64> {
 /// Decibels of a factor of e: 20/ln 10.
 pub(super) const DECIBEL: f64 = 8.685_889_638_065_036;
 
-/// The peaks that at least half of the recordings show.
+/// The peaks that at least half of the recordings show, of which the band reaches to them.
 fn common(looked: &[(usize, &Configuration)]) -> Vec<Peak> {
     let mut all: Vec<Sighting> = looked.iter().flat_map(lone).collect();
     all.sort_by(|a, b| a.log.total_cmp(&b.log));
     let groups = all.chunk_by(|a, b| b.log - a.log < SAME);
     groups
-        .filter(|group| 2 * recordings(group) >= looked.len())
+        .filter(|group| {
+            let could = |one: &&(usize, &Configuration)| {
+                let mut own = group.iter().filter(|peak| peak.configuration == one.0);
+                one.1.reaches(group[0].log.exp()) || own.next().is_some()
+            };
+            2 * recordings(group) >= looked.iter().filter(could).count()
+        })
         .map(|group| {
             let count = group.len() as f64;
             let log = group.iter().map(|one| one.log).sum::<f64>() / count;
@@ -167,6 +173,7 @@ mod tests {
             level: None,
             taps: 3,
             decay_seconds: None,
+            band: None,
             modes: [16.0, 1400.0]
                 .iter()
                 .zip(1..)

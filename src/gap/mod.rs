@@ -31,6 +31,7 @@ mod branches;
 mod catalogue;
 mod catch_all;
 mod checks;
+mod common_modes;
 mod decay_finding;
 mod decay_law;
 mod decay_readings;

@@ -48,7 +48,6 @@ pub(super) const AMPLITUDE: (f64, f64) = (1.0, 0.25);
 
 impl Frame {
     pub(super) fn add_smalls(&mut self, lists: &Lists, settings: &GapSettings) {
-        let (names, places) = (&lists.names, &lists.places);
         let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
         self.small(Small::Scale, 0.0, scale);
         if self.nominal.specimen.shear_rotary > 0.0 {
@@ -57,8 +56,27 @@ impl Frame {
         let mut visits: Vec<usize> = self.setups.iter().map(|setup| setup.visit).collect();
         visits.sort_unstable();
         visits.dedup();
+        self.add_drifts(&visits, settings);
+        for configuration in 0..self.setups.len() {
+            if !self.setups[configuration].scatter.is_empty() {
+                self.small(Small::Scatter { configuration }, 0.0, 1.0);
+            }
+        }
+        for (name, text) in lists.names.iter().enumerate() {
+            if self.nominal.mass_of(text) > 0.0 {
+                self.small(Small::SensorMass { name }, 0.0, settings.sensor_mass_std);
+                self.small(Small::SensorInertia { name }, 0.0, 1.0);
+            }
+        }
+        self.add_places_and_gains(lists, &visits, settings);
+        self.add_damping_level(settings);
+        self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
+    }
+
+    /// What differs between visits: the joint's stiffness and the temperature.
+    fn add_drifts(&mut self, visits: &[usize], settings: &GapSettings) {
         if visits.len() > 1 {
-            for &visit in &visits {
+            for &visit in visits {
                 let sought = self.nominal.sought();
                 for (direction, _) in sought.into_iter().filter(|one| one.0 != COUPLING) {
                     self.small(
@@ -70,17 +88,11 @@ impl Frame {
                 self.small(Small::Temperature { visit }, 0.0, settings.temperature_std);
             }
         }
-        for configuration in 0..self.setups.len() {
-            if !self.setups[configuration].scatter.is_empty() {
-                self.small(Small::Scatter { configuration }, 0.0, 1.0);
-            }
-        }
-        for (name, text) in names.iter().enumerate() {
-            if self.nominal.mass_of(text) > 0.0 {
-                self.small(Small::SensorMass { name }, 0.0, settings.sensor_mass_std);
-                self.small(Small::SensorInertia { name }, 0.0, 1.0);
-            }
-        }
+    }
+
+    /// What shapes and modal constants depend on: places of sensors and of the taps, and calibrations.
+    fn add_places_and_gains(&mut self, lists: &Lists, visits: &[usize], settings: &GapSettings) {
+        let (names, places) = (&lists.names, &lists.places);
         let shapes = self
             .rows
             .iter()
@@ -92,17 +104,21 @@ impl Frame {
             }
         }
         if shapes {
-            for &visit in &visits {
+            for &visit in visits {
                 self.small(Small::TapPlace { visit }, 0.0, settings.position_std);
             }
         }
         if shapes || ratios {
-            for &visit in &visits {
+            for &visit in visits {
                 for name in 0..names.len() {
                     self.small(Small::Gain { visit, name }, 0.0, settings.gain_std);
                 }
             }
         }
+    }
+
+    /// Level and tilt of the nominal damping ratios, where any was observed.
+    fn add_damping_level(&mut self, settings: &GapSettings) {
         if self
             .rows
             .iter()
@@ -120,7 +136,6 @@ impl Frame {
             self.small(Small::Damping, sum / count, 2.0);
             self.small(Small::DampingTilt, 0.0, settings.damping_tilt);
         }
-        self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
     }
 
     pub(super) fn small(&mut self, small: Small, centre: f64, std: f64) {

@@ -181,6 +181,7 @@ impl Scene<'_> {
             level: Some(planned.level),
             taps: self.plan.taps,
             decay_seconds: None,
+            band: None,
             modes: seen_modes,
             covariance: None,
             common: 0.0,

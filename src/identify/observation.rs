@@ -35,6 +35,8 @@ pub struct Configuration {
     pub taps: usize,
     /// Length of the decays that were fitted (s); `None` where nothing was recorded.
     pub decay_seconds: Option<f64>,
+    /// Frequencies at which resonances were looked for (Hz); `None` where nobody said.
+    pub band: Option<(f64, f64)>,
     /// The modes with a number, ascending.
     pub modes: Vec<ObservedMode>,
     /// Covariance of the frequencies (Hz^2), row by row in the order of `modes`, without `common`;
@@ -194,6 +196,12 @@ impl Configuration {
     /// The mode of this number, where it was seen.
     pub fn mode(&self, number: usize) -> Option<&ObservedMode> {
         self.modes.iter().find(|mode| mode.mode == number)
+    }
+
+    /// Whether a resonance at this frequency (Hz) was looked for; where nobody said which were, all.
+    pub fn reaches(&self, frequency: f64) -> bool {
+        self.band
+            .is_none_or(|(low, high)| low <= frequency && frequency <= high)
     }
 }
 

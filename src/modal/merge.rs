@@ -156,6 +156,21 @@ impl fmt::Display for PeakLabel {
     }
 }
 
+/// What one recording shows of a band.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BandReadings {
+    /// Frequencies that were looked at (Hz).
+    pub band: (f64, f64),
+    /// The resonances.
+    pub readings: Vec<ModeReading>,
+}
+
+impl BandReadings {
+    fn covers(&self, frequency: f64) -> bool {
+        self.band.0 <= frequency && frequency <= self.band.1
+    }
+}
+
 /// A resonance of the structure, from the recording that resolves it best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MergedMode {
@@ -169,14 +184,15 @@ pub struct MergedMode {
 ///
 /// Readings are the same resonance when they differ by less than their half lines together plus
 /// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule), or by up to 1.5 % (a joint's
-/// drift of 3 %, where the mode lives in the joint) and no recording shows both; a fitted
+/// drift of 3 %, where the mode lives in the joint) and no recording shows both, though the band of each reaches to
+/// where the other has its own; a fitted
 /// one stays before one that is not, of two fits the one with the smaller standard deviation, else the
 /// one with the smaller half line, and among equals the one that stands out most. Two readings of one recording are
 /// never merged.
-pub fn merge_modes(recordings: &[Vec<ModeReading>]) -> Vec<MergedMode> {
+pub fn merge_modes(recordings: &[BandReadings]) -> Vec<MergedMode> {
     let mut merged: Vec<(MergedMode, Vec<usize>)> = Vec::new();
-    for (recording, readings) in recordings.iter().enumerate() {
-        for reading in readings {
+    for (recording, shown) in recordings.iter().enumerate() {
+        for reading in &shown.readings {
             let candidate = MergedMode {
                 recording,
                 reading: reading.clone(),
@@ -202,7 +218,7 @@ pub fn merge_modes(recordings: &[Vec<ModeReading>]) -> Vec<MergedMode> {
             }
         }
     }
-    merge_drifted(&mut merged);
+    merge_drifted(&mut merged, recordings);
     let mut modes: Vec<MergedMode> = merged.into_iter().map(|(mode, _)| mode).collect();
     modes.sort_by(|a, b| a.reading.frequency.total_cmp(&b.reading.frequency));
     modes
@@ -212,8 +228,8 @@ pub fn merge_modes(recordings: &[Vec<ModeReading>]) -> Vec<MergedMode> {
 const DRIFTED: f64 = 0.015;
 
 /// Merges resonances that no recording shows side by side, the nearest first.
-fn merge_drifted(merged: &mut Vec<(MergedMode, Vec<usize>)>) {
-    while let Some((first, second)) = nearest_apart(merged) {
+fn merge_drifted(merged: &mut Vec<(MergedMode, Vec<usize>)>, recordings: &[BandReadings]) {
+    while let Some((first, second)) = nearest_apart(merged, recordings) {
         let (other, seen) = merged.remove(second);
         let (mode, own) = &mut merged[first];
         own.extend(seen);
@@ -223,15 +239,26 @@ fn merge_drifted(merged: &mut Vec<(MergedMode, Vec<usize>)>) {
     }
 }
 
-/// The two nearest resonances within [`DRIFTED`] that were seen in different recordings.
-fn nearest_apart(merged: &[(MergedMode, Vec<usize>)]) -> Option<(usize, usize)> {
+/// The two nearest resonances within [`DRIFTED`] that were seen in different recordings. Each must have been missed by
+/// a recording that shows the other and would have shown it too: of two bands that only meet, neither could.
+fn nearest_apart(
+    merged: &[(MergedMode, Vec<usize>)],
+    recordings: &[BandReadings],
+) -> Option<(usize, usize)> {
     let distance = |&(a, b): &(usize, usize)| {
         let of = |k: usize| merged[k].0.reading.frequency;
         (of(a) - of(b)).abs() / of(a).max(of(b))
     };
     let apart = |&(a, b): &(usize, usize)| {
         let resonances = [a, b].iter().all(|&k| merged[k].0.reading.label.is_none());
+        let missed = |shown: usize, other: usize| {
+            let frequency = merged[other].0.reading.frequency;
+            let mut seen = merged[shown].1.iter();
+            seen.any(|&recording| recordings[recording].covers(frequency))
+        };
         resonances
+            && missed(a, b)
+            && missed(b, a)
             && merged[a]
                 .1
                 .iter()

@@ -23,6 +23,8 @@ mod reading;
 
 pub use interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};
 pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic, near_mains};
-pub use merge::{FittedReading, FrequencySource, MergedMode, ModeReading, PeakLabel, merge_modes};
+pub use merge::{
+    BandReadings, FittedReading, FrequencySource, MergedMode, ModeReading, PeakLabel, merge_modes,
+};
 pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};
 pub use reading::read_peaks;

@@ -9,7 +9,7 @@ use super::warning::Warning;
 use crate::description::{MeasuredFrequencies, TestDescription};
 use crate::identify::observation::UNPAIRED;
 use crate::identify::{WeightedPeak, pair_by_ratio};
-use crate::modal::{ModeReading, merge_modes};
+use crate::modal::{BandReadings, ModeReading, merge_modes};
 use crate::stats::times;
 use crate::structure::{Assembly, JointStiffness, natural_frequencies};
 
@@ -212,11 +212,21 @@ pub(super) fn own_readings(recording: &RecordingResult) -> Vec<ModeReading> {
         .map_or(Vec::new(), |spectra| spectra.readings.clone())
 }
 
-fn readings_of(recordings: &[RecordingResult], which: &[usize]) -> Vec<Vec<ModeReading>> {
+fn readings_of(recordings: &[RecordingResult], which: &[usize]) -> Vec<BandReadings> {
+    let shown = |recording: &RecordingResult| BandReadings {
+        band: looked_at(recording).unwrap_or((0.0, f64::INFINITY)),
+        readings: own_readings(recording),
+    };
     which
         .iter()
-        .map(|&index| own_readings(&recordings[index]))
+        .map(|&index| shown(&recordings[index]))
         .collect()
+}
+
+/// Frequencies at which a recording was looked for resonances (Hz); `None` without spectra.
+pub(super) fn looked_at(recording: &RecordingResult) -> Option<(f64, f64)> {
+    let lines = recording.measurement.spectra.as_ref()?.averages.lines;
+    Some((lines.low, lines.high))
 }
 
 fn from_reading(reading: ModeReading, recording: Option<String>) -> ModeResult {
@@ -312,15 +322,16 @@ pub(super) fn number_in_order(modes: &mut [ModeResult]) {
 
 /// The numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
 /// to it, within their half lines together and [`OTHER_CONFIGURATION`], and no reading serves two
-/// modes. A reading that lies nearer to a peak without a number is that peak's: a torsion mode stays one where the
-/// sensor sits on a node of the bending mode beside it.
+/// modes. A reading that lies nearer to a peak without a number is that peak's, if none is nearer to the peak: a torsion
+/// mode stays one where the sensor sits on a node of the bending mode beside it, and a bending mode that moved towards
+/// it stays that one.
 pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
         let distance = |index: &usize| (mode.frequency - readings[*index].frequency).abs();
         let nearest = (0..readings.len())
             .filter(|&index| readings[index].label.is_none() && numbers[index].is_none())
-            .filter(|&index| !is_of_another(modes, mode, readings[index].frequency))
+            .filter(|&index| !is_of_another(modes, mode, (readings, index)))
             .filter(|index| {
                 let half_lines = mode.half_line.unwrap_or(0.0) + readings[*index].half_line;
                 distance(index) <= half_lines + OTHER_CONFIGURATION * mode.frequency
@@ -336,15 +347,27 @@ pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec
 /// Peaks without a number that lie nearer than this to a mode may be a part of its line (1, relative).
 const OF_ITS_LINE: f64 = 0.01;
 
-/// Whether a frequency lies nearer to a peak without a number, one apart from this mode, than to the mode.
-fn is_of_another(modes: &[ModeResult], mode: &ModeResult, frequency: f64) -> bool {
+/// Whether a reading lies nearer to a peak without a number, one apart from this mode, than to the mode, and is the one
+/// that shows the peak: the nearest to it of all readings.
+fn is_of_another(
+    modes: &[ModeResult],
+    mode: &ModeResult,
+    (readings, index): (&[ModeReading], usize),
+) -> bool {
+    let frequency = readings[index].frequency;
     let apart =
         |peak: &&ModeResult| (peak.frequency - mode.frequency).abs() > OF_ITS_LINE * mode.frequency;
     let unpaired =
         |peak: &&ModeResult| peak.mode.is_none() && peak.label.as_deref() == Some(UNPAIRED);
     let own = (frequency - mode.frequency).abs();
+    let shows = |peak: &ModeResult| {
+        let distance = (frequency - peak.frequency).abs();
+        let mut others = readings.iter().filter(|other| other.label.is_none());
+        let nearer = others.any(|other| (other.frequency - peak.frequency).abs() < distance);
+        distance < own && !nearer
+    };
     let mut peaks = modes.iter().filter(unpaired).filter(apart);
-    peaks.any(|peak| (frequency - peak.frequency).abs() < own)
+    peaks.any(shows)
 }
 
 #[cfg(test)]
@@ -377,6 +400,8 @@ mod tests {
         };
         assert_eq!(numbers(&[701.0, 1055.2]), [Some(4), None]);
         assert_eq!(numbers(&[1055.2, 1085.0]), [None, Some(5)]);
+        // A moved mode, nearer to the peak than to where it was: the peak has a reading of its own.
+        assert_eq!(numbers(&[1055.2, 1070.0]), [None, Some(5)]);
         // A second pole of the mode's own line takes nothing from it.
         let split = [mode(None, 1089.0), mode(Some(5), 1090.0)];
         assert_eq!(own_numbers(&split, &[reading(1089.1)]), [Some(5)]);

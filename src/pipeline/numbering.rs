@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::analysis::{ModeResult, RecordingResult};
 use super::consistent::{self, NO_SPRING, StructureDetails};
 use super::model::TestedStructure;
-use super::modes::{apply_numbers, number_in_order};
+use super::modes::{apply_numbers, looked_at, number_in_order};
 use super::observations::shape_of;
 use super::warning::Warning;
 use crate::description::FitParameter;
@@ -72,10 +72,7 @@ fn settings(
     let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
     let mut fit = consistent::fitted(structure, details);
     fit.retain(|parameter| joint.contains(parameter));
-    let band = |recording: &&RecordingResult| {
-        let lines = recording.measurement.spectra.as_ref()?.averages.lines;
-        Some((lines.low, lines.high))
-    };
+    let band = |recording: &&RecordingResult| looked_at(recording);
     PairingSettings {
         fit,
         held: [

@@ -40,7 +40,8 @@ pub fn check_force_ripple(
         };
         let depth = decibels(hit);
         let happened = format!(
-            "The force spectrum ripples by {depth:.1} dB every {:.1} Hz, from a second hit of {:.1} % after {:.2} ms (limit {limit:.1} dB).",
+            "The force spectrum ripples by {}{depth:.1} dB every {:.1} Hz, from a second hit of {:.1} % after {:.2} ms (limit {limit:.1} dB).",
+            if hit.is_deepest() { "more than " } else { "" },
             hit.ripple_period(),
             100.0 * hit.ratio,
             1e3 * hit.delay,

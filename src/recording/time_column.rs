@@ -20,9 +20,10 @@ pub(super) fn time_column(
     })
 }
 
-/// Columns named t, time or the like, then those named t_* or time_*, but for those whose unit says otherwise.
+/// Columns named t, time or the like, then those named t_* or time_*, but for those whose unit says otherwise. Those
+/// whose unit nobody knows come after all others.
 fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
-    let names = |exact: bool| {
+    let names = |exact: bool, known: bool| {
         let is_time = move |column: &Column| {
             // An unknown unit stays in the name; it is refused later, with its own message.
             let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
@@ -34,10 +35,15 @@ fn named_as_time(columns: &[Column]) -> impl Iterator<Item = usize> {
         };
         (0..columns.len()).filter(move |at| {
             let column = columns.get(*at);
-            column.is_some_and(|column| is_time(column) && !has_other_unit(column))
+            let wanted = match known {
+                true => TimeUnit::OfTime,
+                false => TimeUnit::Unknown,
+            };
+            column.is_some_and(|column| is_time(column) && time_unit(column) == wanted)
         })
     };
-    names(true).chain(names(false))
+    let of_time = names(true, true).chain(names(false, true));
+    of_time.chain(names(true, false)).chain(names(false, false))
 }
 
 /// A column named as time whose values do not rise throughout.
@@ -52,15 +58,29 @@ pub(super) struct FlatTime {
 }
 
 /// Units of temperature, which no channel has here and the names t and T often mean.
-const TEMPERATURES: [&str; 7] = ["K", "\u{b0}C", "C", "degC", "\u{b0}F", "F", "degF"];
+const TEMPERATURES: [&str; 9] = [
+    "k", "\u{b0}c", "c", "degc", "\u{b0}f", "f", "degf", "celsius", "\u{2103}",
+];
 
-/// Whether a column's unit says that it is no time. One that is not known may be one of time, "sec.": that is an
-/// error worth telling.
-fn has_other_unit(column: &Column) -> bool {
+/// What the unit of a column named as time says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum TimeUnit {
+    /// A unit of time, or none.
+    OfTime,
+    /// One that is not known. It may be one of time, "sec.": that is an error worth telling.
+    Unknown,
+    /// That the column is no time.
+    Other,
+}
+
+fn time_unit(column: &Column) -> TimeUnit {
     let unit = column.unit.as_deref().unwrap_or("s");
+    let plain = unit.to_lowercase().replace([' ', '.'], "");
     match channel_unit(unit) {
-        Some((_, si)) => si != "s",
-        None => TEMPERATURES.contains(&unit),
+        Some((_, "s")) => TimeUnit::OfTime,
+        Some(_) => TimeUnit::Other,
+        None if TEMPERATURES.contains(&plain.as_str()) => TimeUnit::Other,
+        None => TimeUnit::Unknown,
     }
 }
 

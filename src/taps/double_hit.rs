@@ -35,9 +35,13 @@ pub struct SecondHit {
     /// Time between the two crests (s).
     pub delay: f64,
     /// The smaller peak over the larger; of pulses too short to show their height, the smaller impulse over the
-    /// larger.
+    /// larger. From 0 to 1.
     pub ratio: f64,
 }
+
+/// Deepest ripple that is told, as a ratio (1): 60 dB. Two equal hits cancel to nothing between their crests, and what
+/// is left there is noise.
+const DEEPEST_RIPPLE: f64 = 1000.0;
 
 impl SecondHit {
     /// Spacing of the ripple it leaves in the force spectrum, 1/delay (Hz).
@@ -45,9 +49,18 @@ impl SecondHit {
         1.0 / self.delay
     }
 
-    /// Largest over smallest force within a ripple, (1 + r)/(1 - r).
+    /// Largest over smallest force within a ripple, (1 + r)/(1 - r); of two hits that are as good as equal,
+    /// [`SecondHit::is_deepest`], the 1000 (60 dB) that noise lets one see.
     pub fn ripple_depth(&self) -> f64 {
-        (1.0 + self.ratio) / (1.0 - self.ratio)
+        match self.is_deepest() {
+            true => DEEPEST_RIPPLE,
+            false => (1.0 + self.ratio) / (1.0 - self.ratio),
+        }
+    }
+
+    /// Whether both hits are so equal that the force vanishes within a ripple.
+    pub fn is_deepest(&self) -> bool {
+        1.0 + self.ratio >= DEEPEST_RIPPLE * (1.0 - self.ratio)
     }
 }
 
@@ -83,8 +96,14 @@ pub(super) fn second_hit(
         .filter(|copy| copy.ratio >= settings.double_hit_warning)
         .map(|copy| SecondHit {
             delay: (copy.place - main.crest as f64).abs() / force.rate,
-            ratio: main.size_of(&copy),
+            ratio: smaller_over_larger(main.size_of(&copy)),
         })
+}
+
+/// A ratio of two sizes the way round that makes it at most 1: the crest that is read higher may have the smaller
+/// impulse.
+fn smaller_over_larger(ratio: f64) -> f64 {
+    ratio.min(ratio.recip())
 }
 
 /// The tap's main pulse in its surroundings.

@@ -292,6 +292,27 @@ fn regress_forgotten_units_are_asked_about() {
 }
 
 #[test]
+fn regress_a_mass_that_every_recording_places_has_a_place() {
+    let beam = "[beam]\nlength = \"423 mm\"\nwidth = \"40 mm\"\nthickness = \"4 mm\"\n\
+                modulus = \"200 GPa\"\ndensity = 7850\n[joint]\nkind = \"cantilever\"\n\
+                [[sensor]]\nname = \"A\"\nchannel = 2\nmass = \"24 g\"\n";
+    let warnings = |recordings: &str| {
+        let text = format!("{beam}{recordings}");
+        let test = TestDescription::parse(&text, "test.toml").unwrap();
+        let texts = test.warnings.iter().map(ToString::to_string);
+        texts
+            .filter(|text| text.contains("`position` is missing"))
+            .count()
+    };
+    let placed = "[[recording]]\nfile = \"a.wav\"\nat = { A = 0.2 }\n";
+    assert_eq!(warnings(placed), 0);
+    let open = "[[recording]]\nfile = \"b.wav\"\n";
+    assert_eq!(warnings(open), 1);
+    assert_eq!(warnings(&format!("{placed}{open}")), 1);
+    assert_eq!(warnings(""), 1);
+}
+
+#[test]
 fn regress_templates_parse_without_warnings() {
     for kind in [JointKind::Cantilever, JointKind::Lap, JointKind::Free] {
         let test = parse(&template(kind));

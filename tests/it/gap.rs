@@ -6,7 +6,9 @@ use tapjoint::gap::{
     Diagnosis, GapError, GapSettings, Hypothesis, HypothesisResult, Nominal, TestPlan, Verdict,
     diagnose, observe,
 };
-use tapjoint::identify::observation::{Configuration, Observations, ObservedMode};
+use tapjoint::identify::observation::{
+    Configuration, ExtraPeak, Observations, ObservedMode, UNPAIRED,
+};
 use tapjoint::structure::specimen::{PointMass, SpecimenJoint};
 
 const LENGTH: f64 = 0.423;
@@ -198,6 +200,82 @@ fn limit_a_mode_that_one_recording_alone_shows_tests_nothing() {
     assert_eq!(diagnosis.fitted_modes, 5);
 }
 
+/// The recordings of [`five_recordings`], each in three files that were looked at in bands of their own.
+fn in_bands(all: &Observations, bands: [(f64, f64); 3]) -> Observations {
+    let mut configurations = Vec::new();
+    for one in &all.configurations {
+        for (low, high) in bands {
+            let mut part = one.clone();
+            part.recording = Some(configurations.len());
+            part.band = Some((low, high));
+            part.modes
+                .retain(|mode| (low..high).contains(&mode.frequency));
+            part.covariance = None;
+            configurations.push(part);
+        }
+    }
+    Observations { configurations }
+}
+
+#[test]
+fn regress_modes_that_only_some_bands_reach_are_tested() {
+    let nominal = strip_on_springs(1.0, Some(0.01));
+    let whole = observe(&five_recordings(), &nominal, &[], 6).unwrap();
+    let parts = in_bands(&whole, [(0.0, 200.0), (200.0, 500.0), (500.0, 1100.0)]);
+    let begin = strip_on_springs(0.8, Some(0.01));
+    let tested = |observed: &Observations| {
+        diagnose(observed, &begin, &GapSettings::default())
+            .unwrap()
+            .fitted_modes
+    };
+    assert_eq!(tested(&parts), tested(&whole));
+    // Of one mode that a recording alone shows, though all could, nothing is said.
+    let mut stray = read(&PAPER, |f| Some(1e-3 * f));
+    for _ in 0..4 {
+        let mut other = stray.configurations[0].clone();
+        other.modes.truncate(1);
+        stray.configurations.push(other);
+    }
+    assert!(matches!(
+        refusal(&stray),
+        GapError::TooFewModes { modes: 1, .. }
+    ));
+}
+
+#[test]
+fn regress_two_bands_of_one_structure_are_no_two_structures() {
+    let peak = |frequency: f64| ExtraPeak {
+        frequency,
+        std: Some(0.01),
+        level_db: None,
+        constant: None,
+        label: UNPAIRED.to_owned(),
+    };
+    let mut observed = read(&PAPER, |f| Some(1e-3 * f));
+    let mut above = observed.configurations[0].clone();
+    above.modes.drain(..3);
+    above.extra_peaks = [700.0, 830.0, 1100.0].map(peak).into();
+    observed.configurations[0].modes.truncate(3);
+    observed.configurations[0].extra_peaks = [250.0, 400.0].map(peak).into();
+    observed.configurations.push(above);
+    let two = GapError::AnotherStructure {
+        first: "configuration 1".into(),
+        second: "configuration 2".into(),
+        strangers: 5,
+        peaks: 5,
+        percent: 5.0,
+    };
+    assert_eq!(refusal(&observed), two);
+    observed.configurations[0].band = Some((0.0, 500.0));
+    observed.configurations[1].band = Some((450.0, 1200.0));
+    let answer = diagnose(
+        &observed,
+        &strip_on_springs(1.0, Some(0.004)),
+        &GapSettings::default(),
+    );
+    assert!(answer.is_ok(), "{answer:?}");
+}
+
 #[test]
 fn prop_probabilities_sum_to_one_and_repeat_themselves() {
     let crack = effect(
@@ -350,6 +428,7 @@ fn read(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Observations {
             level: None,
             taps: 0,
             decay_seconds: None,
+            band: None,
             modes: frequencies.iter().enumerate().map(mode).collect(),
             covariance: None,
             common: 0.0,

@@ -6,8 +6,8 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tapjoint::modal::{
-    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings,
-    find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
+    BandReadings, CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel,
+    PeakSettings, find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
 };
 use tapjoint::spectral::{Lines, Window, transform_block};
 
@@ -225,6 +225,11 @@ fn reading(frequency: f64, half_line: f64) -> ModeReading {
     }
 }
 
+/// What a recording shows of a band (Hz).
+fn within(band: (f64, f64), readings: Vec<ModeReading>) -> BandReadings {
+    BandReadings { band, readings }
+}
+
 #[test]
 fn prop_each_mode_comes_from_the_recording_that_resolves_it_best() {
     let low = vec![reading(17.0, 0.125), reading(118.1, 0.125)];
@@ -234,7 +239,7 @@ fn prop_each_mode_comes_from_the_recording_that_resolves_it_best() {
         reading(335.6, 0.625),
     ];
     for recordings in [[low.clone(), high.clone()], [high, low]] {
-        let merged = merge_modes(&recordings);
+        let merged = merge_modes(&recordings.map(|readings| within((0.0, 400.0), readings)));
         let frequencies: Vec<f64> = merged.iter().map(|mode| mode.reading.frequency).collect();
         assert_eq!(frequencies, [17.0, 118.1, 335.6]);
     }
@@ -242,8 +247,9 @@ fn prop_each_mode_comes_from_the_recording_that_resolves_it_best() {
 
 #[test]
 fn limit_a_mode_that_drifted_is_one_and_two_modes_are_two() {
-    let at = |frequencies: &[f64]| -> Vec<ModeReading> {
-        frequencies.iter().map(|f| reading(*f, 0.125)).collect()
+    let at = |frequencies: &[f64]| {
+        let readings = frequencies.iter().map(|f| reading(*f, 0.125));
+        within((0.0, 1000.0), readings.collect())
     };
     // A mode of the joint, 0.4 % apart in two recordings.
     assert_eq!(merge_modes(&[at(&[548.3]), at(&[546.3])]).len(), 1);
@@ -251,11 +257,19 @@ fn limit_a_mode_that_drifted_is_one_and_two_modes_are_two() {
     assert_eq!(merge_modes(&[at(&[546.3, 548.3]), at(&[546.4])]).len(), 2);
     // Farther than a joint drifts.
     assert_eq!(merge_modes(&[at(&[548.3]), at(&[538.3])]).len(), 2);
+    // On either side of the seam of two bands, where no recording could show both.
+    let one = |band, frequency| within(band, vec![reading(frequency, 0.125)]);
+    let (below, above) = (one((0.0, 200.0), 198.5), one((200.0, 1000.0), 201.0));
+    assert_eq!(merge_modes(&[below.clone(), above]).len(), 2);
+    // A recording of both bands would have shown the lower one, but the first not the upper one.
+    assert_eq!(merge_modes(&[below, at(&[201.0])]).len(), 2);
+    assert_eq!(merge_modes(&[at(&[198.5]), at(&[201.0])]).len(), 1);
 }
 
 #[test]
 fn limit_close_modes_of_one_recording_are_never_merged() {
     let pair = vec![reading(125.0, 0.125), reading(125.3, 0.125)];
+    let pair = within((0.0, 1000.0), pair);
     assert_eq!(merge_modes(std::slice::from_ref(&pair)).len(), 2);
     assert_eq!(merge_modes(&[pair.clone(), pair]).len(), 2);
 }

@@ -196,6 +196,9 @@ fn val_second_hits_in_time_and_as_ripple() {
         Outcome::Bad,
         &["5.4 dB", "80.0 Hz", "limit 1.7 dB"],
     );
+    // Two equal hits cancel within the ripple.
+    let equal = judged(&hit(1.0), Check::ForceRipple);
+    assert_doubt(&equal, Outcome::Bad, &["more than 60.0 dB", "80.0 Hz"]);
     let blind = changed(|r| r.force = None);
     for check in [Check::DoubleHit, Check::ForceRipple] {
         assert_missing(&judged(&blind, check), "beat in the responses");

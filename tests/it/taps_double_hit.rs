@@ -105,22 +105,44 @@ fn filtered_impulse(offset: f64) -> f64 {
     sinc * taper
 }
 
+/// Two filtered impulses, the second of this size (1), each at a place between samples.
+fn two_impulses(size: f64, (first, second): (f64, f64)) -> Record {
+    let rate = 1900.0;
+    let samples = (0..4096).map(|index| {
+        let main = filtered_impulse(f64::from(index) - 400.0 - first);
+        main + size * filtered_impulse(f64::from(index) - 466.0 - second)
+    });
+    Record {
+        rate,
+        samples: samples.collect(),
+        shape: Shape::HalfSine,
+        begin: 399.0 / rate,
+        width: 2.0 / rate,
+    }
+}
+
+#[test]
+fn regress_of_two_hits_alike_the_ratio_is_at_most_one_and_the_ripple_finite() {
+    for (size, step) in [0.9, 0.95, 1.0]
+        .into_iter()
+        .flat_map(|size| (0..5).map(move |k| (size, k)))
+    {
+        // Between samples the first shows less of its height.
+        let record = two_impulses(size, (0.1 * f64::from(step), 0.0));
+        let Found::Rejected(hit) = found(&record) else {
+            panic!("{size} {step}");
+        };
+        assert!((0.85..=1.0).contains(&hit.ratio), "{size} {step}: {hit:?}");
+        let depth = 20.0 * hit.ripple_depth().log10();
+        assert!((20.0..=60.0).contains(&depth), "{size} {step}: {depth} dB");
+    }
+}
+
 #[test]
 fn regress_the_size_of_a_second_hit_two_samples_wide_is_that_of_its_impulse() {
-    let rate = 1900.0;
     for step in 0..100 {
         let (first, second) = (0.1 * f64::from(step % 10), 0.1 * f64::from(step / 10));
-        let samples = (0..4096).map(|index| {
-            let main = filtered_impulse(f64::from(index) - 400.0 - first);
-            main + 0.6 * filtered_impulse(f64::from(index) - 466.0 - second)
-        });
-        let record = Record {
-            rate,
-            samples: samples.collect(),
-            shape: Shape::HalfSine,
-            begin: 399.0 / rate,
-            width: 2.0 / rate,
-        };
+        let record = two_impulses(0.6, (first, second));
         match found(&record) {
             Found::Rejected(hit) => {
                 assert!((hit.ratio - 0.6).abs() < 0.02, "{first} {second}: {hit:?}");

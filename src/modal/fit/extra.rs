@@ -47,7 +47,8 @@ const LEVEL: f64 = 1e-4;
 /// Least amplitude in standard deviations.
 const LEAST_AMPLITUDE: f64 = 4.0;
 /// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
-/// thousand of them, which tell no more than the decay's own length has room for.
+/// thousand of them, and to fit them all for every proposal of chance takes too long. The price: of one line in s an
+/// amplitude has sqrt(s) times its standard deviation, so that a mode that only all lines together show is not found.
 const SCREENED: usize = 1000;
 
 /// Modes that are fitted, beside which others are tested.
@@ -81,18 +82,25 @@ impl<'a> Accepted<'a> {
     /// are not fitted jointly with it stay as they are. What fails on the lines of a thinned band is not tried on
     /// all of them.
     pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
-        let screened = self.test_on(extra, SCREENED);
-        if screened.0.verdict != ExtraVerdict::Needed {
-            return screened;
+        let (test, together, stride) = self.test_on(extra, SCREENED);
+        if test.verdict != ExtraVerdict::Needed || stride == 1 {
+            return (test, together.with_all_lines());
         }
-        self.test_on(extra, usize::MAX)
+        let (test, together, _) = self.test_on(extra, usize::MAX);
+        (test, together)
     }
 
-    /// The test on so many lines of its band at most.
-    fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self) {
+    fn with_all_lines(mut self) -> Self {
+        self.sweeper.most_lines = usize::MAX;
+        self
+    }
+
+    /// The test on so many lines of its band at most, and of how many lines one was taken.
+    fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
         let mut beside = self.clone();
         beside.sweeper.most_lines = most_lines;
         let group = beside.sweeper.add(extra, self.settings.added_decay);
+        let stride = group.as_ref().map_or(1, |group| group.fit.lines.stride);
         let test = match group {
             Some(group) => beside.judge(&group),
             None => {
@@ -101,7 +109,7 @@ impl<'a> Accepted<'a> {
                 without_mode(Err(failed.unwrap_or(Unfit::NotIndependent)))
             }
         };
-        (test, beside)
+        (test, beside, stride)
     }
 
     /// What speaks for the last mode, one of this group.

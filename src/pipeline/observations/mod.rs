@@ -13,6 +13,7 @@ mod mode;
 mod repeats;
 
 use super::analysis::{Analysis, ModeResult, RecordingResult};
+use super::modes::looked_at;
 use crate::description::SensorKind;
 use crate::identify::observation::{
     Configuration, ExtraPeak, Observations, Observed, ObservedMode, ObservedSensor, ShapeValue,
@@ -84,6 +85,7 @@ fn of_measured(modes: &[ModeResult]) -> Configuration {
         level: None,
         taps: 0,
         decay_seconds: None,
+        band: None,
         covariance: covariance::independent(&modes),
         modes,
         // What was stated is meant to be all.
@@ -132,6 +134,7 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
             },
             decay_seconds: Some(spectra.averages.lines.duration)
                 .filter(|_| recording.format != Format::FrequencyResponses),
+            band: looked_at(recording),
             covariance: covariance::of_taps(&seen),
             // Changes along the decays belong to all taps; they stand with the hardest.
             modes: seen.iter().map(|seen| seen.observed(place == 0)).collect(),

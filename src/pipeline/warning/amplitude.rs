@@ -240,16 +240,28 @@ pub(super) fn write_dependence(
         };
         write!(f, "; {more} more {modes} with it")?;
     }
-    // Of several modes with the same cause it is said of all; what differs is said of the first alone.
-    let way = changes
-        .first()
-        .map_or(Way::Slips, |(_, change)| change.way());
-    write!(
-        f,
-        "; {}; a recording at a second tap level would confirm it, and frequencies should be stated with \
-         their amplitude, or taken from softer taps",
-        way.cause()
+    write_cause(f, changes)?;
+    f.write_str(
+        "; a recording at a second tap level would confirm it, and frequencies should be stated with their amplitude, \
+         or taken from softer taps",
     )
+}
+
+/// What makes the modes go as they go. Of several that go the same way it is said of all; where some go another, of the
+/// first alone.
+fn write_cause(f: &mut fmt::Formatter<'_>, changes: &[(usize, AmplitudeChange)]) -> fmt::Result {
+    let Some((mode, first)) = changes.first() else {
+        return Ok(());
+    };
+    let way = first.way();
+    let others = changes.iter().filter(|(_, change)| change.way() != way);
+    match others.count() {
+        0 => write!(f, "; {}", way.cause()),
+        count => {
+            let cause = way.cause();
+            write!(f, ", {count} of them in another way; mode {mode}: {cause}")
+        }
+    }
 }
 
 #[cfg(test)]
@@ -315,5 +327,23 @@ mod tests {
             let text = warning.to_string();
             assert!(text.contains(cause), "{frequency:?} {damping:?}: {text}");
         }
+    }
+
+    #[test]
+    fn regress_a_cause_is_said_of_the_modes_that_go_its_way_alone() {
+        let softer = change([80.0, 80.5], [0.002, 0.002]);
+        let stiffer = change([500.5, 500.0], [0.002, 0.002]);
+        let text = |changes: Vec<(usize, AmplitudeChange)>| {
+            let file = "a.wav".into();
+            Warning::AmplitudeDependent { file, changes }.to_string()
+        };
+        let alike = text(vec![(1, softer.clone()), (2, softer.clone())]);
+        assert!(
+            alike.contains("1 more mode changes with it; a joint"),
+            "{alike}"
+        );
+        let mixed = text(vec![(1, softer.clone()), (2, softer), (3, stiffer)]);
+        let told = "2 more modes change with it, 1 of them in another way; mode 1: a joint";
+        assert!(mixed.contains(told), "{mixed}");
     }
 }

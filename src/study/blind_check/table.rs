@@ -284,6 +284,11 @@ pub fn render_rows(rows: &[Row]) -> String {
     if rows.iter().any(is_missed) {
         text.push_str("! the target is missed\n");
     }
+    if compared {
+        text.push_str(
+            "ideal: names what is more than 80 % probable and fits; here a verdict does\n",
+        );
+    }
     text
 }
 

@@ -252,6 +252,12 @@ fn the_time_column_is_found_by_name_and_in_its_unit() {
         read_all(text, "t_room"),
         [[20.0, 20.0, 20.0], [3.0, 7.0, 13.0]]
     );
+    // A temperature before the time, in whatever unit.
+    for unit in ["deg C", "Celsius", "\u{2103}", "\u{b0}C", "Grad"] {
+        let text = format!("T ({unit}),time (s),b\n20,0.0,3\n21,0.5,7\n20,1.0,13\n");
+        let read = read_all(&text, "temperature");
+        assert_eq!(read, [[20.0, 21.0, 20.0], [3.0, 7.0, 13.0]], "{unit}");
+    }
     let message = open_error(table("t (kg),a,b", ",", ".", "\n"));
     assert_message(&message, "tested.dat:2: ", &["\"kg\"", "allowed: s, ms"]);
 }

@@ -13,6 +13,7 @@ mod quality;
 mod resolution;
 mod taps;
 mod uncertainty;
+mod verdict;
 
 pub use datasets::datasets;
 pub use frfs::frfs;

@@ -85,8 +85,21 @@ fn row(found: &HypothesisSection, floor: Option<f64>) -> Vec<String> {
         left(found.gap_after, floor),
         left(found.withheld_after, floor),
         sizes(found),
-        found.confounded_with.join(", "),
+        looks_like(&found.confounded_with),
     ]
+}
+
+/// How many hypotheses that cannot be told from one are named; report.json has them all.
+const NAMED: usize = 4;
+
+/// "timebase, modulus", "timebase, modulus, length, fixture and 9 more".
+fn looks_like(names: &[String]) -> String {
+    let named = names[..names.len().min(NAMED)].join(", ");
+    match names.len().saturating_sub(NAMED) {
+        0 => named,
+        1 => names.join(", "),
+        more => format!("{named} and {more} more"),
+    }
 }
 
 /// "mass 24.10 ± 0.30 g".
@@ -152,5 +165,13 @@ mod tests {
         assert_eq!(left(Some(0.0011), Some(0.0052)), "0.0011");
         assert_eq!(left(Some(3.5e-6), None), "0.0000035");
         assert_eq!(left(None, Some(0.0052)), MISSING);
+    }
+
+    #[test]
+    fn limit_a_few_of_many_likenesses_are_named() {
+        let names: Vec<String> = ('a'..='g').map(String::from).collect();
+        assert_eq!(looks_like(&names[..0]), "");
+        assert_eq!(looks_like(&names[..5]), "a, b, c, d, e");
+        assert_eq!(looks_like(&names), "a, b, c, d and 3 more");
     }
 }

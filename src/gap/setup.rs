@@ -38,6 +38,8 @@ pub(super) struct Setup {
     pub(super) path: Option<JointPath>,
     /// Which visit to the structure.
     pub(super) visit: usize,
+    /// Whether there is a recording that could be read once more.
+    pub(super) is_recorded: bool,
     /// What the taps' scatter has in common: share of each mode's standard deviation, with its sign.
     pub(super) scatter: Vec<(usize, f64)>,
 }
@@ -126,6 +128,7 @@ pub(super) fn setup(
         spans: configuration.modes.iter().filter_map(span).collect(),
         path: None,
         visit: configuration.recording.unwrap_or(index),
+        is_recorded: configuration.recording.is_some(),
         scatter: common_scatter(configuration),
     }
 }

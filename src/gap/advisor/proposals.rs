@@ -143,7 +143,12 @@ impl Proposals {
             })
         };
         let rows = (0..kept).flat_map(higher).collect();
-        self.propose(Step::HigherModes { first, last }, Structure::Whole, rows);
+        let step = Step::HigherModes {
+            first,
+            last,
+            is_recorded: frame.setups.iter().any(|setup| setup.is_recorded),
+        };
+        self.propose(step, Structure::Whole, rows);
         if let Some(bias) = frame.nominal.reading_bias {
             let rows = observed_modes(frame).map(|mode| {
                 let configuration = 0;

@@ -6,12 +6,14 @@ use crate::effects::EffectId;
 /// A test that could be made, or a record that could be read again.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// Read higher modes from what is recorded.
+    /// Read higher modes.
     HigherModes {
         /// The lowest of them.
         first: usize,
         /// The highest.
         last: usize,
+        /// Whether recordings are at hand that may show them.
+        is_recorded: bool,
     },
     /// Read frequencies by a fit, or on lines so close, instead of on lines.
     FinerLines {
@@ -104,14 +106,22 @@ impl Step {
     /// In one sentence, without its full stop.
     pub(super) fn sentence(&self) -> String {
         match self {
-            Step::HigherModes { first, last } => format!(
-                "read modes {first} to {last} as well, from the recordings at hand if their band reaches so far"
+            Step::HigherModes {
+                first,
+                last,
+                is_recorded,
+            } => format!(
+                "read modes {first} to {last} as well{}",
+                match is_recorded {
+                    true => ", from the recordings at hand if their band reaches so far",
+                    false => "",
+                }
             ),
             Step::FinerLines { spacing } => format!(
                 "read the frequencies by a curve fit, or on lines of {spacing:.3} Hz or closer"
             ),
             Step::MoreTaps { factor } => format!(
-                "repeat the first recording with {factor} times as many taps, the joint untouched"
+                "repeat the first recording with {factor} times as many taps, everything else untouched"
             ),
             Step::TapLevel { level } if *level < 1.0 => format!(
                 "tap at {:.0} % of the force, everything else untouched",
@@ -130,10 +140,10 @@ impl Step {
                 "record a tone of known frequency beside the taps and compare the clocks to 20 ppm".into()
             }
             Step::MoveSensor { name, position } => format!(
-                "move {name} to {position:.3} m, leave the joint untouched, and tap again"
+                "move {name} to {position:.3} m, leave everything else untouched, and tap again"
             ),
             Step::KnownMass { mass, position } => format!(
-                "fasten {0} at {position:.3} m, leave the joint untouched, tap again, and describe that \
+                "fasten {0} at {position:.3} m, leave everything else untouched, tap again, and describe that \
                  [[recording]] with mass = [{{ position = {position:.3}, mass = \"{0}\" }}]",
                 weight(*mass)
             ),

@@ -429,7 +429,9 @@ def nonlinear(force, modes, shapes, inner, law):
 
 
 def make_test(rng, folder, effects, arguments):
-    """Writes one test's recordings and description; returns the planted effects with their parameters."""
+    """Writes one test's recordings and description; returns the planted effects with their parameters.
+
+    None, and nothing written, where the stepping of a nonlinear joint did not settle."""
     beam = Beam(rng)
     length = beam.length
     nominal = Model(beam, (1, 1), [])
@@ -443,7 +445,6 @@ def make_test(rng, folder, effects, arguments):
     hard = rng.uniform(3, 5)
     plan = [(taps[0], sensors, 20.0), (taps[1], sensors, 20.0), (taps[2], sensors, 20.0),
             (taps[2], [moved, sensors[1]], 20.0), (taps[2], sensors, 20.0 * hard)]
-    folder.mkdir(parents=True)
     text = [f'name = "{folder.name}"', "", "[beam]"]
     text += [f"{key} = {getattr(beam, key):.9g}" for key in ("length", "width", "thickness", "modulus", "density", "poisson")]
     text += ["", "[joint]", 'kind = "cantilever"', 'model = "2p"', 'beam = "euler"']
@@ -461,6 +462,9 @@ def make_test(rng, folder, effects, arguments):
         recorded = record(rng, beam, damping, (tap, places, level, drift),
                           arguments.noise, (rate, rate * OVERSAMPLING), hardest)
         channels.append(recorded)
+    if not all(np.isfinite(x).all() for recorded in channels for x in recorded):
+        return None
+    folder.mkdir(parents=True)
     scales = [1.3 * max(abs(r[0]).max() for r in channels)]
     scales += [1.3 * max(max(abs(r[1]).max(), abs(r[2]).max()) for r in channels)] * 2
     text += ["", "[hammer]", "channel = 1", f"scale = {scales[0]:.9g}"]
@@ -516,8 +520,11 @@ def main():
     for number, which in enumerate(order):
         name = f"t{number:03d}"
         # A stream of its own, so that a test does not depend on how many come before it.
-        own = np.random.default_rng([arguments.seed, int(which)])
-        planted = make_test(own, arguments.out / "tests" / name, cases[which], arguments)
+        planted, attempt = None, 0
+        while planted is None:
+            own = np.random.default_rng([arguments.seed, int(which)] + [attempt] * (attempt > 0))
+            planted = make_test(own, arguments.out / "tests" / name, cases[which], arguments)
+            attempt += 1
         params = planted[0][1] if len(planted) == 1 else {key: values for key, values in planted}
         truths.append({"name": name, "effects": [key for key, _ in planted], "params": params})
         print(name, flush=True)

@@ -286,7 +286,7 @@ pub fn render_rows(rows: &[Row]) -> String {
     }
     if compared {
         text.push_str(
-            "ideal: names what is more than 80 % probable and fits; here a verdict does\n",
+            "ideal: an observer with the very model that made the tests, in a study of 840;\nit names what is more than 80 % probable and fits, the program by its verdict\n",
         );
     }
     text

@@ -66,8 +66,9 @@ const CHANGED: f64 = 0.15;
 
 /// Refuses configurations of which each has fewer than half of its peaks in common with the other, where the bands of
 /// both reach: peaks may be missing in one, where a sensor sits on nodes, or stray, but then most of the other's are
-/// found. Where the peaks
-/// follow each other in order, if farther apart, something was changed on one structure: that is for the diagnosis.
+/// found. Where the peaks follow each other in order, if farther apart, something was changed on one structure, and
+/// where most modes are the same what else there is (harmonics of a contact that rattles, say) belongs to it: that is
+/// for the diagnosis.
 fn same_peaks(observations: &Observations) -> Result<(), GapError> {
     let all = &observations.configurations;
     let peaks: Vec<Vec<f64>> = all.iter().map(peaks_of).collect();
@@ -76,8 +77,9 @@ fn same_peaks(observations: &Observations) -> Result<(), GapError> {
             let within = overlap(&all[second], &all[first]);
             let one = Peaks::new(&peaks[second], &peaks[first], within);
             let other = Peaks::new(&peaks[first], &peaks[second], within);
-            let changed = are_in_order(&other.shared, &one.shared);
-            if !changed && one.are_most_strange() && other.are_most_strange() {
+            let known =
+                are_in_order(&other.shared, &one.shared) || share_modes(&all[first], &all[second]);
+            if !known && one.are_most_strange() && other.are_most_strange() {
                 return Err(GapError::AnotherStructure {
                     first: name_of(observations, first),
                     second: name_of(observations, second),
@@ -89,6 +91,20 @@ fn same_peaks(observations: &Observations) -> Result<(), GapError> {
         }
     }
     Ok(())
+}
+
+/// Modes that two configurations have in common, from which on they show one structure.
+const LEAST_MODES: usize = 3;
+
+/// Whether most modes with a number of either lie where the other has them.
+fn share_modes(one: &Configuration, other: &Configuration) -> bool {
+    let near = |a: f64, b: f64| (a / b - 1.0).abs() <= MOVED;
+    let pairs = one.modes.iter().filter_map(|mode| {
+        let other = other.mode(mode.mode)?;
+        Some((mode.frequency, other.frequency))
+    });
+    let alike = pairs.filter(|&(a, b)| near(a, b)).count();
+    alike >= LEAST_MODES && 2 * alike > one.modes.len().max(other.modes.len())
 }
 
 /// The peaks of one configuration where another looked too.

@@ -1,6 +1,6 @@
 //! What was found, in five lines for a terminal.
 
-use super::document::Document;
+use super::document::{Document, GapVerdictSection};
 use super::format::{signed_or_below, significant};
 use super::summary::{channels, described, most_missed};
 use super::tables::{Parameter, estimated, has_joint, quality_count};
@@ -108,16 +108,32 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 
 fn model(document: &Document) -> Option<String> {
     let worst = most_missed(document)?;
-    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
-        let effects = gap.verdict.effects.join(", ");
-        let colon = if effects.is_empty() { "" } else { ": " };
-        format!("; gap: {}{colon}{effects}", gap.verdict.kind)
-    });
+    let gap = document
+        .gap
+        .as_ref()
+        .map_or_else(String::new, |gap| format!("; {}", missing(&gap.verdict)));
     Some(format!(
         "largest frequency error of the model {} % (mode {}){gap}",
         signed_or_below(worst.error_percent?),
         worst.mode
     ))
+}
+
+/// What the diagnosis answers, in a few words.
+fn missing(verdict: &GapVerdictSection) -> String {
+    let listed = |last: &str| match verdict.effects.split_last() {
+        Some((one, others)) if !others.is_empty() => {
+            format!("{} {last} {one}", others.join(", "))
+        }
+        _ => verdict.effects.join(""),
+    };
+    match verdict.kind.as_str() {
+        "no-gap" => "no gap is established".to_owned(),
+        "named" => format!("missing in it: {}", listed("and")),
+        "group" | "set" => format!("missing in it: {}", listed("or")),
+        "unknown" => "missing in it: something unknown".to_owned(),
+        _ => "too few readings to tell what is missing in it".to_owned(),
+    }
 }
 
 fn doubts(document: &Document) -> Option<String> {

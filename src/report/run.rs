@@ -228,7 +228,8 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
             "gap-place",
             draw_place_map(document),
             live_place_map(document),
-            "Where along the beam a local change of stiffness or of mass would explain the errors."
+            "Where along the beam a local change of stiffness or of mass would explain the errors; \
+             bars: one standard deviation."
                 .to_owned(),
         ),
     ];

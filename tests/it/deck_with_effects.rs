@@ -179,6 +179,30 @@ fn limit_what_has_no_element_is_refused_by_name() {
     }
 }
 
+/// Stiffness goes with the cube of an element's length, and a deck has ten digits: beside a node of an even mesh an
+/// element could be a thousandth of its neighbours, and the lowest frequency be off by 1e-5.
+#[test]
+fn prop_no_element_is_much_shorter_than_the_others() {
+    for position in [0.1, 0.2, 0.201, 0.2013, 0.29999, 0.31] {
+        let mass = effect("added-mass", &format!("mass = 0.02\nposition = {position}"));
+        let deck = deck(HELD, &[mass]).unwrap();
+        assert!(
+            deck.nodes
+                .iter()
+                .any(|node| (node - position).abs() < 1e-12)
+        );
+        let lengths: Vec<f64> = deck.nodes.windows(2).map(|two| two[1] - two[0]).collect();
+        let shortest = lengths.iter().copied().fold(f64::INFINITY, f64::min);
+        let longest = lengths.iter().copied().fold(0.0, f64::max);
+        // Each stretch is divided evenly, into elements of at most a given length: of two or more none is below the
+        // half of it.
+        assert!(
+            shortest >= 0.5 * longest,
+            "{position}: {shortest} {longest}"
+        );
+    }
+}
+
 #[test]
 fn prop_no_two_elements_of_a_deck_have_one_number() {
     let all = [

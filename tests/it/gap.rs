@@ -242,6 +242,37 @@ fn regress_modes_that_only_some_bands_reach_are_tested() {
     ));
 }
 
+/// A contact that rattles makes harmonics of the lowest mode, others in each recording.
+#[test]
+fn regress_harmonics_beside_the_same_modes_are_no_other_structure() {
+    let mut observed = read(&PAPER, |f| Some(1e-3 * f));
+    let lowest = observed.configurations[0].modes[0].frequency;
+    let harmonics = |of: f64| {
+        (2..9).map(move |k| ExtraPeak {
+            frequency: of * f64::from(k),
+            std: Some(0.01),
+            level_db: None,
+            constant: None,
+            label: UNPAIRED.to_owned(),
+        })
+    };
+    let mut harder = observed.configurations[0].clone();
+    observed.configurations[0].extra_peaks = harmonics(lowest).collect();
+    harder.extra_peaks = harmonics(1.2 * lowest).collect();
+    observed.configurations.push(harder);
+    let begin = strip_on_springs(1.0, Some(0.004));
+    let diagnosed = |observed: &Observations| diagnose(observed, &begin, &GapSettings::default());
+    assert!(diagnosed(&observed).is_ok());
+    // Without the modes in common the same peaks are those of two structures.
+    for mode in &mut observed.configurations[1].modes {
+        mode.frequency *= 1.22;
+    }
+    assert!(matches!(
+        diagnosed(&observed),
+        Err(GapError::AnotherStructure { .. })
+    ));
+}
+
 #[test]
 fn regress_two_bands_of_one_structure_are_no_two_structures() {
     let peak = |frequency: f64| ExtraPeak {

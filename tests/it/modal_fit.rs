@@ -273,6 +273,48 @@ fn recover_a_second_mode_only_where_there_is_one() {
     assert_eq!(mistaken, 0);
 }
 
+/// A mode whose frequency falls by a tenth of its half-power width at the hardest of taps of very different strength,
+/// seen by two sensors: two poles mend its line, and share each tap as its strength has it, but have one shape.
+#[test]
+fn regress_a_mode_that_changes_with_the_taps_strength_is_no_second_shape() {
+    let (rate, samples, frequency, damping) = (512.0, 2048usize, 125.0, 0.002);
+    let changing = |strength: f64, shape: f64, random: &mut ChaCha8Rng| -> Vec<f64> {
+        let mut phase = 0.4;
+        let level = |time: f64| strength * (-TAU * frequency * damping * time).exp();
+        (0..samples)
+            .map(|n| {
+                let now = level(n as f64 / rate);
+                let noise: f64 = StandardNormal.sample(random);
+                let value = shape * now * f64::cos(phase) + 1e-4 * noise;
+                phase += TAU * (frequency - 0.1 * now) / rate;
+                value
+            })
+            .collect()
+    };
+    let mut tried = 0;
+    for seed in 0..5 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let taps: Vec<Vec<Vec<f64>>> = [1.0, 0.2, 0.5, 0.1, 0.7]
+            .map(|strength| {
+                let sensors = [1.0, -0.6];
+                sensors
+                    .map(|shape| changing(strength, shape, &mut random))
+                    .to_vec()
+            })
+            .to_vec();
+        let data = collect(&taps, rate, &[(100.0, 150.0)]);
+        let accepted = [start((frequency, damping), 0.0)];
+        let extra = start((frequency - 0.1, 2.0 * damping), 0.0);
+        let found = beside(&data, &accepted, extra, &FitSettings::default());
+        tried += usize::from(found.verdict == ExtraVerdict::Needed);
+        if let Some(likeness) = found.likeness {
+            assert!(likeness > 0.99, "seed {seed}: {found:?}");
+        }
+    }
+    // Else nothing was tested.
+    assert!(tried > 0);
+}
+
 #[test]
 fn recover_the_scatter_of_taps() {
     let mut covered = 0;

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::data::ModalData;
+use super::data::{Basis, ModalData};
 use super::local::{GroupFit, Local};
 use super::result::{ModeFit, report};
 use super::sweep::{Group, Sweeper};
@@ -22,9 +22,11 @@ pub struct ExtraMode {
     pub information_gain: f64,
     /// Size of its amplitudes over their standard deviation, root of the mean square over the columns.
     pub amplitude_over_std: f64,
-    /// Likeness of its amplitudes to those of the nearest other mode of its group (modal assurance
-    /// criterion over all columns); `None` without such a mode, or with one column. Near 1 the second pole
-    /// may only mend a line that is no straight decay: one mode whose frequency changes while it rings.
+    /// Likeness of its shape to that of the nearest other mode of its group: the modal assurance criterion over the
+    /// sensors of a decay, mean of all taps, of functions over all columns; `None` without such a mode, or with one
+    /// sensor. Near 1 the second pole may only mend a line that is no straight decay: one mode whose frequency
+    /// changes while it rings. How the two share a tap depends then on the tap's strength, and is no sign of another
+    /// shape.
     pub likeness: Option<f64>,
     /// Its fit together with the others, where there is one.
     pub fit: Result<ModeFit, Unfit>,
@@ -142,7 +144,7 @@ impl<'a> Accepted<'a> {
             probability,
             information_gain,
             amplitude_over_std,
-            likeness: likeness(&group.fit, inside),
+            likeness: likeness(self.sweeper.data, &group.fit, inside),
             fit,
         }
     }
@@ -197,8 +199,9 @@ fn over_std(mode: &ModeFit) -> f64 {
     (squares.sum::<f64>() / mode.amplitudes.len().max(1) as f64).sqrt()
 }
 
-/// |sum conj(b) c|^2/(sum |b|^2 sum |c|^2) with the nearest pole of the group, in units of noise.
-fn likeness(fit: &GroupFit, place: usize) -> Option<f64> {
+/// sum_t |sum_s conj(b) c|^2/(sum_t sum_s |b|^2 sum_s |c|^2) over taps t and sensors s with the nearest pole of the
+/// group, in units of noise. Functions of places or groups of taps count together: their places are part of a shape.
+fn likeness(data: &ModalData, fit: &GroupFit, place: usize) -> Option<f64> {
     let poles = &fit.at.poles;
     let distance = |other: &usize| (poles[*other] - poles[place]).norm();
     let nearest = (0..poles.len())
@@ -211,10 +214,23 @@ fn likeness(fit: &GroupFit, place: usize) -> Option<f64> {
             amplitudes[(2 * pole + 1, column)],
         )
     };
-    let columns = fit.used.len();
-    let product: Complex64 = (0..columns)
-        .map(|c| of(place, c).conj() * of(nearest, c))
-        .sum();
-    let power = |pole: usize| (0..columns).map(|c| of(pole, c).norm_sqr()).sum::<f64>();
-    (columns > 1).then(|| product.norm_sqr() / (power(place) * power(nearest)))
+    let tap = |column: usize| match data.basis() {
+        Basis::FreeDecay { .. } => data.columns()[fit.used[column]].tap,
+        Basis::FrequencyResponse { .. } => 0,
+    };
+    let columns: Vec<usize> = (0..fit.used.len()).collect();
+    let (mut alike, mut whole) = (0.0, 0.0);
+    for shape in columns.chunk_by(|a, b| tap(*a) == tap(*b)) {
+        if shape.len() < 2 {
+            continue;
+        }
+        let product: Complex64 = shape
+            .iter()
+            .map(|&c| of(place, c).conj() * of(nearest, c))
+            .sum();
+        let power = |pole: usize| shape.iter().map(|&c| of(pole, c).norm_sqr()).sum::<f64>();
+        alike += product.norm_sqr();
+        whole += power(place) * power(nearest);
+    }
+    (whole > 0.0).then(|| alike / whole)
 }

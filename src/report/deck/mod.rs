@@ -254,19 +254,30 @@ fn scalar_springs(
 }
 
 impl Deck {
-    /// Nodes at equal distances and at these places; elements of each beam between its own nodes.
+    /// Nodes at these places and at equal distances between them: a short element beside a node of a regular mesh
+    /// would cost digits. Elements of each beam between its own nodes.
     fn mesh(&mut self, beams: &[Beam], at: &[f64]) {
         let length: f64 = beams.iter().map(|beam| beam.length).sum();
+        let longest = length / ELEMENTS as f64;
         let mut from = 0.0;
         for beam in beams {
             let to = from + beam.length;
-            let count = (beam.length / length * ELEMENTS as f64).ceil().max(1.0) as usize;
-            let mut places: Vec<f64> = (0..=count)
-                .map(|index| from + beam.length * index as f64 / count as f64)
-                .collect();
-            places.extend(at.iter().filter(|place| (from..=to).contains(*place)));
-            places.sort_by(f64::total_cmp);
-            places.dedup_by(|a, b| (*a - *b).abs() < SAME * length);
+            let inside = at
+                .iter()
+                .filter(|place| (from..=to).contains(*place))
+                .copied();
+            let mut ends: Vec<f64> = inside.chain([from, to]).collect();
+            ends.sort_by(f64::total_cmp);
+            ends.dedup_by(|a, b| (*a - *b).abs() < SAME * length);
+            let between = |pair: &[f64]| {
+                // A little more than whole, by rounding, is whole.
+                let count = ((pair[1] - pair[0]) / longest - 1e-6).ceil().max(1.0) as usize;
+                let step = (pair[1] - pair[0]) / count as f64;
+                let start = pair[0];
+                (0..count).map(move |index| start + step * index as f64)
+            };
+            let places = ends.windows(2).flat_map(between);
+            let places: Vec<f64> = places.chain(ends.last().copied()).collect();
             let first = self.nodes.len();
             self.nodes.extend(places);
             self.pieces.push(DeckPiece {

@@ -161,7 +161,10 @@ fn draw_heading(drawing: &mut Drawing, number: usize, curve: &AmplitudeCurve, y:
 
 fn verdict(curve: &AmplitudeCurve) -> (String, Color) {
     match curve.verdict {
-        AmplitudeVerdict::Changes => (format!("change from loud to soft: {}", changes(curve)), INK),
+        AmplitudeVerdict::Changes if is_seen_at_the_ends(curve) => {
+            (format!("change from loud to soft: {}", changes(curve)), INK)
+        }
+        AmplitudeVerdict::Changes => (format!("at half the amplitude: {}", slopes(curve)), INK),
         AmplitudeVerdict::Steady => (
             format!("no change beyond its uncertainty: {}", changes(curve)),
             SOFT,
@@ -178,9 +181,33 @@ fn verdict(curve: &AmplitudeCurve) -> (String, Color) {
     }
 }
 
+/// Whether the change between the largest and the smallest amplitude is beyond its bound, in frequency or damping:
+/// where the softest pieces drown in noise a slope may be certain, and the ends are not.
+fn is_seen_at_the_ends(curve: &AmplitudeCurve) -> bool {
+    let trends = [&curve.frequency, &curve.damping];
+    let mut trends = trends.into_iter().flatten();
+    trends.any(|trend| trend.change.abs() > trend.change_bound)
+}
+
+/// From the largest to the smallest amplitude, with its 95 % bound.
 fn changes(curve: &AmplitudeCurve) -> String {
+    said(curve, |trend| (trend.change, trend.change_bound))
+}
+
+/// By the slopes of the straight lines, for a halved amplitude, with 95 % bounds (normal distribution: a line
+/// leaves many degrees of freedom).
+fn slopes(curve: &AmplitudeCurve) -> String {
+    let half = 0.5f64.ln();
+    said(curve, |trend| {
+        (half * trend.slope, 1.96 * half.abs() * trend.slope_std)
+    })
+}
+
+/// "frequency +0.32 ± 0.01 Hz, damping ratio −0.14 ± 0.01 %".
+fn said(curve: &AmplitudeCurve, of: impl Fn(&Trend) -> (f64, f64)) -> String {
     let part = |name: &str, trend: Option<&Trend>, factor: f64, unit: &str| {
-        let (change, bound) = trend.map(|t| (factor * t.change, factor * t.change_bound))?;
+        let (change, bound) = of(trend?);
+        let (change, bound) = (factor * change, factor * bound);
         // As many decimals as the bound's two leading digits have.
         let decimals = (1.0 - bound.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize;
         let unit_of_last = 10f64.powi(decimals as i32);

@@ -8,6 +8,9 @@ use super::palette::{BLUE, INK, VERMILION};
 use super::panel::{Panel, Sample, X_SPACING, crisp, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
 
+/// How far a bar stands beside its point (px).
+const BESIDE: f64 = 3.0;
+
 /// Local change of stiffness and mass along the beam; `None` without a map.
 pub fn draw_place_map(document: &Document) -> Option<Drawing> {
     let map = document.gap.as_ref()?.map.as_ref()?;
@@ -43,7 +46,9 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
         Stroke::new(INK, 1.0),
     );
     panel.draw_frame(&mut drawing);
-    for (values, stds, color, _) in curves {
+    for (k, (values, stds, color, _)) in curves.into_iter().enumerate() {
+        // Bars of two curves at one place would hide each other.
+        let aside = BESIDE * (2.0 * k as f64 - 1.0);
         let points: Vec<Point> = map
             .positions
             .iter()
@@ -53,7 +58,7 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
         for ((at, value), std) in points.iter().zip(values.iter()).zip(stds.iter()) {
             let ends = [value - std, value + std].map(|end| panel.y.place(100.0 * end));
             drawing.line(
-                vec![(at.0, ends[0]), (at.0, ends[1])],
+                vec![(at.0 + aside, ends[0]), (at.0 + aside, ends[1])],
                 Stroke::new(color, 1.0),
             );
         }

@@ -7,7 +7,7 @@ use super::super::document::{
 };
 use super::super::format::{RIGID, prefix, probability, signed_percent, significant, trimmed};
 use super::has_joint;
-use super::hypotheses::{left, percent};
+use super::hypotheses::{left, percent, together};
 use super::next_tests::next_test;
 use super::verdict::{named, verdict};
 use crate::stats::times;
@@ -106,7 +106,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     };
     let mut text = format!(
         "How far: with {} the errors {shrink} from {} to {} % (rms over fitted frequencies)",
-        found.effect,
+        together(&found.effect),
         percent(found.gap_before),
         left(found.gap_after, gap.noise_floor),
     );

@@ -80,7 +80,7 @@ fn recordings(gap: &GapSection) -> usize {
 
 fn row(found: &HypothesisSection, floor: Option<f64>) -> Vec<String> {
     vec![
-        found.effect.clone(),
+        together(&found.effect),
         probability(found.probability),
         left(found.gap_after, floor),
         left(found.withheld_after, floor),
@@ -102,14 +102,30 @@ fn looks_like(names: &[String]) -> String {
     }
 }
 
-/// "mass 24.10 ± 0.30 g".
+/// "local-crack + joint-nonlinearity": both names of two effects, which a line may be broken between.
+pub(super) fn together(effect: &str) -> String {
+    effect.replace('+', " + ")
+}
+
+/// "mass 24.10 ± 0.30 g"; of two effects "local-crack: compliance ..., position ...; sensor-mass: mass ...".
 pub(super) fn sizes(found: &HypothesisSection) -> String {
-    let parts: Vec<String> = found
-        .parameters
+    let mut of_effects: Vec<(&str, Vec<String>)> = Vec::new();
+    for (name, parameter) in &found.parameters {
+        let (effect, own) = name.split_once('.').unwrap_or(("", name));
+        let part = size(own, parameter);
+        match of_effects.last_mut().filter(|last| last.0 == effect) {
+            Some(last) => last.1.push(part),
+            None => of_effects.push((effect, vec![part])),
+        }
+    }
+    let parts: Vec<String> = of_effects
         .iter()
-        .map(|(name, parameter)| size(name, parameter))
+        .map(|(effect, parts)| match *effect {
+            "" => parts.join(", "),
+            effect => format!("{effect}: {}", parts.join(", ")),
+        })
         .collect();
-    parts.join(", ")
+    parts.join("; ")
 }
 
 fn size(name: &str, parameter: &ParameterSection) -> String {
@@ -126,7 +142,7 @@ fn size(name: &str, parameter: &ParameterSection) -> String {
 
 /// The unit a parameter is read in, and how many of it one SI unit is.
 fn unit_of(name: &str) -> (&'static str, f64) {
-    match name.rsplit('.').next().unwrap_or(name) {
+    match name {
         "mass" => (" g", 1e3),
         "inertia" => (" kg mm\u{b2}", 1e6),
         "position" => (" mm", 1e3),
@@ -173,5 +189,32 @@ mod tests {
         assert_eq!(looks_like(&names[..0]), "");
         assert_eq!(looks_like(&names[..5]), "a, b, c, d, e");
         assert_eq!(looks_like(&names), "a, b, c, d and 3 more");
+    }
+
+    #[test]
+    fn limit_sizes_of_two_effects_stand_under_their_names() {
+        let parameter = |value: f64| ParameterSection {
+            value,
+            std: None,
+            ..ParameterSection::default()
+        };
+        let of = |names: &[(&str, f64)]| {
+            let parameters = names
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), parameter(*value)));
+            sizes(&HypothesisSection {
+                parameters: parameters.collect(),
+                ..HypothesisSection::default()
+            })
+        };
+        assert_eq!(of(&[("mass", 0.024)]), "mass 24.0 g");
+        let two = [
+            ("local-crack.compliance", 0.01),
+            ("local-crack.position", 0.2),
+            ("sensor-mass.mass", 0.024),
+        ];
+        let words =
+            "local-crack: compliance 0.0100 L/EI, position 200 mm; sensor-mass: mass 24.0 g";
+        assert_eq!(of(&two), words);
     }
 }

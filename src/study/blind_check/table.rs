@@ -47,6 +47,9 @@ pub struct Row {
     pub ideal: Option<f64>,
 }
 
+/// The figure that counts tests.
+const NO_ANSWER: &str = "no_answer";
+
 /// All figures in the order of reading, of tests of this extent; of tests made elsewhere (`None`) beside what is aimed
 /// at with five recordings. With one recording nothing is aimed at but what an ideal observer reaches.
 pub fn rows(scores: &Scores, extent: Option<Extent>) -> Vec<Row> {
@@ -177,7 +180,7 @@ fn figures(scores: &Scores) -> [Row; 8] {
     let (median, tenth) = (scores.closure.map(|c| c.0), scores.closure.map(|c| c.1));
     [
         figure(
-            "no_answer",
+            NO_ANSWER,
             "tests that could not be diagnosed",
             (scores.counts.iter().sum::<usize>() > 0).then_some(scores.failed as f64),
             AtMost(0.0),
@@ -263,7 +266,7 @@ pub fn render_rows(rows: &[Row]) -> String {
     for row in rows {
         let value = row
             .value
-            .map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+            .map_or_else(|| "-".to_owned(), |v| format!("{v:.0$}", decimals(row, 3)));
         let interval = row
             .interval
             .map_or_else(String::new, |(low, high)| format!("{low:.3} to {high:.3}"));
@@ -292,6 +295,11 @@ pub fn render_rows(rows: &[Row]) -> String {
     text
 }
 
+/// A number of tests is whole; all else has so many decimals.
+fn decimals(row: &Row, usual: usize) -> usize {
+    if row.key == NO_ANSWER { 0 } else { usual }
+}
+
 fn is_missed(row: &Row) -> bool {
     row.value.is_some_and(|value| !row.target.is_met(value))
 }
@@ -302,5 +310,6 @@ fn target_text(row: &Row) -> String {
         Target::AtMost(limit) => ("<=", limit),
         Target::None => return String::new(),
     };
-    format!("{sign}{limit:.2}{}", if is_missed(row) { "!" } else { "" })
+    let missed = if is_missed(row) { "!" } else { "" };
+    format!("{sign}{limit:.0$}{missed}", decimals(row, 2))
 }

@@ -69,7 +69,8 @@ pub(super) struct BlindCheckArguments {
     #[arg(long, value_name = "DIR", requires = "truth")]
     folder: Option<PathBuf>,
     /// What was planted in them: JSON list of {"name", "effects", "params"}, and if that is known
-    /// "detectable" and "refutable" (true or false), as --keep writes them
+    /// "detectable" and "refutable" (true or false), as --keep writes them; parameters of two effects
+    /// in braces, {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,
     /// Keep the drawn tests in this new folder, each with its recordings and its description, and beside

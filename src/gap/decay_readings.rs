@@ -111,7 +111,11 @@ impl Frame {
                 _ => continue,
             };
             let felt = sensitivity(&solved[configuration], mode) * largest[configuration];
-            widen(&mut self.readings[row], shared * felt / folds);
+            let tones = match self.rows[row] {
+                Row::Slope { .. } => self.tones(configuration, mode),
+                _ => 1.0,
+            };
+            widen(&mut self.readings[row], tones * shared * felt / folds);
         }
         for (row, reading) in &mut self.withheld {
             if let Row::Frequency {
@@ -123,6 +127,16 @@ impl Frame {
                 widen(reading, shared * felt);
             }
         }
+    }
+
+    /// How much more than its own motion the others' may disturb the slope of a mode, 1 at least. A joint whose
+    /// stiffness changes makes tones at sums and differences of the modes' frequencies, in proportion to the amplitudes
+    /// of those that make them. One near a mode rings with it, and pulls its frequency by what the joint changes times
+    /// the ratio of the amplitudes: a mode that hardly turns the joint is pulled most.
+    fn tones(&self, configuration: usize, mode: usize) -> f64 {
+        let path = self.setups[configuration].path.as_ref();
+        let ratio = path.and_then(|path| path.others_over_own(mode));
+        ratio.map_or(1.0, |ratio| ratio.max(1.0))
     }
 
     /// Largest change of ln kr along the followed decays of a configuration.

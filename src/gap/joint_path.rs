@@ -141,6 +141,15 @@ impl JointPath {
         self.modes.iter().position(|one| one.mode == mode)
     }
 
+    /// Largest rotation that another mode begins with over the own one; `None` of a mode whose amplitude is not known.
+    pub(super) fn others_over_own(&self, mode: usize) -> Option<f64> {
+        let place = self.place(mode)?;
+        let others = self.modes.iter().enumerate().filter(|(k, _)| *k != place);
+        let largest = others.map(|(_, m)| m.amplitude.abs()).fold(0.0, f64::max);
+        let ratio = largest / self.modes[place].amplitude.abs();
+        ratio.is_finite().then_some(ratio)
+    }
+
     /// Relative change of the stiffness that a mode feels at a time (s) after its decay began.
     fn change_at(&self, place: usize, time: f64, law: &JointLaw) -> f64 {
         let motion = |m: &ModePath| ModeMotion {

@@ -218,7 +218,7 @@ impl Check {
                 "mass-loading",
                 DEVIATIONS,
                 "The sensor's mass lowers the modes that move where it sits, or the joint changed between the recordings.",
-                "State the sensor's mass in the description so that the model carries it, take a lighter sensor, or place it near the joint.",
+                "State the sensors' masses in the description: the model carries those that it states, and then this is no fault. Else take a lighter sensor, or place it near the joint.",
             ),
         }
     }

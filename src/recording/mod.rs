@@ -63,6 +63,9 @@ use health::HealthMeter;
 use source::Source;
 use warning::health_warnings;
 
+/// Relative difference to a header's factor below which a scale states the same unit: a rounded 9.81 is another.
+const SAME_SCALE: f64 = 1e-6;
+
 /// What the caller knows about a file that the file may not say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ReadSettings {
@@ -319,7 +322,12 @@ impl Recording {
             _ => false,
         };
         self.warnings.retain(|warning| !overruled(warning));
-        if let Some(unit) = &info.header_unit {
+        // A scale that turns the sign alone, or states the header's unit once more, overrules nothing.
+        let factor = |unit: &String| channel_unit(unit).map(|known| known.0);
+        let overrules = |unit: &&String| {
+            factor(unit).is_none_or(|factor| (scale.abs() / factor - 1.0).abs() > SAME_SCALE)
+        };
+        if let Some(unit) = info.header_unit.as_ref().filter(overrules) {
             self.warnings.push(RecordingWarning::ScaleOverUnit {
                 channel: channel_label(channel, info),
                 scale,

@@ -243,6 +243,32 @@ fn val_truths_of_tests_made_elsewhere() {
     assert_eq!(truths[3].class(), Some(Class::Unknown));
 }
 
+/// What only one of two effects has needs no braces, nor what names its effect; what both have does.
+#[test]
+fn regress_parameters_of_two_effects_find_their_owner() {
+    let of = |params: &str| {
+        let entry = format!(
+            r#"[{{"name": "a", "effects": ["sensor-mass", "local-crack"], "params": {params}}}]"#
+        );
+        parse_truths(&entry).expect("a list of truths")
+    };
+    let braces = of(
+        r#"{"sensor-mass": {"mass": 0.008}, "local-crack": {"compliance": 0.01, "position": 0.2}}"#,
+    );
+    for params in [
+        r#"{"mass": 0.008, "compliance": 0.01, "position": 0.2}"#,
+        r#"{"sensor-mass.mass": 0.008, "local-crack.compliance": 0.01, "local-crack.position": 0.2}"#,
+        r#"{"mass": 0.008, "local-crack": {"compliance": 0.01}, "position": 0.2}"#,
+    ] {
+        let flat = of(params);
+        assert_eq!(flat.truths[0].effects, braces.truths[0].effects, "{params}");
+        assert!(flat.doubts.is_empty(), "{:?}", flat.doubts);
+    }
+    let text =
+        r#"[{"name": "a", "effects": ["sensor-mass", "added-mass"], "params": {"mass": 0.01}}]"#;
+    assert_eq!(parse_truths(text).unwrap().doubts.len(), 1);
+}
+
 #[test]
 fn regress_a_wrong_truth_file_says_what_is_expected() {
     for (text, expected) in [

@@ -62,8 +62,8 @@ pub enum TruthDoubt {
     },
     /// A parameter that is not used.
     #[error(
-        "the test \"{test}\": `{parameter}` is no parameter with a number of its effects and is left out; \
-         allowed: {allowed}"
+        "the test \"{test}\": `{parameter}` is no parameter with a number of its effects and is left out of the \
+         errors of size; allowed: {allowed}"
     )]
     Parameter {
         /// The test.
@@ -98,6 +98,47 @@ struct Entry {
     unknown: BTreeMap<String, Value>,
 }
 
+impl Entry {
+    /// Gives parameters of several effects to the one that has them: those written as `effect.parameter`, and those
+    /// that only one of the effects knows.
+    fn sort_parameters(&mut self) {
+        let effects: Vec<EffectId> = self
+            .effects
+            .iter()
+            .filter_map(|name| EffectId::parse(name).ok())
+            .collect();
+        if self.effects.len() < 2 {
+            return;
+        }
+        let has = |id: &EffectId, name: &str| id.parameters().iter().any(|info| info.name == name);
+        let flat: Vec<(String, Value)> = self
+            .params
+            .iter()
+            .filter(|(_, value)| value.is_number())
+            .map(|(key, value)| (key.clone(), value.clone()))
+            .collect();
+        for (key, value) in flat {
+            let (effect, name) = match key.split_once('.') {
+                Some((effect, name)) => (Some(effect), name),
+                None => (None, key.as_str()),
+            };
+            let owners = effects
+                .iter()
+                .filter(|id| effect.is_none_or(|effect| id.name() == effect) && has(id, name));
+            let owners: Vec<&EffectId> = owners.collect();
+            let [owner] = owners[..] else { continue };
+            let own = self
+                .params
+                .entry(owner.name().to_owned())
+                .or_insert_with(|| Value::Object(serde_json::Map::new()));
+            if let Value::Object(own) = own {
+                own.entry(name.to_owned()).or_insert(value);
+                self.params.remove(&key);
+            }
+        }
+    }
+}
+
 /// Reads a truth file's text.
 ///
 /// # Errors
@@ -107,7 +148,8 @@ pub fn parse_truths(text: &str) -> Result<TruthFile, TruthError> {
         serde_json::from_str(text).map_err(|source| TruthError::Shape { source })?;
     let mut truths: Vec<Truth> = Vec::new();
     let mut doubts = Vec::new();
-    for entry in entries {
+    for mut entry in entries {
+        entry.sort_parameters();
         if truths.iter().any(|truth| truth.name == entry.name) {
             return Err(TruthError::Twice { name: entry.name });
         }
@@ -190,7 +232,10 @@ fn unused_parameters(entry: &Entry, effects: &[EffectId]) -> Vec<(String, String
             (_, _, []) => unused.push((key.clone(), "none, for nothing was planted".to_owned())),
             _ => {
                 let ids: Vec<&str> = effects.iter().map(|id| id.name()).collect();
-                let allowed = format!("{} with their own parameters in braces", ids.join(", "));
+                let allowed = format!(
+                    "{} with their own parameters in braces, and what only one of them has",
+                    ids.join(", ")
+                );
                 unused.push((key.clone(), allowed));
             }
         }

@@ -195,6 +195,23 @@ fn a_scale_beside_a_unit_wins_with_a_warning() {
 }
 
 #[test]
+fn regress_a_scale_that_turns_the_sign_overrules_no_unit() {
+    let scaled = |scale: f64, header: &str| {
+        let (_file, recording) = open(table(header, ",", ".", "\n"));
+        let mut recording = recording.unwrap();
+        recording.set_scale(0, scale).unwrap();
+        let warnings = recording.warnings();
+        let about = warnings.iter().filter(|w| w.code() == "scale-over-unit");
+        about.count()
+    };
+    assert_eq!(scaled(-1.0, "t,force (N),b"), 0);
+    assert_eq!(scaled(-1000.0, "t,force (kN),b"), 0);
+    // -1 N for every kN is another unit.
+    assert_eq!(scaled(-1.0, "t,force (kN),b"), 1);
+    assert_eq!(scaled(-1.0, "t,force (tons),b"), 1);
+}
+
+#[test]
 fn units_are_told_apart() {
     let known = [
         ("N", 1.0, "N"),

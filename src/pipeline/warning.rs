@@ -96,6 +96,8 @@ pub enum Warning {
         file: String,
         /// Number of every mode that changes, and how.
         changes: Vec<(usize, AmplitudeChange)>,
+        /// Other recordings whose first mode goes the same way, and the modes that change in them.
+        others: Vec<(String, Vec<usize>)>,
     },
     /// The pair regression contradicts its own frequency equation.
     Closure {
@@ -242,9 +244,11 @@ impl fmt::Display for Warning {
                 };
                 write!(f, "{count} {belong} to no mode: {text}")
             }
-            Warning::AmplitudeDependent { file, changes } => {
-                amplitude::write_dependence(f, file, changes)
-            }
+            Warning::AmplitudeDependent {
+                file,
+                changes,
+                others,
+            } => amplitude::write_dependence(f, (file, changes), others),
             Warning::Misfit { .. }
             | Warning::Closure { .. }
             | Warning::CouplingNotEstablished

@@ -1,6 +1,12 @@
 //! The report as one HTML page that needs nothing else.
 
+use std::io::Write;
+
 use askama::Template;
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 
 use super::ReportError;
 use super::document::{Document, RecordingSection, TestSection, WarningSection};
@@ -15,10 +21,21 @@ pub struct InlineFigure {
     pub caption: String,
     /// An `<svg>` element that this crate made.
     pub svg: String,
-    /// The same curves for the page's script, as JSON that may stand in a `script` element.
+    /// The same curves for the page's script, as JSON.
     pub live: Option<String>,
     /// Whether it is so high that in print it takes a page of its own.
     pub tall: bool,
+}
+
+impl InlineFigure {
+    /// The curves as they stand in the page: deflated, since numbers take up most of it, and in base 64. Browsers
+    /// inflate them by themselves; one that cannot shows the picture.
+    fn packed(&self) -> Option<String> {
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+        // Writing to memory does not fail; the picture would stand still.
+        encoder.write_all(self.live.as_ref()?.as_bytes()).ok()?;
+        Some(BASE64_STANDARD.encode(encoder.finish().ok()?))
+    }
 }
 
 /// The plotting library, its style and the page's own script, all inside the page: a report opens

@@ -348,9 +348,3 @@ fn live_mark(peak: &PeakMark) -> Option<LiveMark> {
         mode: peak.mode.is_some(),
     })
 }
-
-/// The plot as JSON that can stand inside a `script` element.
-pub(super) fn script_json(plot: &impl Serialize) -> Result<String, serde_json::Error> {
-    // Only a slash or a comment's beginning after < could end the element.
-    Ok(serde_json::to_string(plot)?.replace('<', "\\u003c"))
-}

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::document::Document;
 use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
-use super::live::{LivePlot, live_frf, live_spectrum, live_taps, script_json};
+use super::live::{LivePlot, live_frf, live_spectrum, live_taps};
 use super::live_amplitude::live_amplitude;
 use super::live_model::{live_frequencies, live_gap, live_place_map, live_shapes};
 use super::live_points::{LivePoints, live_cloud, live_stabilisation};
@@ -163,7 +163,7 @@ fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), Report
         live: picture
             .live
             .as_ref()
-            .map(script_json)
+            .map(serde_json::to_string)
             .transpose()
             .map_err(ReportError::Json)?,
     };

@@ -4,6 +4,11 @@
 //! do and writes down what came of it. Without a Chromium these tests say so and pass.
 
 use super::{samples, tapjoint};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use flate2::Compression;
+use flate2::read::ZlibDecoder;
+use flate2::write::ZlibEncoder;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -61,6 +66,8 @@ const VISITOR: &str = r#"
     return draw.apply(this, arguments);
   };
   async function visit() {
+    // The page unpacks its curves before they are drawn.
+    for (var turn = 0; turn < 100 && !document.querySelector("figure.live"); turn++) await wait(50);
     await wait(200);
     var figures = document.querySelectorAll("figure.curves");
     seen.figures = figures.length;
@@ -140,19 +147,6 @@ const VISITOR: &str = r#"
 </script>
 "#;
 
-/// Makes the spectra of the first recording ten thousand times smaller before the page draws them.
-const TINY: &str = r#"<script>
-(function () {
-  var figures = Array.from(document.querySelectorAll("figure.curves > script"));
-  var first = figures.filter(function (script) { return JSON.parse(script.textContent).kind === "spectrum"; })[0];
-  var plot = JSON.parse(first.textContent);
-  plot.panels.forEach(function (panel) {
-    panel.series.forEach(function (one) { one.values = one.values.map(function (v) { return v === null ? v : v * 1e-4; }); });
-  });
-  first.textContent = JSON.stringify(plot);
-})();
-</script>"#;
-
 /// A page that shows the report in a frame, because a browser's window has a least width.
 const FRAME: &str = r#"<!DOCTYPE html><meta name="color-scheme" content="light dark"><body>
 <iframe src="report.html" style="width: WIDTHpx; height: 900px; border: 0"></iframe>
@@ -221,6 +215,39 @@ fn visited(chromium: &Path, page: &Path, width: u32, dark: bool) -> (Value, Stri
     (serde_json::from_str(&written).unwrap(), console)
 }
 
+/// The curves of a figure as the page holds them: JSON, deflated, in base 64.
+fn unpacked(text: &str) -> Value {
+    let bytes = BASE64_STANDARD.decode(text).unwrap();
+    serde_json::from_reader(ZlibDecoder::new(bytes.as_slice())).unwrap()
+}
+
+fn packed(plot: &Value) -> String {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    serde_json::to_writer(&mut encoder, plot).unwrap();
+    BASE64_STANDARD.encode(encoder.finish().unwrap())
+}
+
+/// The page with the spectra of the first recording ten thousand times smaller.
+fn with_tiny_spectra(html: &str) -> String {
+    const OPEN: &str = "<script type=\"text/plain\">";
+    let texts = html.split(OPEN).skip(1);
+    let texts = texts.map(|rest| rest.split_once("</script>").unwrap().0);
+    let (text, mut plot) = texts
+        .map(|text| (text, unpacked(text)))
+        .find(|(_, plot)| plot["kind"] == "spectrum")
+        .unwrap();
+    for panel in plot["panels"].as_array_mut().unwrap() {
+        for series in panel["series"].as_array_mut().unwrap() {
+            for value in series["values"].as_array_mut().unwrap() {
+                if let Some(number) = value.as_f64() {
+                    *value = Value::from(1e-4 * number);
+                }
+            }
+        }
+    }
+    html.replace(text, &packed(&plot))
+}
+
 /// The page of the sample with the visitor's script, in a folder of its own.
 fn page_with_visitor() -> (tempfile::TempDir, PathBuf) {
     let folder = samples();
@@ -231,7 +258,7 @@ fn page_with_visitor() -> (tempfile::TempDir, PathBuf) {
     );
     let file = folder.path().join("report/report.html");
     let html = std::fs::read_to_string(&file).unwrap();
-    let html = html.replace("</main>", &format!("</main>{TINY}"));
+    let html = with_tiny_spectra(&html);
     let (head, tail) = html.rsplit_once("</body>").unwrap();
     std::fs::write(&file, format!("{head}{VISITOR}</body>{tail}")).unwrap();
     (folder, file)

@@ -153,6 +153,11 @@ enum Way {
 }
 
 impl AmplitudeChange {
+    /// Change of the frequency, as a share of it.
+    fn size(&self) -> f64 {
+        ((self.frequency[1] - self.frequency[0]) / self.frequency[0]).abs()
+    }
+
     /// By the signs of what changes beyond its bounds.
     fn way(&self) -> Way {
         let sign = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
@@ -204,26 +209,59 @@ fn decimals(value: f64) -> usize {
     (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
 }
 
-/// One warning for each recording with modes that change.
+/// One warning for the recordings whose modes change, with the one that changes most; another where the first mode of
+/// some goes another way.
 pub(in crate::pipeline) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<Warning> {
-    let warning = |recording: &RecordingResult| {
+    let of_recording = |recording: &RecordingResult| {
         let spectra = recording.measurement.spectra.as_ref()?;
         let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
-        let changes: Vec<(usize, AmplitudeChange)> = numbered
+        let changes: Changes = numbered
             .filter_map(|(reading, &mode)| Some((mode?, AmplitudeChange::of(reading, recording)?)))
             .collect();
-        (!changes.is_empty()).then(|| Warning::AmplitudeDependent {
-            file: recording.file.clone(),
+        (!changes.is_empty()).then(|| (recording.file.clone(), changes))
+    };
+    by_way(recordings.iter().filter_map(of_recording).collect())
+}
+
+/// Numbers of modes, and how each changes.
+type Changes = Vec<(usize, AmplitudeChange)>;
+
+fn by_way(all: Vec<(String, Changes)>) -> Vec<Warning> {
+    let way = |one: &(String, Changes)| one.1.first().map(|(_, change)| change.way());
+    let mut groups: Vec<Vec<(String, Changes)>> = Vec::new();
+    for one in all {
+        match groups.iter_mut().find(|group| way(&group[0]) == way(&one)) {
+            Some(group) => group.push(one),
+            None => groups.push(vec![one]),
+        }
+    }
+    let most = |one: &(String, Changes)| {
+        let sizes = one.1.iter().map(|(_, change)| change.size());
+        sizes.fold(0.0, f64::max)
+    };
+    let warning = |mut group: Vec<(String, Changes)>| {
+        // The first of equal ones.
+        let worst = (0..group.len())
+            .rev()
+            .max_by(|&a, &b| most(&group[a]).total_cmp(&most(&group[b])))?;
+        let (file, changes) = group.remove(worst);
+        let modes = |changes: Changes| changes.into_iter().map(|(mode, _)| mode).collect();
+        Some(Warning::AmplitudeDependent {
+            file,
             changes,
+            others: group
+                .into_iter()
+                .map(|(file, changes)| (file, modes(changes)))
+                .collect(),
         })
     };
-    recordings.iter().filter_map(warning).collect()
+    groups.into_iter().filter_map(warning).collect()
 }
 
 pub(super) fn write_dependence(
     f: &mut fmt::Formatter<'_>,
-    file: &str,
-    changes: &[(usize, AmplitudeChange)],
+    (file, changes): (&str, &[(usize, AmplitudeChange)]),
+    others: &[(String, Vec<usize>)],
 ) -> fmt::Result {
     let named: Vec<String> = changes
         .iter()
@@ -244,7 +282,17 @@ pub(super) fn write_dependence(
     f.write_str(
         "; a recording at a second tap level would confirm it, and frequencies should be stated with their amplitude, \
          or taken from softer taps",
-    )
+    )?;
+    let other = |(file, modes): &(String, Vec<usize>)| {
+        let numbers: Vec<String> = modes.iter().map(usize::to_string).collect();
+        let plural = if modes.len() == 1 { "" } else { "s" };
+        format!("{file}: mode{plural} {}", numbers.join(", "))
+    };
+    if others.is_empty() {
+        return Ok(());
+    }
+    let listed: Vec<String> = others.iter().map(other).collect();
+    write!(f, " (also {})", listed.join("; "))
 }
 
 /// What makes the modes go as they go. Of several that go the same way it is said of all; where some go another, of the
@@ -323,6 +371,7 @@ mod tests {
             let warning = Warning::AmplitudeDependent {
                 file: "a.wav".into(),
                 changes: vec![(1, change(frequency, damping))],
+                others: Vec::new(),
             };
             let text = warning.to_string();
             assert!(text.contains(cause), "{frequency:?} {damping:?}: {text}");
@@ -334,8 +383,7 @@ mod tests {
         let softer = change([80.0, 80.5], [0.002, 0.002]);
         let stiffer = change([500.5, 500.0], [0.002, 0.002]);
         let text = |changes: Vec<(usize, AmplitudeChange)>| {
-            let file = "a.wav".into();
-            Warning::AmplitudeDependent { file, changes }.to_string()
+            by_way(vec![("a.wav".into(), changes)])[0].to_string()
         };
         let alike = text(vec![(1, softer.clone()), (2, softer.clone())]);
         assert!(
@@ -345,5 +393,29 @@ mod tests {
         let mixed = text(vec![(1, softer.clone()), (2, softer), (3, stiffer)]);
         let told = "2 more modes change with it, 1 of them in another way; mode 1: a joint";
         assert!(mixed.contains(told), "{mixed}");
+    }
+
+    #[test]
+    fn regress_recordings_that_change_alike_are_one_warning() {
+        let softer = change([80.0, 80.5], [0.002, 0.002]);
+        let softest = change([79.0, 80.5], [0.002, 0.002]);
+        let stiffer = change([500.5, 500.0], [0.002, 0.002]);
+        let one = |file: &str, changes: &[(usize, &AmplitudeChange)]| {
+            let own = changes.iter().map(|&(mode, one)| (mode, one.clone()));
+            (file.to_owned(), own.collect())
+        };
+        let found = by_way(vec![
+            one("a.wav", &[(1, &softer), (2, &softer)]),
+            one("b.wav", &[(3, &stiffer)]),
+            one("c.wav", &[(1, &softest)]),
+            one("d.wav", &[(2, &softer)]),
+        ]);
+        let texts: Vec<String> = found.iter().map(ToString::to_string).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        assert!(texts[0].starts_with("c.wav: mode 1 rises"), "{}", texts[0]);
+        let also = "(also a.wav: modes 1, 2; d.wav: mode 2)";
+        assert!(texts[0].ends_with(also), "{}", texts[0]);
+        assert!(texts[1].starts_with("b.wav: mode 3 falls"), "{}", texts[1]);
+        assert!(!texts[1].contains("also"), "{}", texts[1]);
     }
 }

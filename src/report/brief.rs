@@ -3,7 +3,7 @@
 use super::document::{Document, GapVerdictSection};
 use super::format::{signed_or_below, significant};
 use super::summary::{channels, described, most_missed};
-use super::tables::{Parameter, estimated, has_joint, quality_count};
+use super::tables::{Parameter, estimated, has_joint, joint_with, quality_count};
 
 /// At most five lines, each with what it is about; what was not computed has none.
 pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
@@ -108,10 +108,13 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 
 fn model(document: &Document) -> Option<String> {
     let worst = most_missed(document)?;
-    let gap = document
-        .gap
-        .as_ref()
-        .map_or_else(String::new, |gap| format!("; {}", missing(&gap.verdict)));
+    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
+        let with = joint_with(gap).filter(|_| gap.verdict.kind == "named");
+        // A value stays on the line of its name and unit.
+        let with = with.map(|joint| joint.replace(" = ", "\u{a0}=\u{a0}"));
+        let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
+        format!("; {}{with}", missing(&gap.verdict))
+    });
     Some(format!(
         "largest frequency error of the model {} % (mode {}){gap}",
         signed_or_below(worst.error_percent?),

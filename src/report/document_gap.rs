@@ -122,6 +122,17 @@ pub struct GapVerdictSection {
     pub reason: Option<String>,
 }
 
+impl GapVerdictSection {
+    /// Whether this hypothesis is what the verdict names: both of two effects together, or one of several that cannot be
+    /// told apart.
+    pub fn holds(&self, effect: &str) -> bool {
+        match self.kind.as_str() {
+            "named" => self.effects.join("+") == effect,
+            _ => self.effects.iter().any(|one| one == effect),
+        }
+    }
+}
+
 /// Where the gap lies.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct GapPlaceSection {
@@ -298,4 +309,22 @@ pub struct NextTestSection {
     pub bits: f64,
     /// What it costs, in multiples of reading again what is recorded; tests are ranked by bits over this.
     pub effort: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limit_a_verdict_on_two_effects_holds_for_neither_alone() {
+        let verdict = |kind: &str| GapVerdictSection {
+            kind: kind.to_owned(),
+            effects: vec!["local-crack".to_owned(), "sensor-mass".to_owned()],
+            reason: None,
+        };
+        assert!(verdict("named").holds("local-crack+sensor-mass"));
+        assert!(!verdict("named").holds("local-crack"));
+        assert!(verdict("group").holds("local-crack"));
+        assert!(!verdict("group").holds("fixture"));
+    }
 }

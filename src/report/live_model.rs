@@ -172,10 +172,9 @@ fn odds_panel(gap: &GapSection) -> PointPanel {
     let x = PointAxis::of(&linear((0.0, 100.0)), "probability", "%");
     let y = PointAxis::of(&linear((lowest, BAR)), "", "").named(names);
     let bars = |name: &str, color: &str, found: bool| {
-        let named = |effect: &String| gap.verdict.effects.contains(effect);
         let rows = rows
             .iter()
-            .filter(|(_, entry)| named(&entry.effect) == found);
+            .filter(|(_, entry)| gap.verdict.holds(&entry.effect) == found);
         let percent = |probability: f64| (1e5 * probability).round() / 1e3;
         let places = rows
             .clone()

@@ -215,7 +215,7 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
         let bottom = top + step - 12.0;
         drawing.rectangle((ODDS.0, top), (ODDS.1, bottom), GRID, 0.6);
         let end = ODDS.0 + found.probability * (ODDS.1 - ODDS.0);
-        let named = gap.verdict.effects.contains(&found.effect);
+        let named = gap.verdict.holds(&found.effect);
         drawing.rectangle(
             (ODDS.0, top),
             (end, bottom),

@@ -235,14 +235,24 @@ fn price(gap: &GapSection) -> Option<String> {
         return None;
     }
     let moves = parts.join(", ");
-    Some(match found.joint {
-        Some([kt, kr]) => format!(
-            "With it the joint is Kt = {}, Kr = {} ({moves} against the joint without it).",
-            stiffness(kt, "N/m"),
-            stiffness(kr, "N\u{a0}m/rad")
-        ),
+    Some(match joint(found) {
+        Some(joint) => {
+            format!("With it the joint is {joint} ({moves} against the joint without it).")
+        }
         None => format!("Adding it moves the joint: {moves}."),
     })
+}
+
+/// "Kt = 168.2 kN/m, Kr = 205.4 N m/rad": the joint that is found together with what the verdict names; `None` where it
+/// names nothing.
+pub(in crate::report) fn joint_with(gap: &GapSection) -> Option<String> {
+    joint(named(gap).filter(|found| found.effect != "none")?)
+}
+
+fn joint(found: &HypothesisSection) -> Option<String> {
+    let [kt, kr] = found.joint?;
+    let kr = stiffness(kr, "N\u{a0}m/rad");
+    Some(format!("Kt = {}, Kr = {kr}", stiffness(kt, "N/m")))
 }
 
 /// "1.995 MN/m", on one line.

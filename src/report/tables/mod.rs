@@ -17,6 +17,7 @@ mod verdict;
 
 pub use datasets::datasets;
 pub use frfs::frfs;
+pub(super) use gap::joint_with;
 pub use gap::{gap_story, place_of};
 pub use hypotheses::hypotheses;
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};

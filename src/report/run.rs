@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::document::Document;
 use super::figures::RecordingFigure;
-use super::html::{InlineFigure, PageFigures, render_html};
+use super::html::{InlineFigure, PageFigures, packed, render_html};
 use super::live::{LivePlot, live_frf, live_spectrum, live_taps};
 use super::live_amplitude::live_amplitude;
 use super::live_model::{live_frequencies, live_gap, live_place_map, live_shapes};
@@ -160,12 +160,7 @@ fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), Report
         caption: picture.caption.clone(),
         svg: render_svg(&picture.drawing)?,
         tall: picture.drawing.height > picture.drawing.width,
-        live: picture
-            .live
-            .as_ref()
-            .map(serde_json::to_string)
-            .transpose()
-            .map_err(ReportError::Json)?,
+        live: picture.live.as_ref().map(packed).transpose()?,
     };
     let files = [
         file("png", PictureFormat::Png)?,

@@ -80,9 +80,33 @@ fn summary(command: &Command) -> String {
     format!("{} ...", kept[..end].trim_end_matches([',', ':']))
 }
 
+/// What helps with a wrong command line, where clap knows no better: the nearest command, or how several files are
+/// taken together.
+pub(super) fn with_suggestion(error: clap::Error, command: &Command) -> clap::Error {
+    match error.kind() {
+        ErrorKind::UnknownArgument => with_description(error),
+        _ => with_nearest(error, command),
+    }
+}
+
+/// Commands take one file, and `*.wav` gives them many.
+fn with_description(mut error: clap::Error) -> clap::Error {
+    let is_file = |value: &ContextValue| match value {
+        ContextValue::String(name) => std::path::Path::new(name).is_file(),
+        _ => false,
+    };
+    if error.get(ContextKind::InvalidArg).is_some_and(is_file) {
+        let tip = "one file at a time; recordings of one test belong into a description, which \
+                   `tapjoint init *.wav > test.toml` begins";
+        let tip = ContextValue::StyledStrs(vec![tip.into()]);
+        error.insert(ContextKind::Suggested, tip);
+    }
+    error
+}
+
 /// Names the nearest command where clap found none near enough: two letters changed places are the
 /// commonest slip, and count as one change here.
-pub(super) fn with_suggestion(mut error: clap::Error, command: &Command) -> clap::Error {
+fn with_nearest(mut error: clap::Error, command: &Command) -> clap::Error {
     const MOST_CHANGES: usize = 2;
     let known = error.get(ContextKind::SuggestedSubcommand).is_some();
     let wanted = match error.get(ContextKind::InvalidSubcommand) {

@@ -210,3 +210,33 @@ impl JointPath {
         Changes { modes, mean }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(amplitudes: &[f64]) -> JointPath {
+        let one = |(index, &amplitude): (usize, &f64)| ModePath {
+            mode: index + 1,
+            amplitude,
+            omega: 100.0 * (index + 1) as f64,
+            rate: 1.0,
+        };
+        JointPath {
+            modes: amplitudes.iter().enumerate().map(one).collect(),
+            seconds: 10.0,
+        }
+    }
+
+    /// A mode by itself is disturbed by nothing; one of several by the largest of the others, whatever the signs; of a
+    /// mode that was not seen nothing is said, nor of one that does not turn the joint.
+    #[test]
+    fn limit_only_others_disturb_a_mode() {
+        assert_eq!(path(&[0.5]).others_over_own(1), Some(0.0));
+        let several = path(&[1.0, -2.0, 0.25]);
+        let ratios = [1, 2, 3].map(|mode| several.others_over_own(mode));
+        assert_eq!(ratios, [Some(2.0), Some(0.5), Some(8.0)]);
+        assert_eq!(several.others_over_own(4), None);
+        assert_eq!(path(&[1.0, 0.0]).others_over_own(2), None);
+    }
+}

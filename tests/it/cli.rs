@@ -180,6 +180,11 @@ fn regress_bad_usage_is_explained() {
         ),
         (&["spectrum", "a.wav", "--block", "8"], &["16..=4000000"]),
         (&["spectrum", "a.wav"], &["a.wav: cannot be read"]),
+        // `run *` where files are.
+        (
+            &["run", "test.toml", "test.toml"],
+            &["unexpected argument 'test.toml'", "tip: one file at a time"],
+        ),
         (&["inspect", "a.wav", "--hammer", "0"], &["count from 1"]),
         (&["predict"], &["required"]),
         (

@@ -16,6 +16,7 @@ moved, one tapped harder. Between recordings the joint drifts.
 import argparse
 import json
 import math
+import sys
 from pathlib import Path
 
 import numba
@@ -25,6 +26,8 @@ from scipy.linalg import eigh
 from scipy.signal import lfilter, resample_poly
 
 OVERSAMPLING = 5
+# Draws of one test whose nonlinear joint does not settle in steps of that length.
+MOST_ATTEMPTS = 20
 TAPS, INTERVAL, LEAD = 5, 4.5, 0.6
 SINGLES = ["sensor-mass", "sensor-cable", "cross-coupling", "joint-mass", "joint-nonlinearity", "fixture",
            "scale", "added-mass", "local-crack", "axial-load", "shear-rotary", "joint-damping"]
@@ -521,10 +524,14 @@ def main():
         name = f"t{number:03d}"
         # A stream of its own, so that a test does not depend on how many come before it.
         planted, attempt = None, 0
-        while planted is None:
+        while planted is None and attempt < MOST_ATTEMPTS:
             own = np.random.default_rng([arguments.seed, int(which)] + [attempt] * (attempt > 0))
             planted = make_test(own, arguments.out / "tests" / name, cases[which], arguments)
             attempt += 1
+        if planted is None:
+            sys.exit(f"{name}: the stepping of its joint did not settle in {MOST_ATTEMPTS} draws")
+        if attempt > 1:
+            print(f"{name}: drawn {attempt} times, until the stepping of its joint settled", file=sys.stderr)
         params = planted[0][1] if len(planted) == 1 else {key: values for key, values in planted}
         truths.append({"name": name, "effects": [key for key, _ in planted], "params": params})
         print(name, flush=True)

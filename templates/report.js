@@ -294,8 +294,8 @@ function start(node, index, plot) {
 }
 
 var nodes = Array.from(document.querySelectorAll("figure.curves"));
-if (window.DecompressionStream) Promise.all(nodes.map(unpacked)).then(function (plots) {
-  plots.forEach(function (plot, index) { start(nodes[index], index, plot); });
+if (window.DecompressionStream) Promise.allSettled(nodes.map(unpacked)).then(function (found) {
+  found.forEach(function (one, index) { if (one.value) start(nodes[index], index, one.value); });
 });
 addEventListener("resize", function () {
   all.forEach(function (figure) {

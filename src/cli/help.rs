@@ -96,7 +96,7 @@ fn with_description(mut error: clap::Error) -> clap::Error {
         _ => false,
     };
     if error.get(ContextKind::InvalidArg).is_some_and(is_file) {
-        let tip = "one file at a time; recordings of one test belong into a description, which \
+        let tip = "one file at a time; recordings of one test belong in a description, which \
                    `tapjoint init *.wav > test.toml` begins";
         let tip = ContextValue::StyledStrs(vec![tip.into()]);
         error.insert(ContextKind::Suggested, tip);

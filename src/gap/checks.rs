@@ -77,8 +77,8 @@ fn same_peaks(observations: &Observations) -> Result<(), GapError> {
             let within = overlap(&all[second], &all[first]);
             let one = Peaks::new(&peaks[second], &peaks[first], within);
             let other = Peaks::new(&peaks[first], &peaks[second], within);
-            let known =
-                are_in_order(&other.shared, &one.shared) || share_modes(&all[first], &all[second]);
+            let known = are_in_order(&other.shared, &one.shared)
+                || share_modes([&all[first], &all[second]], within);
             if !known && one.are_most_strange() && other.are_most_strange() {
                 return Err(GapError::AnotherStructure {
                     first: name_of(observations, first),
@@ -93,18 +93,25 @@ fn same_peaks(observations: &Observations) -> Result<(), GapError> {
     Ok(())
 }
 
-/// Modes that two configurations have in common, from which on they show one structure.
+/// Modes that two configurations have in common, from which on they show one structure: two may agree by chance.
 const LEAST_MODES: usize = 3;
 
-/// Whether most modes with a number of either lie where the other has them.
-fn share_modes(one: &Configuration, other: &Configuration) -> bool {
-    let near = |a: f64, b: f64| (a / b - 1.0).abs() <= MOVED;
-    let pairs = one.modes.iter().filter_map(|mode| {
-        let other = other.mode(mode.mode)?;
-        Some((mode.frequency, other.frequency))
-    });
-    let alike = pairs.filter(|&(a, b)| near(a, b)).count();
-    alike >= LEAST_MODES && 2 * alike > one.modes.len().max(other.modes.len())
+/// Whether most modes with a number of either, between these frequencies (Hz), lie where the other has them.
+fn share_modes([one, other]: [&Configuration; 2], (low, high): (f64, f64)) -> bool {
+    let inside = |frequency: f64| low <= frequency && frequency <= high;
+    let count = |all: &Configuration| {
+        let modes = all.modes.iter();
+        modes.filter(|mode| inside(mode.frequency)).count()
+    };
+    let modes = one.modes.iter().filter(|mode| inside(mode.frequency));
+    let pairs = modes.filter_map(|mode| Some((mode.frequency, other.mode(mode.mode)?.frequency)));
+    let alike = pairs.filter(|&(a, b)| is_near(a, b)).count();
+    alike >= LEAST_MODES && 2 * alike > count(one).max(count(other))
+}
+
+/// Whether a frequency may be another one that has moved (both in Hz).
+fn is_near(frequency: f64, other: f64) -> bool {
+    (frequency / other - 1.0).abs() <= MOVED
 }
 
 /// The peaks of one configuration where another looked too.
@@ -119,10 +126,7 @@ impl Peaks {
     fn new(own: &[f64], other: &[f64], (low, high): (f64, f64)) -> Self {
         let shared = own.iter().filter(|&&own| low <= own && own <= high);
         let shared: Vec<f64> = shared.copied().collect();
-        let strange = |own: &&f64| {
-            let near = |other: &f64| (*own / other - 1.0).abs() <= MOVED;
-            !other.iter().any(near)
-        };
+        let strange = |own: &&f64| !other.iter().any(|other| is_near(**own, *other));
         let strangers = shared.iter().filter(strange).count();
         Peaks { shared, strangers }
     }

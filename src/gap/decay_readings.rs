@@ -131,8 +131,10 @@ impl Frame {
 
     /// How much more than its own motion the others' may disturb the slope of a mode, 1 at least. A joint whose
     /// stiffness changes makes tones at sums and differences of the modes' frequencies, in proportion to the amplitudes
-    /// of those that make them. One near a mode rings with it, and pulls its frequency by what the joint changes times
-    /// the ratio of the amplitudes: a mode that hardly turns the joint is pulled most.
+    /// of those that make them. One near a mode rings with it, and pulls its frequency by what the mode feels of the
+    /// joint's change times the ratio of the amplitudes, here those with which the decays begin. Whether a tone lies near
+    /// is not asked: six modes make some hundred of the third order, so that this is the worst case. Frequencies keep
+    /// the share that is their own: they are averages over whole decays.
     fn tones(&self, configuration: usize, mode: usize) -> f64 {
         let path = self.setups[configuration].path.as_ref();
         let ratio = path.and_then(|path| path.others_over_own(mode));

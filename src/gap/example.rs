@@ -1,7 +1,10 @@
 //! What unit tests of the diagnosis begin with.
 
+use super::frame::Frame;
+use super::hypothesis::{Fit, fit_nominal};
 use super::nominal::{Nominal, NominalSensor};
-use super::synthetic::{PlannedConfiguration, TestPlan};
+use super::settings::GapSettings;
+use super::synthetic::{PlannedConfiguration, TestPlan, observe};
 use crate::structure::Beam;
 use crate::structure::specimen::{Body, Specimen, SpecimenJoint};
 
@@ -54,4 +57,13 @@ pub(super) fn plan(places: &[f64]) -> TestPlan {
         damping: 0.003,
         scatter: 1.0,
     }
+}
+
+/// That strip with a sensor of 4 g at two places, without any effect, and the nominal model's fit.
+pub(super) fn fitted() -> (Frame, Fit) {
+    let settings = GapSettings::default();
+    let observations = observe(&plan(&[0.34, 0.19]), &strip(0.004), &[], 3).unwrap();
+    let frame = Frame::new(&observations, &strip(0.004), &settings);
+    let fit = fit_nominal(&frame, &settings).unwrap();
+    (frame, fit)
 }

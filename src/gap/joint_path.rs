@@ -141,7 +141,8 @@ impl JointPath {
         self.modes.iter().position(|one| one.mode == mode)
     }
 
-    /// Largest rotation that another mode begins with over the own one; `None` of a mode whose amplitude is not known.
+    /// Largest rotation that another mode begins with over the own one (1); `None` of a mode whose amplitude is not
+    /// known, or that does not turn the joint: such a one feels nothing of it either.
     pub(super) fn others_over_own(&self, mode: usize) -> Option<f64> {
         let place = self.place(mode)?;
         let others = self.modes.iter().enumerate().filter(|(k, _)| *k != place);

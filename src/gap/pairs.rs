@@ -323,19 +323,14 @@ fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::example::{plan, strip};
-    use super::super::hypothesis::fit_nominal;
-    use super::super::synthetic::observe;
+    use super::super::example::fitted;
     use super::*;
 
     /// Two effects that chance did not favour: where they miss the withheld readings by more than these can be off,
     /// what is unknown explains the others as well.
     #[test]
     fn regress_two_effects_that_foretell_badly_are_as_good_as_something_unknown() {
-        let settings = GapSettings::default();
-        let observations = observe(&plan(&[0.34, 0.19]), &strip(0.004), &[], 3).unwrap();
-        let mut frame = Frame::new(&observations, &strip(0.004), &settings);
-        let fit = fit_nominal(&frame, &settings).unwrap();
+        let (mut frame, fit) = fitted();
         let exact = WithheldErrors::new(&frame, &fit).unwrap();
         assert!(foretells(&frame, &fit), "{exact:?}");
         let unknown_beside = |frame: &Frame| {

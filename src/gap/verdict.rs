@@ -157,20 +157,13 @@ fn set_of(entries: &[Entry], groups: &[(Vec<usize>, f64)]) -> Verdict {
 
 #[cfg(test)]
 mod tests {
-    use super::super::example::{plan, strip};
-    use super::super::frame::Frame;
-    use super::super::hypothesis::fit_nominal;
-    use super::super::settings::GapSettings;
-    use super::super::synthetic::observe;
+    use super::super::example::fitted;
     use super::*;
 
     /// What refutes the nominal model, one block perhaps, gives no name to an effect that explains less.
     #[test]
     fn regress_an_effect_without_evidence_is_not_named() {
-        let settings = GapSettings::default();
-        let observations = observe(&plan(&[0.34, 0.19]), &strip(0.004), &[], 3).unwrap();
-        let frame = Frame::new(&observations, &strip(0.004), &settings);
-        let fit = fit_nominal(&frame, &settings).unwrap();
+        let (frame, fit) = fitted();
         let entry = |hypothesis, evidence: f64, probability| {
             let mut entry = Entry::new(hypothesis, fit.clone());
             entry.fit.log_evidence = evidence;

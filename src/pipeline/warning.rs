@@ -96,7 +96,7 @@ pub enum Warning {
         file: String,
         /// Number of every mode that changes, and how.
         changes: Vec<(usize, AmplitudeChange)>,
-        /// Other recordings whose first mode goes the same way, and the modes that change in them.
+        /// Other recordings in which modes go the same way, and these modes.
         others: Vec<(String, Vec<usize>)>,
     },
     /// The pair regression contradicts its own frequency equation.

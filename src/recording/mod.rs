@@ -299,7 +299,7 @@ impl Recording {
 
     /// Sets what file units of a channel (0-based) are multiplied by: SI units per file unit,
     /// negative when the sensor was mounted the other way. It replaces the factor of a unit in the
-    /// header, with a warning.
+    /// header, with a warning where it is another one but for the sign.
     ///
     /// # Errors
     /// An unknown channel; a scale that is 0 or not finite.
@@ -322,11 +322,13 @@ impl Recording {
             _ => false,
         };
         self.warnings.retain(|warning| !overruled(warning));
-        // A scale that turns the sign alone, or states the header's unit once more, overrules nothing.
-        let factor = |unit: &String| channel_unit(unit).map(|known| known.0);
-        let overrules = |unit: &&String| {
-            factor(unit).is_none_or(|factor| (scale.abs() / factor - 1.0).abs() > SAME_SCALE)
+        // Volts are another quantity than what is scaled, whatever the number.
+        let repeats = |unit: &String| {
+            channel_unit(unit).is_some_and(|(factor, si)| {
+                si != "V" && (scale.abs() / factor - 1.0).abs() <= SAME_SCALE
+            })
         };
+        let overrules = |unit: &&String| !repeats(unit);
         if let Some(unit) = info.header_unit.as_ref().filter(overrules) {
             self.warnings.push(RecordingWarning::ScaleOverUnit {
                 channel: channel_label(channel, info),

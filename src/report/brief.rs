@@ -3,7 +3,7 @@
 use super::document::{Document, GapVerdictSection};
 use super::format::{signed_or_below, significant};
 use super::summary::{channels, described, most_missed};
-use super::tables::{Parameter, estimated, has_joint, joint_with, quality_count};
+use super::tables::{Parameter, estimated, has_joint, joint_with, quality_count, together};
 
 /// At most five lines, each with what it is about; what was not computed has none.
 pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
@@ -124,18 +124,31 @@ fn model(document: &Document) -> Option<String> {
 
 /// What the diagnosis answers, in a few words.
 fn missing(verdict: &GapVerdictSection) -> String {
-    let listed = |last: &str| match verdict.effects.split_last() {
+    let mut names: Vec<String> = Vec::new();
+    for effect in &verdict.effects {
+        let name = match effect.as_str() {
+            "none" => "nothing".to_owned(),
+            "unknown" => "something unknown".to_owned(),
+            effect => together(effect),
+        };
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let listed = |last: &str| match names.split_last() {
         Some((one, others)) if !others.is_empty() => {
             format!("{} {last} {one}", others.join(", "))
         }
-        _ => verdict.effects.join(""),
+        _ => names.join(""),
     };
     match verdict.kind.as_str() {
         "no-gap" => "no gap is established".to_owned(),
         "named" => format!("missing in it: {}", listed("and")),
-        "group" | "set" => format!("missing in it: {}", listed("or")),
+        "group" => format!("missing in it: one of {}", listed("or")),
+        "set" if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
+        "set" => format!("not decided is what is missing in it: {}", listed("or")),
         "unknown" => "missing in it: something unknown".to_owned(),
-        _ => "too few readings to tell what is missing in it".to_owned(),
+        _ => "not enough data to tell whether something is missing in it".to_owned(),
     }
 }
 
@@ -149,4 +162,30 @@ fn doubts(document: &Document) -> Option<String> {
     // Where nothing was computed there is nothing to doubt.
     let computed = document.modes.is_some() || document.recordings.is_some();
     computed.then_some(warnings + &checks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regress_every_verdict_has_its_words() {
+        let words = |kind: &str, effects: &[&str]| {
+            missing(&GapVerdictSection {
+                kind: kind.to_owned(),
+                effects: effects.iter().map(|name| (*name).to_owned()).collect(),
+                reason: None,
+            })
+        };
+        let pair = words("named", &["local-crack", "sensor-mass"]);
+        assert_eq!(pair, "missing in it: local-crack and sensor-mass");
+        // A group of pairs repeats what they share.
+        let group = words("group", &["modulus", "length", "modulus"]);
+        assert_eq!(group, "missing in it: one of modulus or length");
+        let set = words("set", &["modulus", "none", "unknown"]);
+        let said = "not decided is what is missing in it: modulus, nothing or something unknown";
+        assert_eq!(set, said);
+        assert_eq!(words("set", &["modulus"]), "perhaps missing in it: modulus");
+        assert!(words("not-enough-data", &[]).starts_with("not enough data"));
+    }
 }

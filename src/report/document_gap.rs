@@ -123,11 +123,16 @@ pub struct GapVerdictSection {
 }
 
 impl GapVerdictSection {
+    /// The effects as a hypothesis that has them all is called.
+    pub fn joined(&self) -> String {
+        self.effects.join("+")
+    }
+
     /// Whether this hypothesis is what the verdict names: both of two effects together, or one of several that cannot be
     /// told apart.
     pub fn holds(&self, effect: &str) -> bool {
         match self.kind.as_str() {
-            "named" => self.effects.join("+") == effect,
+            "named" => self.joined() == effect,
             _ => self.effects.iter().any(|one| one == effect),
         }
     }

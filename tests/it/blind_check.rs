@@ -264,9 +264,27 @@ fn regress_parameters_of_two_effects_find_their_owner() {
         assert_eq!(flat.truths[0].effects, braces.truths[0].effects, "{params}");
         assert!(flat.doubts.is_empty(), "{:?}", flat.doubts);
     }
-    let text =
+    let told = |text: &str| parse_truths(text).unwrap().doubts.len();
+    let shared =
         r#"[{"name": "a", "effects": ["sensor-mass", "added-mass"], "params": {"mass": 0.01}}]"#;
-    assert_eq!(parse_truths(text).unwrap().doubts.len(), 1);
+    assert_eq!(told(shared), 1);
+    let alone = r#"[{"name": "a", "effects": ["length"], "params": {"length.relative": 0.01}}]"#;
+    assert_eq!(told(alone), 0);
+    // Of two values neither is dropped in silence.
+    assert_eq!(
+        of(r#"{"mass": 0.008, "sensor-mass": {"mass": 0.009}}"#)
+            .doubts
+            .len(),
+        1
+    );
+    // What lies outside the catalogue may have a mass too.
+    let outside =
+        r#"[{"name": "a", "effects": ["sensor-mass", "loose-screw"], "params": {"mass": 0.01}}]"#;
+    let truth = &parse_truths(outside).unwrap().truths[0];
+    assert_eq!(
+        truth.effects[0],
+        Planted::Catalogue(EffectId::SensorMass, BTreeMap::new())
+    );
 }
 
 #[test]

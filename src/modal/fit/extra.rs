@@ -23,7 +23,7 @@ pub struct ExtraMode {
     /// Size of its amplitudes over their standard deviation, root of the mean square over the columns.
     pub amplitude_over_std: f64,
     /// Likeness of its shape to that of the nearest other mode of its group: the modal assurance criterion over the
-    /// sensors of a decay, mean of all taps, of functions over all columns; `None` without such a mode, or with one
+    /// sensors of a decay, mean of all taps weighted by their power, of functions over all columns; `None` without such a mode, or with one
     /// sensor. Near 1 the second pole may only mend a line that is no straight decay: one mode whose frequency
     /// changes while it rings. How the two share a tap depends then on the tap's strength, and is no sign of another
     /// shape.

@@ -153,9 +153,16 @@ enum Way {
 }
 
 impl AmplitudeChange {
-    /// Change of the frequency, as a share of it.
-    fn size(&self) -> f64 {
-        ((self.frequency[1] - self.frequency[0]) / self.frequency[0]).abs()
+    /// Change of the frequency and of the damping ratio as shares of them, 0 within their bounds; compared in this order.
+    fn size(&self) -> (f64, f64) {
+        let share = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
+            true => ((values[1] - values[0]) / values[0]).abs(),
+            false => 0.0,
+        };
+        (
+            share(self.frequency, self.frequency_bound),
+            share(self.damping_ratio, self.damping_bound),
+        )
     }
 
     /// By the signs of what changes beyond its bounds.
@@ -209,8 +216,7 @@ fn decimals(value: f64) -> usize {
     (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
 }
 
-/// One warning for the recordings whose modes change, with the one that changes most; another where the first mode of
-/// some goes another way.
+/// One warning for each way in which modes change, with the recording in which they change most.
 pub(in crate::pipeline) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<Warning> {
     let of_recording = |recording: &RecordingResult| {
         let spectra = recording.measurement.spectra.as_ref()?;
@@ -227,35 +233,56 @@ pub(in crate::pipeline) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<W
 type Changes = Vec<(usize, AmplitudeChange)>;
 
 fn by_way(all: Vec<(String, Changes)>) -> Vec<Warning> {
-    let way = |one: &(String, Changes)| one.1.first().map(|(_, change)| change.way());
-    let mut groups: Vec<Vec<(String, Changes)>> = Vec::new();
-    for one in all {
-        match groups.iter_mut().find(|group| way(&group[0]) == way(&one)) {
-            Some(group) => group.push(one),
-            None => groups.push(vec![one]),
+    let mut groups: Vec<(Way, Vec<(String, Changes)>)> = Vec::new();
+    for (file, changes) in all {
+        for (mode, change) in changes {
+            let way = change.way();
+            let place = groups.iter().position(|group| group.0 == way);
+            let place = place.unwrap_or_else(|| {
+                groups.push((way, Vec::new()));
+                groups.len() - 1
+            });
+            let own = &mut groups[place].1;
+            match own.last_mut().filter(|one| one.0 == file) {
+                Some(one) => one.1.push((mode, change)),
+                None => own.push((file.clone(), vec![(mode, change)])),
+            }
         }
     }
+    let warnings = groups
+        .into_iter()
+        .filter_map(|(_, group)| one_warning(group));
+    warnings.collect()
+}
+
+/// The recordings whose modes change in one way.
+fn one_warning(mut group: Vec<(String, Changes)>) -> Option<Warning> {
     let most = |one: &(String, Changes)| {
         let sizes = one.1.iter().map(|(_, change)| change.size());
-        sizes.fold(0.0, f64::max)
+        sizes.fold(
+            (0.0, 0.0),
+            |most: (f64, f64), size| {
+                if size > most { size } else { most }
+            },
+        )
     };
-    let warning = |mut group: Vec<(String, Changes)>| {
-        // The first of equal ones.
-        let worst = (0..group.len())
-            .rev()
-            .max_by(|&a, &b| most(&group[a]).total_cmp(&most(&group[b])))?;
-        let (file, changes) = group.remove(worst);
-        let modes = |changes: Changes| changes.into_iter().map(|(mode, _)| mode).collect();
-        Some(Warning::AmplitudeDependent {
-            file,
-            changes,
-            others: group
-                .into_iter()
-                .map(|(file, changes)| (file, modes(changes)))
-                .collect(),
-        })
-    };
-    groups.into_iter().filter_map(warning).collect()
+    let (mut worst, mut size) = (0, most(group.first()?));
+    for (place, one) in group.iter().enumerate().skip(1) {
+        let own = most(one);
+        if own > size {
+            (worst, size) = (place, own);
+        }
+    }
+    let (file, changes) = group.remove(worst);
+    let modes = |changes: Changes| changes.into_iter().map(|(mode, _)| mode).collect();
+    let others = group
+        .into_iter()
+        .map(|(file, changes)| (file, modes(changes)));
+    Some(Warning::AmplitudeDependent {
+        file,
+        changes,
+        others: others.collect(),
+    })
 }
 
 pub(super) fn write_dependence(
@@ -292,23 +319,14 @@ pub(super) fn write_dependence(
         return Ok(());
     }
     let listed: Vec<String> = others.iter().map(other).collect();
-    write!(f, " (also {})", listed.join("; "))
+    write!(f, "; the same in {}", listed.join("; "))
 }
 
-/// What makes the modes go as they go. Of several that go the same way it is said of all; where some go another, of the
-/// first alone.
+/// What makes the modes go as they go.
 fn write_cause(f: &mut fmt::Formatter<'_>, changes: &[(usize, AmplitudeChange)]) -> fmt::Result {
-    let Some((mode, first)) = changes.first() else {
-        return Ok(());
-    };
-    let way = first.way();
-    let others = changes.iter().filter(|(_, change)| change.way() != way);
-    match others.count() {
-        0 => write!(f, "; {}", way.cause()),
-        count => {
-            let cause = way.cause();
-            write!(f, ", {count} of them in another way; mode {mode}: {cause}")
-        }
+    match changes.first() {
+        Some((_, first)) => write!(f, "; {}", first.way().cause()),
+        None => Ok(()),
     }
 }
 
@@ -390,9 +408,19 @@ mod tests {
             alike.contains("1 more mode changes with it; a joint"),
             "{alike}"
         );
-        let mixed = text(vec![(1, softer.clone()), (2, softer), (3, stiffer)]);
-        let told = "2 more modes change with it, 1 of them in another way; mode 1: a joint";
-        assert!(mixed.contains(told), "{mixed}");
+        let mixed = by_way(vec![(
+            "a.wav".into(),
+            vec![(1, softer.clone()), (2, softer), (3, stiffer)],
+        )]);
+        let texts: Vec<String> = mixed.iter().map(ToString::to_string).collect();
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        let told = "1 more mode changes with it; a joint";
+        assert!(texts[0].contains(told), "{texts:?}");
+        let other = texts[1].starts_with("a.wav: mode 3 falls");
+        assert!(
+            other && texts[1].contains("stiffens the harder"),
+            "{texts:?}"
+        );
     }
 
     #[test]
@@ -408,14 +436,31 @@ mod tests {
             one("a.wav", &[(1, &softer), (2, &softer)]),
             one("b.wav", &[(3, &stiffer)]),
             one("c.wav", &[(1, &softest)]),
-            one("d.wav", &[(2, &softer)]),
+            one("d.wav", &[(2, &softer), (3, &stiffer)]),
         ]);
         let texts: Vec<String> = found.iter().map(ToString::to_string).collect();
         assert_eq!(texts.len(), 2, "{texts:?}");
         assert!(texts[0].starts_with("c.wav: mode 1 rises"), "{}", texts[0]);
-        let also = "(also a.wav: modes 1, 2; d.wav: mode 2)";
+        let also = "; the same in a.wav: modes 1, 2; d.wav: mode 2";
         assert!(texts[0].ends_with(also), "{}", texts[0]);
         assert!(texts[1].starts_with("b.wav: mode 3 falls"), "{}", texts[1]);
-        assert!(!texts[1].contains("also"), "{}", texts[1]);
+        assert!(
+            texts[1].ends_with("; the same in d.wav: mode 3"),
+            "{}",
+            texts[1]
+        );
+    }
+
+    /// Whose frequency stays within its bounds is ranked by its damping, and not by noise.
+    #[test]
+    fn regress_modes_that_rub_are_ranked_by_their_damping() {
+        let little = change([80.0, 80.015], [0.002, 0.003]);
+        let much = change([80.0, 80.001], [0.002, 0.006]);
+        let found = by_way(vec![
+            ("a.wav".to_owned(), vec![(1, little)]),
+            ("b.wav".to_owned(), vec![(1, much)]),
+        ]);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].to_string().starts_with("b.wav"), "{found:?}");
     }
 }

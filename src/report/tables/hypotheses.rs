@@ -103,7 +103,7 @@ fn looks_like(names: &[String]) -> String {
 }
 
 /// "local-crack + joint-nonlinearity": both names of two effects, which a line may be broken between.
-pub(super) fn together(effect: &str) -> String {
+pub(in crate::report) fn together(effect: &str) -> String {
     effect.replace('+', " + ")
 }
 

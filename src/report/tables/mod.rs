@@ -20,6 +20,7 @@ pub use frfs::frfs;
 pub(super) use gap::joint_with;
 pub use gap::{gap_story, place_of};
 pub use hypotheses::hypotheses;
+pub(super) use hypotheses::together;
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};
 pub use measured::{channels, conditions, recordings};
 pub use modes::{fitted_to, mode_details, modes, modes_from, reading_details, readings};

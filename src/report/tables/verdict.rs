@@ -152,7 +152,7 @@ fn odds(gap: &GapSection) -> Option<f64> {
 pub(super) fn named(gap: &GapSection) -> Option<&HypothesisSection> {
     let name = match gap.verdict.kind.as_str() {
         "no-gap" => "none".to_owned(),
-        _ => gap.verdict.effects.join("+"),
+        _ => gap.verdict.joined(),
     };
     gap.hypotheses.iter().find(|found| found.effect == name)
 }

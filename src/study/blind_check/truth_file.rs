@@ -99,17 +99,16 @@ struct Entry {
 }
 
 impl Entry {
-    /// Gives parameters of several effects to the one that has them: those written as `effect.parameter`, and those
-    /// that only one of the effects knows.
+    /// Gives parameters to the effect that has them: those written as `effect.parameter`, and of several effects those
+    /// that only one of them knows, unless one lies outside the catalogue and has parameters of its own. What is given
+    /// twice stays where it is, and is told.
     fn sort_parameters(&mut self) {
         let effects: Vec<EffectId> = self
             .effects
             .iter()
             .filter_map(|name| EffectId::parse(name).ok())
             .collect();
-        if self.effects.len() < 2 {
-            return;
-        }
+        let all_known = effects.len() == self.effects.len() && effects.len() > 1;
         let has = |id: &EffectId, name: &str| id.parameters().iter().any(|info| info.name == name);
         let flat: Vec<(String, Value)> = self
             .params
@@ -120,7 +119,8 @@ impl Entry {
         for (key, value) in flat {
             let (effect, name) = match key.split_once('.') {
                 Some((effect, name)) => (Some(effect), name),
-                None => (None, key.as_str()),
+                None if all_known => (None, key.as_str()),
+                None => continue,
             };
             let owners = effects
                 .iter()
@@ -131,8 +131,10 @@ impl Entry {
                 .params
                 .entry(owner.name().to_owned())
                 .or_insert_with(|| Value::Object(serde_json::Map::new()));
-            if let Value::Object(own) = own {
-                own.entry(name.to_owned()).or_insert(value);
+            if let Value::Object(own) = own
+                && !own.contains_key(name)
+            {
+                own.insert(name.to_owned(), value);
                 self.params.remove(&key);
             }
         }

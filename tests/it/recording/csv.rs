@@ -209,6 +209,7 @@ fn regress_a_scale_that_turns_the_sign_overrules_no_unit() {
     // -1 N for every kN is another unit.
     assert_eq!(scaled(-1.0, "t,force (kN),b"), 1);
     assert_eq!(scaled(-1.0, "t,force (tons),b"), 1);
+    assert_eq!(scaled(1.0, "t,force (V),b"), 1);
 }
 
 #[test]

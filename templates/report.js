@@ -214,7 +214,7 @@ function build(figure) {
 }
 
 function chosen(figure, index) {
-  var tap = figure.plot.taps[index], x = figure.x, reach = Math.max(20 * figure.plot.x.step, 0.02 * x[x.length - 1]);
+  var tap = figure.plot.taps[index], x = figure.x, reach = Math.max(20 * finest(figure), 0.02 * x[x.length - 1]);
   figure.tap = index;
   figure.said.textContent = tap.name + ": " + tap.words;
   // The recording stays whole where the samples themselves are shown below it.
@@ -236,11 +236,16 @@ function chips(figure) {
   return bar;
 }
 
+// The least distance of points.
+function finest(figure) {
+  return Math.min.apply(null, figure.plot.x.runs.map(function (run) { return run[1]; }));
+}
+
 function curveChips(figure, chip) {
   chip("whole range", "reset", function () { figure.tap = -1; figure.said.textContent = ""; closeUp(figure, null); whole(figure); });
   figure.plot.marks.forEach(function (mark) {
     chip(mark.name + ", " + mark.words, mark.mode ? "mode" : "other", function () {
-      var reach = Math.max(40 * mark.half, 10 * figure.plot.x.step);
+      var reach = Math.max(40 * mark.half, 10 * finest(figure));
       zoom(figure, mark.at - reach, mark.at + reach);
     });
   });
@@ -275,7 +280,7 @@ function unpacked(node) {
 function start(node, index, plot) {
   var figure = { element: node, key: "figure" + index, panels: [], tap: -1, shown: 0, x: [], plot: plot };
   var points = figure.plot.kind === "points", axis = figure.plot.x;
-  for (var i = 0; !points && i < axis.count; i++) figure.x.push(axis.start + i * axis.step);
+  if (!points) axis.runs.forEach(function (run) { for (var i = 0; i < run[2]; i++) figure.x.push(run[0] + i * run[1]); });
   var live = element("div", "plot");
   figure.host = element("div", "host");
   figure.said = element("p", "said");

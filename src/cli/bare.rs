@@ -55,6 +55,19 @@ pub(super) fn analyse(
     Ok(run_functions(&functions, &settings)?)
 }
 
+/// Whether a file holds frequency response functions and no samples in time.
+///
+/// # Errors
+/// What keeps it from being read as either.
+pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> anyhow::Result<bool> {
+    match arguments.open(path) {
+        Ok(_) => Ok(false),
+        Err(RecordingError::Responses(ResponseError::NotTimeSeries { .. })) => Ok(true),
+        Err(RecordingError::Uff(UffError::NoTimeSeries { .. })) => Ok(true),
+        Err(problem) => Err(problem.into()),
+    }
+}
+
 /// Options for samples in time say nothing of functions that an analyser has computed.
 fn refuse_options(
     path: &Path,

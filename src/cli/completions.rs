@@ -25,6 +25,6 @@ pub(super) fn run(
     generate(arguments.shell, &mut command, "tapjoint", &mut script);
     let script = String::from_utf8(script)?;
     terminal.say(&script)?;
-    terminal.write_json(&serde_json::json!({ "version": 1, "script": script }))?;
+    terminal.write_json(&serde_json::json!({ "script": script }))?;
     Ok(Outcome::Answered)
 }

@@ -92,7 +92,7 @@ pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Re
         }
         None => terminal.say(&text)?,
     }
-    terminal.write_json(&serde_json::json!({ "version": 1, "deck": text }))?;
+    terminal.write_json(&serde_json::json!({ "deck": text }))?;
     Ok(Outcome::Answered)
 }
 

@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::arguments::{Band, ChannelScale, RecordingArguments, block_size};
+use super::bare::{BareSettings, analyse, holds_functions};
 use super::choices::{EstimatorArgument, FormArgument, SensorArgument, WindowArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFile;
@@ -27,7 +28,7 @@ use tapjoint::report::{
     after_help = "Examples:\n  tapjoint frf taps.wav --hammer 1 --scale-hammer 500 --scale-sensor 2000 --png frf.png\n  tapjoint frf test.toml --form receptance --csv frf.csv"
 )]
 pub(super) struct FrfArguments {
-    /// A recording (WAV, CSV, UFF58) or a test description (.toml)
+    /// A recording (WAV, CSV, UFF58), frequency response functions (UFF58 or text) or a test description (.toml)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]
@@ -84,6 +85,8 @@ pub(super) struct FrfArguments {
 enum Subject {
     Test(Box<TestFile>),
     Recording(Box<ChannelRef>),
+    /// Functions that an analyser has computed.
+    Functions,
 }
 
 /// The arguments, checked, and every output shown to be writable.
@@ -105,14 +108,7 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Requ
         (Subject::Test(Box::new(file)), stems)
     } else {
         check_file(&arguments.file)?;
-        let Some(hammer) = arguments.recording.hammer.clone() else {
-            bail!(
-                "{}: a frequency response function needs the force; name the hammer's channel with --hammer CH, or give a test description",
-                arguments.file.display()
-            );
-        };
-        let stems = vec![stem(&arguments.file)];
-        (Subject::Recording(Box::new(hammer)), stems)
+        (bare_subject(arguments)?, vec![stem(&arguments.file)])
     };
     let pngs = match &arguments.png {
         Some(png) => picture_files(png, &stems)
@@ -141,6 +137,30 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Requ
         csv: csv.transpose()?,
         universal,
     })
+}
+
+/// A bare recording needs the hammer's channel; a file of functions has no channels.
+fn bare_subject(arguments: &FrfArguments) -> anyhow::Result<Subject> {
+    let file = arguments.file.display();
+    if let Some(hammer) = arguments.recording.hammer.clone() {
+        return Ok(Subject::Recording(Box::new(hammer)));
+    }
+    if !holds_functions(&arguments.file, &arguments.recording)? {
+        bail!(
+            "{file}: a frequency response function needs the force; name the hammer's channel with --hammer CH, or give a test description"
+        );
+    }
+    let given = [
+        ("--sensor", !arguments.sensor.is_empty()),
+        ("--scale-hammer", arguments.scale_hammer.is_some()),
+        ("--scale-sensor", !arguments.scale_sensor.is_empty()),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        Some((name, _)) => bail!(
+            "{file}: holds frequency response functions, and {name} is for samples in time; leave it out"
+        ),
+        None => Ok(Subject::Functions),
+    }
 }
 
 /// The description, which says itself what the arguments for bare recordings would.
@@ -205,6 +225,16 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
     let analysis = match &request.subject {
         Subject::Test(file) => file.analyse(&IdentifySettings::unperturbed())?,
         Subject::Recording(hammer) => bare(arguments, hammer)?,
+        Subject::Functions => analyse(
+            &arguments.file,
+            &arguments.recording,
+            &BareSettings {
+                block: arguments.block,
+                band: arguments.zoom.map(|band| (band.low, band.high)),
+                window: arguments.window.map(WindowKind::from),
+                ..BareSettings::default()
+            },
+        )?,
     };
     let frfs: Vec<Vec<Frf>> = analysis
         .recordings

@@ -31,6 +31,6 @@ pub(super) fn run(arguments: &InitArguments, terminal: Terminal) -> anyhow::Resu
         files => template_of(kind, files),
     };
     terminal.say(&text)?;
-    terminal.write_json(&json!({ "version": 1, "template": text }))?;
+    terminal.write_json(&json!({ "template": text }))?;
     Ok(Outcome::Answered)
 }

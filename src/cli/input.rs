@@ -2,8 +2,8 @@
 
 use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail};
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 use tapjoint::description::TestDescription;
 use tapjoint::pipeline::{Analysis, IdentifySettings, PipelineError, run_test};
 
@@ -103,8 +103,28 @@ fn readable_file(path: &Path) -> Result<(), String> {
         Ok(_) => fs::File::open(path)
             .map(drop)
             .map_err(|error| error.to_string()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let like = like_in_folder(path).map(|name| format!("; did you mean {name}?"));
+            Err(format!("there is no such file{}", like.unwrap_or_default()))
+        }
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// The file beside the missing one whose name is most like it, of one or two letters mistyped.
+fn like_in_folder(path: &Path) -> Option<String> {
+    const LETTERS: usize = 2;
+    let wanted = path.file_name()?.to_string_lossy().into_owned();
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    let entries = fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let names = entries.flatten().map(|entry| entry.file_name());
+    let mut near: Vec<(usize, String)> = names
+        .map(|name| name.to_string_lossy().into_owned())
+        .map(|name| (strsim::damerau_levenshtein(&wanted, &name), name))
+        .filter(|(distance, _)| *distance <= LETTERS)
+        .collect();
+    near.sort();
+    near.into_iter().next().map(|(_, name)| name)
 }
 
 /// Whether a file is a test description rather than a recording: by its name, because a

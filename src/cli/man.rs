@@ -35,12 +35,12 @@ pub(super) fn run(
             }
             let folder = output.publish()?;
             terminal.say(&format!("{} pages in {}", pages.len(), folder.display()))?;
-            serde_json::json!({ "version": 1, "pages": pages.iter().map(|(name, _)| name).collect::<Vec<_>>() })
+            serde_json::json!({ "pages": pages.iter().map(|(name, _)| name).collect::<Vec<_>>() })
         }
         None => {
             let page = String::from_utf8(page(chosen(&command, arguments.command.as_deref())?)?)?;
             terminal.say(&page)?;
-            serde_json::json!({ "version": 1, "page": page })
+            serde_json::json!({ "page": page })
         }
     };
     terminal.write_json(&written)?;

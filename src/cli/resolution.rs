@@ -234,7 +234,7 @@ pub(super) fn run(
     let head = prediction_of(&request.file.test.name, &request.structure, &[]);
     let warnings: Vec<_> = warnings
         .iter()
-        .map(|(code, text)| serde_json::json!({"code": code, "text": text}))
+        .map(|(code, text)| serde_json::json!({"code": code, "text": text, "beside": false}))
         .collect();
     terminal.write_json(&serde_json::json!({
         "version": head.version,

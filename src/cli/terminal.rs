@@ -3,7 +3,9 @@
 use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
 use super::progress::Progress;
+use serde_json::json;
 use std::io::{self, IsTerminal, Write};
+use tapjoint::report::text::wrapped;
 use tapjoint::report::{document::Document, render_json, render_readings, render_stages};
 
 /// Where a command's words go.
@@ -65,9 +67,18 @@ impl Terminal {
     /// Prints a warning on standard error, unless it was asked to be quiet. A standard error that
     /// cannot be written to is nothing that could be reported.
     pub(super) fn warn(&self, text: &str) {
-        if !self.quiet {
-            let _ = writeln!(io::stderr(), "warning: {text}");
+        if self.quiet {
+            return;
         }
+        let whole = format!("warning: {text}\n");
+        let mut error = io::stderr();
+        // A file of messages keeps each on its line.
+        let shown = if error.is_terminal() {
+            wrapped(&whole, 2)
+        } else {
+            whole
+        };
+        let _ = write!(error, "{shown}");
     }
 
     /// Shows how far a long task is, on a terminal only; of a thousand steps every tenth.
@@ -106,9 +117,16 @@ impl Terminal {
         self.write_text(&render_json(document)?)
     }
 
-    /// Writes the document to where `--json` says, if it says anything. Call it last.
+    /// Writes what is no report's document to where `--json` says, if it says anything, with the keys that all
+    /// documents have. Call it last.
     pub(super) fn write_json(self, document: &serde_json::Value) -> anyhow::Result<()> {
-        let mut text = serde_json::to_string_pretty(document)?;
+        let mut whole = document.clone();
+        if let Some(keys) = whole.as_object_mut() {
+            for (key, value) in [("version", json!(1)), ("warnings", json!([]))] {
+                keys.entry(key).or_insert(value);
+            }
+        }
+        let mut text = serde_json::to_string_pretty(&whole)?;
         text.push('\n');
         self.write_text(&text)
     }

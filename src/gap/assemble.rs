@@ -24,6 +24,7 @@ use super::unplaced::Unplaced;
 use super::verdict::verdict;
 use super::withheld::{WithheldErrors, closure};
 use crate::effects::{Effect, EffectId};
+use crate::identify::estimate::NORMAL_95;
 
 /// The answer to a competition.
 pub(super) fn diagnosis(
@@ -176,6 +177,7 @@ impl<'a> Context<'a> {
             },
             effects: self.effects(entry),
             joint: self.joint(entry),
+            joint_intervals: self.joint_intervals(entry),
             coupling: self.coupling(entry),
             scale: self.scale(entry),
         }
@@ -223,6 +225,23 @@ impl<'a> Context<'a> {
             }
         }
         Some(joint)
+    }
+
+    /// The joint's 95 % intervals: its stiffnesses' logarithms are sought.
+    fn joint_intervals(&self, entry: &Entry) -> [Option<[f64; 2]>; 2] {
+        let mut intervals = [None; 2];
+        if entry.hypothesis == Hypothesis::Unknown {
+            return intervals;
+        }
+        let (values, spreads) = (&entry.fit.branch.optimum.parameters, spreads(entry));
+        for (k, (direction, _)) in self.frame().nominal.sought().iter().enumerate() {
+            if let Some(interval) = intervals.get_mut(*direction) {
+                let ends =
+                    [-1.0, 1.0].map(|sign| (values[k] + sign * NORMAL_95 * spreads[k]).exp());
+                *interval = Some(ends).filter(|ends| ends.iter().all(|end| end.is_finite()));
+            }
+        }
+        intervals
     }
 
     fn coupling(&self, entry: &Entry) -> f64 {

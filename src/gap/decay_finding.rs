@@ -17,8 +17,10 @@ use crate::effects::JointLaw;
 const CHANCE: f64 = 0.001;
 /// Goodness of fit below which a joint's law does not explain the changes.
 const MISFIT: f64 = 0.001;
-/// Changes beyond three standard uncertainties that have to go the same way before they are a joint's: one
-/// by itself always does.
+/// Standard uncertainties beyond which a change has a direction, 95 % two-sided: that there are changes at all is
+/// certain before that is asked.
+const DIRECTED: f64 = 2.0;
+/// Changes with a direction that have to go the same way before they are a joint's: one by itself always does.
 const TOGETHER: usize = 2;
 
 /// Frequencies that change along the decays, and what joint would do that.
@@ -63,13 +65,19 @@ impl DecayFinding {
     /// change do so the same way, of which there are two at least. Joints soften in translation too,
     /// which modes feel that do not turn them; how much the rotation changes is then not told.
     pub fn is_of_joint(&self) -> bool {
-        let stands_out = |change: &&DecayChange| change.percent_per_fold.abs() > 3.0 * change.std;
-        let changes: Vec<_> = self.changes.iter().filter(stands_out).collect();
-        let same_way = changes.len() >= TOGETHER
-            && changes
-                .iter()
-                .all(|change| change.percent_per_fold * self.ratio > 0.0);
-        self.is_lawful() || same_way
+        let same_way = |change: &&DecayChange| change.percent_per_fold * self.ratio > 0.0;
+        self.is_lawful() || self.is_enough() && self.directed().all(|change| same_way(&change))
+    }
+
+    /// Whether more than one frequency changes in a certain direction: of one alone nobody can tell what does that.
+    pub fn is_enough(&self) -> bool {
+        self.directed().count() >= TOGETHER
+    }
+
+    fn directed(&self) -> impl Iterator<Item = &DecayChange> {
+        let is_directed =
+            |change: &&DecayChange| change.percent_per_fold.abs() > DIRECTED * change.std;
+        self.changes.iter().filter(is_directed)
     }
 
     /// Whether the largest change that is looked for explains the changes best: the ratio is then a bound,

@@ -23,6 +23,8 @@ pub(super) struct Branch {
     pub(super) knowledge: Vec<Knowledge>,
     /// Logarithm of the evidence.
     pub(super) log_evidence: f64,
+    /// The spreads of the drift that it was averaged over, each with the logarithm of its own evidence.
+    pub(super) drifts: Vec<(f64, f64)>,
 }
 
 /// Fits a hypothesis from a start and integrates over everything, the drift's spread included.
@@ -60,6 +62,7 @@ pub(super) fn evaluate(
         optimum,
         knowledge: own,
         log_evidence,
+        drifts: vec![(middle, log_evidence)],
     })
 }
 
@@ -87,7 +90,7 @@ pub(super) fn over_drifts(
         let own = with_drift(frame, layout, known, drift);
         let moved = moved_optimum(&frame.readings, layout, (&own, &optimum));
         let log_evidence = log_evidence(&frame.readings, layout, &own, &moved);
-        all.push(log_evidence);
+        all.push((drift, log_evidence));
         if best
             .as_ref()
             .is_none_or(|best| log_evidence > best.log_evidence)
@@ -96,6 +99,7 @@ pub(super) fn over_drifts(
                 optimum: moved,
                 knowledge: own,
                 log_evidence,
+                drifts: Vec::new(),
             });
         }
     }
@@ -103,8 +107,11 @@ pub(super) fn over_drifts(
         optimum,
         knowledge: known.to_vec(),
         log_evidence: f64::NEG_INFINITY,
+        drifts: Vec::new(),
     });
-    best.log_evidence = log_mean(&all);
+    let logs: Vec<f64> = all.iter().map(|one| one.1).collect();
+    best.log_evidence = log_mean(&logs);
+    best.drifts = all;
     best
 }
 

@@ -111,7 +111,8 @@ impl Own {
                 DECIBEL * (constant - looked.1.map_or(half, |weak| half.min(weak)))
             }));
         }
-        if !over.is_empty() && peaks.contains(own.log) && apart(&solved, own.log) {
+        let is_told = peaks.contains(own.log) && !peaks.is_hinted(own.log);
+        if !over.is_empty() && is_told && apart(&solved, own.log) {
             own.over = Some(crate::stats::median(&mut over));
         }
         Some(own)

@@ -86,7 +86,7 @@ impl Frame {
         nominal: &Nominal,
         settings: &GapSettings,
     ) -> Self {
-        let highest = highest_mode(observations);
+        let highest = highest_mode(observations).min(settings.highest_mode);
         let observations = &up_to(highest, observations);
         let fitted_modes = if highest >= settings.withhold_from {
             highest.saturating_sub(settings.withheld_modes)

@@ -1,13 +1,15 @@
 //! Peaks that belong to no mode, as all recordings show them.
 
 use super::setup::TWIN;
-use crate::identify::observation::{Configuration, Observations, UNPAIRED};
+use crate::identify::observation::{Configuration, Observations, UNCLEAR, UNPAIRED};
 
 /// The peaks of a test that belong to no mode, and where such peaks can be told.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Peaks {
     /// Those that at least half of the recordings show, of which the band reaches to them.
     pub(super) all: Vec<Peak>,
+    /// Logarithms of the frequencies of peaks that fewer show, be they clear resonances or not.
+    pub(super) hints: Vec<f64>,
     /// Logarithms of the lowest and the highest frequency of a mode; `None` where nobody looked for peaks.
     pub(super) band: Option<(f64, f64)>,
     /// The configurations that were looked at, with the logarithm of the modal constant (1/kg) from which peaks
@@ -58,17 +60,37 @@ impl Peaks {
         let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| {
             (low.min(log), high.max(log))
         });
+        let all = common(&looked);
         let weakest = looked.iter().map(|(index, one)| (*index, weakest_of(one)));
         Peaks {
-            all: common(&looked),
+            hints: hints(&looked, &all),
+            all,
             band: (low < high).then_some((low, high)),
             looked: weakest.collect(),
         }
     }
 
+    /// Whether some recording shows a peak about as far from here as the frequency of a fixture is open that no peak
+    /// states.
+    pub(super) fn is_hinted(&self, log: f64) -> bool {
+        self.hints.iter().any(|hint| (hint - log).abs() < OPEN)
+    }
+
     pub(super) fn contains(&self, log: f64) -> bool {
         self.band.is_some_and(|(low, high)| log > low && log < high)
     }
+}
+
+/// Relative distance up to which a peak may be that of a fixture whose frequency the modes of the beam alone tell.
+const OPEN: f64 = 0.02;
+
+/// Peaks that a recording shows beside its modes and those that most of them show; mains and the like are none.
+fn hints(looked: &[(usize, &Configuration)], common: &[Peak]) -> Vec<f64> {
+    let peaks = looked.iter().flat_map(|(_, one)| &one.extra_peaks);
+    let nobodys = peaks.filter(|peak| [UNPAIRED, UNCLEAR].contains(&peak.label.as_str()));
+    let logs = nobodys.map(|peak| peak.frequency.ln());
+    let is_common = |log: f64| common.iter().any(|one| (one.log - log).abs() < SAME);
+    logs.filter(|log| !is_common(*log)).collect()
 }
 
 /// Level over the noise (dB) that a peak needs to be read, as the search for resonances asks for unless told
@@ -201,6 +223,9 @@ mod tests {
         assert!((peaks.all[0].log - 183.35_f64.ln()).abs() < 1e-6);
         assert_eq!(peaks.all[0].constants.len(), 2);
         assert!(peaks.contains(183.0_f64.ln()) && !peaks.contains(1500.0_f64.ln()));
+        // What one recording shows may be a fixture's all the same; what most show states where it is.
+        let hinted = [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_hinted(f.ln()));
+        assert_eq!(hinted, [true, true, false, false, false]);
         // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
         let weakest = peaks.looked[0].1.unwrap();
         assert!((weakest - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);

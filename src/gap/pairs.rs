@@ -11,7 +11,7 @@ use super::result::Hypothesis;
 use super::search::Competition;
 use super::settings::GapSettings;
 use super::trial::{Trial, refutes_withheld};
-use super::withheld::WithheldErrors;
+use super::withheld::{self, WithheldErrors};
 use crate::effects::EffectId;
 use rayon::prelude::*;
 
@@ -32,7 +32,7 @@ pub(super) fn add_pairs(competition: &mut Competition, settings: &GapSettings) {
     let suffices = |entry: &Entry| {
         entry.hypothesis != Hypothesis::Unknown
             && entry.drift.is_none()
-            && !misfits(frame, &entry.fit)
+            && stands(frame, &entry.fit)
     };
     let seen = |entry: &Entry| entry.hypothesis != Hypothesis::None;
     if frame.rows.len() < 6 || !competition.entries.first().is_some_and(seen) {
@@ -295,20 +295,22 @@ fn distinct(found: Vec<Entry>) -> Vec<Entry> {
     pairs
 }
 
-/// Whether the readings refute a fit.
-pub(super) fn misfits(frame: &Frame, fit: &Fit) -> bool {
-    Trial::new(frame, fit).is_none_or(|trial| trial.refuted())
+/// Whether neither the readings refute a fit nor those that took no part.
+pub(super) fn stands(frame: &Frame, fit: &Fit) -> bool {
+    let trial = Trial::new(frame, fit).map(|trial| trial.with_withheld(frame, fit));
+    trial.is_some_and(|trial| !trial.refuted())
 }
 
 /// Whether the readings that took no part are predicted better, or at least do not refute the fit: two effects leave
 /// more open than one does. Where that cannot be said, whether each mode is predicted better from the others.
 fn improves(frame: &Frame, before: &Fit, after: &Fit) -> bool {
+    let foretold = || withheld::goodness(frame, after, refutes_withheld);
     match (
         WithheldErrors::new(frame, before),
         WithheldErrors::new(frame, after),
     ) {
         (Some(before), Some(after)) => {
-            after.rms() < before.rms() || after.goodness().is_some_and(|p| !refutes_withheld(p))
+            after.rms() < before.rms() || foretold().is_some_and(|p| !refutes_withheld(p))
         }
         _ => {
             let left_out =

@@ -56,6 +56,7 @@ pub(super) fn place_map(frame: &Frame, nominal: &Fit) -> Option<PlaceMap> {
         mass,
         mass_std,
         mass_alone: alone(frame, nominal, &of_mass)?,
+        misfit: 2.0 * nominal.branch.optimum.objective,
         // Half a wave of the highest mode is what its energy resolves.
         resolution: length / frame.fitted_modes as f64,
     })

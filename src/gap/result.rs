@@ -143,6 +143,9 @@ pub struct HypothesisResult {
     pub effects: Vec<Effect>,
     /// The joint's stiffnesses that go with them (N/m, N m/rad); `None` without a joint.
     pub joint: Option<[f64; 2]>,
+    /// 95 % intervals of these, from low to high (N/m, N m/rad); a stiffness that was not sought, or that nothing
+    /// holds, has none.
+    pub joint_intervals: [Option<[f64; 2]>; 2],
     /// The coupling of the joint's own model that goes with them (1), without the effects'.
     pub coupling: f64,
     /// Logarithm of the common factor on all frequencies that goes with them, within the tolerance of the
@@ -288,6 +291,8 @@ pub struct PlaceMap {
     pub mass_std: Vec<f64>,
     /// By how much chi square falls if the mass of this piece alone changes.
     pub mass_alone: Vec<f64>,
+    /// The chi square that is to fall: all that the described model leaves.
+    pub misfit: f64,
     /// Length over which a local change is smeared (m).
     pub resolution: f64,
 }

@@ -9,7 +9,7 @@ use super::frame::Frame;
 use super::hypothesis::{Fit, Search, fit_nominal};
 use super::joint_path::joint_amplitude;
 use super::nominal::{COUPLING, Nominal};
-use super::pairs::{add_pairs, misfits};
+use super::pairs::{add_pairs, stands};
 use super::posterior::{Entry, set_probabilities};
 use super::result::Hypothesis;
 use super::settings::GapSettings;
@@ -205,7 +205,7 @@ fn compete_once(
         .flatten()
         .collect();
     let fits = entries.iter().map(|entry| &entry.fit).chain([&none]);
-    if fits.into_iter().all(|fit| misfits(&frame, fit)) {
+    if fits.into_iter().all(|fit| !stands(&frame, fit)) {
         seek_from_afar(&search, &candidates, &mut entries);
     }
     if let Some((fit, drift)) = fit_drift(&frame, &none) {

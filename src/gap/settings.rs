@@ -41,6 +41,9 @@ pub struct GapSettings {
     /// Standard deviation of the logarithm of the joint's stiffnesses about where the search begins:
     /// 1.5, a factor of 20 either way in 95 % of cases.
     pub joint_std: f64,
+    /// The highest mode that is compared: 10. Waves of higher ones are short beside the width of a joint, the height of a
+    /// sensor and the thickness of the beam, of which the model takes the first order only.
+    pub highest_mode: usize,
     /// Number of modes from which on the highest is withheld: 6.
     pub withhold_from: usize,
     /// How many of the highest modes are withheld: 1.
@@ -77,6 +80,7 @@ impl GapSettings {
             s if !(s.sensor_radius.is_finite() && s.sensor_radius >= 0.0) => {
                 refused("sensor_radius must be finite and not below 0")
             }
+            s if s.highest_mode == 0 => refused("highest_mode must be at least 1"),
             s if s.unknown_positions == 0 => refused("unknown_positions must be at least 1"),
             _ => Ok(()),
         }
@@ -99,6 +103,7 @@ impl Default for GapSettings {
             damping_scatter: 0.4,
             damping_tilt: 0.5,
             joint_std: 1.5,
+            highest_mode: 10,
             withhold_from: 6,
             withheld_modes: 1,
             unknown_positions: 12,

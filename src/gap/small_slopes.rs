@@ -6,8 +6,9 @@ use super::frame::Row;
 use super::joint_energy::joint_shares;
 use super::small_unknowns::Small;
 use super::solved::Solved;
-use crate::effects::SensorPlace;
+use crate::effects::{EffectId, SensorPlace};
 use nalgebra::DMatrix;
+use std::f64::consts::TAU;
 
 impl Forward<'_> {
     /// Adds the small unknowns to the predictions, and their columns to the slopes.
@@ -76,7 +77,10 @@ impl Forward<'_> {
             Row::Frequency {
                 configuration,
                 mode,
-            } => self.frequency_slope(small, (configuration, mode), &solved[configuration]),
+            } => {
+                let one = &solved[configuration];
+                self.frequency_slope(small, (configuration, mode), (one, parameters))
+            }
             Row::Constant {
                 configuration,
                 mode,
@@ -112,7 +116,7 @@ impl Forward<'_> {
         &self,
         small: &Small,
         (configuration, mode): (usize, usize),
-        one: &Solved,
+        (one, parameters): (&Solved, &[f64]),
     ) -> f64 {
         let setup = &self.frame.setups[configuration];
         let Some(index) = one.index(mode) else {
@@ -144,14 +148,51 @@ impl Forward<'_> {
             }),
             // d ln f/d J = -(phi')^2/2.
             Small::SensorInertia { name } => over(&setup.names, name, &|sensor| {
-                let inertia = sensor.mass * self.frame.sensor_radius.powi(2);
+                let inertia = self.mass_at(sensor, parameters) * self.frame.sensor_radius.powi(2);
                 -0.5 * inertia * slope(sensor.position).powi(2)
             }),
+            Small::AddedInertia => {
+                let added = self.added_masses(parameters);
+                let inertia = |mass: f64| mass * self.frame.sensor_radius.powi(2);
+                added
+                    .map(|(mass, x)| -0.5 * inertia(mass) * slope(x).powi(2))
+                    .sum()
+            }
+            // d ln f = (k/omega^2 - m) phi phi' dx, of what sits there and of what holds it there.
             Small::SensorPlace { place } => over(&setup.places, place, &|sensor| {
-                -sensor.mass * displacement(sensor.position) * slope(sensor.position)
+                let omega = TAU * one.modes().frequencies()[index];
+                let held = self.size_of(EffectId::SensorCable, parameters) / (omega * omega);
+                let moved = displacement(sensor.position) * slope(sensor.position);
+                (held - self.mass_at(sensor, parameters)) * moved
             }),
             _ => fastened_slope(small, setup, (one, index)),
         }
+    }
+
+    /// Size of an effect under the hypothesis, all of its kind together; 0 without it.
+    fn size_of(&self, wanted: EffectId, parameters: &[f64]) -> f64 {
+        let effects = self.layout.effects.iter().enumerate();
+        let own = effects.filter(|(_, one)| one.effect == wanted);
+        own.map(|(k, _)| parameters[self.layout.size(k)]).sum()
+    }
+
+    /// Mass of a sensor (kg): the stated one, and of one that weighs nobody knows what that of the hypothesis.
+    fn mass_at(&self, sensor: &SensorPlace, parameters: &[f64]) -> f64 {
+        match sensor.mass {
+            0.0 => self.size_of(EffectId::SensorMass, parameters),
+            stated => stated,
+        }
+    }
+
+    /// Masses that the hypothesis adds (kg), and where (m).
+    fn added_masses<'b>(&'b self, parameters: &'b [f64]) -> impl Iterator<Item = (f64, f64)> + 'b {
+        let layout = &self.layout;
+        let effects = layout.effects.iter().enumerate();
+        let own = effects.filter(|(_, one)| one.effect == EffectId::AddedMass);
+        own.filter_map(move |(k, one)| {
+            let place = one.place?.outward(parameters[layout.place(k)?]);
+            Some((parameters[layout.size(k)], place))
+        })
     }
 
     fn constant_slope(

@@ -20,6 +20,9 @@ pub(super) enum Small {
     SensorMass { name: usize },
     /// Rotary inertia of a sensor over its mass times the square of [`GapSettings::sensor_radius`] (1).
     SensorInertia { name: usize },
+    /// Rotary inertia of a mass that a hypothesis adds over that mass times the square of
+    /// [`GapSettings::sensor_radius`] (1).
+    AddedInertia,
     /// Place of a sensor (m), the same in all configurations where it has the same stated one.
     SensorPlace { place: usize },
     /// A fastened mass over its stated one (1).
@@ -65,9 +68,10 @@ impl Frame {
         for (name, text) in lists.names.iter().enumerate() {
             if self.nominal.mass_of(text) > 0.0 {
                 self.small(Small::SensorMass { name }, 0.0, settings.sensor_mass_std);
-                self.small(Small::SensorInertia { name }, 0.0, 1.0);
             }
+            self.small(Small::SensorInertia { name }, 0.0, 1.0);
         }
+        self.small(Small::AddedInertia, 0.0, 1.0);
         self.add_places_and_gains(lists, &visits, settings);
         self.add_damping_level(settings);
         self.small(Small::Amplitude, AMPLITUDE.0.ln(), AMPLITUDE.1);
@@ -92,16 +96,14 @@ impl Frame {
 
     /// What shapes and modal constants depend on: places of sensors and of the taps, and calibrations.
     fn add_places_and_gains(&mut self, lists: &Lists, visits: &[usize], settings: &GapSettings) {
-        let (names, places) = (&lists.names, &lists.places);
+        let names = &lists.names;
         let shapes = self
             .rows
             .iter()
             .any(|row| matches!(row, Row::Constant { .. }));
         let ratios = self.rows.iter().any(|row| matches!(row, Row::Ratio { .. }));
-        for (place, (name, _)) in places.iter().enumerate() {
-            if shapes || ratios || self.nominal.mass_of(&names[*name]) > 0.0 {
-                self.small(Small::SensorPlace { place }, 0.0, settings.position_std);
-            }
+        for place in 0..lists.places.len() {
+            self.small(Small::SensorPlace { place }, 0.0, settings.position_std);
         }
         if shapes {
             for &visit in visits {

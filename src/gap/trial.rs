@@ -9,7 +9,7 @@ use super::posterior::Entry;
 use super::quality::Residuals;
 use super::result::{Block, Closure};
 use super::setup::Setup;
-use super::withheld::WithheldErrors;
+use super::withheld;
 use crate::effects::EffectId;
 
 /// Goodness of fit below which an explanation is refused: by chance one in a hundred. The nominal model is given up
@@ -19,6 +19,9 @@ pub const MISFIT: f64 = 0.01;
 const BLOCK_MISFIT: f64 = 0.001;
 /// Probability of an error of withheld readings from which the hypothesis counts as predicting them.
 const PREDICTED: f64 = 0.05;
+
+/// Share of the gap on withheld readings that what is named closes: less leaves most of it to something else.
+const HALF: f64 = 0.5;
 
 /// Whether a misfit of withheld readings, of probability `p`, refutes an explanation. They are few, and linearised
 /// about the fit: as little is believed as of one block among many.
@@ -141,7 +144,7 @@ impl Trial {
 
     /// The same with what the fit predicts of readings that took no part.
     pub(super) fn with_withheld(mut self, frame: &Frame, fit: &Fit) -> Self {
-        self.withheld = WithheldErrors::new(frame, fit).and_then(|errors| errors.goodness());
+        self.withheld = withheld::goodness(frame, fit, refutes_withheld);
         self
     }
 
@@ -170,12 +173,12 @@ impl Trial {
         self.closure.is_none_or(|closure| closure.value > 0.0)
     }
 
-    /// Whether withheld readings leave the hypothesis its name: it closes some of the gap for certain, or closes
-    /// some and predicts them within what it leaves open. Where they cannot decide, either will do.
+    /// Whether withheld readings leave the hypothesis its name: it closes half of the gap, and some of it for certain
+    /// or predicts them within what it leaves open. Where they cannot decide, closing some or predicting will do.
     pub(super) fn holds(&self) -> bool {
         let predicts = self.withheld.is_some_and(|p| p > PREDICTED);
         self.closure.is_none_or(|closure| match self.decides {
-            true => closure.low > 0.0 || predicts && closure.value > 0.0,
+            true => closure.value >= HALF && (closure.low > 0.0 || predicts),
             false => predicts || closure.value > 0.0,
         })
     }
@@ -222,6 +225,7 @@ mod tests {
             (0.01, true, [0.9, -0.5], false),
             (0.5, true, [0.9, -0.5], true),
             (0.5, true, [-0.9, -5.0], false),
+            (0.5, true, [0.45, 0.3], false),
             // Too small a gap to decide by.
             (0.01, false, [0.9, -0.5], true),
             (0.5, false, [-0.9, -5.0], true),

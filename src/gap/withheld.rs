@@ -1,11 +1,12 @@
 //! The readings that took no part in the fit: how far each hypothesis predicts them.
 
-use super::evidence::covariance;
+use super::evidence::{covariance, log_sum};
 use super::forward::{Forward, Layout};
 use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
-use super::least_squares::Model;
-use super::noise;
+use super::knowledge::with_drift;
+use super::least_squares::{Model, maximise};
+use super::noise::{self, Reading};
 use super::result::Closure;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
@@ -92,6 +93,61 @@ impl WithheldErrors {
     }
 }
 
+/// Probability of errors on the withheld frequencies as large or larger if the hypothesis is true; `None` where nothing
+/// was withheld, or the hypothesis does not predict it.
+///
+/// What `refutes` it by the prediction linearised about the fit is tried once more without that, and with every spread
+/// of the joint's drift, as probable as the fit has left it: the most probable one is not the only one, and a drift
+/// multiplies an effect at the joint.
+pub(super) fn goodness(frame: &Frame, fit: &Fit, refutes: impl Fn(f64) -> bool) -> Option<f64> {
+    let linearised = WithheldErrors::new(frame, fit)?.goodness()?;
+    if !refutes(linearised) {
+        return Some(linearised);
+    }
+    let logs: Vec<f64> = fit.branch.drifts.iter().map(|drift| drift.1).collect();
+    let all = log_sum(&logs);
+    let of_drift = |&(drift, log): &(f64, f64)| {
+        let weight = (log - all).exp();
+        // What weighs so little cannot keep it from being refuted.
+        let counts = weight.is_finite() && !refutes(weight);
+        let found = counts.then(|| goodness_together(frame, fit, drift));
+        weight * found.flatten().unwrap_or(0.0)
+    };
+    let bent: f64 = fit.branch.drifts.iter().map(of_drift).sum();
+    Some(linearised.max(bent))
+}
+
+/// The probability of what the withheld readings add to the misfit when the same parameters have to explain them as
+/// well, with this spread of the joint's drift.
+///
+/// Twice the growth is chi square of as many degrees of freedom as there are readings; of a linear model it is the
+/// quadratic form of [`WithheldErrors::goodness`].
+fn goodness_together(frame: &Frame, fit: &Fit, drift: f64) -> Option<f64> {
+    let layout = Layout::new(frame, &fit.effects);
+    let known = with_drift(frame, &layout, &fit.branch.knowledge, drift);
+    let (more, stated): (Vec<Row>, Vec<Reading>) = frame.withheld.iter().copied().unzip();
+    // As the linearised prediction takes them.
+    let normal = stated.iter().map(|reading| Reading {
+        freedom: f64::INFINITY,
+        ..*reading
+    });
+    let readings: Vec<Reading> = frame.readings.iter().copied().chain(normal).collect();
+    let rows = [&frame.rows[..], &more].concat();
+    let least = |readings: &[Reading], rows: &[Row], start: &[f64]| {
+        let layout = layout.clone();
+        let forward = Forward {
+            frame,
+            layout,
+            rows,
+        };
+        maximise(readings, &known, start, &forward)
+    };
+    let own = least(&frame.readings, &frame.rows, &fit.branch.optimum.parameters)?;
+    let both = least(&readings, &rows, &own.parameters)?;
+    let grown = 2.0 * (both.objective - own.objective).max(0.0);
+    noise::chi_square_tail(grown, stated.len() as f64)
+}
+
 /// Draws of the interval: 2.5 % of 400 is ten draws.
 const DRAWS: usize = 400;
 
@@ -154,6 +210,10 @@ fn root_mean_square(values: &DVector<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::example::fitted;
+    use super::super::hypothesis::fit_nominal;
+    use super::super::settings::GapSettings;
+    use super::super::small_unknowns::Small;
     use super::*;
 
     fn errors(size: f64, std: f64) -> WithheldErrors {
@@ -172,6 +232,85 @@ mod tests {
         assert!((found.value - 0.0375 / 0.0396).abs() < 1e-12, "{found:?}");
         assert!(found.low <= found.value && found.value <= found.high);
         assert_eq!(closure(&errors(0.039, 0.02), &errors(0.01, 0.02), 1), None);
+    }
+
+    /// Within what readings of 0.005 % leave open the structure is as good as linear: both probabilities are then the
+    /// same.
+    #[test]
+    fn limit_near_the_fit_the_misfit_grows_as_the_linearised_errors_say() {
+        let (mut frame, _) = fitted();
+        // Student's t gives way where it is pulled, which no linear model does.
+        for reading in &mut frame.readings {
+            reading.freedom = f64::INFINITY;
+        }
+        let fit = fit_nominal(&frame, &GapSettings::default()).unwrap();
+        for (k, (_, reading)) in frame.withheld.iter_mut().enumerate() {
+            reading.value += [3.0, -2.0][k % 2] * reading.std;
+        }
+        let linearised = WithheldErrors::new(&frame, &fit).unwrap().goodness();
+        let linearised = linearised.unwrap();
+        let together = goodness_together(&frame, &fit, drift_of(&frame, &fit)).unwrap();
+        // Curvature over 1e-4 is a share of 1e-4 of the slopes; the search ends 1e-4 from the optimum.
+        assert!(
+            (together / linearised - 1.0).abs() < 2e-3,
+            "{together} {linearised}"
+        );
+        assert!(linearised < 0.05, "{linearised}: the errors are not small");
+        assert_eq!(goodness(&frame, &fit, |_| false), Some(linearised));
+    }
+
+    /// The drift's standard deviation in a fit.
+    fn drift_of(frame: &Frame, fit: &Fit) -> f64 {
+        let is_drift = |small: &Small| matches!(small, Small::Drift { .. });
+        let first = frame.smalls.iter().position(is_drift).unwrap();
+        let smalls = Layout::new(frame, &fit.effects).smalls();
+        fit.branch.knowledge[smalls + first].std
+    }
+
+    /// What only a joint that drifts by more explains is refuted as long as it is known to drift by less.
+    #[test]
+    fn regress_a_drift_that_is_as_probable_keeps_an_explanation_from_being_refuted() {
+        let (mut frame, _) = fitted();
+        // Readings so poor that they say nothing of the drift, and nothing else that could move the withheld ones.
+        for reading in &mut frame.readings {
+            reading.std *= 1e3;
+        }
+        let is_drift = |small: &Small| matches!(small, Small::Drift { .. });
+        let others = frame.smalls.iter().zip(&mut frame.small_stds);
+        for (_, std) in others.filter(|(small, _)| !is_drift(small)) {
+            *std = 1e-9;
+        }
+        let settings = GapSettings {
+            drift_stds: vec![0.002],
+            ..GapSettings::default()
+        };
+        let mut fit = fit_nominal(&frame, &settings).unwrap();
+        let refutes = |p: f64| p < 1e-3;
+        let errors = WithheldErrors::new(&frame, &fit).unwrap().errors;
+        // Ten times what the smaller drift moves mode 6 by, against each other in both recordings.
+        let layout = Layout::new(&frame, &[]);
+        let first = layout.smalls();
+        let rows: Vec<Row> = frame.withheld.iter().map(|one| one.0).collect();
+        let forward = Forward {
+            frame: &frame,
+            layout,
+            rows: &rows,
+        };
+        let at = &fit.branch.optimum.parameters;
+        let slopes = forward.linearise(at, &fit.branch.knowledge).unwrap().slopes;
+        let drifts = (0..frame.smalls.len()).filter(|k| is_drift(&frame.smalls[*k]));
+        let by_drift = drifts
+            .map(|k| slopes.column(first + k).amax())
+            .fold(0.0, f64::max);
+        for (k, (_, reading)) in frame.withheld.iter_mut().enumerate() {
+            let away = 10.0 * 0.002 * by_drift * [1.0, -1.0][k % 2];
+            reading.value += away - errors[k] / 100.0;
+            reading.std = 1e-3 * by_drift * 0.002;
+        }
+        let known = goodness(&frame, &fit, refutes).unwrap();
+        fit.branch.drifts = vec![(0.002, 0.0), (0.05, 0.0)];
+        let open = goodness(&frame, &fit, refutes).unwrap();
+        assert!(refutes(known) && !refutes(open), "{known} {open}");
     }
 
     /// A covariance of rank one, and one that rounding has made indefinite.

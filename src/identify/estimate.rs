@@ -7,7 +7,7 @@ use crate::structure::Beam;
 use crate::structure::joint::StiffnessUnits;
 
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
-pub(super) const NORMAL_95: f64 = 1.959_964;
+pub(crate) const NORMAL_95: f64 = 1.959_964;
 
 /// Relative standard uncertainty of any frequency that no repetition within a recording shows (1): 0.005 %, a steel beam's change
 /// over a third of a kelvin.

@@ -156,6 +156,8 @@ pub enum DecayVerdict {
 
 /// Label of a peak that belongs to no mode and is no mains line.
 pub const UNPAIRED: &str = "unpaired";
+/// The label of a peak that may be none.
+pub const UNCLEAR: &str = "no clear resonance";
 
 /// A peak that belongs to no mode of the model.
 #[derive(Debug, Clone, PartialEq)]

@@ -79,6 +79,8 @@ pub struct Conditions {
     pub tap: Option<f64>,
     /// Where each sensor sits (m), moved ones at their place in this recording.
     pub sensor_positions: BTreeMap<String, f64>,
+    /// What each sensor weighs (kg), of those whose mass is stated.
+    pub sensor_masses: BTreeMap<String, f64>,
     /// Known masses that are fastened to the beam.
     pub masses: Vec<PointMass>,
     /// Tightening torque (N m).

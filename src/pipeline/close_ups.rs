@@ -1,13 +1,15 @@
 //! The samples about each tap, for pictures: an overview's pieces are longer than a tap's pulse.
 
 use crate::recording::{Recording, RecordingError};
-use crate::taps::{TapSource, Taps};
+use crate::taps::{Tap, TapSource, Taps};
 use std::ops::Range;
 
 /// Shown before a tap's trigger (s).
 const BEFORE: f64 = 2e-3;
 /// Shown after it (s): the pulse, and how the response sets out.
 const AFTER: f64 = 30e-3;
+/// Shown after a second hit (s): its pulse.
+const AFTER_SECOND: f64 = 10e-3;
 
 /// The samples about a tap.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,20 +35,23 @@ pub(super) fn close_ups(
         TapSource::Responses(responses) => (None, responses),
     };
     let channels = (force, responses.first().copied());
-    let times = taps.taps.iter().map(|tap| tap.time);
-    times
-        .map(|time| close_up(recording, channels, time))
+    let shown = |tap: &Tap| {
+        let second = tap.second_hit.map(|second| second.delay + AFTER_SECOND);
+        (tap.time, second.map_or(AFTER, |second| second.max(AFTER)))
+    };
+    let all = taps.taps.iter().map(shown);
+    all.map(|about| close_up(recording, channels, about))
         .collect()
 }
 
 fn close_up(
     recording: &Recording,
     (force, response): (Option<usize>, Option<usize>),
-    time: f64,
+    (time, after): (f64, f64),
 ) -> Result<CloseUp, RecordingError> {
     let rate = recording.sample_rate();
     let first = ((time - BEFORE) * rate).round().max(0.0) as u64;
-    let last = ((time + AFTER) * rate).round().max(0.0) as u64;
+    let last = ((time + after) * rate).round().max(0.0) as u64;
     let read = |channel| samples(recording, channel, first..last);
     Ok(CloseUp {
         start: first as f64 / rate - time,
@@ -70,6 +75,7 @@ fn samples(
 mod tests {
     use super::*;
     use crate::recording::Channel;
+    use crate::taps::SecondHit;
 
     #[test]
     fn limit_a_close_up_ends_where_the_recording_does() {
@@ -80,7 +86,8 @@ mod tests {
         };
         let channels = vec![channel(0.0), channel(500.0)];
         let recording = Recording::from_samples("taps", 1000.0, channels).expect("samples");
-        let found = |time: f64| close_up(&recording, (Some(0), Some(1)), time).expect("samples");
+        let found =
+            |time: f64| close_up(&recording, (Some(0), Some(1)), (time, AFTER)).expect("samples");
         let lengths = [0.001, 0.050, 0.090].map(|time| found(time).force.map(|force| force.len()));
         assert_eq!(lengths, [Some(31), Some(32), Some(12)]);
         let middle = found(0.050);
@@ -88,5 +95,29 @@ mod tests {
         // Of both channels the same frames, each less its mean.
         assert_eq!(middle.force, middle.response);
         assert_eq!(middle.force.map(|force| force[0]), Some(48.0 - 49.5));
+        // As far as a second hit, which is why a tap is rejected.
+        let hit = |second_hit| Tap {
+            time: 0.010,
+            peak: 1.0,
+            pulse_end: None,
+            record: 0..100,
+            second_hit,
+            rejection: None,
+        };
+        let far = SecondHit {
+            delay: 0.035,
+            ratio: 0.6,
+        };
+        let taps = Taps {
+            taps: vec![hit(None), hit(Some(far))],
+            noise: 0.0,
+            remarks: Vec::new(),
+        };
+        let all = close_ups(&recording, &TapSource::Responses(vec![0]), &taps).expect("samples");
+        let lengths: Vec<_> = all
+            .iter()
+            .map(|one| one.response.as_ref().map(Vec::len))
+            .collect();
+        assert_eq!(lengths, [Some(32), Some(47)]);
     }
 }

@@ -157,9 +157,11 @@ fn open_described(
 fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
     let place =
         |sensor: &SensorDescription| Some((sensor.name.clone(), description.place_of(sensor)?));
+    let mass = |sensor: &SensorDescription| Some((sensor.name.clone(), sensor.mass?));
     Conditions {
         tap: description.tap,
         sensor_positions: test.sensors.iter().filter_map(place).collect(),
+        sensor_masses: test.sensors.iter().filter_map(mass).collect(),
         masses: fastened_masses(description),
         torque: description.torque,
         temperature: description.temperature,

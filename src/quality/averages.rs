@@ -145,13 +145,16 @@ pub fn check_frequency_scatter(
         };
         let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {
             let excess = times(excess);
-            format!("{excess} times what noise explains, where {largest:.1} is chance")
+            format!("{excess} times what noise explains, where chance reaches {largest:.1}")
         });
+        let limit = match outcome {
+            Outcome::Doubtful => format!("bad from {:.0} %", 100.0 * limit),
+            _ => format!("limit {:.0} %", 100.0 * limit),
+        };
         let happened = format!(
-            "The frequency scatters by {:.4} % over {} taps, {noise}{small} (limit {:.0} %).",
+            "The frequency scatters by {:.4} % over {} taps, {noise}{small} ({limit}).",
             100.0 * relative,
-            mode.tap_frequencies.len(),
-            100.0 * limit
+            mode.tap_frequencies.len()
         );
         // What decides is shown: a doubt comes of the noise's share, not of the limit.
         match excess.filter(|_| outcome == Outcome::Doubtful) {

@@ -3,7 +3,9 @@
 use super::document::{Document, GapVerdictSection};
 use super::format::{signed_or_below, significant};
 use super::summary::{channels, described, most_missed};
-use super::tables::{Parameter, estimated, has_joint, joint_with, quality_count, together};
+use super::tables::{
+    Parameter, estimated, has_joint, joint_with, quality_count, shows_gap, together,
+};
 
 /// At most five lines, each with what it is about; what was not computed has none.
 pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
@@ -113,7 +115,7 @@ fn model(document: &Document) -> Option<String> {
         // A value stays on the line of its name and unit.
         let with = with.map(|joint| joint.replace(" = ", "\u{a0}=\u{a0}"));
         let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
-        format!("; {}{with}", missing(&gap.verdict))
+        format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
     });
     Some(format!(
         "largest frequency error of the model {} % (mode {}){gap}",
@@ -122,8 +124,8 @@ fn model(document: &Document) -> Option<String> {
     ))
 }
 
-/// What the diagnosis answers, in a few words.
-fn missing(verdict: &GapVerdictSection) -> String {
+/// What the diagnosis answers, in a few words; `there` where the readings show a gap, be its cause known or not.
+fn missing(verdict: &GapVerdictSection, there: bool) -> String {
     let mut names: Vec<String> = Vec::new();
     for effect in &verdict.effects {
         let name = match effect.as_str() {
@@ -148,6 +150,7 @@ fn missing(verdict: &GapVerdictSection) -> String {
         "set" if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
         "set" => format!("not decided is what is missing in it: {}", listed("or")),
         "unknown" => "missing in it: something unknown".to_owned(),
+        _ if there => "something is missing in it, and these data cannot say what".to_owned(),
         _ => "not enough data to tell whether something is missing in it".to_owned(),
     }
 }
@@ -171,21 +174,32 @@ mod tests {
     #[test]
     fn regress_every_verdict_has_its_words() {
         let words = |kind: &str, effects: &[&str]| {
-            missing(&GapVerdictSection {
+            let verdict = GapVerdictSection {
                 kind: kind.to_owned(),
                 effects: effects.iter().map(|name| (*name).to_owned()).collect(),
                 reason: None,
-            })
+            };
+            [false, true].map(|there| missing(&verdict, there))
         };
-        let pair = words("named", &["local-crack", "sensor-mass"]);
+        let [pair, _] = words("named", &["local-crack", "sensor-mass"]);
         assert_eq!(pair, "missing in it: local-crack and sensor-mass");
         // A group of pairs repeats what they share.
-        let group = words("group", &["modulus", "length", "modulus"]);
+        let [group, _] = words("group", &["modulus", "length", "modulus"]);
         assert_eq!(group, "missing in it: one of modulus or length");
-        let set = words("set", &["modulus", "none", "unknown"]);
+        let [set, _] = words("set", &["modulus", "none", "unknown"]);
         let said = "not decided is what is missing in it: modulus, nothing or something unknown";
         assert_eq!(set, said);
-        assert_eq!(words("set", &["modulus"]), "perhaps missing in it: modulus");
-        assert!(words("not-enough-data", &[]).starts_with("not enough data"));
+        let [alone, _] = words("set", &["modulus"]);
+        assert_eq!(alone, "perhaps missing in it: modulus");
+        // That there is a gap and what causes it are two questions.
+        let [open, there] = words("not-enough-data", &[]);
+        assert!(
+            open.starts_with("not enough data to tell whether"),
+            "{open}"
+        );
+        assert!(
+            there.starts_with("something is missing in it, and"),
+            "{there}"
+        );
     }
 }

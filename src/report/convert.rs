@@ -182,6 +182,7 @@ fn recording_section(recording: &RecordingResult) -> RecordingSection {
         averages: spectra.map_or(0, |spectra| spectra.averages.taps),
         tap: recording.conditions.tap,
         sensor_positions: recording.conditions.sensor_positions.clone(),
+        sensor_masses: recording.conditions.sensor_masses.clone(),
         masses: recording.conditions.masses.iter().map(fastened).collect(),
         torque: recording.conditions.torque,
         temperature: recording.conditions.temperature,

@@ -232,7 +232,11 @@ fn frf_curve(frf: &Frf, others: Vec<FrfEstimator>) -> FrfCurve {
         unit: unit_words(&frf.unit),
         magnitude: magnitudes(frf.values()),
         phase: frf.values().iter().map(phase).collect(),
-        estimator: frf.estimator.name().to_string(),
+        // Of what an analyser has made nobody says by which.
+        estimator: match frf.averages {
+            0 => "of the file".to_owned(),
+            _ => frf.estimator.name().to_owned(),
+        },
         others: others
             .into_iter()
             .map(|estimator| (estimator.name().to_string(), magnitudes(frf.of(estimator))))

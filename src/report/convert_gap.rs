@@ -69,6 +69,7 @@ fn along_decays(found: &DecayFinding) -> AlongDecaysSection {
         effect: found
             .is_of_joint()
             .then(|| EffectId::JointNonlinearity.name().to_owned()),
+        enough: found.is_enough(),
         lawful: found.is_lawful(),
         ratio: found.ratio,
         ratio_std: found.ratio_std,
@@ -179,6 +180,7 @@ fn hypothesis(found: &HypothesisResult) -> HypothesisSection {
         goodness_of_fit: found.goodness_of_fit,
         joint_shift: shift(&found.joint_shift),
         joint: found.joint,
+        joint_intervals: found.joint_intervals,
     }
 }
 
@@ -209,12 +211,19 @@ fn left_out(found: &LeftOutRecordings) -> LeftOutSection {
 }
 
 fn map(map: &PlaceMap) -> PlaceMapSection {
+    let share = |fall: &f64| match map.misfit > 0.0 {
+        true => fall / map.misfit,
+        false => 0.0,
+    };
+    let shares = |falls: &[f64]| falls.iter().map(share).collect();
     PlaceMapSection {
         positions: map.positions.clone(),
         stiffness: map.stiffness.clone(),
         stiffness_std: map.stiffness_std.clone(),
         mass: map.mass.clone(),
         mass_std: map.mass_std.clone(),
+        stiffness_explains: shares(&map.stiffness_alone),
+        mass_explains: shares(&map.mass_alone),
         resolution: map.resolution,
     }
 }

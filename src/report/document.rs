@@ -158,6 +158,8 @@ pub struct RecordingSection {
     pub tap: Option<f64>,
     /// Where each sensor sits (m), moved ones at their place in this recording.
     pub sensor_positions: BTreeMap<String, f64>,
+    /// What each sensor weighs (kg), of those whose mass is stated.
+    pub sensor_masses: BTreeMap<String, f64>,
     /// Known masses fastened to the beam for this recording, as described.
     pub masses: Vec<FastenedMassSection>,
     /// Tightening torque (N m), as described.

@@ -73,6 +73,8 @@ pub struct AlongDecaysSection {
     /// "joint-nonlinearity" where a joint's law explains the changes, or all frequencies that change do so
     /// the same way; null where neither holds.
     pub effect: Option<String>,
+    /// Whether more than one frequency changes in a certain direction; of one alone nobody can tell what does that.
+    pub enough: bool,
     /// Whether a law of the joint's rotation explains the changes: only then `ratio` is its size.
     pub lawful: bool,
     /// Relative change of the joint's rotational stiffness at the largest amplitude (1): negative where it
@@ -207,6 +209,8 @@ pub struct HypothesisSection {
     pub joint_shift: JointShiftSection,
     /// Stiffnesses of the joint with it (N/m, N m/rad).
     pub joint: Option<[f64; 2]>,
+    /// Their 95 % intervals, low and high (N/m, N m/rad); null where a stiffness was not sought.
+    pub joint_intervals: [Option<[f64; 2]>; 2],
 }
 
 /// A parameter of an effect.
@@ -283,6 +287,10 @@ pub struct PlaceMapSection {
     pub mass: Vec<f64>,
     /// Its standard uncertainty.
     pub mass_std: Vec<f64>,
+    /// Share of the misfit (1) that each piece would explain if its stiffness alone changed.
+    pub stiffness_explains: Vec<f64>,
+    /// The same of its mass.
+    pub mass_explains: Vec<f64>,
     /// Length over which a local change is smeared (m).
     pub resolution: f64,
 }

@@ -6,10 +6,8 @@ use serde::Serialize;
 use super::figures::{FrfCurve, PeakMark, RecordingFigure, SpectraFigure, TimeOverview};
 use super::format::significant;
 use super::live_close_up::{LiveCloseUp, live_close_up};
+use super::live_lines::{Stretch, stretches};
 
-/// Most points of a curve: two for each pixel of the page's width, so that zooming finds more than the whole
-/// view shows, while five long recordings stay below the page's limit of 3 MB.
-const MOST_POINTS: usize = 2000;
 /// Significant digits of a value: hovering shows four.
 const DIGITS: usize = 4;
 
@@ -30,19 +28,15 @@ pub struct LivePlot {
     pub note: String,
 }
 
-/// Equally spaced points.
+/// Points, equally spaced piece by piece.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LiveAxis {
     /// "frequency".
     pub label: &'static str,
     /// "Hz".
     pub unit: &'static str,
-    /// First point (unit).
-    pub start: f64,
-    /// Distance of the points (unit).
-    pub step: f64,
-    /// Number of points.
-    pub count: usize,
+    /// First point (unit), distance of the points (unit) and their number, of each piece.
+    pub runs: Vec<(f64, f64, usize)>,
 }
 
 /// One panel.
@@ -184,9 +178,7 @@ pub fn live_taps(figure: &RecordingFigure) -> Option<LivePlot> {
         x: LiveAxis {
             label: "time",
             unit: "s",
-            start: 0.5 * overview.step,
-            step: overview.step,
-            count,
+            runs: vec![(0.5 * overview.step, overview.step, count)],
         },
         panels: vec![panel],
         marks: Vec::new(),
@@ -274,60 +266,44 @@ fn over_lines(
     spectra: &SpectraFigure,
     mut panels: Vec<LivePanel>,
 ) -> Option<LivePlot> {
+    let axis = &spectra.lines;
     let all = panels.iter().flat_map(|panel| &panel.series);
     let lines = all.map(|series| series.values.len()).max()?;
     if lines == 0 {
         return None;
     }
-    // Every so many lines become two points, the smallest and the largest value.
-    let stride = if lines > MOST_POINTS {
-        (2 * lines).div_ceil(MOST_POINTS)
-    } else {
-        1
-    };
-    let (mut count, mut step, mut note) = (lines, spectra.lines.spacing, String::new());
+    let modes = spectra.peaks.iter().filter(|peak| peak.mode.is_some());
+    let modes: Vec<usize> = modes.map(|peak| axis.nearest(peak.frequency)).collect();
+    let stretches = stretches(lines, &modes);
     for series in panels.iter_mut().flat_map(|panel| &mut panel.series) {
         series.values.resize(lines, None);
-        if stride > 1 {
-            series.values = series.values.chunks(stride).flat_map(ends).collect();
-        }
-        count = series.values.len();
+        let thinned = stretches.iter().map(|one| one.thinned(&series.values));
+        series.values = thinned.collect::<Vec<_>>().concat();
     }
-    if stride > 1 {
-        step *= stride as f64 / 2.0;
-        note = format!("Of {lines} lines the smallest and largest of every {stride} are drawn.");
-    }
+    let run = |stretch: &Stretch| {
+        let (first, step, count) = stretch.points();
+        let start = axis.frequency(0) + first * axis.spacing;
+        (start, step * axis.spacing, count)
+    };
+    let most = stretches.iter().map(|one| one.stride).max();
+    let note = match most.filter(|stride| *stride > 1) {
+        Some(stride) => format!(
+            "All lines about the modes are drawn; of the other lines the smallest and largest of every {stride}."
+        ),
+        None => String::new(),
+    };
     Some(LivePlot {
         kind,
         x: LiveAxis {
             label: "frequency",
             unit: "Hz",
-            start: spectra.lines.frequency(0),
-            step,
-            count,
+            runs: stretches.iter().map(run).collect(),
         },
         panels,
         marks: spectra.peaks.iter().filter_map(live_mark).collect(),
         taps: Vec::new(),
         note,
     })
-}
-
-/// Smallest and largest of some values, in the order in which they stand.
-fn ends(values: &[Option<f64>]) -> [Option<f64>; 2] {
-    let known = || {
-        values
-            .iter()
-            .enumerate()
-            .filter_map(|(at, value)| Some((at, (*value)?)))
-    };
-    let low = known().min_by(|a, b| a.1.total_cmp(&b.1));
-    let high = known().max_by(|a, b| a.1.total_cmp(&b.1));
-    match (low, high) {
-        (Some(low), Some(high)) if low.0 <= high.0 => [Some(low.1), Some(high.1)],
-        (Some(low), Some(high)) => [Some(high.1), Some(low.1)],
-        _ => [None, None],
-    }
 }
 
 fn live_mark(peak: &PeakMark) -> Option<LiveMark> {

@@ -7,7 +7,7 @@ use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointRule,
 use super::plot::axis::Axis;
 use super::plot::comparison::{Error, errors, frequencies_words, panel};
 use super::plot::gap::{Explanation, MOST_BARS, abscissa, errors_panel};
-use super::plot::place_map::map_panel;
+use super::plot::place_map::{explained_panel, map_panel};
 use super::plot::shapes::{Places, displacement, joint_of, places, shown};
 use super::tables::place_of;
 
@@ -208,7 +208,25 @@ pub fn live_place_map(document: &Document) -> Option<LivePoints> {
         ),
         change(map, ("mass", "c0"), (&map.mass, &map.mass_std)),
     ];
-    Some(together(vec![panel_of(x, y, sets)]))
+    let explained = explained_panel(map)?;
+    let share = |name: &str, color: &str, values: &[f64]| {
+        let places = map.positions.iter().zip(values);
+        let places = places.map(|(at, value)| (coarse(1e3 * at), coarse(100.0 * value)));
+        let mut set = PointSet::new(name, color, ("curve", 2.0), places);
+        let said = |value: &f64| format!("{:.0} %", 100.0 * value);
+        set.said = values.iter().map(said).collect();
+        set
+    };
+    let shares = vec![
+        share("bending stiffness", "c1", &map.stiffness_explains),
+        share("mass", "c0", &map.mass_explains),
+    ];
+    let above = panel_of(
+        PointAxis::of(&explained.x, "position from the joint", "mm"),
+        PointAxis::of(&explained.y, "misfit explained by one place alone", "%"),
+        shares,
+    );
+    Some(together(vec![above, panel_of(x, y, sets)]))
 }
 
 fn change(

@@ -30,6 +30,7 @@ pub mod html;
 pub mod live;
 pub mod live_amplitude;
 pub mod live_close_up;
+mod live_lines;
 pub mod live_model;
 pub mod live_points;
 pub mod plot;

@@ -106,7 +106,8 @@ pub fn render_run(
     Ok(files)
 }
 
-/// The averaged spectra of a recording as a picture; `None` when no tap was accepted.
+/// The averaged spectra of a recording as a picture, its functions where the file holds nothing else; `None` when no
+/// tap was accepted.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
@@ -114,7 +115,7 @@ pub fn render_spectrum_picture(
     figure: &RecordingFigure,
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
-    optional(draw_spectrum(figure), format)
+    optional(draw_spectrum(figure).or_else(|| draw_frf(figure)), format)
 }
 
 /// The frequency response functions of a recording as a picture; `None` without a hammer or an accepted
@@ -223,8 +224,8 @@ fn gap_pictures(document: &Document) -> Vec<Picture> {
             "gap-place",
             draw_place_map(document),
             live_place_map(document),
-            "Where along the beam a local change of stiffness or of mass would explain the errors; \
-             bars: one standard deviation."
+            "Where along the beam a local change of stiffness or of mass would explain the errors: above each place by \
+             itself, which peaks where a local cause sits; below all places together, bars: one standard deviation."
                 .to_owned(),
         ),
     ];

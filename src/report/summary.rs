@@ -1,8 +1,10 @@
 //! What was found, in a few plain sentences.
 
-use super::document::{Document, ModeSection, PredictionSection, RecordingSection};
+use super::document::{
+    Document, EstimateSection, ModeSection, PredictionSection, RecordingSection,
+};
 use super::format::{bound_percent, signed_or_below, significant, trimmed};
-use super::tables::{Parameter, estimated, gap_story, quality_count, reading_bound};
+use super::tables::{Parameter, estimated, gap_in_short, gap_story, quality_count, reading_bound};
 use crate::identify::observation::UNPAIRED;
 use crate::pipeline::AmplitudeChange;
 
@@ -14,13 +16,14 @@ pub fn sentences(document: &Document) -> Vec<String> {
         estimate(document),
         misfit(document),
         gap_story(document).into_iter().next(),
-        resolution(document),
-        described(document),
     ];
+    let last = [resolution(document), described(document)];
     let first = first.into_iter().flatten();
     first
         .chain(amplitudes(document))
         .chain(rest.into_iter().flatten())
+        .chain(gap_in_short(document))
+        .chain(last.into_iter().flatten())
         .collect()
 }
 
@@ -30,7 +33,8 @@ pub(super) fn described(document: &Document) -> Option<String> {
         .test
         .as_ref()
         .is_some_and(|test| test.kind.is_none());
-    let analysed = document.recordings.is_some() && document.modes.is_some();
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let analysed = document.recordings.is_some() && !modes.is_empty();
     (bare && analysed && document.frfs.is_none()).then(|| {
         "A description of the beam (tapjoint\u{a0}init\u{a0}>\u{a0}test.toml) would add mode numbers, measured \
          beside predicted frequencies, the joint's stiffness and the diagnosis of the gap."
@@ -291,8 +295,17 @@ fn misfit(document: &Document) -> Option<String> {
     ))
 }
 
+/// What reading on lines alone would leave open; nothing beside a misfit that is larger than what the readings leave
+/// open, for the spans would look like what is known of the joint.
 fn resolution(document: &Document) -> Option<String> {
     let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    let misses = |estimate: &EstimateSection| {
+        let all = estimated(estimate);
+        all.iter().any(|one| one.value.std_scaled.is_some())
+    };
+    if estimate.is_some_and(misses) {
+        return None;
+    }
     let main = estimate.map_or("", |estimate| estimate.method.as_str());
     let spans = document.resolution_span.as_deref()?;
     // Of the method that the estimate is by; else of the one that there is.

@@ -1,7 +1,9 @@
-//! Whether a laboratory can be.
+//! Whether a laboratory can be, and what it is asked to plant.
 
 use super::error::SimulateError;
 use super::laboratory::{Damping, Laboratory};
+use crate::description::TestDescription;
+use crate::effects::{Effect, EffectId};
 
 /// Looks at every number.
 pub(super) fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {
@@ -50,6 +52,22 @@ pub(super) fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateEr
     let clock = [("the clock's error", recorder.clock_error)];
     check_all(&clock, |value| value.abs() < 0.5, "smaller than 0.5")?;
     check_all(&damping(laboratory), |value| value >= 0.0, "at least 0")
+}
+
+/// Refuses effects that would change nothing or that no recording contains: the truth would say what is not so.
+pub(super) fn check_effects(
+    test: &TestDescription,
+    effects: &[Effect],
+) -> Result<(), SimulateError> {
+    let planted = |id: EffectId| effects.iter().any(|effect| effect.id == id);
+    if planted(EffectId::Resolution) {
+        return Err(SimulateError::Resolution);
+    }
+    let stated = |mass: Option<f64>| mass.is_some_and(|mass| mass > 0.0);
+    if planted(EffectId::SensorMass) && test.sensors.iter().all(|one| stated(one.mass)) {
+        return Err(SimulateError::NothingToWeigh);
+    }
+    Ok(())
 }
 
 fn damping(laboratory: &Laboratory) -> Vec<(&'static str, f64)> {

@@ -71,6 +71,12 @@ pub enum SimulateError {
         "`resolution` is a bias of reading frequencies, which no recording contains; plant it in [measured]"
     )]
     Resolution,
+    /// An effect that acts on sensors of unknown mass alone.
+    #[error(
+        "`sensor-mass` is the mass of sensors that the description does not state, and it states that of every sensor; \
+         remove `mass` from the [[sensor]] that shall weigh more than is known"
+    )]
+    NothingToWeigh,
     /// A non-linear joint without a rotational spring.
     #[error(
         "`joint-nonlinearity` needs a joint that turns: its rotational stiffness is {stiffness} N m/rad, and must be positive and finite"

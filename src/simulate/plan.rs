@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::chain::Signal;
-use super::check::check_laboratory;
+use super::check::{check_effects, check_laboratory};
 use super::error::SimulateError;
 use super::hammer::TapPlan;
 use super::joint_moment::{JointMoment, LEAST_SLOPE};
@@ -74,13 +74,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_laboratory(plan.laboratory)?;
     let test = plan.description;
     let described = distinct_files(test)?;
-    if plan
-        .effects
-        .iter()
-        .any(|effect| effect.id == EffectId::Resolution)
-    {
-        return Err(SimulateError::Resolution);
-    }
+    check_effects(test, plan.effects)?;
     check_softening(plan.effects)?;
     let mut recordings = Vec::new();
     let mut trials = Vec::new();

@@ -116,9 +116,13 @@ impl AveragedSpectra {
     }
 
     /// Frequency response function of one response (its unit per N), `None` on lines where it does not
-    /// exist; `None` without a hammer.
+    /// exist; `None` without a hammer. Of functions that an analyser has averaged only its own estimate is there,
+    /// taken as H1.
     pub fn frf(&self, response: usize, estimator: FrfEstimator) -> Option<Vec<Option<Complex64>>> {
-        self.powers(response, 0)?;
+        if self.powers(response, 0).is_none() {
+            let stated = self.h1.as_ref().filter(|_| estimator == FrfEstimator::H1);
+            return Some(stated?.get(response)?.iter().copied().map(Some).collect());
+        }
         let value = |line| self.powers(response, line)?.frf(estimator);
         Some((0..self.lines.points()).map(value).collect())
     }

@@ -290,6 +290,41 @@ fn limit_without_taps_there_is_no_function() {
     assert_eq!(names(folder.path()), ["q.wav"]);
 }
 
+/// What `frf` writes it reads, and a report of it shows its curves: the picture of a file's functions is that of the
+/// functions themselves.
+#[test]
+fn regress_a_file_of_functions_has_its_curves() {
+    let folder = bare(3);
+    let first = ["taps.wav", "--hammer", "1", "--uff58b", "frf.uff"];
+    let written = json(folder.path(), &first);
+    let read = json(folder.path(), &["frf.uff", "--png", "again.svg"]);
+    let values = |document: &Value| numbers(&document["frfs"][0]["imaginary"]);
+    assert_eq!(values(&written), values(&read));
+    // The longest line of a picture, in characters.
+    let longest = |name: &str| {
+        let svg = fs::read_to_string(folder.path().join(name)).unwrap();
+        let drawn = svg.split_once("</defs>").unwrap().1;
+        let lines = drawn.split(" d=\"").skip(1);
+        let lengths = lines.map(|rest| rest.split('"').next().map_or(0, str::len));
+        lengths.max().unwrap_or(0)
+    };
+    Command::cargo_bin("tapjoint")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["run", "frf.uff", "--out", "report", "-q"])
+        .assert()
+        .success();
+    // Some 800 points of a curve; axes and marks have a few characters.
+    for name in ["again.svg", "report/frf-frf.svg"] {
+        assert!(longest(name) > 800, "{name}: {}", longest(name));
+    }
+    // There is no spectrum of what was never recorded.
+    assert!(!folder.path().join("report/spectrum-frf.png").exists());
+    frf(folder.path(), &["frf.uff", "--sensor", "2"])
+        .code(2)
+        .stderr(predicate::str::contains("--sensor is for samples in time"));
+}
+
 #[test]
 fn regress_bad_usage_is_refused_and_nothing_written() {
     let folder = sample();

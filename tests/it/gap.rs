@@ -59,7 +59,8 @@ fn recover_a_sensor_mass_that_the_model_left_out() {
     );
     assert!(mass.smallest_isolable.unwrap() < 0.0113);
     assert!(found.closure.unwrap().value > 0.9, "{:?}", found.closure);
-    assert!(found.withheld_after.unwrap() < 0.3 * found.withheld_before.unwrap());
+    // How high a sensor stands of which nothing is known moves the highest mode.
+    assert!(found.withheld_after.unwrap() < 0.5 * found.withheld_before.unwrap());
     assert!(found.gap_after.unwrap() < 0.2 * found.gap_before);
 }
 
@@ -123,14 +124,50 @@ fn limit_a_sensor_that_stands_up_is_no_gap() {
     let nominal = strip_on_springs(1.0, Some(0.01));
     // Its centre of mass 8 mm above the axis; a mode's f falls by phi'^2 J/2.
     let plan = five_recordings();
-    let turned = observe_with_inertia(&plan, &nominal, 0.01 * 0.008_f64.powi(2));
+    let turned = observe_with_inertia((&plan, &nominal), &[], 0.01 * 0.008_f64.powi(2));
     let begin = strip_on_springs(0.8, Some(0.01));
     let diagnosis = diagnose(&turned, &begin, &GapSettings::default()).unwrap();
     assert_eq!(diagnosis.verdict, Verdict::NoGap, "{:?}", diagnosis.blocks);
 }
 
-/// Observations of a structure whose sensors have a rotary inertia (kg m2).
-fn observe_with_inertia(plan: &TestPlan, nominal: &Nominal, inertia: f64) -> Observations {
+/// What is not known of a sensor of known mass is not known of one that weighs nobody knows what: where exactly it sits, and
+/// how high it is.
+#[test]
+fn recover_the_mass_of_a_sensor_that_stands_up_beside_its_place() {
+    let nominal = strip_on_springs(1.0, None);
+    // Readings so good that both are seen.
+    let plan = TestPlan {
+        frequency_std: 3e-5,
+        ..five_recordings()
+    };
+    let planted = effect(EffectId::SensorMass, &[("mass", 0.012)]);
+    let mut observed =
+        observe_with_inertia((&plan, &nominal), &[planted], 0.012 * 0.007_f64.powi(2));
+    for configuration in &mut observed.configurations {
+        for position in configuration
+            .sensors
+            .iter_mut()
+            .flat_map(|one| &mut one.position)
+        {
+            *position += 7e-4;
+        }
+    }
+    let begin = strip_on_springs(0.8, None);
+    let diagnosis = diagnose(&observed, &begin, &GapSettings::default()).unwrap();
+    let named = Verdict::Named(vec![EffectId::SensorMass]);
+    assert_eq!(diagnosis.verdict, named, "{:?}", diagnosis.blocks);
+    let mass = &result(&diagnosis, "sensor-mass").parameters[0];
+    // Four standard uncertainties: one case in 16 000 misses.
+    let off = (mass.value - 0.012).abs();
+    assert!(off < 4.0 * mass.std.unwrap(), "{mass:?}");
+}
+
+/// Observations of a structure with effects whose sensors have a rotary inertia (kg m2).
+fn observe_with_inertia(
+    (plan, nominal): (&TestPlan, &Nominal),
+    effects: &[Effect],
+    inertia: f64,
+) -> Observations {
     let mut all: Option<Observations> = None;
     for (k, one) in plan.configurations.iter().enumerate() {
         let mut with = nominal.clone();
@@ -141,7 +178,7 @@ fn observe_with_inertia(plan: &TestPlan, nominal: &Nominal, inertia: f64) -> Obs
                 inertia,
             });
         }
-        let mut seen = observe(plan, &with, &[], 7).unwrap();
+        let mut seen = observe(plan, &with, effects, 7).unwrap();
         let own = seen.configurations.swap_remove(k);
         match &mut all {
             None => {

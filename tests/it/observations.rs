@@ -3,7 +3,8 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use tapjoint::description::{ChannelRef, SensorKind, TestDescription};
-use tapjoint::identify::observation::{Configuration, Observations};
+use tapjoint::identify::observation::{Configuration, Observations, UNCLEAR};
+use tapjoint::modal::PeakLabel;
 use tapjoint::pipeline::{
     Analysis, IdentifySettings, RecordingResult, measure_bare, observations, run_test,
     tested_structure,
@@ -328,4 +329,10 @@ fn regress_frequencies_read_elsewhere_keep_their_stated_uncertainty() {
         (configuration.taps, configuration.modes[0].freedom),
         (0, None)
     );
+}
+
+/// The diagnosis knows peaks by the words that the measurement gives them.
+#[test]
+fn val_an_unclear_peak_is_called_the_same_on_both_sides() {
+    assert_eq!(PeakLabel::NoResonance.to_string(), UNCLEAR);
 }

@@ -339,8 +339,8 @@ fn val_scatter_beside_what_noise_explains() {
             "110.00 Hz",
             "0.0200 %",
             "10 times",
-            "1.8 is chance",
-            "limit 1 %",
+            "chance reaches 1.8",
+            "bad from 1 %",
         ],
     );
     assert_eq!(

@@ -592,6 +592,11 @@ fn regress_what_cannot_be_simulated_is_said() {
     let resolution = Effect::from_pairs(EffectId::Resolution, &[("offset", 0.1)]).unwrap();
     let error = refuse(CANTILEVER, &[resolution], &laboratory);
     assert!(matches!(error, SimulateError::Resolution), "{error}");
+    // What would change nothing is not planted either.
+    let stated = CANTILEVER.replace("position = 0.338", "position = 0.338\nmass = 0.001");
+    let sensor_mass = Effect::from_pairs(EffectId::SensorMass, &[("mass", 0.02)]).unwrap();
+    let error = refuse(&stated, &[sensor_mass], &laboratory);
+    assert!(matches!(error, SimulateError::NothingToWeigh), "{error}");
     let law = [("ratio", -0.1), ("exponent", 2.0)];
     let nonlinear = Effect::from_pairs(EffectId::JointNonlinearity, &law).unwrap();
     let error = refuse(&cases[3].0, &[nonlinear], &laboratory);

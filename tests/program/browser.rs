@@ -379,7 +379,7 @@ const ANSWERS: [(&str, usize, &[&str]); 6] = [
     (
         "position from the joint ",
         1,
-        &[" mm", "local change ", " ± ", " %"],
+        &[" mm", "misfit explained by one place alone ", " %"],
     ),
 ];
 

@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 fn samples() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let example = Path::new("examples").join("five_recordings.toml");
+    std::fs::create_dir_all(folder.path().join("examples")).unwrap();
+    std::fs::copy(root.join(&example), folder.path().join(&example)).unwrap();
     for test in ["cantilever", "lap-joint"] {
         let (from, to) = (
             root.join("recordings").join(test),

@@ -38,6 +38,7 @@ fn prop_reports_keep_to_the_shipped_schema() {
     let folder = samples();
     let cantilever = "recordings/cantilever/test.toml";
     let wav = "recordings/cantilever/low.wav";
+    let virtual_test = "examples/five_recordings.toml";
     let commands: &[&[&str]] = &[
         &["run", cantilever],
         &["run", "recordings/lap-joint/test.toml"],
@@ -47,6 +48,25 @@ fn prop_reports_keep_to_the_shipped_schema() {
         &["inspect", wav],
         &["spectrum", wav, "--hammer", "1"],
         &["frf", wav, "--hammer", "1"],
+        &["diagnose", cantilever],
+        &["plan", virtual_test, "--draws", "1"],
+        &["export", cantilever],
+        &[
+            "resolution",
+            virtual_test,
+            "--draws",
+            "2",
+            "--fit-draws",
+            "2",
+            "--blocks",
+            "1024",
+        ],
+        &["simulate", virtual_test, "--out", "virtual"],
+        &["blind-check", "--cases", "2", "--seed", "4"],
+        &["reproduce"],
+        &["init"],
+        &["completions", "bash"],
+        &["man", "run"],
     ];
     for command in commands {
         let mut arguments = command.to_vec();

@@ -141,7 +141,7 @@ pub(super) fn run(
     }
     let folder = request.output.publish()?;
     terminal.say(&summary::summary(&truth, &test, &folder))?;
-    terminal.write_json(&serde_json::to_value(&truth)?)?;
+    terminal.write_json(&serde_json::json!({ "truth": truth }))?;
     Ok(Outcome::Answered)
 }
 

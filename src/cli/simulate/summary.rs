@@ -165,9 +165,9 @@ fn of_damping(damping: &Damping) -> String {
         Damping::Modal(ratios) => {
             let ratios: Vec<String> = ratios
                 .iter()
-                .map(|ratio| format!("{:.3} %", 100.0 * ratio))
+                .map(|ratio| format!("{:.3}", 100.0 * ratio))
                 .collect();
-            format!("{} (the last for all beyond)", ratios.join(", "))
+            format!("{} % (the last for all beyond)", ratios.join(", "))
         }
         Damping::Rayleigh { mass, stiffness } => {
             format!("{mass} 1/s of mass, {stiffness} s of stiffness")

@@ -113,7 +113,10 @@ impl Proposals {
             bare: None,
             turned: None,
         };
-        planned.read_again(frame);
+        if frame.modes + MORE_MODES <= settings.highest_mode {
+            planned.read_higher(frame);
+        }
+        planned.read_finer(frame);
         planned.tap_again(frame);
         planned.change(frame, settings);
         planned.take_apart(frame);
@@ -129,8 +132,8 @@ impl Proposals {
         self.all.push(Proposal { step, readings });
     }
 
-    /// Higher modes, finer lines.
-    fn read_again(&mut self, frame: &Frame) {
+    /// Higher modes.
+    fn read_higher(&mut self, frame: &Frame) {
         let (first, last) = (frame.modes + 1, frame.modes + MORE_MODES);
         let kept = self.whole.setups.len();
         let higher = |configuration: usize| {
@@ -149,6 +152,10 @@ impl Proposals {
             is_recorded: frame.setups.iter().any(|setup| setup.is_recorded),
         };
         self.propose(step, Structure::Whole, rows);
+    }
+
+    /// Finer lines.
+    fn read_finer(&mut self, frame: &Frame) {
         if let Some(bias) = frame.nominal.reading_bias {
             let rows = observed_modes(frame).map(|mode| {
                 let configuration = 0;

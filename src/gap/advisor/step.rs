@@ -121,7 +121,7 @@ impl Step {
                 "read the frequencies by a curve fit, or on lines of {spacing:.3} Hz or closer"
             ),
             Step::MoreTaps { factor } => format!(
-                "repeat the first recording with {factor} times as many taps, everything else untouched"
+                "repeat the first measurement with {factor} times as many taps, everything else untouched"
             ),
             Step::TapLevel { level } if *level < 1.0 => format!(
                 "tap at {:.0} % of the force, everything else untouched",
@@ -131,7 +131,7 @@ impl Step {
                 format!("tap {level:.0} times as hard, everything else untouched")
             }
             Step::WeighSensor => {
-                "weigh each sensor with its mounting and the cable that hangs on it to 0.5 g, and state its mass".into()
+                "weigh each sensor of unknown mass with its mounting and the cable that hangs on it to 0.5 g, and state it".into()
             }
             Step::Calipers => {
                 "weigh the beam to 0.1 %, measure its thickness to 0.01 mm and its free length to 0.2 mm".into()

@@ -170,8 +170,8 @@ impl Canvas<'_> {
         for y in 0..mask.height {
             for x in 0..mask.width {
                 let coverage = mask.coverage[(y * mask.width + x) as usize];
-                if coverage > 0.0 {
-                    let alpha = f64::from(coverage) * stroke.opacity;
+                if coverage > 0 {
+                    let alpha = f64::from(coverage) / FULL * stroke.opacity;
                     self.blend(mask.left + x, mask.top + y, stroke.color, alpha);
                 }
             }
@@ -179,13 +179,16 @@ impl Canvas<'_> {
     }
 }
 
-/// How much of each pixel in a rectangle a line covers, 0 to 1.
+/// A pixel that is covered wholly, in the steps that a colour has.
+const FULL: f64 = 255.0;
+
+/// How much of each pixel in a rectangle a line covers, 0 to [`FULL`].
 struct Mask {
     left: i32,
     top: i32,
     width: i32,
     height: i32,
-    coverage: Vec<f32>,
+    coverage: Vec<u8>,
 }
 
 impl Mask {
@@ -208,7 +211,7 @@ impl Mask {
             top,
             width,
             height,
-            coverage: vec![0.0; width as usize * height as usize],
+            coverage: vec![0; width as usize * height as usize],
         })
     }
 
@@ -252,7 +255,7 @@ impl Mask {
         let (x, y) = (x - self.left, y - self.top);
         if (0..self.width).contains(&x) && (0..self.height).contains(&y) {
             let cell = &mut self.coverage[(y * self.width + x) as usize];
-            *cell = cell.max(coverage as f32);
+            *cell = (*cell).max((FULL * coverage).round() as u8);
         }
     }
 }

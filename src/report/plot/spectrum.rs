@@ -23,9 +23,10 @@ const PAST_HIGHEST: f64 = 1.25;
 /// An axis is shortened when that hides more than the rest of this share of the band.
 const MOST_SHOWN_PART: f64 = 0.6;
 
-/// The spectra of a recording; `None` when no tap was accepted.
+/// The spectra of a recording; `None` when no tap was accepted, and where only functions are known.
 pub fn draw_spectrum(figure: &RecordingFigure) -> Option<Drawing> {
-    let spectra = figure.spectra.as_ref()?;
+    let known = |spectra: &&SpectraFigure| !spectra.responses.is_empty();
+    let spectra = figure.spectra.as_ref().filter(known)?;
     let with_closeups = spectra.peaks.iter().any(|peak| peak.mode.is_some());
     let force = spectra.force.as_deref().filter(|force| is_something(force));
     let force_height = if force.is_some() { 130.0 } else { 0.0 };
@@ -66,6 +67,13 @@ pub fn subtitle(spectra: &SpectraFigure) -> String {
     } else {
         String::new()
     };
+    if spectra.averages == 0 {
+        let spacing = trimmed(lines.spacing, 4);
+        return format!(
+            "as the file holds them \u{b7} {} lines \u{b7} line spacing {spacing} Hz{shown}",
+            lines.points()
+        );
+    }
     format!(
         "{} {taps} averaged \u{b7} block {} samples, {} lines \u{b7} line spacing {} Hz \u{b7} resolution 1/T = {} Hz{shown}",
         spectra.averages,

@@ -33,9 +33,8 @@ pub fn frfs(document: &Document) -> Option<Table> {
     let (least, most) = (taps.clone().min().unwrap_or(0), taps.max().unwrap_or(0));
     let table = Table {
         caption: format!(
-            "Frequency response functions at the resonances, {}, {}",
-            first.estimator,
-            averages(least, most)
+            "Frequency response functions at the resonances, {}",
+            made_by(&first.estimator, least, most)
         ),
         columns: vec![
             words("Recording"),
@@ -54,11 +53,13 @@ pub fn frfs(document: &Document) -> Option<Table> {
     Some(table.without_empty_columns())
 }
 
-fn averages(least: usize, most: usize) -> String {
+/// Estimator and taps; of what an analyser has made nobody says either.
+fn made_by(estimator: &str, least: usize, most: usize) -> String {
     match (least, most) {
-        (1, 1) => "1 tap".to_owned(),
-        _ if least == most => format!("{least} taps averaged"),
-        _ => format!("{least} to {most} taps averaged"),
+        (0, 0) => "as the file holds them".to_owned(),
+        (1, 1) => format!("{estimator}, 1 tap"),
+        _ if least == most => format!("{estimator}, {least} taps averaged"),
+        _ => format!("{estimator}, {least} to {most} taps averaged"),
     }
 }
 

@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use super::super::document::{
     ClosureSection, Document, GapSection, HypothesisSection, PullSection,
 };
-use super::super::format::{RIGID, prefix, probability, signed_percent, significant, trimmed};
+use super::super::format::{
+    RIGID, prefix, probability, rounded, signed_percent, significant, trimmed,
+};
 use super::has_joint;
 use super::hypotheses::{left, percent, together};
 use super::next_tests::next_test;
-use super::verdict::{named, verdict};
+use super::verdict::{named, shows_gap, verdict};
 use crate::stats::times;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
@@ -38,7 +40,13 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
         .iter()
         .take(3)
         .filter(|(_, p)| **p >= 0.01)
-        .map(|(name, p)| format!("{name}{} {}", sensors_at(document, name), probability(**p)))
+        .map(|(name, p)| {
+            format!(
+                "{name}{} {}",
+                sensors_at(document, gap, name),
+                probability(**p)
+            )
+        })
         .collect();
     let worst = place
         .modes
@@ -55,13 +63,20 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
 }
 
 /// " (A at 338 mm)" behind the place "sensor", without the position of one that moves; nothing behind other
-/// places, and where too many sensors may be meant.
-fn sensors_at(document: &Document, place: &str) -> String {
+/// places, and where too many sensors may be meant. An unknown mass is that of sensors whose mass is not stated.
+fn sensors_at(document: &Document, gap: &GapSection, place: &str) -> String {
     const MOST: usize = 3;
     let recordings = document.recordings.as_deref().unwrap_or_default();
+    let mut at_sensors = gap.hypotheses.iter().map(|found| found.effect.as_str());
+    let by_mass = at_sensors.find(|effect| effect.starts_with("sensor")) == Some("sensor-mass");
     let mut sensors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
-    for (name, position) in recordings.iter().flat_map(|one| &one.sensor_positions) {
-        sensors.entry(name).or_default().push(*position);
+    for one in recordings {
+        for (name, position) in &one.sensor_positions {
+            let weighed = one.sensor_masses.get(name).is_some_and(|mass| *mass > 0.0);
+            if !(by_mass && weighed) {
+                sensors.entry(name).or_default().push(*position);
+            }
+        }
     }
     if place != "sensor" || sensors.is_empty() || sensors.len() > MOST {
         return String::new();
@@ -137,7 +152,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         Some(_) => format!(
             "{text}. Their uncertainty is {floor} %: the cause shows elsewhere, not in the mean frequencies."
         ),
-        None => format!("{text}; noise would leave {floor} %."),
+        None => format!("{text}; their own uncertainty is {floor} %."),
     })
 }
 
@@ -185,9 +200,14 @@ fn along_decays(gap: &GapSection) -> Option<String> {
         change(largest.percent_per_fold, 3)
     );
     let Some(effect) = &found.effect else {
-        return Some(format!(
-            "{seen}, but not as a joint whose stiffness depends on the amplitude would make them."
-        ));
+        return Some(match found.enough {
+            true => format!(
+                "{seen}, but not as a joint whose stiffness depends on the amplitude would make them."
+            ),
+            false => format!(
+                "{seen}; of one frequency alone nobody can tell whether the joint does that."
+            ),
+        });
     };
     if gap.verdict.effects.contains(effect) {
         return None;
@@ -235,9 +255,9 @@ fn price(gap: &GapSection) -> Option<String> {
         return None;
     }
     let moves = parts.join(", ");
-    Some(match joint(found) {
+    Some(match joint(found, true) {
         Some(joint) => {
-            format!("With it the joint is {joint} ({moves} against the joint without it).")
+            format!("With it the joint is {joint}: {moves} against the joint without it.")
         }
         None => format!("Adding it moves the joint: {moves}."),
     })
@@ -246,20 +266,53 @@ fn price(gap: &GapSection) -> Option<String> {
 /// "Kt = 168.2 kN/m, Kr = 205.4 N m/rad": the joint that is found together with what the verdict names; `None` where it
 /// names nothing.
 pub(in crate::report) fn joint_with(gap: &GapSection) -> Option<String> {
-    joint(named(gap).filter(|found| found.effect != "none")?)
+    joint(named(gap).filter(|found| found.effect != "none")?, false)
 }
 
-fn joint(found: &HypothesisSection) -> Option<String> {
+/// What a named effect does, in one sentence, and the test to make next; empty where nothing is missing.
+pub fn gap_in_short(document: &Document) -> Vec<String> {
+    let Some(gap) = document.gap.as_ref().filter(|gap| shows_gap(gap)) else {
+        return Vec::new();
+    };
+    let found = named(gap).filter(|found| found.effect != "none");
+    let shrink = found.and_then(|found| {
+        let before = found
+            .gap_before
+            .filter(|before| found.gap_after < Some(*before))?;
+        let joint =
+            joint(found, true).map_or(String::new(), |joint| format!(", and the joint is {joint}"));
+        Some(format!(
+            "With {} the errors of the frequencies shrink from {} to {} % (rms){joint}.",
+            together(&found.effect),
+            percent(Some(before)),
+            left(found.gap_after, gap.noise_floor)
+        ))
+    });
+    shrink.into_iter().chain(next_test(gap)).collect()
+}
+
+/// With 95 % intervals if these are wanted.
+fn joint(found: &HypothesisSection, intervals: bool) -> Option<String> {
     let [kt, kr] = found.joint?;
-    let kr = stiffness(kr, "N\u{a0}m/rad");
-    Some(format!("Kt = {}, Kr = {kr}", stiffness(kt, "N/m")))
+    let [of_kt, of_kr] = found
+        .joint_intervals
+        .map(|interval| interval.filter(|_| intervals));
+    let kr = stiffness((kr, of_kr), "N\u{a0}m/rad");
+    Some(format!("Kt = {}, Kr = {kr}", stiffness((kt, of_kt), "N/m")))
 }
 
-/// "1.995 MN/m", on one line.
-fn stiffness(value: f64, unit: &str) -> String {
+/// "1.995 MN/m (95 %: 1.991 to 1.999)", the value on one line with its unit.
+fn stiffness((value, interval): (f64, Option<[f64; 2]>), unit: &str) -> String {
     if value.is_infinite() {
         return RIGID.to_owned();
     }
     let (factor, letter) = prefix(value);
-    format!("{}\u{a0}{letter}{unit}", significant(factor * value, 4))
+    let known = interval.filter(|ends| ends.iter().all(|end| end.is_finite()));
+    let Some([low, high]) = known.map(|ends| ends.map(|end| factor * end)) else {
+        return format!("{}\u{a0}{letter}{unit}", significant(factor * value, 4));
+    };
+    // All with the digits that the interval supports.
+    let shown = rounded(factor * value, Some(0.5 * (high - low))).value;
+    let decimals = shown.split_once('.').map_or(0, |(_, behind)| behind.len());
+    format!("{shown}\u{a0}{letter}{unit} (95 %: {low:.decimals$} to {high:.decimals$})")
 }

@@ -35,6 +35,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
             number("Fitted (%)"),
             number("Withheld (%)"),
             words("Size"),
+            words("Told apart from").on_page(),
             words("Looks like").on_page(),
         ],
         rows: listed.collect(),
@@ -66,8 +67,24 @@ fn note(document: &Document, gap: &GapSection) -> String {
          The described model has {one_joint}geometry, shear and masses exactly as described; every hypothesis, none \
          too, {drift}lets these and sensors' inertias move within their uncertainty, and so usually leaves less; the fit \
          weighs each reading by its uncertainty, so that a plain rms may also be larger. All are errors of fits to the \
-         readings that take part in the diagnosis{part}; those of the estimate, which weighs all modes, may differ. Size \u{b1} one standard deviation."
+         readings that take part in the diagnosis{part}; those of the estimate, which weighs all modes, may differ. Size \u{b1} one standard deviation.{}",
+        one_factor(gap)
     )
+}
+
+/// What the baseline leaves that needs no cause, only a factor.
+fn one_factor(gap: &GapSection) -> String {
+    let scale = gap.baselines.iter().find(|one| one.name == "scale");
+    let floor = gap.noise_floor;
+    scale.map_or_else(String::new, |scale| {
+        let withheld = scale.withheld_after.map_or_else(String::new, |after| {
+            format!(", of the withheld ones {} %", left(Some(after), floor))
+        });
+        format!(
+            " For comparison: one unnamed factor on all frequencies leaves an error of {} % (rms){withheld}.",
+            left(scale.gap_after, floor)
+        )
+    })
 }
 
 /// How many recordings the diagnosis compares.
@@ -85,8 +102,22 @@ fn row(found: &HypothesisSection, floor: Option<f64>) -> Vec<String> {
         left(found.gap_after, floor),
         left(found.withheld_after, floor),
         sizes(found),
+        told_apart(found),
         looks_like(&found.confounded_with),
     ]
+}
+
+/// The size of a single effect from which these readings would tell it from every other.
+fn told_apart(found: &HypothesisSection) -> String {
+    let mut parameters = found.parameters.iter();
+    let least = |(name, parameter): (&String, &ParameterSection)| {
+        let (unit, factor) = unit_of(name);
+        let least = factor * parameter.smallest_isolable?;
+        Some(format!("{}{unit}", significant(least, 2)))
+    };
+    let single = !found.effect.contains('+');
+    let found = single.then(|| parameters.find_map(least)).flatten();
+    found.unwrap_or_else(|| MISSING.to_owned())
 }
 
 /// How many hypotheses that cannot be told from one are named; report.json has them all.
@@ -112,6 +143,14 @@ pub(super) fn sizes(found: &HypothesisSection) -> String {
     let mut of_effects: Vec<(&str, Vec<String>)> = Vec::new();
     for (name, parameter) in &found.parameters {
         let (effect, own) = name.split_once('.').unwrap_or(("", name));
+        // Of what may be anywhere, and of an inertia of no mass, no digit says anything.
+        let unknown = match parameter.std {
+            None => is_place(own),
+            Some(std) => own == "inertia" && std == 0.0,
+        };
+        if unknown {
+            continue;
+        }
         let part = size(own, parameter);
         match of_effects.last_mut().filter(|last| last.0 == effect) {
             Some(last) => last.1.push(part),
@@ -126,6 +165,11 @@ pub(super) fn sizes(found: &HypothesisSection) -> String {
         })
         .collect();
     parts.join("; ")
+}
+
+/// Whether a parameter says where an effect sits, at which frequency or after which law, and not how large it is.
+fn is_place(name: &str) -> bool {
+    matches!(name, "position" | "frequency" | "exponent" | "inertia")
 }
 
 fn size(name: &str, parameter: &ParameterSection) -> String {
@@ -193,15 +237,36 @@ mod tests {
 
     #[test]
     fn limit_sizes_of_two_effects_stand_under_their_names() {
-        let parameter = |value: f64| ParameterSection {
-            value,
-            std: None,
-            ..ParameterSection::default()
+        let known = |value: f64, std: Option<f64>| {
+            let parameters = [("mass", Some(1e-3), 0.0), ("position", std, value)];
+            let section = |(name, std, value): (&str, Option<f64>, f64)| {
+                let parameter = ParameterSection {
+                    value,
+                    std,
+                    ..ParameterSection::default()
+                };
+                (name.to_owned(), parameter)
+            };
+            sizes(&HypothesisSection {
+                parameters: parameters.map(section).into(),
+                ..HypothesisSection::default()
+            })
         };
+        // Next to nothing of it may be anywhere.
+        assert_eq!(known(0.004, None), "mass 0.0 \u{b1} 1.0 g");
+        let somewhere = known(0.004, Some(0.001));
+        assert_eq!(
+            somewhere,
+            "mass 0.0 \u{b1} 1.0 g, position 4.0 \u{b1} 1.0 mm"
+        );
         let of = |names: &[(&str, f64)]| {
-            let parameters = names
-                .iter()
-                .map(|(name, value)| ((*name).to_owned(), parameter(*value)));
+            let parameters = names.iter().map(|(name, value)| {
+                let parameter = ParameterSection {
+                    value: *value,
+                    ..ParameterSection::default()
+                };
+                ((*name).to_owned(), parameter)
+            });
             sizes(&HypothesisSection {
                 parameters: parameters.collect(),
                 ..HypothesisSection::default()
@@ -210,11 +275,9 @@ mod tests {
         assert_eq!(of(&[("mass", 0.024)]), "mass 24.0 g");
         let two = [
             ("local-crack.compliance", 0.01),
-            ("local-crack.position", 0.2),
             ("sensor-mass.mass", 0.024),
         ];
-        let words =
-            "local-crack: compliance 0.0100 L/EI, position 200 mm; sensor-mass: mass 24.0 g";
+        let words = "local-crack: compliance 0.0100 L/EI; sensor-mass: mass 24.0 g";
         assert_eq!(of(&two), words);
     }
 }

@@ -18,7 +18,7 @@ mod verdict;
 pub use datasets::datasets;
 pub use frfs::frfs;
 pub(super) use gap::joint_with;
-pub use gap::{gap_story, place_of};
+pub use gap::{gap_in_short, gap_story, place_of};
 pub use hypotheses::hypotheses;
 pub(super) use hypotheses::together;
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};
@@ -30,6 +30,7 @@ pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use resolution::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
+pub(super) use verdict::shows_gap;
 
 use super::document::{Document, ModeSection};
 use super::format::MISSING;

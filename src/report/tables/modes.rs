@@ -159,7 +159,7 @@ fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
 const INTERVAL_NOTE: &str = "Interval from: the noise that the fit leaves (residual), or the scatter of the taps \
                              where that is more than the noise explains (taps).";
 const LINE_NOTE: &str = "Line: the highest spectral line \u{b1} half of the larger of line spacing \
-                         and 1/T, as an analyser shows it.";
+                         and 1/T, as an analyser shows it; none where that line is of another peak.";
 const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, each fitted alone; p: \
                          how often noise alone makes taps scatter so.";
 
@@ -223,7 +223,8 @@ fn columns() -> Vec<Column> {
 }
 
 fn row(mode: &ModeSection) -> Vec<String> {
-    let line = mode.line_frequency.map(|line| match mode.half_line {
+    let line = mode.line_frequency.filter(|line| is_of(mode, *line));
+    let line = line.map(|line| match mode.half_line {
         Some(half) => line_reading(line, half).joined(),
         None => significant(line, 6),
     });
@@ -245,6 +246,14 @@ fn row(mode: &ModeSection) -> Vec<String> {
         optional(mode.random_error.map(|error| 100.0 * error), 2),
         mode.recording.clone().unwrap_or_else(|| MISSING.into()),
     ]
+}
+
+/// Whether the reading on a line is of this mode: the highest line near a pole may be of another peak, and its bound
+/// says nothing of the pole then. A fit is taken as off by three times its interval.
+fn is_of(mode: &ModeSection, line: f64) -> bool {
+    let bounds = mode.half_line.zip(bound_of(mode));
+    let far = |(half, bound): (f64, f64)| (line - mode.frequency).abs() > half + 3.0 * bound;
+    mode.method != "fit" || !bounds.is_some_and(far)
 }
 
 /// Distance (Hz) of the tap farthest from the mean of all taps; `None` with fewer than two.

@@ -1,8 +1,8 @@
 //! The verdict of the diagnosis in a sentence or two: which effect, none, or that nobody can say.
 
-use super::super::document::{GapSection, HypothesisSection};
+use super::super::document::{GapSection, HypothesisSection, UnplacedSection};
 use super::super::format::{probability, trimmed};
-use super::hypotheses::{LEAST_PROBABILITY, percent, sizes};
+use super::hypotheses::{LEAST_PROBABILITY, left, percent, sizes};
 use crate::gap::{MISFIT, SEEN};
 
 pub(super) fn verdict(gap: &GapSection, has_joint: bool) -> String {
@@ -81,13 +81,42 @@ fn no_gap(gap: &GapSection) -> String {
             probability(p)
         ),
         None => format!(
-            "No gap: the described model explains the frequencies within their uncertainty.{open}"
+            "No gap: the described model explains the frequencies within their uncertainty{}.{open}",
+            of_none.map_or_else(String::new, |none| by_moving(none, gap.noise_floor))
         ),
+    }
+}
+
+/// What the described model itself leaves, where that is much more than the readings' uncertainty and than what is
+/// left with a joint that may differ between recordings.
+fn by_moving(none: &HypothesisSection, floor: Option<f64>) -> String {
+    let all = none.gap_before.zip(none.gap_after).zip(floor);
+    match all.filter(|((before, after), floor)| *before > 2.0 * after.max(*floor)) {
+        Some(((before, after), floor)) => format!(
+            ", once joint, geometry and masses may differ from what is described by their tolerances and from recording \
+             to recording (errors {} %; exactly as described {} %)",
+            left(Some(after), Some(floor)),
+            percent(Some(before))
+        ),
+        None => String::new(),
     }
 }
 
 /// Probability of `none` below which a gap counts as there.
 const GAP: f64 = 0.1;
+
+/// Whether the readings show a gap, be its cause known or not.
+pub fn shows_gap(gap: &GapSection) -> bool {
+    let mut all = gap.hypotheses.iter();
+    let none = all.find(|found| found.effect == "none");
+    misfit_unplaced(gap).is_some() || none.is_some_and(|none| none.probability < GAP)
+}
+
+/// What the model misses without masses that sat nobody knows where, if it does.
+fn misfit_unplaced(gap: &GapSection) -> Option<&UnplacedSection> {
+    let unplaced = gap.unplaced.as_ref();
+    unplaced.filter(|one| one.goodness_of_fit < MISFIT)
+}
 
 /// That there is no answer, and what is known all the same.
 fn undecided(gap: &GapSection, has_joint: bool) -> String {
@@ -96,11 +125,7 @@ fn undecided(gap: &GapSection, has_joint: bool) -> String {
     let Some(none) = of("none") else {
         return format!("No diagnosis: {reason}.");
     };
-    let without = gap
-        .unplaced
-        .as_ref()
-        .filter(|one| one.goodness_of_fit < MISFIT);
-    let mut text = if let Some(without) = without {
+    let mut text = if let Some(without) = misfit_unplaced(gap) {
         format!(
             "There is a gap: without the {} g of {}, which sat nobody knows where, the described model misses the \
              frequencies by {} % (rms), as chance would in {} of tests. These data cannot say what causes it: {reason}.",

@@ -2,6 +2,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
 use tapjoint::modal::polyreference::PoleStability;
 use tapjoint::report::document::*;
 use tapjoint::report::figures::*;
@@ -99,6 +100,7 @@ fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recor
         aside: None,
         tap: Some(0.04),
         sensor_positions: [("A".to_owned(), 0.338)].into(),
+        sensor_masses: BTreeMap::new(),
         torque: Some(12.0),
         masses: Vec::new(),
         temperature: None,

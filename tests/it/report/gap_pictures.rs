@@ -138,6 +138,6 @@ fn regress_local_changes_have_the_digits_of_their_uncertainty() {
     });
     let live = live_place_map(&document).unwrap();
     let is_curve = |set: &&PointSet| set.mark == "curve";
-    let set = live.views[0].panels[0].sets.iter().find(is_curve).unwrap();
+    let set = live.views[0].panels[1].sets.iter().find(is_curve).unwrap();
     assert_eq!(set.said, ["3 \u{b1} 12 %", "12.34500 \u{b1} 0.00050 %"]);
 }

@@ -188,7 +188,7 @@ fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
     }
     let story = gap_story(&document).join("\n").replace('\u{a0}', " ");
     assert!(
-        story.contains("With it the joint is Kt = 1.995 MN/m, Kr = 1.223 kN m/rad (Kx by +11 %"),
+        story.contains("With it the joint is Kt = 1.995 MN/m, Kr = 1.223 kN m/rad: Kx by +11 %"),
         "{story}"
     );
     assert!(story.contains("sensor (A at 338 mm) 99.7 %"), "{story}");

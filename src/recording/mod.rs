@@ -299,7 +299,7 @@ impl Recording {
 
     /// Sets what file units of a channel (0-based) are multiplied by: SI units per file unit,
     /// negative when the sensor was mounted the other way. It replaces the factor of a unit in the
-    /// header, with a warning where it is another one but for the sign.
+    /// header, with a warning where it is another one but for the sign, volts apart, of which it says what they mean.
     ///
     /// # Errors
     /// An unknown channel; a scale that is 0 or not finite.
@@ -322,13 +322,14 @@ impl Recording {
             _ => false,
         };
         self.warnings.retain(|warning| !overruled(warning));
-        // Volts are another quantity than what is scaled, whatever the number.
-        let repeats = |unit: &String| {
-            channel_unit(unit).is_some_and(|(factor, si)| {
-                si != "V" && (scale.abs() / factor - 1.0).abs() <= SAME_SCALE
+        // A scale says what a volt means; whether per millivolt or per volt, nobody knows.
+        let agrees = |unit: &String| {
+            channel_unit(unit).is_some_and(|(factor, si)| match si {
+                "V" => factor == 1.0,
+                _ => (scale.abs() / factor - 1.0).abs() <= SAME_SCALE,
             })
         };
-        let overrules = |unit: &&String| !repeats(unit);
+        let overrules = |unit: &&String| !agrees(unit);
         if let Some(unit) = info.header_unit.as_ref().filter(overrules) {
             self.warnings.push(RecordingWarning::ScaleOverUnit {
                 channel: channel_label(channel, info),

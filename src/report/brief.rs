@@ -112,8 +112,6 @@ fn model(document: &Document) -> Option<String> {
     let worst = most_missed(document)?;
     let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
         let with = joint_with(gap).filter(|_| gap.verdict.kind == "named");
-        // A value stays on the line of its name and unit.
-        let with = with.map(|joint| joint.replace(" = ", "\u{a0}=\u{a0}"));
         let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
         format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
     });

@@ -298,7 +298,11 @@ fn joint(found: &HypothesisSection, intervals: bool) -> Option<String> {
         .joint_intervals
         .map(|interval| interval.filter(|_| intervals));
     let kr = stiffness((kr, of_kr), "N\u{a0}m/rad");
-    Some(format!("Kt = {}, Kr = {kr}", stiffness((kt, of_kt), "N/m")))
+    // A value stays on the line of its name and unit.
+    Some(format!(
+        "Kt\u{a0}=\u{a0}{}, Kr\u{a0}=\u{a0}{kr}",
+        stiffness((kt, of_kt), "N/m")
+    ))
 }
 
 /// "1.995 MN/m (95 %: 1.991 to 1.999)", the value on one line with its unit.

@@ -209,7 +209,9 @@ fn regress_a_scale_that_turns_the_sign_overrules_no_unit() {
     // -1 N for every kN is another unit.
     assert_eq!(scaled(-1.0, "t,force (kN),b"), 1);
     assert_eq!(scaled(-1.0, "t,force (tons),b"), 1);
-    assert_eq!(scaled(1.0, "t,force (V),b"), 1);
+    // What a volt means no header says; per how many of them, one in millivolts leaves open.
+    assert_eq!(scaled(200.0, "t,force (V),b"), 0);
+    assert_eq!(scaled(200.0, "t,force (mV),b"), 1);
 }
 
 #[test]

@@ -23,6 +23,9 @@ const PREDICTED: f64 = 0.05;
 /// Share of the gap on withheld readings that what is named closes: less leaves most of it to something else.
 const HALF: f64 = 0.5;
 
+/// Closure at which the mean square of the errors on withheld readings has doubled.
+const WORSE: f64 = -1.0;
+
 /// Whether a misfit of withheld readings, of probability `p`, refutes an explanation. They are few, and linearised
 /// about the fit: as little is believed as of one block among many.
 pub(super) fn refutes_withheld(p: f64) -> bool {
@@ -174,12 +177,13 @@ impl Trial {
     }
 
     /// Whether withheld readings leave the hypothesis its name: it closes half of the gap, and some of it for certain
-    /// or predicts them within what it leaves open. Where they cannot decide, closing some or predicting will do.
+    /// or predicts them within what it leaves open. Where they cannot decide, closing some or predicting will do, but
+    /// no name makes their errors much worse.
     pub(super) fn holds(&self) -> bool {
         let predicts = self.withheld.is_some_and(|p| p > PREDICTED);
         self.closure.is_none_or(|closure| match self.decides {
             true => closure.value >= HALF && (closure.low > 0.0 || predicts),
-            false => predicts || closure.value > 0.0,
+            false => closure.value > 0.0 || predicts && closure.value > WORSE,
         })
     }
 }
@@ -230,6 +234,7 @@ mod tests {
             (0.01, false, [0.9, -0.5], true),
             (0.5, false, [-0.9, -5.0], true),
             (0.01, false, [-6.0, -20.0], false),
+            (0.5, false, [-30.0, -60.0], false),
         ] {
             let found = trial(withheld, decides, closure).holds();
             assert_eq!(found, holds, "{withheld} {decides} {closure:?}");

@@ -39,10 +39,14 @@ pub(super) fn analyse(
         Err(problem) => problem,
     };
     // Only a file that is recognised as no time series is looked at again.
+    if !is_no_time_series(&problem) {
+        return Err(problem.into());
+    }
     let mut functions = match (problem, open_frequency_responses(path)) {
-        (RecordingError::Responses(ResponseError::NotTimeSeries { .. }), functions) => functions?,
-        (RecordingError::Uff(UffError::NoTimeSeries { .. }), Ok(functions)) => functions,
-        (problem, _) => return Err(problem.into()),
+        (_, Ok(functions)) => functions,
+        // A universal file without samples may hold neither.
+        (problem @ RecordingError::Uff(_), Err(_)) => return Err(problem.into()),
+        (_, Err(problem)) => return Err(problem.into()),
     };
     refuse_options(path, arguments, settings)?;
     let name = path.file_name().unwrap_or(path.as_os_str());
@@ -62,10 +66,18 @@ pub(super) fn analyse(
 pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> anyhow::Result<bool> {
     match arguments.open(path) {
         Ok(_) => Ok(false),
-        Err(RecordingError::Responses(ResponseError::NotTimeSeries { .. })) => Ok(true),
-        Err(RecordingError::Uff(UffError::NoTimeSeries { .. })) => Ok(true),
+        Err(problem) if is_no_time_series(&problem) => Ok(true),
         Err(problem) => Err(problem.into()),
     }
+}
+
+/// Whether a file was recognised and holds no samples in time.
+fn is_no_time_series(problem: &RecordingError) -> bool {
+    matches!(
+        problem,
+        RecordingError::Responses(ResponseError::NotTimeSeries { .. })
+            | RecordingError::Uff(UffError::NoTimeSeries { .. })
+    )
 }
 
 /// Options for samples in time say nothing of functions that an analyser has computed.
@@ -80,6 +92,14 @@ fn refuse_options(
         ("--block", settings.block.is_some()),
         ("--window", settings.window.is_some()),
     ];
+    refuse_given(path, &given)
+}
+
+/// Refuses the first of these options that was given.
+///
+/// # Errors
+/// One was.
+pub(super) fn refuse_given(path: &Path, given: &[(&str, bool)]) -> anyhow::Result<()> {
     match given.iter().find(|(_, given)| *given) {
         Some((name, _)) => bail!(
             "{}: holds frequency response functions, and {name} is for samples in time; leave it out",

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::arguments::{Band, ChannelScale, RecordingArguments, block_size};
-use super::bare::{BareSettings, analyse, holds_functions};
+use super::bare::{BareSettings, analyse, holds_functions, refuse_given};
 use super::choices::{EstimatorArgument, FormArgument, SensorArgument, WindowArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFile;
@@ -141,13 +141,13 @@ fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Requ
 
 /// A bare recording needs the hammer's channel; a file of functions has no channels.
 fn bare_subject(arguments: &FrfArguments) -> anyhow::Result<Subject> {
-    let file = arguments.file.display();
     if let Some(hammer) = arguments.recording.hammer.clone() {
         return Ok(Subject::Recording(Box::new(hammer)));
     }
     if !holds_functions(&arguments.file, &arguments.recording)? {
         bail!(
-            "{file}: a frequency response function needs the force; name the hammer's channel with --hammer CH, or give a test description"
+            "{}: a frequency response function needs the force; name the hammer's channel with --hammer CH, or give a test description",
+            arguments.file.display()
         );
     }
     let given = [
@@ -155,12 +155,8 @@ fn bare_subject(arguments: &FrfArguments) -> anyhow::Result<Subject> {
         ("--scale-hammer", arguments.scale_hammer.is_some()),
         ("--scale-sensor", !arguments.scale_sensor.is_empty()),
     ];
-    match given.iter().find(|(_, given)| *given) {
-        Some((name, _)) => bail!(
-            "{file}: holds frequency response functions, and {name} is for samples in time; leave it out"
-        ),
-        None => Ok(Subject::Functions),
-    }
+    refuse_given(&arguments.file, &given)?;
+    Ok(Subject::Functions)
 }
 
 /// The description, which says itself what the arguments for bare recordings would.

@@ -81,7 +81,8 @@ impl Peaks {
     }
 }
 
-/// Relative distance up to which a peak may be that of a fixture whose frequency the modes of the beam alone tell.
+/// Relative distance up to which a peak may be that of a fixture whose frequency the modes of the beam alone tell: to
+/// about one percent, so that this is two standard deviations.
 const OPEN: f64 = 0.02;
 
 /// Peaks that a recording shows beside its modes and those that most of them show; mains and the like are none.

@@ -287,6 +287,9 @@ fn over_lines(
     };
     let most = stretches.iter().map(|one| one.stride).max();
     let note = match most.filter(|stride| *stride > 1) {
+        Some(stride) if modes.is_empty() => {
+            format!("Of {lines} lines the smallest and largest of every {stride} are drawn.")
+        }
         Some(stride) => format!(
             "All lines about the modes are drawn; of the other lines the smallest and largest of every {stride}."
         ),

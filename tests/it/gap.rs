@@ -162,6 +162,38 @@ fn recover_the_mass_of_a_sensor_that_stands_up_beside_its_place() {
     assert!(off < 4.0 * mass.std.unwrap(), "{mass:?}");
 }
 
+/// What many modes show beyond the tenth is left aside.
+#[test]
+fn limit_ten_modes_are_compared_at_most() {
+    let plan = TestPlan {
+        modes: 12,
+        ..five_recordings()
+    };
+    let nominal = strip_on_springs(1.0, Some(0.004));
+    let observed = observe(&plan, &nominal, &[], 5).unwrap();
+    let fitted = |settings: &GapSettings| {
+        diagnose(&observed, &nominal, settings)
+            .unwrap()
+            .fitted_modes
+    };
+    // The highest is withheld.
+    assert_eq!(fitted(&GapSettings::default()), 9);
+    let fewer = GapSettings {
+        highest_mode: 7,
+        ..GapSettings::default()
+    };
+    assert_eq!(fitted(&fewer), 6);
+    let none = GapSettings {
+        highest_mode: 0,
+        ..GapSettings::default()
+    };
+    let refused = diagnose(&observed, &nominal, &none);
+    assert!(
+        matches!(refused, Err(GapError::Setting { .. })),
+        "{refused:?}"
+    );
+}
+
 /// Observations of a structure with effects whose sensors have a rotary inertia (kg m2).
 fn observe_with_inertia(
     (plan, nominal): (&TestPlan, &Nominal),

@@ -143,6 +143,10 @@ fn val_the_bolted_beam_softens_and_is_no_pair_of_springs() {
         "{found:?}"
     );
     assert!(found.is_of_joint(), "{found:?}");
+    // So it does where the band holds four modes.
+    let narrow = text.replace("[[recording]]", "[[recording]]\nband = [0, 900]");
+    let narrow = diagnosed(&narrow, Path::new(".")).along_decays.unwrap();
+    assert!(narrow.is_of_joint() && narrow.ratio < 0.0, "{narrow:?}");
     let first = found
         .changes
         .iter()
@@ -217,6 +221,13 @@ fn regress_one_frequency_that_changes_is_no_joint() {
     assert!(!finding(&[-0.2]).is_of_joint());
     assert!(finding(&[-0.2, -0.1]).is_of_joint());
     assert!(!finding(&[-0.2, 0.1]).is_of_joint());
+    assert!(!finding(&[-0.2]).is_enough() && finding(&[-0.2, 0.1]).is_enough());
+    // A change within two standard uncertainties has no direction.
+    let mut weak = finding(&[-0.2, 0.1, -0.1]);
+    weak.changes[1].std = 0.06;
+    assert!(weak.is_of_joint());
+    weak.changes[2].std = 0.06;
+    assert!(!weak.is_of_joint() && !weak.is_enough());
 }
 
 // ---------------------------------------------------------------------------------------------

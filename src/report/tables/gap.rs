@@ -271,7 +271,12 @@ pub(in crate::report) fn joint_with(gap: &GapSection) -> Option<String> {
 
 /// What a named effect does, in one sentence, and the test to make next; empty where nothing is missing.
 pub fn gap_in_short(document: &Document) -> Vec<String> {
-    let Some(gap) = document.gap.as_ref().filter(|gap| shows_gap(gap)) else {
+    let is_there = |gap: &&GapSection| match gap.verdict.kind.as_str() {
+        "no-gap" => false,
+        "not-enough-data" => shows_gap(gap),
+        _ => true,
+    };
+    let Some(gap) = document.gap.as_ref().filter(is_there) else {
         return Vec::new();
     };
     let found = named(gap).filter(|found| found.effect != "none");

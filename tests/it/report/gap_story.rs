@@ -1,12 +1,12 @@
 //! What is said of the gap, by verdict.
 
 use tapjoint::report::document::{
-    AlongDecaysSection, DecayChangeSection, Document, GapPlaceSection, GapSection,
+    AlongDecaysSection, BaselineSection, DecayChangeSection, Document, GapPlaceSection, GapSection,
     GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection, ParameterSection,
     PullSection, RecordingSection, TestSection,
 };
 use tapjoint::report::render_text;
-use tapjoint::report::tables::{gap_story, hypotheses, next_tests};
+use tapjoint::report::tables::{gap_in_short, gap_story, hypotheses, next_tests};
 
 #[test]
 fn val_the_odds_of_a_group_are_those_of_its_members_together() {
@@ -311,4 +311,90 @@ fn regress_no_gap_beside_a_misfit_says_so() {
         "{}",
         story(0.2)
     );
+}
+
+/// All digits are those that the interval supports, and nothing is said of what is not missing.
+#[test]
+fn val_the_short_answer_has_the_joint_with_its_interval_and_the_next_test() {
+    let said = |kind: &str| {
+        let mut document = gap_with(kind);
+        let gap = document.gap.as_mut().unwrap();
+        gap.verdict.effects = vec!["joint-damping".into()];
+        gap.hypotheses[0].joint = Some([1.9954e6, f64::INFINITY]);
+        gap.hypotheses[0].joint_intervals = [Some([1.9906e6, 2.0001e6]), None];
+        gap_in_short(&document).join("\n").replace('\u{a0}', " ")
+    };
+    let named = said("named");
+    let answer = "With joint-damping the errors of the frequencies shrink from 2.0 to 0.050 % (rms), and the joint is \
+                  Kt = 1.9954 MN/m (95 %: 1.9906 to 2.0001), Kr = \u{221e} (rigid).\nTo confirm it: weigh the sensor";
+    assert!(named.starts_with(answer), "{named:?}");
+    assert_eq!(said("no-gap"), "");
+}
+
+#[test]
+fn regress_a_joint_that_has_moved_is_said_where_nothing_is_missing() {
+    let told = |after: f64| {
+        let mut document = gap_with("no-gap");
+        let gap = document.gap.as_mut().unwrap();
+        gap.noise_floor = Some(0.01);
+        gap.hypotheses[1].gap_after = Some(after);
+        gap_story(&document).join("\n")
+    };
+    let moved = "once joint, geometry and masses may differ";
+    assert!(told(0.02).contains(moved), "{}", told(0.02));
+    assert!(
+        told(0.02).contains("exactly as described 2.0 %"),
+        "{}",
+        told(0.02)
+    );
+    assert!(!told(1.5).contains(moved), "{}", told(1.5));
+}
+
+#[test]
+fn regress_a_change_of_one_frequency_alone_is_nobodys() {
+    let told = |enough: bool| {
+        let mut document = gap_with("unknown");
+        document.gap.as_mut().unwrap().along_decays = Some(AlongDecaysSection {
+            enough,
+            changes: vec![DecayChangeSection {
+                std: 0.1,
+                ..DecayChangeSection::default()
+            }],
+            ..AlongDecaysSection::default()
+        });
+        gap_story(&document).join("\n")
+    };
+    assert!(told(false).contains("of one frequency alone nobody can tell"));
+    assert!(told(true).contains("but not as a joint"));
+}
+
+#[test]
+fn regress_the_table_has_the_size_told_apart_and_the_baseline() {
+    let mut document = gap_with("named");
+    let gap = document.gap.as_mut().unwrap();
+    let mass = ParameterSection {
+        value: 0.024,
+        std: Some(0.001),
+        smallest_isolable: Some(0.0051),
+        ..ParameterSection::default()
+    };
+    gap.hypotheses[0].effect = "sensor-mass".into();
+    gap.hypotheses[0].parameters = [("mass".to_owned(), mass)].into();
+    gap.baselines = vec![BaselineSection {
+        name: "scale".into(),
+        gap_after: Some(0.71),
+        withheld_after: Some(0.93),
+    }];
+    let table = hypotheses(&document).unwrap();
+    let place = |name: &str| {
+        table
+            .columns
+            .iter()
+            .position(|one| one.name == name)
+            .unwrap()
+    };
+    assert_eq!(table.rows[0][place("Told apart from")], "5.1 g");
+    assert_eq!(table.rows[1][place("Told apart from")], "\u{2013}");
+    let baseline = "leaves an error of 0.71 % (rms), of the withheld ones 0.93 %.";
+    assert!(table.note.ends_with(baseline), "{}", table.note);
 }

@@ -16,27 +16,18 @@
 pub mod notation;
 pub mod references;
 
-pub mod description;
-pub mod quantity;
-pub mod stats;
-
-pub mod modal;
-pub mod quality;
-pub mod recording;
-pub mod spectral;
-pub mod taps;
-
-pub mod identify;
-pub mod structure;
-
-pub mod effects;
-pub mod gap;
-
-pub mod described;
-pub mod pipeline;
-pub mod report;
-pub mod simulate;
-pub mod study;
+pub use tapjoint_analysis as pipeline;
+pub use tapjoint_beam as structure;
+pub use tapjoint_beam::effects;
+pub use tapjoint_description as description;
+pub use tapjoint_description::described;
+pub use tapjoint_diagnosis as gap;
+pub use tapjoint_identify as identify;
+pub use tapjoint_numerics::{quantity, stats};
+pub use tapjoint_report as report;
+pub use tapjoint_signal::{modal, quality, recording, spectral, taps};
+pub use tapjoint_simulate as simulate;
+pub use tapjoint_study as study;
 
 /// The README's code, compiled so that it stays true.
 #[cfg(doctest)]

@@ -5,8 +5,8 @@ use super::keys;
 use super::limits::Limits;
 use super::reader::{Entry, Table};
 use super::{BeamDescription, BeamTolerance, RightHalf};
-use crate::quantity::Dimension;
 use std::ops::Bound;
+use tapjoint_numerics::quantity::Dimension;
 
 /// One property of a beam: what it may be, and what it usually is.
 struct Property {

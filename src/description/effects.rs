@@ -4,7 +4,7 @@ use super::EffectDescription;
 use super::error::DescriptionError;
 use super::keys;
 use super::reader::Entry;
-use crate::quantity::Dimension;
+use tapjoint_numerics::quantity::Dimension;
 
 /// Reads one `[[effect]]`. Whether there is such an effect with such parameters is for whoever uses it to
 /// say.

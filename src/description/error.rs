@@ -1,7 +1,7 @@
 //! What can be wrong with a test description, and what is merely odd.
 
-use crate::quantity::QuantityError;
 use std::fmt;
+use tapjoint_numerics::quantity::QuantityError;
 
 /// Why a test description cannot be used. Displays as
 /// `FILE:LINE: what is wrong, what is allowed, what to do`.

@@ -8,8 +8,8 @@ use super::reader::{Entry, Table};
 use super::{
     BeamTheory, JointDescription, JointKind, JointModel, KnownStiffness, Overlap, RightHalf,
 };
-use crate::quantity::Dimension;
 use std::ops::Bound;
+use tapjoint_numerics::quantity::Dimension;
 
 const KINDS: [(&str, JointKind); 3] = [
     ("cantilever", JointKind::Cantilever),

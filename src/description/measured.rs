@@ -4,8 +4,8 @@ use super::MeasuredFrequencies;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
 use super::limits::Limits;
 use super::reader::{Entry, Table};
-use crate::quantity::Dimension;
 use std::ops::Bound;
+use tapjoint_numerics::quantity::Dimension;
 
 const FREQUENCY: Limits =
     Limits::positive(1e9, "natural frequencies in Hz, rigid-body modes left out");

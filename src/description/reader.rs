@@ -4,8 +4,8 @@
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
 use super::keys::{self, KnownTable};
 use super::limits::Limits;
-use crate::quantity::{Dimension, parse_quantity};
 use std::collections::BTreeMap;
+use tapjoint_numerics::quantity::{Dimension, parse_quantity};
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 

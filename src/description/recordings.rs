@@ -6,9 +6,9 @@ use super::keys;
 use super::limits::Limits;
 use super::reader::{Entry, Table, quantities_by_name};
 use super::{BeamDescription, FastenedMass, FrfForm, RecordingDescription, SensorDescription};
-use crate::quantity::Dimension;
 use std::collections::BTreeMap;
 use std::ops::Bound;
+use tapjoint_numerics::quantity::Dimension;
 
 const FORMS: [(&str, FrfForm); 3] = [
     ("accelerance", FrfForm::Accelerance),

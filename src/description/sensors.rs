@@ -9,7 +9,7 @@ use super::{
     BeamDescription, ChannelPlace, ChannelRef, HammerDescription, RecordingDescription, Scale,
     SensorDescription, SensorKind,
 };
-use crate::quantity::Dimension;
+use tapjoint_numerics::quantity::Dimension;
 
 const KINDS: [(&str, SensorKind); 4] = [
     ("acceleration", SensorKind::Acceleration),

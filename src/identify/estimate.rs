@@ -3,11 +3,9 @@
 use super::pairs::{ModeLambda, PairsEstimate, PairsModel, estimate_pairs};
 use super::perturbation::Stiffnesses;
 use super::{Doubt, IdentifyError, SingleModeStiffness, single_mode_stiffness};
-use crate::structure::Beam;
-use crate::structure::joint::StiffnessUnits;
-
-/// Half width of a 95 % interval of a normal distribution, in standard deviations.
-pub(crate) const NORMAL_95: f64 = 1.959_964;
+use tapjoint_beam::Beam;
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_numerics::stats::NORMAL_95;
 
 /// Relative standard uncertainty of any frequency that no repetition within a recording shows (1): 0.005 %, a steel beam's change
 /// over a third of a kelvin.

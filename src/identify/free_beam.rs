@@ -1,7 +1,7 @@
 //! A free beam has no joint: its natural frequencies check modulus and density.
 
 use super::{IdentifyError, MeasuredMode, Uncertain};
-use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_modes};
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, natural_modes};
 
 /// What the natural frequencies of a free beam say about its material.
 #[derive(Debug, Clone, PartialEq)]

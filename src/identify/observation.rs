@@ -5,7 +5,7 @@
 //! the measurement gives it (scatter of the repeated taps, noise that the fits leave). No number here
 //! knows of a hypothesis or of its residual.
 
-use crate::structure::specimen::PointMass;
+use tapjoint_beam::specimen::PointMass;
 
 /// All configurations of a test.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -12,9 +12,9 @@
 
 use super::perturbation::Stiffnesses;
 use super::{Doubt, IdentifyError};
-use crate::structure::JointStiffness;
-use crate::structure::receptance::EndFunctions;
 use nalgebra::{DMatrix, DVector, SVD};
+use tapjoint_beam::JointStiffness;
+use tapjoint_beam::receptance::EndFunctions;
 
 /// A singular value below this part of the largest is taken for zero. Frequencies are never
 /// known to ten digits, so that nothing measurable is lost.

@@ -1,7 +1,7 @@
 //! Natural frequencies of a known or estimated joint beside the measured ones.
 
 use super::{IdentifyError, MeasuredMode};
-use crate::structure::{
+use tapjoint_beam::{
     Assembly, Beam, BeamTheory, JointStiffness, NaturalMode, Slenderness, natural_modes,
 };
 

@@ -9,16 +9,16 @@ use super::document::{
     PredictionSection, RecordingSection, TapSection, TestSection, VERSION, WarningSection,
 };
 use super::format::with_minus_signs;
-use crate::identify::{PairsModel, PredictedMode};
-use crate::modal::{FrequencySource, ModeReading};
-use crate::pipeline::{
+use tapjoint_analysis::{
     AmplitudeChange, Analysis, Identification, MeasuredSpectra, ModeResult, RecordingResult,
     TestedStructure, Warning, sampled_shapes,
 };
-use crate::recording::{Format, Separator, UffCoding};
-use crate::spectral::Window;
-use crate::structure::specimen::PointMass;
-use crate::structure::{Assembly, BeamTheory, NaturalMode};
+use tapjoint_beam::specimen::PointMass;
+use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
+use tapjoint_identify::{PairsModel, PredictedMode};
+use tapjoint_signal::modal::{FrequencySource, ModeReading};
+use tapjoint_signal::recording::{Format, Separator, UffCoding};
+use tapjoint_signal::spectral::Window;
 
 /// The document of a whole analysis.
 pub fn document(analysis: &Analysis) -> Document {

@@ -5,9 +5,9 @@ use super::document::{
     ValueSection,
 };
 use super::format::significant;
-use crate::identify::consistent::{ConsistentEstimate, EstimatedQuantity, Limit, Quantity};
-use crate::stats::times;
-use crate::structure::Beam;
+use tapjoint_beam::Beam;
+use tapjoint_identify::consistent::{ConsistentEstimate, EstimatedQuantity, Limit, Quantity};
+use tapjoint_numerics::stats::times;
 
 /// The main estimate; what stands beside it is added by the caller.
 pub(super) fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {

@@ -1,7 +1,7 @@
 //! From the listing of a universal file to the document.
 
 use super::document::DatasetSection;
-use crate::recording::{
+use tapjoint_signal::recording::{
     Abscissa, Dataset, Function, Ordinate, Precision, UffCoding, UniversalFile,
 };
 

@@ -5,8 +5,8 @@ use super::document::{
     EstimateSection, FreeBeamSection, PairsSection, PredictionSection, SingleModeSection,
     ValueSection,
 };
-use crate::identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Uncertain};
-use crate::pipeline::{Estimate, Identification};
+use tapjoint_analysis::{Estimate, Identification};
+use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Uncertain};
 
 pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection> {
     let closed = found.estimate.as_ref().map(|estimate| match estimate {

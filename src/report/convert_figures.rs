@@ -9,14 +9,14 @@ use super::figures::{
 use super::format::unit_words;
 use super::plot::amplitude::AmplitudeFigure;
 use super::short_names::ends_of_paths;
-use crate::description::SensorKind;
-use crate::modal::amplitude::AmplitudeCurve;
-use crate::modal::polyreference::BandSearch;
-use crate::pipeline::{
+use tapjoint_analysis::{
     AmplitudeChange, Analysis, CloseUp, Frf, FrfSettings, MeasuredSpectra, RecordingResult,
     Response, frfs_of,
 };
-use crate::spectral::FrfEstimator;
+use tapjoint_description::SensorKind;
+use tapjoint_signal::modal::amplitude::AmplitudeCurve;
+use tapjoint_signal::modal::polyreference::BandSearch;
+use tapjoint_signal::spectral::FrfEstimator;
 
 /// One set of pictures for each recording.
 pub fn figures(analysis: &Analysis) -> Vec<RecordingFigure> {

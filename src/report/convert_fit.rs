@@ -4,10 +4,10 @@ use super::document_fit::{
     AmplitudeEndsSection, AmplitudePointSection, AmplitudeSection, ConstantSection, FitSection,
     TapFitSection, TrendSection,
 };
-use crate::modal::FittedReading;
-use crate::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict, Trend};
-use crate::modal::fit::UncertaintySource;
-use crate::pipeline::AmplitudeChange;
+use tapjoint_analysis::AmplitudeChange;
+use tapjoint_signal::modal::FittedReading;
+use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict, Trend};
+use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// The fit of one mode.
 pub(super) fn fit_section(fit: &FittedReading, change: Option<AmplitudeChange>) -> FitSection {

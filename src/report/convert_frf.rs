@@ -7,9 +7,9 @@ use super::convert::document;
 use super::csv::write;
 use super::document::{Document, FrfResonanceSection, FrfSection, WarningSection};
 use super::format::with_minus_signs;
-use crate::pipeline::{Analysis, Frf, FrfResonance, Warning};
-use crate::quality::Check;
-use crate::spectral::Window;
+use tapjoint_analysis::{Analysis, Frf, FrfResonance, Warning};
+use tapjoint_signal::quality::Check;
+use tapjoint_signal::spectral::Window;
 
 /// Columns of the table of frequency response functions.
 const COLUMNS: [&str; 13] = [

@@ -6,8 +6,8 @@ use super::document::{
     LeftOutSection, NextTestSection, ParameterSection, PlaceMapSection, PullSection,
     UnplacedSection,
 };
-use crate::effects::EffectId;
-use crate::gap::{
+use tapjoint_beam::effects::EffectId;
+use tapjoint_diagnosis::{
     Closure, DecayFinding, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult,
     JointShift, LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Unplaced, Verdict,
 };

@@ -5,9 +5,9 @@ use super::document::{
     AverageSection, Document, MonteCarloSection, PerturbationSection, ResolutionSpanSection,
     SensitivitySection, ValueSection,
 };
-use crate::identify::perturbation::{AverageError, Span, UniformPerturbation};
-use crate::identify::{MonteCarlo, Spread, Stiffnesses};
-use crate::pipeline::{BoundPerturbation, EstimateMethod, Perturbation};
+use tapjoint_analysis::{BoundPerturbation, EstimateMethod, Perturbation};
+use tapjoint_identify::perturbation::{AverageError, Span, UniformPerturbation};
+use tapjoint_identify::{MonteCarlo, Spread, Stiffnesses};
 
 /// The document with what the perturbations of all methods say.
 pub(super) fn with_perturbations(document: Document, found: &[Perturbation]) -> Document {

@@ -1,7 +1,7 @@
 //! Checks of good practice into the document.
 
 use super::document_quality::VerdictSection;
-use crate::quality::{Subject, Verdict};
+use tapjoint_signal::quality::{Subject, Verdict};
 
 /// One check.
 pub(super) fn verdict_section(verdict: &Verdict) -> VerdictSection {

@@ -1,8 +1,8 @@
 //! The data that pictures are drawn from.
 
 use super::plot::amplitude::AmplitudeFigure;
-use crate::modal::polyreference::PoleStability;
-use crate::spectral::Lines;
+use tapjoint_signal::modal::polyreference::PoleStability;
+use tapjoint_signal::spectral::Lines;
 
 /// What the pictures of one recording need.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,12 +1,12 @@
 //! Frequency response functions as a universal file.
 
-use crate::pipeline::Frf;
-use crate::recording::{
+use num_complex::Complex64;
+use tapjoint_analysis::Frf;
+use tapjoint_signal::recording::{
     FrequencyResponse, FrequencyResponses, Point, UffError, UffFormat,
     encode_frequency_responses_uff,
 };
-use crate::spectral::FrfEstimator;
-use num_complex::Complex64;
+use tapjoint_signal::spectral::FrfEstimator;
 
 /// The functions, by the estimator that each is shown by, with their coherences: datasets 58 or 58b, of
 /// several recordings one after the other. Sensors are nodes 1, 2, ... of a recording, the tap of the

@@ -43,11 +43,11 @@ pub fn packed(curves: &impl Serialize) -> Result<String, ReportError> {
 
 /// The plotting library, its style and the page's own script, all inside the page: a report opens
 /// from a disk without a network.
-const PLOT_LIBRARY: &str = include_str!("../../assets/uPlot.iife.min.js");
-const PLOT_STYLE: &str = include_str!("../../assets/uPlot.min.css");
-const PLOT_LICENSE: &str = include_str!("../../assets/uPlot-LICENSE.txt");
-const SCRIPT: &str = include_str!("../../templates/report.js");
-const POINTS: &str = include_str!("../../templates/report_points.js");
+const PLOT_LIBRARY: &str = include_str!("assets/uPlot.iife.min.js");
+const PLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
+const PLOT_LICENSE: &str = include_str!("assets/uPlot-LICENSE.txt");
+const SCRIPT: &str = include_str!("templates/report.js");
+const POINTS: &str = include_str!("templates/report_points.js");
 
 /// What makes pictures live; left out where there is none.
 struct Live {

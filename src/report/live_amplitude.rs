@@ -5,7 +5,7 @@ use super::plot::amplitude::MOST_COLOURS;
 use super::plot::amplitude::{
     AmplitudeFigure, BAR, DAMPING, FREQUENCY, Quantity, amplitude_axis, quantity_axis, taps,
 };
-use crate::modal::amplitude::{AmplitudeCurve, AmplitudePoint, Trend};
+use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudePoint, Trend};
 
 /// Places at which the curve and its bound are computed.
 const CURVE_POINTS: usize = 80;

@@ -10,7 +10,7 @@ use super::plot::axis::{Axis, Scale};
 use super::plot::cloud::method_words;
 use super::plot::cloud_points::{Cloud, clouds};
 use super::plot::stabilisation::{CLASSES, level, named};
-use crate::modal::polyreference::PoleStability;
+use tapjoint_signal::modal::polyreference::PoleStability;
 
 /// Most points of the level behind a stabilisation diagram: it is faint, and the spectra have all of it.
 const LEVEL_POINTS: usize = 400;

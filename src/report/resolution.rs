@@ -5,7 +5,7 @@ use super::plot::resolution::draw_resolution;
 use super::plot::{PictureFormat, render_picture};
 use super::tables::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 use super::text::{render_table, wrapped};
-use crate::study::resolution::{EstimateMethod, ResolutionStudy, WindowName};
+use tapjoint_study::resolution::{EstimateMethod, ResolutionStudy, WindowName};
 
 /// Columns of the CSV.
 const COLUMNS: [&str; 20] = [

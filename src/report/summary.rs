@@ -5,8 +5,8 @@ use super::document::{
 };
 use super::format::{bound_percent, signed_or_below, significant, trimmed};
 use super::tables::{Parameter, estimated, gap_in_short, gap_story, quality_count, reading_bound};
-use crate::identify::observation::UNPAIRED;
-use crate::pipeline::AmplitudeChange;
+use tapjoint_analysis::AmplitudeChange;
+use tapjoint_identify::observation::UNPAIRED;
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {

@@ -4,7 +4,7 @@
 use toml::{Table, Value};
 
 use super::plan::VirtualTest;
-use crate::description::{Scale, TestDescription};
+use tapjoint_description::{Scale, TestDescription};
 
 /// What stands at the head of the description.
 const HEAD: &str = "# Recordings of a virtual test, made by `tapjoint simulate`.\n\n";

@@ -2,8 +2,8 @@
 
 use super::error::SimulateError;
 use super::laboratory::{Damping, Laboratory};
-use crate::description::TestDescription;
-use crate::effects::{Effect, EffectId};
+use tapjoint_beam::effects::{Effect, EffectId};
+use tapjoint_description::TestDescription;
 
 /// Looks at every number.
 pub(super) fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {

@@ -1,7 +1,7 @@
 //! Why a described test cannot be simulated.
 
-use crate::recording::RecordingError;
-use crate::structure::StructureError;
+use tapjoint_beam::StructureError;
+use tapjoint_signal::recording::RecordingError;
 
 /// Why a described test cannot be simulated.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Moments of a joint's rotation that are no linear spring, as what they add to one.
 
-use crate::effects::{JointLaw, JointLawKind};
+use tapjoint_beam::effects::{JointLaw, JointLawKind};
 
 /// How many sliders stand for a continuous distribution of them: kinks are then a fortieth of the whole.
 const SLIDERS: usize = 40;

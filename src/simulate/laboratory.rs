@@ -128,7 +128,7 @@ impl Default for HammerSettings {
 /// The sensors and how they are fastened.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorSettings {
-    /// Noise of hammer and sensors, in multiples of that of good ones ([`crate::simulate::Signal::good_noise`]). 1.
+    /// Noise of hammer and sensors, in multiples of that of good ones ([`crate::Signal::good_noise`]). 1.
     pub noise: f64,
     /// Error of each sensor's and the hammer's sensitivity (1, standard deviation). 0.01: as calibrated.
     pub sensitivity_error: f64,

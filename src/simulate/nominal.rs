@@ -1,13 +1,13 @@
 //! From a test description to the specimen it describes.
 
 use super::error::SimulateError;
-use crate::described::{
+use tapjoint_beam::effects::SensorPlace;
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
+use tapjoint_description::described::{
     coupling, described_beam, described_specimen, fastened_masses, stiffness_of,
 };
-use crate::description::{JointKind, RecordingDescription, SensorKind, TestDescription};
-use crate::effects::SensorPlace;
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::specimen::{PointMass, Specimen, SpecimenJoint};
+use tapjoint_description::{JointKind, RecordingDescription, SensorKind, TestDescription};
 
 /// Non-dimensional stiffnesses of a joint, in place of the description's.
 #[derive(Debug, Clone, Copy, PartialEq)]

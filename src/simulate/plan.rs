@@ -1,10 +1,10 @@
 //! From a described test and what is planted in it to recordings ready to be made.
 
-use crate::description::{RecordingDescription, Scale, SensorKind, TestDescription};
-use crate::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
+use tapjoint_description::{RecordingDescription, Scale, SensorKind, TestDescription};
 
 use super::chain::Signal;
 use super::check::{check_effects, check_laboratory};
@@ -17,7 +17,7 @@ use super::reduced::Sensed;
 use super::seen::{SeenStructure, hangs};
 use super::take::{Take, TakePlan};
 use super::trial::{Trial, round_scale, try_out};
-use crate::structure::specimen::{Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
 
 /// What is to be simulated.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::laboratory::SpecimenSettings;
 use super::reduced::{ReducedMode, ReducedStructure, StruckPlace};
-use crate::structure::StructureError;
-use crate::structure::specimen::{Body, Mesh, Specimen, SpecimenJoint, SpecimenModes};
+use tapjoint_beam::StructureError;
+use tapjoint_beam::specimen::{Body, Mesh, Specimen, SpecimenJoint, SpecimenModes};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
 /// them has fallen with the cube of their number.

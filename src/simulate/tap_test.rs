@@ -14,8 +14,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::stats::root_mean_square;
-use crate::structure::ModeShape;
+use tapjoint_beam::ModeShape;
+use tapjoint_numerics::stats::root_mean_square;
 
 /// One mode of the structure as the sensors see it.
 #[derive(Debug, Clone, PartialEq)]

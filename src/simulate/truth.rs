@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::hammer::Tap;
 use super::laboratory::Laboratory;
 use super::plan::{TestPlan, VirtualRecording, VirtualTest};
-use crate::effects::Effect;
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::specimen::{Specimen, SpecimenJoint};
+use tapjoint_beam::effects::Effect;
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
 
 /// All that is true of a virtual test.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -108,7 +108,9 @@ pub struct ModeTruth {
 
 /// The truth about a virtual test.
 pub fn truth_of(plan: &TestPlan<'_>, test: &VirtualTest) -> Truth {
-    let units = StiffnessUnits::of(&crate::described::described_beam(plan.description));
+    let units = StiffnessUnits::of(&tapjoint_description::described::described_beam(
+        plan.description,
+    ));
     Truth {
         version: 1,
         name: plan.description.name.clone(),

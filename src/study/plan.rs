@@ -9,14 +9,14 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
-use crate::description::{JointKind, TestDescription};
-use crate::effects::{Effect, EffectError, EffectId};
-use crate::gap::{
+use tapjoint_analysis::{fastened_masses, nominal_with};
+use tapjoint_beam::effects::{Effect, EffectError, EffectId};
+use tapjoint_beam::{Beam, JointStiffness};
+use tapjoint_description::{JointKind, TestDescription};
+use tapjoint_diagnosis::{
     GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
     observe,
 };
-use crate::pipeline::{fastened_masses, nominal_with};
-use crate::structure::{Beam, JointStiffness};
 
 /// Non-centrality of a chi square of one degree of freedom that is noticed nine times out of ten at the
 /// 1 % level, (2.576 + 1.282)^2.

@@ -2,13 +2,17 @@
 //! natural frequencies. What the diagnosis leaves open of shear and rotary inertia, 2 %, has no place in a description
 //! and stays out.
 
-use crate::description::{FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription};
-use crate::effects::{Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply};
-use crate::gap::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
-use crate::identify::observation::effective_share;
-use crate::pipeline::{fastened_masses, nominal_with};
-use crate::structure::StructureError;
-use crate::structure::specimen::{Mesh, PointMass};
+use tapjoint_analysis::{fastened_masses, nominal_with};
+use tapjoint_beam::StructureError;
+use tapjoint_beam::effects::{
+    Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply,
+};
+use tapjoint_beam::specimen::{Mesh, PointMass};
+use tapjoint_description::{
+    FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription,
+};
+use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
+use tapjoint_identify::observation::effective_share;
 use toml::Value;
 
 /// A model brought up to date.
@@ -180,7 +184,7 @@ fn right_half(test: &TestDescription, scale: f64) -> String {
 }
 
 fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
-    use crate::description::BeamTheory;
+    use tapjoint_description::BeamTheory;
     let kind = match test.joint.kind {
         JointKind::Cantilever => "cantilever",
         JointKind::Lap => "lap",
@@ -266,7 +270,7 @@ fn table_of(effect: &Effect) -> String {
 /// # Errors
 /// The first that there is not, with the line of its table.
 pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, DescribedEffectError> {
-    let read = |described: &crate::description::EffectDescription| {
+    let read = |described: &tapjoint_description::EffectDescription| {
         let at = |cause: EffectError| DescribedEffectError {
             line: Some(described.line),
             cause: cause.into(),

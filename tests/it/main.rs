@@ -20,7 +20,6 @@ mod gap_fixture;
 mod identify;
 mod identify_consistent;
 mod identify_perturbation;
-mod layers;
 mod modal;
 mod modal_fit;
 mod modal_matrix_pencil;

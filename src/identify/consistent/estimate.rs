@@ -12,9 +12,9 @@ use super::problem::Problem;
 use super::quantities::{Quantity, joint_at};
 use super::result::{ConsistentEstimate, EstimatedQuantity, FittedMode, Limit, OtherMinimum};
 use super::settings::{ConsistentSettings, Intervals, ResidualWeights};
-use crate::identify::estimate::NORMAL_95;
-use crate::identify::{IdentifyError, MeasuredMode};
-use crate::stats::{root_mean_square, student};
+use crate::{IdentifyError, MeasuredMode};
+use tapjoint_numerics::stats::NORMAL_95;
+use tapjoint_numerics::stats::{root_mean_square, student};
 
 /// Estimates a joint from the frequencies of these modes.
 ///

@@ -9,10 +9,10 @@ use super::problem::{Datum, Prior, Problem, along};
 use super::quantities::Quantity;
 use super::result::Limit;
 use super::settings::{ConsistentSettings, ResidualWeights};
-use crate::identify::{IdentifyError, MeasuredMode, Stiffnesses};
-use crate::structure::interface::LAST_STEP;
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, Beam, JointStiffness};
+use crate::{IdentifyError, MeasuredMode, Stiffnesses};
+use tapjoint_beam::interface::LAST_STEP;
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{Assembly, Beam, JointStiffness};
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
 #[derive(Debug, Clone)]
@@ -228,7 +228,7 @@ impl ConsistentEstimator {
     }
 
     /// The non-dimensional stiffnesses as a function of the frequencies (Hz), for
-    /// [`crate::identify::perturbation`]; `None` where the search does not come to an end.
+    /// [`crate::perturbation`]; `None` where the search does not come to an end.
     pub fn stiffnesses_near<'a>(
         &'a self,
         near: &'a Neighbourhood,

@@ -6,8 +6,8 @@ use super::model::{Parameter, Point};
 use super::problem::along;
 use super::result::Limit;
 use super::settings::ResidualWeights;
-use crate::stats::median;
 use nalgebra::{DMatrix, SVD};
+use tapjoint_numerics::stats::median;
 
 /// A combination of parameters known no better than this (1, relative) is called flat: a factor of
 /// two either way is within its 95 % interval.

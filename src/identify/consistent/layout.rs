@@ -1,10 +1,10 @@
 //! The tested structure without its joint: beams, what is fastened to them, and by which route its
 //! frequencies are computed.
 
-use crate::structure::finite_elements::PointAttachment;
-use crate::structure::specimen::LapLayout;
-use crate::structure::{Assembly, Beam, BeamTheory, StructureError};
 use std::f64::consts::PI;
+use tapjoint_beam::finite_elements::PointAttachment;
+use tapjoint_beam::specimen::LapLayout;
+use tapjoint_beam::{Assembly, Beam, BeamTheory, StructureError};
 
 /// By which route frequencies are computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -32,7 +32,6 @@ mod covariance;
 mod starts;
 mod valleys;
 
-pub use crate::structure::specimen::LapLayout;
 pub use estimate::estimate_consistently;
 pub use estimator::{ConsistentEstimator, Neighbourhood, PointFit};
 pub use goodness::{Goodness, Verdict, exceedance};
@@ -47,3 +46,4 @@ pub use result::{
     ConsistentEstimate, Correlation, EstimatedQuantity, FittedMode, Limit, OtherMinimum,
 };
 pub use settings::{BeamTolerances, ConsistentSettings, HeldJoint, Intervals, ResidualWeights};
+pub use tapjoint_beam::specimen::LapLayout;

@@ -5,11 +5,11 @@
 //! beam's modulus follows from those with the springs: 1/2 less their sum.
 
 use super::layout::{JointedStructure, Route, elements_for};
-use crate::structure::finite_elements::InterfaceModes;
-use crate::structure::interface::{
+use tapjoint_beam::finite_elements::InterfaceModes;
+use tapjoint_beam::interface::{
     JoinedHalf, JointCompliance, JointedBody, LAST_STEP, interface_root,
 };
-use crate::structure::{
+use tapjoint_beam::{
     Assembly, Beam, JointStiffness, Slenderness, StructureError, natural_lambdas, natural_modes,
 };
 

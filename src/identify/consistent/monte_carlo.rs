@@ -3,8 +3,8 @@
 use super::estimator::{ConsistentEstimator, Neighbourhood};
 use super::model::Point;
 use super::quantities::Quantity;
-use crate::identify::monte_carlo::{self, MonteCarlo, Spread};
-use crate::identify::{IdentifyError, Stiffnesses};
+use crate::monte_carlo::{self, MonteCarlo, Spread};
+use crate::{IdentifyError, Stiffnesses};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,7 +1,7 @@
 //! What a point means: stiffnesses in both units, the coupling, the beam.
 
 use super::model::{PARAMETERS, Parameter, Point, log_nondimensional};
-use crate::structure::JointStiffness;
+use tapjoint_beam::JointStiffness;
 
 /// A number that an estimate reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

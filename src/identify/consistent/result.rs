@@ -5,7 +5,7 @@ use super::identifiability::Identifiability;
 use super::least_squares::StopReason;
 use super::model::Parameter;
 use super::quantities::Quantity;
-use crate::structure::{Beam, JointStiffness};
+use tapjoint_beam::{Beam, JointStiffness};
 
 /// A parameter at the end of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

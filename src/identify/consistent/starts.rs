@@ -6,8 +6,8 @@
 
 use super::model::{Parameter, Point, log_nondimensional};
 use super::problem::Problem;
-use crate::structure::interface::{InterfaceFunctions, JointCompliance};
 use std::f64::consts::{LN_10, PI};
+use tapjoint_beam::interface::{InterfaceFunctions, JointCompliance};
 
 /// Decades of Kx and Ky tried: below the first a joint is hardly one, above the last hardly one
 /// mode feels that it gives.

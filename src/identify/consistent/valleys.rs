@@ -6,9 +6,9 @@ use super::model::{FrequencyModel, Parameter, Point};
 use super::problem::{Evaluation, Loss, Problem};
 use super::settings::{ConsistentSettings, ResidualWeights};
 use super::starts::{everywhere, promising};
-use crate::identify::pairs::{ModeLambda, PairsModel, estimate_pairs};
-use crate::structure::Assembly;
-use crate::structure::joint::StiffnessUnits;
+use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
+use tapjoint_beam::Assembly;
+use tapjoint_beam::joint::StiffnessUnits;
 
 /// Two valleys nearer than this in every estimated coordinate (1, logarithms) are one.
 const SAME_VALLEY: f64 = 0.05;

@@ -5,9 +5,9 @@ use std::f64::consts::{LN_10, PI};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{MeasuredPeak, PairingSettings};
-use crate::identify::consistent::{FrequencyModel, Parameter, Point};
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, JointStiffness};
+use crate::consistent::{FrequencyModel, Parameter, Point};
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{Assembly, JointStiffness};
 
 /// Degrees of freedom of the model's discrepancy: tails in which one mode may lie far off.
 const FREEDOM: f64 = 4.0;

@@ -25,10 +25,10 @@ pub use by_frequency::{WeightedPeak, pair_by_frequency, pair_by_ratio};
 pub use strength::PeakStrength;
 
 use super::consistent::{FrequencyModel, JointedStructure, Parameter};
-use crate::structure::StructureError;
 use candidates::Assignment;
 use joint::JointSearch;
 use strength::Neighbours;
+use tapjoint_beam::StructureError;
 
 /// A measured peak that may be a mode.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::joint::{JointFit, JointSearch};
 use super::{MeasuredPeak, MissingCause, MissingMode, ShapeAt};
-use crate::structure::{ModeShape, mode_shapes};
+use tapjoint_beam::{ModeShape, mode_shapes};
 
 /// Standard deviation of the angle between a measured shape and its model (rad): positions, axes and
 /// calibrations of sensors, and the closed form without masses.

@@ -5,7 +5,7 @@ use super::super::plot::axis::Axis;
 use super::super::plot::drawing::Stroke;
 use super::super::plot::palette::{BLUE, VERMILION};
 use super::super::plot::panel::{Panel, Sample, draw_legend, draw_title};
-use crate::study::blind_check::{Case, CaseKind, Verdict};
+use tapjoint_study::blind_check::{Case, CaseKind, Verdict};
 
 /// Closures below this are drawn at it: an effect that makes things much worse.
 const LEAST: f64 = -1.0;

@@ -6,8 +6,8 @@ use super::super::plot::Drawing;
 use super::super::plot::drawing::{Align, Text};
 use super::super::plot::palette::{BLUE, GRID, INK, SOFT, WHITE};
 use super::super::plot::panel::{LABEL_SIZE, TICK_SIZE, draw_title};
-use crate::effects::EffectId;
-use crate::study::blind_check::{Case, Class};
+use tapjoint_beam::effects::EffectId;
+use tapjoint_study::blind_check::{Case, Class};
 
 const WIDTH: u32 = 1200;
 const LEFT: f64 = 230.0;

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::plot::{PictureFormat, render_picture};
 use super::{ReportError, ReportFile};
-use crate::study::blind_check::{Case, Conduct, Planted, Row, Scores, Target, Truth, rows};
+use tapjoint_study::blind_check::{Case, Conduct, Planted, Row, Scores, Target, Truth, rows};
 
 /// All files: `score.json`, `cases.csv`, `truth.json`, and as PNG and SVG `confusion`, `reliability`,
 /// `closure`.

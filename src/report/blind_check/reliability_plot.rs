@@ -5,7 +5,7 @@ use super::super::plot::axis::Axis;
 use super::super::plot::drawing::{Align, Stroke, Text};
 use super::super::plot::palette::{BLUE, SOFT};
 use super::super::plot::panel::{Panel, TICK_SIZE, draw_title};
-use crate::study::blind_check::Calibration;
+use tapjoint_study::blind_check::Calibration;
 
 /// The reliability diagram: on the diagonal probabilities are what they say.
 pub(super) fn draw_reliability(calibration: &Calibration) -> Drawing {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::confusion_plot::classes;
-use crate::study::blind_check::{
+use tapjoint_study::blind_check::{
     Case, Class, Row, Scores, Target, Verdict, render_rows, rows, score,
 };
 

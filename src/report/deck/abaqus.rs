@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Deck, DeckJoint, DeckMass};
-use crate::structure::BeamTheory;
+use tapjoint_beam::BeamTheory;
 
 /// w and theta of a plane beam.
 const W: usize = 2;

@@ -8,11 +8,11 @@ mod abaqus;
 mod nastran;
 mod with_effects;
 
-use crate::description::TestDescription;
-use crate::identify::consistent::JointedStructure;
-use crate::pipeline::{Analysis, jointed_structure, structure_details, tested_structure};
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
+use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
+use tapjoint_description::TestDescription;
+use tapjoint_identify::consistent::JointedStructure;
 
 pub use abaqus::render_abaqus;
 pub use nastran::render_nastran;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Deck, DeckJoint, DeckMass, DeckPiece};
-use crate::structure::BeamTheory;
+use tapjoint_beam::BeamTheory;
 
 /// Degrees of freedom that a plane beam has not: along it, out of its plane, twist.
 const HELD: &str = "1345";

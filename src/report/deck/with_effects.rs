@@ -2,8 +2,8 @@
 //! dimensions and material.
 
 use super::{Deck, DeckError, DeckJoint, scalar_springs};
-use crate::structure::specimen::{Body, Hinge, Specimen, SpecimenJoint};
-use crate::structure::{Beam, BeamTheory};
+use tapjoint_beam::specimen::{Body, Hinge, Specimen, SpecimenJoint};
+use tapjoint_beam::{Beam, BeamTheory};
 
 /// The deck of a structure, and the frequencies (Hz) that it is predicted to have.
 ///

@@ -1,6 +1,6 @@
 //! Natural frequency and damping against amplitude: a pair of panels for every mode.
 
-use crate::modal::amplitude::{AmplitudeCurve, AmplitudePoint, AmplitudeVerdict, Trend};
+use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudePoint, AmplitudeVerdict, Trend};
 
 use super::super::format::significant;
 use super::axis::{Axis, Tick, extent, padded};
@@ -30,9 +30,9 @@ const TELLING: f64 = 4.0;
 /// Standard uncertainties by which a point lies apart from the others: chance does not reach that far.
 const APART: f64 = 4.0;
 /// From this many taps on all points have one colour.
-pub(in crate::report) const MOST_COLOURS: usize = 4;
+pub(crate) const MOST_COLOURS: usize = 4;
 /// Half length of a bar: 95 % of a normal distribution.
-pub(in crate::report) const BAR: f64 = 1.96;
+pub(crate) const BAR: f64 = 1.96;
 /// Decades up to which 2 and 5 are labelled beside the powers of ten.
 const FEW_DECADES: f64 = 2.6;
 
@@ -48,18 +48,18 @@ pub struct AmplitudeFigure {
 }
 
 /// One quantity of a row.
-pub(in crate::report) struct Quantity {
+pub(crate) struct Quantity {
     title: &'static str,
     /// Name and unit.
-    pub(in crate::report) words: (&'static str, &'static str),
-    pub(in crate::report) trend: fn(&AmplitudeCurve) -> Option<&Trend>,
+    pub(crate) words: (&'static str, &'static str),
+    pub(crate) trend: fn(&AmplitudeCurve) -> Option<&Trend>,
     /// Value and standard uncertainty of a point, in the unit drawn.
-    pub(in crate::report) value: fn(&AmplitudePoint) -> (f64, f64),
+    pub(crate) value: fn(&AmplitudePoint) -> (f64, f64),
     /// Unit drawn over the trend's unit.
-    pub(in crate::report) factor: f64,
+    pub(crate) factor: f64,
 }
 
-pub(in crate::report) const FREQUENCY: Quantity = Quantity {
+pub(crate) const FREQUENCY: Quantity = Quantity {
     title: "frequency (Hz)",
     words: ("frequency", "Hz"),
     trend: |curve| curve.frequency.as_ref(),
@@ -67,7 +67,7 @@ pub(in crate::report) const FREQUENCY: Quantity = Quantity {
     factor: 1.0,
 };
 
-pub(in crate::report) const DAMPING: Quantity = Quantity {
+pub(crate) const DAMPING: Quantity = Quantity {
     title: "damping ratio (%)",
     words: ("damping ratio", "%"),
     trend: |curve| curve.damping.as_ref(),
@@ -136,7 +136,7 @@ fn legend(modes: &[&(usize, AmplitudeCurve)]) -> Vec<(Sample, String)> {
 }
 
 /// Number of taps with points.
-pub(in crate::report) fn taps(curve: &AmplitudeCurve) -> usize {
+pub(crate) fn taps(curve: &AmplitudeCurve) -> usize {
     let taps = curve.points.iter().map(|point| point.tap + 1);
     taps.max().unwrap_or(0)
 }
@@ -266,13 +266,13 @@ fn amplitudes(curve: &AmplitudeCurve) -> (f64, f64) {
 }
 
 /// All amplitudes, with some room.
-pub(in crate::report) fn amplitude_axis(curve: &AmplitudeCurve, pixels: (f64, f64)) -> Axis {
+pub(crate) fn amplitude_axis(curve: &AmplitudeCurve, pixels: (f64, f64)) -> Axis {
     let (low, high) = amplitudes(curve);
     Axis::logarithmic((low / 1.12, high * 1.12), pixels)
 }
 
 /// What [`range`] says.
-pub(in crate::report) fn quantity_axis(
+pub(crate) fn quantity_axis(
     curve: &AmplitudeCurve,
     quantity: &Quantity,
     pixels: (f64, f64),

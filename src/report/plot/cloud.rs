@@ -46,7 +46,7 @@ pub fn draw_cloud(document: &Document) -> Option<Drawing> {
     Some(drawing)
 }
 
-pub(in crate::report) fn method_words(method: &str) -> &'static str {
+pub(crate) fn method_words(method: &str) -> &'static str {
     match method {
         "pairs" => "Pair regression",
         _ => "Consistent estimate",

@@ -13,23 +13,23 @@ const CORNERS: usize = 120;
 
 /// The estimates of one method, as pairs of Kx and Ky.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(in crate::report) struct Cloud {
+pub(crate) struct Cloud {
     /// "pairs" or "consistent".
-    pub(in crate::report) method: String,
+    pub(crate) method: String,
     /// At all ends of the bounds.
-    pub(in crate::report) patterns: Vec<Point>,
+    pub(crate) patterns: Vec<Point>,
     /// Under random errors.
-    pub(in crate::report) random: Vec<Point>,
+    pub(crate) random: Vec<Point>,
     /// With all frequencies changed alike: percent and place.
-    pub(in crate::report) shifted: Vec<(f64, Point)>,
+    pub(crate) shifted: Vec<(f64, Point)>,
     /// The estimate itself.
-    pub(in crate::report) estimate: Option<Point>,
+    pub(crate) estimate: Option<Point>,
     /// The 95 % region by the covariance; empty where there is none.
-    pub(in crate::report) ellipse: Vec<Point>,
+    pub(crate) ellipse: Vec<Point>,
 }
 
 /// The clouds of all methods, the consistent estimate's first; one without two points is none.
-pub(in crate::report) fn clouds(document: &Document) -> Vec<Cloud> {
+pub(crate) fn clouds(document: &Document) -> Vec<Cloud> {
     let methods = ["consistent", "pairs"].into_iter();
     methods
         .map(|method| cloud(document, method))
@@ -105,7 +105,7 @@ fn ellipse(estimate: &EstimateSection, method: &str) -> Vec<Point> {
 
 impl Cloud {
     /// Axes on which all of it can be seen but the outermost of the random ones.
-    pub(in crate::report) fn axes(&self, across: (f64, f64), upwards: (f64, f64)) -> (Axis, Axis) {
+    pub(crate) fn axes(&self, across: (f64, f64), upwards: (f64, f64)) -> (Axis, Axis) {
         let each = |pick: fn(&Point) -> f64| {
             let shifted = self.shifted.iter().map(|(_, point)| point);
             let shown = self.patterns.iter().chain(shifted).chain(&self.estimate);

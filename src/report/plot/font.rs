@@ -26,8 +26,8 @@ pub const FAMILY: &str = "sans-serif";
 /// this font.
 pub(super) const BASELINE: f64 = 0.365;
 
-static REGULAR: &[u8] = include_bytes!("../../../assets/DejaVuSans-sub.ttf");
-static BOLD: &[u8] = include_bytes!("../../../assets/DejaVuSans-Bold-sub.ttf");
+static REGULAR: &[u8] = include_bytes!("../assets/DejaVuSans-sub.ttf");
+static BOLD: &[u8] = include_bytes!("../assets/DejaVuSans-Bold-sub.ttf");
 
 /// The embedded font, read once.
 pub(super) fn face(weight: Weight) -> Option<&'static FontRef<'static>> {

@@ -6,7 +6,7 @@ use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{Color, INK, SOFT, curve};
 use super::panel::{LABEL_SIZE, Panel, Sample, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
-use crate::study::resolution::{EstimateMethod, ReadingName, ResolutionStudy, WindowName};
+use tapjoint_study::resolution::{EstimateMethod, ReadingName, ResolutionStudy, WindowName};
 
 /// Height of a panel (pixels).
 const HEIGHT: f64 = 300.0;
@@ -248,7 +248,7 @@ fn draw_curve(drawing: &mut Drawing, panel: &Panel, curve: &Curve) {
 }
 
 fn mode_legend(study: &ResolutionStudy) -> Vec<(Sample, String)> {
-    let mode = |(index, mode): (usize, &crate::study::resolution::StudiedMode)| {
+    let mode = |(index, mode): (usize, &tapjoint_study::resolution::StudiedMode)| {
         let words = format!("mode {}: {} Hz", mode.mode, significant(mode.frequency, 4));
         (Sample::Dot(curve(index)), words)
     };

@@ -13,7 +13,7 @@ use super::panel::{
     LABEL_SIZE, Panel, Sample, TICK_SIZE, X_SPACING, crisp, draw_legend, draw_title,
 };
 use super::spectrum::{LEFT, RIGHT, WIDTH, frequency_axis, magnitude_axis, over_lines};
-use crate::modal::polyreference::PoleStability;
+use tapjoint_signal::modal::polyreference::PoleStability;
 
 /// Upper end of the panel of the whole band (pixels).
 const TOP: f64 = 98.0 + STRIP;
@@ -35,7 +35,7 @@ const NARROW_RADIUS: f64 = 2.6;
 const FAINT: Color = Color(178, 186, 196);
 
 /// Classes from the best to the worst, with words for the legend.
-pub(in crate::report) const CLASSES: [(PoleStability, &str); 5] = [
+pub(crate) const CLASSES: [(PoleStability, &str); 5] = [
     (PoleStability::All, "stable: frequency and damping"),
     (
         PoleStability::FrequencyAndDamping,
@@ -183,7 +183,7 @@ fn draw_narrow(
 }
 
 /// "modes 1, 2 · 40 to 60 Hz".
-pub(in crate::report) fn named(spectra: &SpectraFigure, band: &StabilisationBand) -> String {
+pub(crate) fn named(spectra: &SpectraFigure, band: &StabilisationBand) -> String {
     let (low, high) = band.core;
     let within = |frequency: f64| (low..=high).contains(&frequency);
     let numbers: Vec<String> = spectra
@@ -220,11 +220,7 @@ fn draw_level(drawing: &mut Drawing, panel: &Panel, spectra: &SpectraFigure) {
 
 /// The largest level of all frequency response functions, or without a hammer of all responses, each
 /// over its own highest value: its logarithm fills the panel up to the order `top`.
-pub(in crate::report) fn level(
-    spectra: &SpectraFigure,
-    band: (f64, f64),
-    top: f64,
-) -> Vec<(f64, f64)> {
+pub(crate) fn level(spectra: &SpectraFigure, band: (f64, f64), top: f64) -> Vec<(f64, f64)> {
     let curves: Vec<&[f64]> = if spectra.frfs.is_empty() {
         spectra
             .responses

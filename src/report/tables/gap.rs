@@ -12,7 +12,7 @@ use super::has_joint;
 use super::hypotheses::{left, percent, together};
 use super::next_tests::next_test;
 use super::verdict::{named, shows_gap, verdict};
-use crate::stats::times;
+use tapjoint_numerics::stats::times;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
 pub fn gap_story(document: &Document) -> Vec<String> {
@@ -265,7 +265,7 @@ fn price(gap: &GapSection) -> Option<String> {
 
 /// "Kt = 168.2 kN/m, Kr = 205.4 N m/rad": the joint that is found together with what the verdict names; `None` where it
 /// names nothing.
-pub(in crate::report) fn joint_with(gap: &GapSection) -> Option<String> {
+pub(crate) fn joint_with(gap: &GapSection) -> Option<String> {
     joint(named(gap).filter(|found| found.effect != "none")?, false)
 }
 

@@ -134,7 +134,7 @@ fn looks_like(names: &[String]) -> String {
 }
 
 /// "local-crack + joint-nonlinearity": both names of two effects, which a line may be broken between.
-pub(in crate::report) fn together(effect: &str) -> String {
+pub(crate) fn together(effect: &str) -> String {
     effect.replace('+', " + ")
 }
 

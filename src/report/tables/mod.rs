@@ -34,7 +34,7 @@ pub(super) use verdict::shows_gap;
 
 use super::document::{Document, ModeSection};
 use super::format::MISSING;
-use crate::identify::observation::UNPAIRED;
+use tapjoint_identify::observation::UNPAIRED;
 
 /// Whether a joint is sought: a free beam has none.
 pub fn has_joint(document: &Document) -> bool {

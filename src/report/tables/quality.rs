@@ -201,7 +201,7 @@ fn unit(verdict: &VerdictSection) -> String {
 mod tests {
     use super::super::super::convert_quality::verdict_section;
     use super::*;
-    use crate::quality::{Check, Outcome, Subject, Verdict};
+    use tapjoint_signal::quality::{Check, Outcome, Subject, Verdict};
 
     fn verdict(check: Check, outcome: Outcome, value: f64) -> VerdictSection {
         verdict_section(&Verdict {

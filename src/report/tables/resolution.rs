@@ -2,7 +2,7 @@
 
 use super::super::format::{MISSING, optional, significant, trimmed};
 use super::{Column, Table, number};
-use crate::study::resolution::{
+use tapjoint_study::resolution::{
     EstimateMethod, FrequencyError, ReadingName, ResolutionStudy, StiffnessError, StudiedMode,
     StudiedStiffness, WindowName,
 };
@@ -24,7 +24,7 @@ pub fn resolution_lines(study: &ResolutionStudy) -> Table {
         columns.push(number(&format!("{name}: spacing (Hz)")));
         columns.push(number("record (s)"));
     }
-    let row = |block: &crate::study::resolution::BlockLines| {
+    let row = |block: &tapjoint_study::resolution::BlockLines| {
         let mut row = vec![
             block.block.to_string(),
             block.lines.to_string(),

@@ -3,7 +3,7 @@
 use super::super::document::{GapSection, HypothesisSection, UnplacedSection};
 use super::super::format::{probability, trimmed};
 use super::hypotheses::{LEAST_PROBABILITY, left, percent, sizes};
-use crate::gap::{MISFIT, SEEN};
+use tapjoint_diagnosis::{MISFIT, SEEN};
 
 pub(super) fn verdict(gap: &GapSection, has_joint: bool) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));

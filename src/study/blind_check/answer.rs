@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::case::{Answer, Class, Verdict};
-use crate::effects::{EffectId, Place};
-use crate::gap::{Diagnosis, Hypothesis, Verdict as Found};
+use tapjoint_beam::effects::{EffectId, Place};
+use tapjoint_diagnosis::{Diagnosis, Hypothesis, Verdict as Found};
 
 impl Answer {
     /// Of a diagnosis.

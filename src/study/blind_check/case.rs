@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::effects::{EffectId, Group, Place};
+use tapjoint_beam::effects::{EffectId, Group, Place};
 
 /// What a diagnosis chooses between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -15,14 +15,14 @@ use rand_distr::{Distribution, StandardNormal};
 use super::case::{Planted, Truth};
 use super::outside::{Fastened, OutsideKind};
 use super::sizes::{GROUPS, draw_effect};
-use crate::description::{DescriptionError, TestDescription};
-use crate::effects::{Effect, EffectError, EffectId};
-use crate::gap::GapError;
-use crate::simulate::{Damping, Laboratory, SimulateError};
-use crate::structure::StructureError;
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
-use crate::study::plan::PlanError;
+use crate::plan::PlanError;
+use tapjoint_beam::StructureError;
+use tapjoint_beam::effects::{Effect, EffectError, EffectId};
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
+use tapjoint_description::{DescriptionError, TestDescription};
+use tapjoint_diagnosis::GapError;
+use tapjoint_simulate::{Damping, Laboratory, SimulateError};
 
 /// How many recordings a drawn test has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

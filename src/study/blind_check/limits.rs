@@ -2,12 +2,12 @@
 
 use super::case::{CaseKind, Truth};
 use super::draw::{DrawError, DrawnTest};
-use crate::effects::Effect;
-use crate::gap::{GapSettings, Hypothesis, diagnose, nominal_chi_square, observe};
-use crate::identify::observation::Observations;
-use crate::pipeline::nominal_with;
-use crate::stats::chi_square_quantile;
-use crate::study::plan::{NOTICED, PlanSettings, plan_of};
+use crate::plan::{NOTICED, PlanSettings, plan_of};
+use tapjoint_analysis::nominal_with;
+use tapjoint_beam::effects::Effect;
+use tapjoint_diagnosis::{GapSettings, Hypothesis, diagnose, nominal_chi_square, observe};
+use tapjoint_identify::observation::Observations;
+use tapjoint_numerics::stats::chi_square_quantile;
 
 /// Relative standard uncertainty of a frequency, mean of five taps at 60 dB: what a steel beam's
 /// temperature leaves, since the noise is smaller.

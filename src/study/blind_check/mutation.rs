@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::case::{Answer, Class, Truth, Verdict};
 use super::draw::Extent;
 use super::score::{Case, score};
-use crate::effects::EffectId;
+use tapjoint_beam::effects::EffectId;
 
 /// How a check was conducted, and what answers earn that cannot know.
 #[derive(Debug, Clone, PartialEq, Default)]

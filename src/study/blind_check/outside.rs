@@ -3,8 +3,8 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::structure::Beam;
-use crate::structure::specimen::{Hinge, PointMass, PointSpring, Specimen};
+use tapjoint_beam::Beam;
+use tapjoint_beam::specimen::{Hinge, PointMass, PointSpring, Specimen};
 
 /// Things fastened to a specimen that neither its description nor an effect knows.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -5,8 +5,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::draw::{DrawError, DrawnTest};
-use crate::simulate::{SeenStructure, TestPlan, VirtualRecording, believed_description, plan_test};
-use crate::stats::root_mean_square;
+use tapjoint_numerics::stats::root_mean_square;
+use tapjoint_simulate::{
+    SeenStructure, TestPlan, VirtualRecording, believed_description, plan_test,
+};
 
 /// What the diagnosis is given: recordings, and the description without the truth.
 #[derive(Debug, Clone)]
@@ -63,7 +65,7 @@ impl DrawnTest {
     fn fasten(&self, recording: &mut VirtualRecording, number: usize) -> Result<(), DrawError> {
         self.fastened.add_to(&mut recording.seen.specimen);
         let moved = &self.description.recordings[number].at;
-        let place = |sensor: &crate::description::SensorDescription| {
+        let place = |sensor: &tapjoint_description::SensorDescription| {
             moved.get(&sensor.name).copied().or(sensor.position)
         };
         let places: Vec<f64> = self.description.sensors.iter().filter_map(place).collect();

@@ -3,7 +3,7 @@
 use super::calibration::{Calibration, calibrate};
 use super::case::{Answer, CaseKind, Class, Planted, Truth, Verdict};
 use super::rate::Rate;
-use crate::effects::{EffectId, Group, Place};
+use tapjoint_beam::effects::{EffectId, Group, Place};
 
 /// Share of the probability that an answer's set holds.
 pub const SET_SHARE: f64 = 0.9;

@@ -4,8 +4,8 @@ use rand::RngExt;
 use rand::seq::IndexedRandom;
 use rand_chacha::ChaCha8Rng;
 
-use crate::effects::{Effect, EffectError, EffectId};
-use crate::structure::Beam;
+use tapjoint_beam::Beam;
+use tapjoint_beam::effects::{Effect, EffectError, EffectId};
 
 /// The groups that single effects are dealt from; `resolution` is a reading bias that recordings
 /// cannot hold, `joint-drift` a nuisance that every test has.

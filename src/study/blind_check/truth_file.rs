@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::case::{Planted, Truth};
 use super::outside::OutsideKind;
-use crate::effects::{EffectError, EffectId};
+use tapjoint_beam::effects::{EffectError, EffectId};
 
 /// Why a truth file cannot be used.
 #[derive(Debug, thiserror::Error)]

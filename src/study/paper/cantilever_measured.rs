@@ -2,12 +2,12 @@
 
 use super::printed::{Printed, PrintedTable};
 use super::{PaperError, Row, Table, estimate_from_printed};
-use crate::identify::perturbation::{PAPER_PERCENTS, UniformPerturbation, average_errors};
-use crate::identify::{ModeLambda, PairsModel, Stiffnesses, estimate_pairs};
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{
     Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies, natural_lambdas,
 };
+use tapjoint_identify::perturbation::{PAPER_PERCENTS, UniformPerturbation, average_errors};
+use tapjoint_identify::{ModeLambda, PairsModel, Stiffnesses, estimate_pairs};
 
 const TABLE_2: &str = include_str!("../../../tests/validation/tables/table2.csv");
 const TABLE_3: &str = include_str!("../../../tests/validation/tables/table3.csv");

@@ -2,8 +2,8 @@
 
 use super::printed::{Printed, PrintedTable};
 use super::{PaperError, Row, Table, Verdict, estimate_from_printed, joint_label};
-use crate::identify::PairsModel;
-use crate::structure::{Assembly, JointStiffness, natural_lambdas};
+use tapjoint_beam::{Assembly, JointStiffness, natural_lambdas};
+use tapjoint_identify::PairsModel;
 
 const TABLE_1A: &str = include_str!("../../../tests/validation/tables/table1a.csv");
 const TABLE_1B: &str = include_str!("../../../tests/validation/tables/table1b.csv");

@@ -2,8 +2,10 @@
 
 use super::printed::{Printed, PrintedTable};
 use super::{PaperError, Row, Table, Verdict, estimate_from_printed, joint_label};
-use crate::identify::{ModeLambda, PairsModel, Stiffnesses, estimate_pairs, single_mode_stiffness};
-use crate::structure::{Assembly, JointStiffness, natural_lambdas};
+use tapjoint_beam::{Assembly, JointStiffness, natural_lambdas};
+use tapjoint_identify::{
+    ModeLambda, PairsModel, Stiffnesses, estimate_pairs, single_mode_stiffness,
+};
 
 const TABLE_10: &str = include_str!("../../../tests/validation/tables/table10.csv");
 const TABLE_11_13: &str = include_str!("../../../tests/validation/tables/table11_13.csv");

@@ -12,11 +12,11 @@ mod text;
 pub use printed::Printed;
 pub use text::render;
 
-use crate::identify::perturbation::{Span, sign_pattern_spans};
-use crate::identify::{
+use tapjoint_beam::StructureError;
+use tapjoint_identify::perturbation::{Span, sign_pattern_spans};
+use tapjoint_identify::{
     IdentifyError, ModeLambda, PairsEstimate, PairsModel, Stiffnesses, estimate_pairs,
 };
-use crate::structure::StructureError;
 
 /// Why the tables cannot be set beside ours. Both would be defects of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

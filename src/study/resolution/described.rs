@@ -1,9 +1,9 @@
 //! What a test description gives the study.
 
 use super::StudiedTest;
-use crate::description::TestDescription;
-use crate::pipeline::{TestedStructure, structure_details};
-use crate::structure::{Assembly, JointStiffness};
+use tapjoint_analysis::{TestedStructure, structure_details};
+use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_description::TestDescription;
 
 /// Modes studied where the description says nothing: those of Ingole & Chatterjee.
 const USUAL_MODES: usize = 5;

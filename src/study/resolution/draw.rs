@@ -10,10 +10,10 @@ use super::estimate::{Estimators, ParameterErrors};
 use super::plan::{BlockPlan, readings_of};
 use super::reading::{Read, read_band};
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
-use crate::identify::consistent::{FrequencyModel, Parameter, Point};
-use crate::simulate::{SimulatedMode, TapTestSettings, seen_modes, simulate_tap_test};
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, JointStiffness, ModeShape, mode_shapes};
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
+use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
+use tapjoint_simulate::{SimulatedMode, TapTestSettings, seen_modes, simulate_tap_test};
 
 /// Most modes that are simulated: more than a joint needs, and than a band of a tap test holds.
 const MOST_MODES: usize = 12;

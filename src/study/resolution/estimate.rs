@@ -5,12 +5,14 @@ use super::plan::{BlockPlan, Layout};
 use super::reading::Read;
 use super::result::{EstimateMethod, ReadingName, StudiedStiffness};
 use super::{ResolutionError, StudiedTest};
-use crate::identify::consistent::{
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_identify::consistent::{
     ConsistentEstimator, ConsistentSettings, HeldJoint, JointedStructure, Neighbourhood, Parameter,
 };
-use crate::identify::{IdentifyError, MeasuredMode, PairsModel, estimate_modulus, pairs_estimator};
-use crate::structure::joint::StiffnessUnits;
-use crate::structure::{Assembly, JointStiffness};
+use tapjoint_identify::{
+    IdentifyError, MeasuredMode, PairsModel, estimate_modulus, pairs_estimator,
+};
 
 /// Errors (1) of the stiffnesses in one draw, in the order of [`Estimators::parameters`]; `None` where
 /// there is no estimate.

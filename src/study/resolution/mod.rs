@@ -23,13 +23,13 @@ pub use result::{
 
 use rayon::prelude::*;
 
-use crate::identify::IdentifyError;
-use crate::pipeline::{StructureDetails, TestedStructure};
-use crate::spectral::SpectralError;
-use crate::structure::{JointStiffness, StructureError};
 use draw::{Truths, drawn};
 use estimate::Estimators;
 use plan::{BlockPlan, Layout};
+use tapjoint_analysis::{StructureDetails, TestedStructure};
+use tapjoint_beam::{JointStiffness, StructureError};
+use tapjoint_identify::IdentifyError;
+use tapjoint_signal::spectral::SpectralError;
 
 /// What is tested virtually.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use super::draw::{Truths, sample_draw};
 use super::reading::window_of;
 use super::result::{Omitted, ReadingName};
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
-use crate::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
+use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
 
 /// Room between a mode and the upper end of its band, as a share of the band's end: truths vary by some
 /// lines, and a peak on the last line is none.

@@ -5,12 +5,12 @@ use num_complex::Complex64;
 use super::draw::{Truth, VirtualRecord};
 use super::plan::BandPlan;
 use super::result::{ReadingName, WindowName};
-use crate::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
-use crate::modal::{
+use tapjoint_signal::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
+use tapjoint_signal::modal::{
     CompositeLevel, FittedReading, FrequencySource, ModeReading, PeakSettings, find_peaks,
     read_peaks,
 };
-use crate::spectral::{
+use tapjoint_signal::spectral::{
     AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, band_limited, choose_window,
     exponential_to, largest_smooth_block, measure_decay,
 };
@@ -223,7 +223,7 @@ fn fit(
     }
 }
 
-type Fits = Vec<Result<crate::modal::fit::ModeFit, crate::modal::fit::Unfit>>;
+type Fits = Vec<Result<tapjoint_signal::modal::fit::ModeFit, tapjoint_signal::modal::fit::Unfit>>;
 
 fn fits(band: &BandPlan, record: &VirtualRecord, starts: &[PoleStart]) -> Option<Fits> {
     let decay = band.gate.checked_sub(record.pulse_end)?;

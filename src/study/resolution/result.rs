@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::estimate::Estimators;
 use super::plan::{BlockPlan, Layout};
 use super::{ResolutionSettings, StudiedTest, answer};
-use crate::description::{ReadingMethod, WindowKind};
+use tapjoint_description::{ReadingMethod, WindowKind};
 
 /// A window of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

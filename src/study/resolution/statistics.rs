@@ -5,7 +5,7 @@ use super::draw::Outcome;
 use super::estimate::Estimators;
 use super::plan::{BlockPlan, Layout};
 use super::result::{EstimateMethod, FrequencyError, ReadingName, ResolutionStudy, StiffnessError};
-use crate::stats::root_mean_square;
+use tapjoint_numerics::stats::root_mean_square;
 
 /// rms, mean, 95 % point and largest of some errors; `None` without any.
 #[derive(Debug, Clone, Copy)]

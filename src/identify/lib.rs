@@ -1,0 +1,135 @@
+//! Where measurement and theory meet: joint stiffness from natural frequencies.
+//!
+//! ```text
+//! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
+//!                         consistent  least squares on the frequencies themselves
+//!                         free_beam  modulus and density of a beam without a joint
+//!                      -> estimate   with uncertainty, in SI units, with what speaks against it
+//!                      -> predict    frequencies of the estimate beside the measured ones
+//!                      -> perturbation  how far errors in the frequencies move the estimate
+//! ```
+//!
+//! What the measurement saw, as a diagnosis compares it with predictions, is [`observation`]; which peak
+//! is which mode says [`pairing`].
+//!
+//! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
+//! a [`Doubt`], not an error; an error means that no number exists.
+
+pub mod consistent;
+pub mod doubt;
+pub mod estimate;
+pub mod free_beam;
+pub mod monte_carlo;
+pub mod observation;
+pub mod pairing;
+pub mod pairs;
+pub mod perturbation;
+pub mod predict;
+
+pub use doubt::Doubt;
+pub use estimate::{
+    FREQUENCY_FLOOR, JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator,
+};
+pub use free_beam::{FreeBeamEstimate, estimate_modulus};
+pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
+pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio, pair_modes};
+pub use pairs::{
+    ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap, estimate_pairs,
+    estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,
+};
+pub use perturbation::Stiffnesses;
+pub use predict::{PredictedMode, compare, predict, predict_lambdas};
+
+use tapjoint_beam::StructureError;
+
+/// Why an estimate does not exist.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum IdentifyError {
+    /// Fewer modes than the model has unknowns and one more.
+    #[error(
+        "{found} mode(s) given, but the {model} needs at least {needed}: its {unknowns} unknown(s) \
+         and their product; measure more modes{simpler}"
+    )]
+    TooFewModes {
+        /// The model, in words.
+        model: &'static str,
+        /// How many unknown stiffnesses it has.
+        unknowns: usize,
+        /// How many modes it needs.
+        needed: usize,
+        /// How many were given.
+        found: usize,
+        /// A model that needs fewer, as the end of the sentence; empty where there is none.
+        simpler: &'static str,
+    },
+    /// The modes given do not determine all unknowns.
+    #[error(
+        "the modes given determine only {rank} of the {unknowns} unknowns of the {model}; {remedy}"
+    )]
+    Undetermined {
+        /// The model, in words.
+        model: &'static str,
+        /// How many unknowns it has.
+        unknowns: usize,
+        /// Rank of the regression.
+        rank: usize,
+        /// What helps.
+        remedy: &'static str,
+    },
+    /// Fewer frequencies than unknowns.
+    #[error(
+        "{found} {} cannot determine {unknowns} unknowns; measure more modes, or estimate \
+         fewer parameters", if *.found == 1 { "frequency" } else { "frequencies" }
+    )]
+    TooFewFrequencies {
+        /// How many parameters are to be estimated.
+        unknowns: usize,
+        /// How many frequencies were given.
+        found: usize,
+    },
+    /// Measured weights without an uncertainty to weigh by.
+    #[error(
+        "mode {mode} has no standard uncertainty to weigh it by; state half_line, std or scatter, \
+         or take weights = \"relative\""
+    )]
+    NoUncertainty {
+        /// The mode's number.
+        mode: usize,
+    },
+    /// Nothing was asked for, or what the structure does not have.
+    #[error(
+        "there is nothing to estimate: name at least one parameter, and no joint stiffness of a \
+         free beam"
+    )]
+    NothingToEstimate,
+    /// A frequency that is no frequency.
+    #[error("mode {mode} has the frequency {value}, but it must be positive and finite")]
+    Frequency {
+        /// The mode's number.
+        mode: usize,
+        /// Its frequency (Hz) or lambda (1).
+        value: f64,
+    },
+    /// More sign patterns than can be tried.
+    #[error(
+        "{modes} modes have too many sign patterns to try all; at most {limit} modes, \
+         take the first {limit} or less"
+    )]
+    TooManyPatterns {
+        /// How many modes were given.
+        modes: usize,
+        /// How many are allowed.
+        limit: usize,
+    },
+    /// Two lists that belong together differ in length.
+    #[error("{frequencies} frequencies but {bounds} bounds were given; one bound for each")]
+    Bounds {
+        /// Number of frequencies.
+        frequencies: usize,
+        /// Number of bounds.
+        bounds: usize,
+    },
+    /// The beam or the joint cannot exist.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
+}

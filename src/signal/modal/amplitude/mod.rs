@@ -1,0 +1,282 @@
+//! Natural frequency and damping of each mode against amplitude, along the decays of a recording.
+//!
+//! A joint that slips softens and dissipates more the harder it is driven: frequency and damping of a
+//! mode then drift along every decay. Five steps:
+//! 1. *Band* (`band`): every response is mixed down to the mode's frequency and low-pass filtered by
+//!    a finite filter of length M that is only ever laid over samples that exist. An exponential stays
+//!    an exponential that way, so the abrupt start of the decay leaves no transient; the price is that
+//!    the first value belongs to the time M/2 after the start.
+//! 2. *Sensors* (`sensors`): their bands are added with the weights of best signal to noise.
+//! 3. *Context* (`context`): whatever else lies in the band (neighbouring modes, hum, lines nobody
+//!    listed) is found by fits to the whole decay; the same fits say whether poles that do not change
+//!    explain the decay as well as one pole that does. Two close modes beat, and a beat is no
+//!    amplitude dependence.
+//! 4. *Segments* (`walk`): pieces that do not overlap, each fitted by the mode's pole with the
+//!    context held near what the whole decay says.
+//! 5. *Trend* (`trend`): points of all segments and taps against log amplitude.
+//!
+//! What to know: a point is an average over its segment, attributed to the time at which a linear drift
+//! has the same value; how the drift bends within the segment is taken from the fit to the whole decay.
+//! What that fit misses within a segment (at most [`AmplitudeSettings::longest`] of the decay time)
+//! remains as bias. Frequencies are undamped natural frequencies. Damping is the rate at which the
+//! measured quantity falls: for an acceleration that contains omega squared, whose own drift is a few
+//! thousandths of it and is left in. A neighbour that nobody listed nearer than about the half-power width
+//! cannot be told from a drift by one decay.
+
+use rayon::prelude::*;
+
+use tapjoint_numerics::stats::median;
+
+mod band;
+mod context;
+mod exponentials;
+mod fit;
+mod polynomial;
+mod segment;
+mod sensors;
+mod trend;
+mod walk;
+
+pub use trend::{AmplitudeReading, Trend};
+
+/// The ringing after one tap, force no longer acting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decay {
+    /// Time of the first sample after the tap (s).
+    pub start: f64,
+    /// Samples per second (Hz).
+    pub sample_rate: f64,
+    /// Samples of every sensor, in the same order for all taps.
+    pub responses: Vec<Vec<f64>>,
+}
+
+/// A mode, roughly known: within its half-power width.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownMode {
+    /// Natural frequency (Hz).
+    pub frequency: f64,
+    /// Damping ratio (1), within a factor of about three.
+    pub damping_ratio: f64,
+}
+
+/// How decays are cut and judged. Times are shares of the decay time 1/sigma, or of a quarter of the
+/// record where that is shorter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AmplitudeSettings {
+    /// Length of the band filter where neighbours leave room: 0.1. It decides how early the curve
+    /// begins.
+    pub filter: f64,
+    /// Longest filter accepted to keep a neighbour out; one that is nearer is fitted instead: 0.35.
+    pub longest_filter: f64,
+    /// Shortest segment: 0.15.
+    pub shortest: f64,
+    /// Longest segment: 0.7, over which the amplitude falls to a half.
+    pub longest: f64,
+    /// Uncertainty of the damping at which a segment is long enough, relative: 3 %.
+    pub aim: f64,
+    /// Uncertainty of the damping at which the curve ends, relative: 40 %, where the mode stands about
+    /// 18 dB above the noise of a segment.
+    pub end: f64,
+    /// Level of the test for a change: 1 %, since a recording has many modes to be tested.
+    pub level: f64,
+}
+
+impl Default for AmplitudeSettings {
+    fn default() -> Self {
+        AmplitudeSettings {
+            filter: 0.1,
+            longest_filter: 0.35,
+            shortest: 0.15,
+            longest: 0.7,
+            aim: 0.03,
+            end: 0.4,
+            level: 0.01,
+        }
+    }
+}
+
+/// One segment of one decay.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AmplitudePoint {
+    /// Which decay (0-based).
+    pub tap: usize,
+    /// Time after the tap (s).
+    pub time: f64,
+    /// Peak amplitude of the strongest sensor (its unit).
+    pub amplitude: f64,
+    /// Natural frequency (Hz).
+    pub frequency: f64,
+    /// Its standard uncertainty (Hz).
+    pub frequency_std: f64,
+    /// Damping ratio (1).
+    pub damping_ratio: f64,
+    /// Its standard uncertainty (1).
+    pub damping_std: f64,
+}
+
+/// A line in the mode's band that was fitted along with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Companion {
+    /// Which decay (0-based).
+    pub tap: usize,
+    /// Frequency (Hz).
+    pub frequency: f64,
+    /// Its amplitude over the mode's at the start of the decay.
+    pub share: f64,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// Why a line was looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// It is one of the modes given.
+    Listed,
+    /// It was found in what the fit left: hum, or a mode nobody listed.
+    Found,
+}
+
+/// What a curve says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AmplitudeVerdict {
+    /// Frequency or damping changes along the decay by more than its uncertainty.
+    Changes,
+    /// Neither changes by more than its uncertainty.
+    Steady,
+    /// The curve changes, but poles that do not change explain the decay as well: a neighbour at
+    /// `frequency` (Hz) beats with the mode.
+    Beating {
+        /// Frequency of the neighbour (Hz).
+        frequency: f64,
+    },
+    /// A mode given lies nearer than the decay can tell apart.
+    Unresolved {
+        /// Frequency of that mode (Hz).
+        frequency: f64,
+    },
+    /// Fewer points than a trend needs.
+    TooFewPoints,
+}
+
+/// Frequency and damping of one mode against amplitude.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmplitudeCurve {
+    /// The mode as given.
+    pub mode: KnownMode,
+    /// Points of all taps: by tap, then by time; independent of each other.
+    pub points: Vec<AmplitudePoint>,
+    /// Sensor (0-based) whose amplitude is given; `None` without points.
+    pub sensor: Option<usize>,
+    /// Length of the band filter (s): nothing is said about the first half of it.
+    pub filter_length: Option<f64>,
+    /// Frequency (Hz) against log amplitude; `None` with too few points.
+    pub frequency: Option<Trend>,
+    /// Damping ratio against log amplitude; `None` with too few points.
+    pub damping: Option<Trend>,
+    /// Lines fitted along with the mode.
+    pub companions: Vec<Companion>,
+    /// What it says.
+    pub verdict: AmplitudeVerdict,
+}
+
+impl AmplitudeCurve {
+    /// Frequency and damping at an amplitude (unit of the strongest sensor); `None` outside the
+    /// points' range and a little beyond.
+    pub fn at_amplitude(&self, amplitude: f64) -> Option<AmplitudeReading> {
+        trend::reading_at(self, amplitude)
+    }
+
+    /// Frequency and damping at a time (s) after a tap; `None` outside its decay's usable time.
+    pub fn at_time(&self, tap: usize, time: f64) -> Option<AmplitudeReading> {
+        trend::reading_at_time(self, tap, time)
+    }
+}
+
+/// Farthest that a point may lie from its mode's frequency (1, relative). Joints that slip move a frequency by a few
+/// percent; a segment that is fitted farther off has followed noise or another mode.
+const FARTHEST: f64 = 0.1;
+
+/// Least points of a trend: two of its own, and two more for its uncertainty.
+const LEAST_POINTS: usize = 4;
+
+/// Frequency and damping against amplitude of every mode.
+pub fn follow_amplitude(
+    decays: &[Decay],
+    modes: &[KnownMode],
+    settings: &AmplitudeSettings,
+) -> Vec<AmplitudeCurve> {
+    (0..modes.len())
+        .into_par_iter()
+        .map(|mode| follow_mode(decays, modes, mode, settings))
+        .collect()
+}
+
+fn follow_mode(
+    decays: &[Decay],
+    modes: &[KnownMode],
+    index: usize,
+    settings: &AmplitudeSettings,
+) -> AmplitudeCurve {
+    let mode = modes[index];
+    let mut curve = AmplitudeCurve {
+        mode,
+        points: Vec::new(),
+        sensor: None,
+        filter_length: None,
+        frequency: None,
+        damping: None,
+        companions: Vec::new(),
+        verdict: AmplitudeVerdict::TooFewPoints,
+    };
+    let bands = band::extract_bands(decays, modes, index, settings);
+    curve.sensor = sensors::strongest(&bands);
+    let Some(sensor) = curve.sensor else {
+        return curve;
+    };
+    curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
+    let (mut doubts, mut followed) = (Vec::new(), 0);
+    for band in &bands {
+        let Some(series) = sensors::combine(band, sensor) else {
+            continue;
+        };
+        let context = context::explain(&series, band);
+        let mut points = walk::walk_decay(&series, band, &context, settings);
+        let found = !points.is_empty();
+        points.retain(|point| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST);
+        if found && points.is_empty() {
+            // What was followed is something else.
+            continue;
+        }
+        curve.companions.extend(context.companions(band));
+        curve.points.extend(points);
+        doubts.extend(context.doubt(band));
+        followed += 1;
+    }
+    // One decay without a doubt settles it for all.
+    doubts.truncate(if doubts.len() == followed { 1 } else { 0 });
+    judge(&mut curve, &doubts, settings);
+    curve
+}
+
+fn judge(curve: &mut AmplitudeCurve, doubts: &[AmplitudeVerdict], settings: &AmplitudeSettings) {
+    if curve.points.len() < LEAST_POINTS {
+        return;
+    }
+    curve.frequency = trend::frequency_trend(&curve.points);
+    curve.damping = trend::damping_trend(&curve.points);
+    let changes = [&curve.frequency, &curve.damping]
+        .into_iter()
+        .flatten()
+        // Two tests share the level (Bonferroni).
+        .any(|trend| trend.p_value < 0.5 * settings.level);
+    curve.verdict = match (changes, doubts.first()) {
+        (false, _) => AmplitudeVerdict::Steady,
+        (true, None) => AmplitudeVerdict::Changes,
+        (true, Some(doubt)) => *doubt,
+    };
+}
+
+/// Median of values that are not to be reordered.
+fn median_of(values: impl Iterator<Item = f64>) -> f64 {
+    median(&mut values.collect::<Vec<f64>>())
+}

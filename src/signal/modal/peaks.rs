@@ -1,0 +1,201 @@
+//! Finding resonances: prominence, height over the noise, separation, number.
+
+use crate::spectral::Lines;
+use tapjoint_numerics::stats::median;
+
+/// Level of a spectrum over all sensors, and of its noise, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompositeLevel {
+    /// The axis.
+    pub lines: Lines,
+    /// Level (dB, arbitrary reference).
+    pub level_db: Vec<f64>,
+    /// Level that noise alone would have (dB, same reference); `None` where nothing is known.
+    pub noise_db: Option<Vec<f64>>,
+}
+
+impl CompositeLevel {
+    /// Combines the powers of several sensors. Each is scaled by its own median over the lines, so
+    /// that sensors of different kind or sensitivity count alike.
+    ///
+    /// `noise` are the powers that noise alone would leave, per sensor, where known.
+    pub fn new(lines: Lines, powers: &[Vec<f64>], noise: Option<&[Vec<f64>]>) -> Self {
+        let weights: Vec<f64> = powers
+            .iter()
+            .map(|power| {
+                1.0 / median_of_positive(power).max(f64::MIN_POSITIVE) / powers.len() as f64
+            })
+            .collect();
+        CompositeLevel {
+            lines,
+            level_db: weighted_db(powers, &weights, lines.points()),
+            noise_db: noise.map(|noise| weighted_db(noise, &weights, lines.points())),
+        }
+    }
+}
+
+fn weighted_db(powers: &[Vec<f64>], weights: &[f64], points: usize) -> Vec<f64> {
+    (0..points)
+        .map(|index| {
+            let sum: f64 = powers
+                .iter()
+                .zip(weights)
+                .map(|(power, weight)| weight * power.get(index).copied().unwrap_or(0.0))
+                .sum();
+            // A power of exactly zero has no level; -400 dB keeps it out of every comparison.
+            if sum > 0.0 {
+                10.0 * sum.log10()
+            } else {
+                -400.0
+            }
+        })
+        .collect()
+}
+
+/// Median of the positive entries; 0 when there are none.
+fn median_of_positive(values: &[f64]) -> f64 {
+    median(
+        &mut values
+            .iter()
+            .copied()
+            .filter(|&v| v > 0.0)
+            .collect::<Vec<_>>(),
+    )
+}
+
+/// What counts as a resonance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PeakSettings {
+    /// Least prominence (dB): how far the level falls on both sides before it rises above the peak.
+    /// 2 dB, where noise allows it: two equal resonances two half-power widths apart still have it; of
+    /// nearer or unequal ones only the higher is seen. The ripple that noise puts on a level comes on top.
+    pub prominence_db: f64,
+    /// Least prominence where nothing is known of the noise (dB). 8 dB.
+    pub blind_prominence_db: f64,
+    /// Least height above the noise (dB). 15 dB: noise alone passes it on one line in 10^13.
+    pub above_noise_db: f64,
+    /// Least distance of two peaks (lines, or resolution widths 1/T where those are wider). 3: two
+    /// peaks nearer than that share their flanks.
+    pub separation: usize,
+    /// At most so many peaks, the most prominent ones. 60.
+    pub most: usize,
+}
+
+impl Default for PeakSettings {
+    fn default() -> Self {
+        PeakSettings {
+            prominence_db: 2.0,
+            blind_prominence_db: 8.0,
+            above_noise_db: 15.0,
+            separation: 3,
+            most: 60,
+        }
+    }
+}
+
+/// A local maximum that counts as a resonance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// Index of its line.
+    pub index: usize,
+    /// How far it stands out (dB).
+    pub prominence_db: f64,
+    /// Height above the noise (dB), where the noise is known.
+    pub above_noise_db: Option<f64>,
+}
+
+/// Resonances of a composite level, ascending in frequency.
+///
+/// The first two resolution widths are left out: drift and offsets live there.
+pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> {
+    let lines = &level.lines;
+    let first = lines.frequency(0);
+    let mut peaks: Vec<Peak> = local_maxima(&level.level_db)
+        .into_iter()
+        .filter(|&index| first > 0.0 || lines.frequency(index) > 2.0 * lines.resolution())
+        .map(|index| Peak {
+            index,
+            prominence_db: prominence(&level.level_db, index),
+            above_noise_db: level
+                .noise_db
+                .as_ref()
+                .map(|noise| level.level_db[index] - noise[index]),
+        })
+        .filter(|peak| peak.prominence_db >= needed_prominence(peak, settings))
+        .filter(|peak| {
+            let height = peak
+                .above_noise_db
+                .unwrap_or_else(|| above_surroundings(&level.level_db, peak.index));
+            height >= settings.above_noise_db
+        })
+        .collect();
+    peaks.sort_by(|a, b| b.prominence_db.total_cmp(&a.prominence_db));
+    let width = (lines.resolution() / lines.spacing).ceil().max(1.0) as usize;
+    let separation = settings.separation.saturating_mul(width);
+    let mut kept: Vec<Peak> = Vec::new();
+    for peak in peaks {
+        let clear = kept
+            .iter()
+            .all(|other| peak.index.abs_diff(other.index) >= separation);
+        if clear && kept.len() < settings.most {
+            kept.push(peak);
+        }
+    }
+    kept.sort_by_key(|peak| peak.index);
+    kept
+}
+
+/// The least prominence of a peak. Noise s dB below a level makes it ripple by 8.7 10^(-s/20) dB;
+/// six times that is out of its reach on any line.
+fn needed_prominence(peak: &Peak, settings: &PeakSettings) -> f64 {
+    match peak.above_noise_db {
+        Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
+        None => settings.blind_prominence_db,
+    }
+}
+
+/// Interior local maxima; the first line of a plateau stands for it.
+fn local_maxima(level: &[f64]) -> Vec<usize> {
+    (1..level.len().saturating_sub(1))
+        .filter(|&i| level[i] > level[i - 1] && level[i] >= level[i + 1])
+        .collect()
+}
+
+/// Height over the higher of the two lowest points between the peak and the next higher ground. A
+/// side that meets the end of the axis before higher ground says nothing: the band just ends there,
+/// perhaps on the flank. The highest peak of all stands over the lower of its two sides.
+fn prominence(level: &[f64], index: usize) -> f64 {
+    let height = level[index];
+    let (left, left_ends) = valley(level[..index].iter().rev(), height);
+    let (right, right_ends) = valley(level[index + 1..].iter(), height);
+    height
+        - match (left_ends, right_ends) {
+            (true, false) => right,
+            (false, true) => left,
+            (true, true) => left.min(right),
+            (false, false) => left.max(right),
+        }
+}
+
+/// Lowest point before higher ground, and whether the axis ended before there was any.
+fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
+    let mut lowest = height;
+    for &level in side {
+        if level > height {
+            return (lowest, false);
+        }
+        lowest = lowest.min(level);
+    }
+    (lowest, true)
+}
+
+/// Height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the
+/// position to either side, whichever is more. A peak of noise stands at most some 12 dB above it.
+fn above_surroundings(level: &[f64], index: usize) -> f64 {
+    let reach = (index / 10).max(25);
+    let first = index.saturating_sub(reach);
+    let last = (index + reach + 1).min(level.len());
+    let mut around = level[first..last].to_vec();
+    around.sort_by(f64::total_cmp);
+    level[index] - around[around.len() / 2]
+}

@@ -1,0 +1,301 @@
+//! Physical poles out of a stabilisation diagram.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::residues::{Contribution, SeenPole, contribution, near};
+use super::{PolyreferenceSettings, ResponseMatrix, StabilisationPole};
+
+/// A mode: a pole that returns over the orders and that the responses need.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PolyreferenceMode {
+    /// The pole (1/s), imaginary part positive, decay of an exponential window taken out.
+    pub pole: Complex64,
+    /// Natural frequency (Hz), |p|/(2 pi).
+    pub frequency: f64,
+    /// Damping ratio, -Re p/|p|.
+    pub damping_ratio: f64,
+    /// Standard deviation over the orders of the frequency (Hz). A measure of stability: the orders
+    /// share their data, so that it is no standard uncertainty.
+    pub frequency_spread: f64,
+    /// The same of the damping ratio.
+    pub damping_spread: f64,
+    /// Number of orders at which the pole was found.
+    pub count: usize,
+    /// Their share of all orders, 0 to 1.
+    pub share: f64,
+    /// Participation of each input, of unit length, its largest entry real.
+    pub participation: Vec<Complex64>,
+    /// Shape factor of each output (unit of the responses times 1/s): residue = shape times
+    /// participation.
+    pub shape: Vec<Complex64>,
+    /// Sum of squares that the mode explains around its peak over the variance of what is left
+    /// (dB), mean over the outputs.
+    pub above_noise_db: f64,
+}
+
+/// What makes a pole a mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SelectionSettings {
+    /// Distance within which poles of different orders are one, in half-power half-widths (1 = the
+    /// pole's own decay). 0.5: two modes a half-power width apart are 2 apart in this measure.
+    pub radius: f64,
+    /// The same at least (lines), for poles narrower than a line. 0.1.
+    pub least_radius: f64,
+    /// Least share of the orders at which the pole is found. 0.3: weak modes come in only where the
+    /// order suffices for the strong ones; poles of noise scatter over the band.
+    pub least_share: f64,
+    /// Least ratio of what the mode explains to the noise (dB). 13 dB, a factor of 20: the
+    /// strongest of some hundred lines of noise alone reaches 8 to 10.
+    pub above_noise_db: f64,
+    /// Least level of the mode at its peak over the highest level around it. 1e-4: what poles of
+    /// rounding and of the model's own error have on noise-free data.
+    pub least_level: f64,
+    /// Least decay over a length of 1/spacing (sigma/spacing). 0.02: a steady tone, mains hum say, is
+    /// rational too, and its pole scatters about no decay at all, by some 0.005 where it stands
+    /// 35 dB over the noise; a mode of 0.01 % damping at 50 Hz has 0.03 per second.
+    pub least_decay: f64,
+}
+
+impl Default for SelectionSettings {
+    fn default() -> Self {
+        SelectionSettings {
+            radius: 0.5,
+            least_radius: 0.1,
+            least_share: 0.3,
+            above_noise_db: 13.0,
+            least_level: 1e-4,
+            least_decay: 0.02,
+        }
+    }
+}
+
+/// Poles of different orders that are one, at most one of each order.
+struct Cluster {
+    members: Vec<usize>,
+    pole: Complex64,
+}
+
+/// Selects the modes of `matrix` from the diagram that [`super::stabilise_poles`] made of it,
+/// ascending in frequency.
+///
+/// The pole with the most neighbours at other orders founds a cluster, nearest pole first and one of
+/// each order; then the next among those left. Distance is measured in the complex plane relative
+/// to the pole's own decay, so that frequency and damping count alike and two close modes stay two.
+/// A cluster at enough orders is a candidate; the candidates that the responses can do without are
+/// then dropped, the least needed first.
+pub fn select_modes(
+    matrix: &ResponseMatrix,
+    diagram: &[StabilisationPole],
+    settings: &PolyreferenceSettings,
+) -> Vec<PolyreferenceMode> {
+    let selection = &settings.selection;
+    let orders = settings.order + 1 - settings.least_order.clamp(1, settings.order);
+    let least = (selection.least_share * orders as f64).ceil().max(2.0) as usize;
+    let mut clusters = cluster_poles(diagram, settings, TAU * matrix.spacing(), least);
+    let least_decay = selection.least_decay * matrix.spacing();
+    clusters.retain(|cluster| -cluster.pole.re >= least_decay);
+    clusters.sort_by(|a, b| a.pole.im.total_cmp(&b.pole.im));
+    let seen: Vec<SeenPole> = clusters
+        .iter()
+        .map(|cluster| seen_pole(diagram, cluster, settings.added_decay))
+        .collect();
+    let kept = needed_poles(matrix, &seen, selection);
+    let mut modes: Vec<PolyreferenceMode> = kept
+        .into_iter()
+        .map(|(index, part)| {
+            let participation = seen[index].participation.clone();
+            mode_of(diagram, &clusters[index], (participation, part), orders)
+        })
+        .collect();
+    modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    modes
+}
+
+/// Distance of two poles in units of the radius allowed between them.
+fn distance(a: Complex64, b: Complex64, settings: &PolyreferenceSettings, spacing: f64) -> f64 {
+    let selection = &settings.selection;
+    let decay = -0.5 * (a.re + b.re) + settings.added_decay;
+    (a - b).norm() / (selection.radius * decay).max(selection.least_radius * spacing)
+}
+
+fn cluster_poles(
+    diagram: &[StabilisationPole],
+    settings: &PolyreferenceSettings,
+    spacing: f64,
+    least: usize,
+) -> Vec<Cluster> {
+    let neighbours = neighbour_lists(diagram, settings, spacing);
+    let mut free = vec![true; diagram.len()];
+    let mut clusters = Vec::new();
+    loop {
+        let founder = (0..diagram.len())
+            .filter(|&index| free[index])
+            .map(|index| {
+                let others = neighbours[index].iter().filter(|(other, _)| free[*other]);
+                let (mut count, mut sum, mut order) = (0_usize, 0.0, 0);
+                for &(other, distance) in others {
+                    // Two neighbours of the same order count once.
+                    if diagram[other].order != order {
+                        count += 1;
+                        sum += distance;
+                        order = diagram[other].order;
+                    }
+                }
+                (index, count, sum)
+            })
+            .max_by(|a, b| a.1.cmp(&b.1).then(b.2.total_cmp(&a.2)));
+        let Some((founder, count, _)) = founder else {
+            break;
+        };
+        if count + 1 < least {
+            break;
+        }
+        let members = members_of(diagram, founder, &neighbours[founder], &free);
+        for &member in &members {
+            free[member] = false;
+        }
+        let pole = median_pole(diagram, &members);
+        clusters.push(Cluster { members, pole });
+    }
+    clusters
+}
+
+/// For every pole those of other orders within the radius, by order, with their distance.
+fn neighbour_lists(
+    diagram: &[StabilisationPole],
+    settings: &PolyreferenceSettings,
+    spacing: f64,
+) -> Vec<Vec<(usize, f64)>> {
+    let mut lists: Vec<Vec<(usize, f64)>> = vec![Vec::new(); diagram.len()];
+    for (i, a) in diagram.iter().enumerate() {
+        for (j, b) in diagram.iter().enumerate() {
+            if a.order != b.order {
+                let apart = distance(a.pole, b.pole, settings, spacing);
+                if apart <= 1.0 {
+                    lists[i].push((j, apart));
+                }
+            }
+        }
+    }
+    lists
+}
+
+/// The founder and of every other order its nearest free neighbour.
+fn members_of(
+    diagram: &[StabilisationPole],
+    founder: usize,
+    neighbours: &[(usize, f64)],
+    free: &[bool],
+) -> Vec<usize> {
+    let mut best: Vec<(usize, f64)> = Vec::new();
+    for &(other, apart) in neighbours.iter().filter(|(other, _)| free[*other]) {
+        match best.last_mut() {
+            Some(last) if diagram[last.0].order == diagram[other].order => {
+                if apart < last.1 {
+                    *last = (other, apart);
+                }
+            }
+            _ => best.push((other, apart)),
+        }
+    }
+    let mut members: Vec<usize> = best.into_iter().map(|(index, _)| index).collect();
+    members.push(founder);
+    members.sort_by_key(|&index| diagram[index].order);
+    members
+}
+
+/// Median of real and imaginary parts: a few stray members do not move it.
+fn median_pole(diagram: &[StabilisationPole], members: &[usize]) -> Complex64 {
+    let part = |of: fn(&Complex64) -> f64| {
+        let mut values: Vec<f64> = members.iter().map(|&m| of(&diagram[m].pole)).collect();
+        tapjoint_numerics::stats::median(&mut values)
+    };
+    Complex64::new(part(|p| p.re), part(|p| p.im))
+}
+
+/// The cluster's pole as the responses show it. Its participation is that of the highest order:
+/// vectors of a repeated root are arbitrary within a plane, and only those of one order are
+/// independent of each other.
+fn seen_pole(diagram: &[StabilisationPole], cluster: &Cluster, added_decay: f64) -> SeenPole {
+    SeenPole {
+        pole: cluster.pole - added_decay,
+        participation: cluster
+            .members
+            .last()
+            .map_or_else(Vec::new, |&last| diagram[last].participation.clone()),
+    }
+}
+
+/// Drops the candidate that the responses need least, as long as one is below the limits; returns
+/// the places of those that stay.
+fn needed_poles(
+    matrix: &ResponseMatrix,
+    seen: &[SeenPole],
+    selection: &SelectionSettings,
+) -> Vec<(usize, Contribution)> {
+    let least = 10f64.powf(0.1 * selection.above_noise_db);
+    let mut kept: Vec<usize> = (0..seen.len()).collect();
+    let mut parts: Vec<Option<Contribution>> = (0..seen.len())
+        .map(|index| contribution(matrix, seen, index))
+        .collect();
+    // Above 1 a candidate is needed: the smaller of both ratios counts.
+    let need = |part: &Option<Contribution>| {
+        part.as_ref().map_or(0.0, |part| {
+            (part.above_noise / least).min(part.share_of_peak / selection.least_level)
+        })
+    };
+    loop {
+        let weakest = (0..kept.len()).min_by(|&a, &b| need(&parts[a]).total_cmp(&need(&parts[b])));
+        let Some(place) = weakest.filter(|&place| need(&parts[place]) < 1.0) else {
+            break;
+        };
+        let removed = kept.remove(place);
+        parts.remove(place);
+        let poles: Vec<SeenPole> = kept.iter().map(|&index| seen[index].clone()).collect();
+        for (index, part) in parts.iter_mut().enumerate() {
+            if near(matrix, &poles[index], &seen[removed]) {
+                *part = contribution(matrix, &poles, index);
+            }
+        }
+    }
+    kept.into_iter()
+        .zip(parts)
+        .filter_map(|(index, part)| Some((index, part?)))
+        .collect()
+}
+
+fn mode_of(
+    diagram: &[StabilisationPole],
+    cluster: &Cluster,
+    (participation, part): (Vec<Complex64>, Contribution),
+    orders: usize,
+) -> PolyreferenceMode {
+    let frequency = cluster.pole.norm() / TAU;
+    let damping_ratio = -cluster.pole.re / cluster.pole.norm();
+    let spread = |of: fn(&StabilisationPole) -> f64| {
+        let values = cluster.members.iter().map(|&member| of(&diagram[member]));
+        standard_deviation(&values.collect::<Vec<f64>>())
+    };
+    PolyreferenceMode {
+        pole: cluster.pole,
+        frequency,
+        damping_ratio,
+        frequency_spread: spread(|pole| pole.frequency),
+        damping_spread: spread(|pole| pole.damping_ratio),
+        count: cluster.members.len(),
+        share: cluster.members.len() as f64 / orders as f64,
+        participation,
+        shape: part.shape,
+        above_noise_db: 10.0 * part.above_noise.log10(),
+    }
+}
+
+/// Of two values or more; a cluster has at least two members.
+fn standard_deviation(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (squares / (count - 1.0).max(1.0)).sqrt()
+}

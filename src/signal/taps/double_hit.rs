@@ -1,0 +1,335 @@
+//! A second hit within one tap's record.
+//!
+//! Two rules look at the unwindowed force. A second excursion above a tenth of the peak is one,
+//! whatever its exact form, unless it is ringing or far wider or narrower than a blow. Below that, a
+//! weaker copy of the tap's own pulse is looked for: the same thing as a ripple of period 1/delay and
+//! depth (1 + r)/(1 - r) in the force spectrum, for |1 + r e^{-j omega d}| swings between 1 + r and
+//! 1 - r, but without the spectrum's trouble to tell a ripple of long period from the pulse's own fall.
+
+use super::copy::{PulseCopy, Template, reach};
+use super::force::{Force, half_width};
+use super::{Event, TapSettings};
+use tapjoint_numerics::stats::median;
+
+/// Candidates are looked at from this share of the limit: what smoothing and noise may take away.
+const CANDIDATE: f64 = 0.7;
+/// Candidates stand out of the channel's disturbances by this factor: noise reaches 4.5 standard
+/// deviations in 65,536 samples, a steady hum 1.4.
+const OVER_NOISE: f64 = 6.0;
+/// A hammer never pulls: pulses that point downwards are disturbance, and upward ones that are not
+/// larger by this factor are disturbance too.
+const OVER_DOWNWARD: f64 = 1.5;
+/// Least distance of the two crests, in widths at half height: nearer, their flanks overlap.
+const LEAST_DELAY: f64 = 3.0;
+/// A pulse narrower at half height than this (samples) does not show its height.
+const FORM_SHOWS: f64 = 3.0;
+/// Most candidates that are compared with the pulse; the rest of a noisy channel is no hit.
+const MOST_CANDIDATES: usize = 24;
+/// An excursion that is wider or narrower than the pulse by this factor is no blow of the same
+/// hammer: a moved hand, a cable, a spike.
+const OTHER_WIDTH: f64 = 3.0;
+
+/// A second hit as the force shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SecondHit {
+    /// Time between the two crests (s).
+    pub delay: f64,
+    /// The smaller peak over the larger; of pulses too short to show their height, the smaller impulse over the
+    /// larger. From 0 to 1.
+    pub ratio: f64,
+}
+
+/// Deepest ripple that is told, as a ratio (1): 60 dB. Two equal hits cancel to nothing between their crests, and what
+/// is left there is noise.
+const DEEPEST_RIPPLE: f64 = 1000.0;
+
+impl SecondHit {
+    /// Spacing of the ripple it leaves in the force spectrum, 1/delay (Hz).
+    pub fn ripple_period(&self) -> f64 {
+        1.0 / self.delay
+    }
+
+    /// Largest over smallest force within a ripple, (1 + r)/(1 - r); of two hits that are as good as equal,
+    /// [`SecondHit::is_deepest`], the 1000 (60 dB) that noise lets one see.
+    pub fn ripple_depth(&self) -> f64 {
+        match self.is_deepest() {
+            true => DEEPEST_RIPPLE,
+            false => (1.0 + self.ratio) / (1.0 - self.ratio),
+        }
+    }
+
+    /// Whether both hits are so equal that the force vanishes within a ripple.
+    pub fn is_deepest(&self) -> bool {
+        1.0 + self.ratio >= DEEPEST_RIPPLE * (1.0 - self.ratio)
+    }
+}
+
+/// The largest second hit in the force about an event, from `double_hit_warning` of the peak up.
+///
+/// `own` ends where the next event may begin; only there an excursion counts whatever its form.
+pub(super) fn second_hit(
+    force: &Force,
+    (event, own): (&Event, usize),
+    settings: &TapSettings,
+) -> Option<SecondHit> {
+    let start = force.index(event.trigger);
+    let samples = &force.samples;
+    let near = samples.get(start..own)?;
+    // The first of equal samples, where the pulse is clipped.
+    let (offset, _) = near
+        .iter()
+        .enumerate()
+        .rev()
+        .max_by(|a, b| a.1.total_cmp(b.1))?;
+    let main = Pulse::new(samples, start + offset);
+    let copies = copies(&main, settings.double_hit_warning);
+    let excursion = excursion(&main, force.noise, (own, settings));
+    // A copy has been fitted where an excursion has only been looked at.
+    let excursion = excursion.filter(|other| {
+        let same = |copy: &PulseCopy| (copy.place - other.place).abs() <= main.width + 1.0;
+        !copies.iter().any(same)
+    });
+    copies
+        .into_iter()
+        .chain(excursion)
+        .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+        .filter(|copy| copy.ratio >= settings.double_hit_warning)
+        .map(|copy| SecondHit {
+            delay: (copy.place - main.crest as f64).abs() / force.rate,
+            ratio: smaller_over_larger(main.size_of(&copy)),
+        })
+}
+
+/// A ratio of two sizes the way round that makes it at most 1: the crest that is read higher may have the smaller
+/// impulse.
+fn smaller_over_larger(ratio: f64) -> f64 {
+    ratio.min(ratio.recip())
+}
+
+/// The tap's main pulse in its surroundings.
+struct Pulse<'a> {
+    samples: &'a [f64],
+    crest: usize,
+    peak: f64,
+    /// Width at half height (samples).
+    width: f64,
+}
+
+impl<'a> Pulse<'a> {
+    fn new(samples: &'a [f64], crest: usize) -> Self {
+        Pulse {
+            samples,
+            crest,
+            peak: samples.get(crest).copied().unwrap_or(0.0),
+            width: half_width(samples, crest).max(1.0),
+        }
+    }
+
+    /// A second hit's size, by what the samples tell of it. Of a pulse two samples wide the height between them is
+    /// anybody's guess (a narrower and higher copy fits as well), but an anti-alias filter keeps its impulse, which
+    /// is also what the spectrum ripples by.
+    fn size_of(&self, copy: &PulseCopy) -> f64 {
+        if self.width >= FORM_SHOWS {
+            return copy.ratio;
+        }
+        let place = copy.place.round().max(0.0) as usize;
+        // An anti-alias filter rings for some samples about each pulse; half the way to the other is its own.
+        let reach = (3 * reach(self.width)).min(self.crest.abs_diff(place) / 2);
+        let ratio = self.impulse(place, reach) / self.impulse(self.crest, reach);
+        // Beyond that something else lies beside one of the two.
+        let is_alike = (0.5..=2.0).contains(&(ratio / copy.ratio));
+        if is_alike { ratio } else { copy.ratio }
+    }
+
+    /// Sum of the samples within the reach of a crest, above the median of as many beyond it; those at its ends
+    /// count half, so that a ringing from sample to sample leaves nothing.
+    fn impulse(&self, crest: usize, reach: usize) -> f64 {
+        let last = self.samples.len().saturating_sub(1);
+        let sample = |index: usize| self.samples.get(index.min(last)).copied().unwrap_or(0.0);
+        let pair = |step: usize| [sample(crest.saturating_sub(step)), sample(crest + step)];
+        let mut beyond: Vec<f64> = (reach + 1..=2 * reach).flat_map(pair).collect();
+        let base = median(&mut beyond);
+        let height = |step: usize| pair(step).iter().map(|x| x - base).sum::<f64>();
+        let inside: f64 = (1..reach).map(height).sum();
+        sample(crest) - base + inside + 0.5 * height(reach)
+    }
+
+    fn is_clear(&self, index: usize) -> bool {
+        self.crest.abs_diff(index) as f64 >= LEAST_DELAY * self.width
+    }
+}
+
+/// Copies of the pulse, at least `least` of its height.
+fn copies(main: &Pulse, least: f64) -> Vec<PulseCopy> {
+    let crests = crests(main);
+    let own = crests.get(main.crest).copied().unwrap_or(0.0);
+    let limit = (CANDIDATE * least * own).max(OVER_NOISE * disturbance(main, &crests));
+    let template = Template::new(main.samples, main.crest, main.width);
+    let fitted = |sign: f64| -> Vec<PulseCopy> {
+        candidates(main, (&crests, sign), limit)
+            .into_iter()
+            .filter_map(|place| template.fit(place))
+            .filter(|copy| copy.ratio * sign > 0.0)
+            .collect()
+    };
+    let upward = fitted(1.0);
+    if upward.is_empty() {
+        return upward;
+    }
+    let deepest = fitted(-1.0).iter().map(|c| -c.ratio).fold(0.0, f64::max);
+    upward
+        .into_iter()
+        .filter(|copy| copy.ratio >= OVER_DOWNWARD * deepest)
+        .filter(|copy| {
+            let crest = Crest {
+                place: (copy.place.round().max(0.0) as usize).min(main.samples.len() - 1),
+                peak: copy.ratio * main.peak,
+                base: copy.base,
+            };
+            !is_ringing(main, &crest)
+        })
+        .collect()
+}
+
+/// How far the force, smoothed over half a width, stands above its mean at the reach to either side,
+/// c(t) = s(t) - (s(t - k) + s(t + k))/2: offset and slope drop out, a pulse keeps its height.
+fn crests(main: &Pulse) -> Vec<f64> {
+    let smooth = smoothed(main.samples, (main.width / 4.0).round() as usize);
+    let reach = reach(main.width);
+    let last = smooth.len().saturating_sub(1);
+    let height = |(index, x): (usize, &f64)| {
+        let before = smooth[index.saturating_sub(reach)];
+        let after = smooth[(index + reach).min(last)];
+        x - 0.5 * (before + after)
+    };
+    smooth.iter().enumerate().map(height).collect()
+}
+
+/// Mean over `reach` samples to either side.
+fn smoothed(samples: &[f64], reach: usize) -> Vec<f64> {
+    let mut sum = 0.0;
+    let sums: Vec<f64> = std::iter::once(0.0)
+        .chain(samples.iter().map(|x| {
+            sum += x;
+            sum
+        }))
+        .collect();
+    (0..samples.len())
+        .map(|index| {
+            let first = index.saturating_sub(reach);
+            let end = (index + reach + 1).min(samples.len());
+            (sums[end] - sums[first]) / (end - first) as f64
+        })
+        .collect()
+}
+
+/// Standard deviation of the crests away from the pulse, by their median magnitude: noise, hum, and
+/// whatever else goes on for most of the record.
+fn disturbance(main: &Pulse, crests: &[f64]) -> f64 {
+    let stride = (crests.len() / 4096).max(1);
+    let mut magnitudes: Vec<f64> = (0..crests.len())
+        .step_by(stride)
+        .filter(|&index| main.is_clear(index))
+        .map(|index| crests[index].abs())
+        .collect();
+    1.4826 * median(&mut magnitudes)
+}
+
+/// Places of the highest crests above `limit` (with `sign` -1: of the deepest below).
+fn candidates(main: &Pulse, (crests, sign): (&[f64], f64), limit: f64) -> Vec<usize> {
+    let width = main.width.ceil() as usize;
+    let mut found: Vec<usize> = Vec::new();
+    for (index, crest) in crests.iter().enumerate() {
+        if sign * crest <= limit || !main.is_clear(index) {
+            continue;
+        }
+        match found.last_mut() {
+            // Within one width there is one crest, the highest.
+            Some(last) if index - *last <= width => {
+                if sign * crest > sign * crests[*last] {
+                    *last = index;
+                }
+            }
+            _ => found.push(index),
+        }
+    }
+    found.sort_by(|&a, &b| (sign * crests[b]).total_cmp(&(sign * crests[a])));
+    found.truncate(MOST_CANDIDATES);
+    found
+}
+
+/// The largest second excursion above `double_hit` of the peak after the force has fallen below
+/// `rearm` of it.
+fn excursion(
+    main: &Pulse,
+    noise: f64,
+    (own, settings): (usize, &TapSettings),
+) -> Option<PulseCopy> {
+    let limit = (settings.double_hit * main.peak).max(OVER_NOISE * noise);
+    let rearm = (settings.rearm * main.peak).max(3.0 * noise);
+    let samples = main.samples.get(..own)?;
+    excursions(samples, limit, rearm)
+        .into_iter()
+        .filter(|other| main.crest.abs_diff(other.place) as f64 > main.width)
+        .filter(|other| !is_ringing(main, other))
+        .filter(|other| {
+            let width = half_width(samples, other.place);
+            width <= OTHER_WIDTH * main.width + 2.0 && OTHER_WIDTH * width + 2.0 >= main.width
+        })
+        .max_by(|a, b| a.peak.total_cmp(&b.peak))
+        .map(|other| PulseCopy {
+            place: other.place as f64,
+            ratio: other.peak / main.peak,
+            base: 0.0,
+        })
+}
+
+/// One crest of the force.
+struct Crest {
+    place: usize,
+    /// Its height above `base`.
+    peak: f64,
+    base: f64,
+}
+
+fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Crest> {
+    let mut found: Vec<Crest> = Vec::new();
+    let mut armed = true;
+    let crest = |place: usize, peak: f64| Crest {
+        place,
+        peak,
+        base: 0.0,
+    };
+    for (place, &x) in force.iter().enumerate() {
+        if armed && x > limit {
+            found.push(crest(place, x));
+            armed = false;
+        } else if !armed && x < rearm {
+            armed = true;
+        } else if let Some(open) = found.last_mut().filter(|open| !armed && x > open.peak) {
+            *open = crest(place, x);
+        }
+    }
+    found
+}
+
+/// An anti-alias filter rings around a short pulse, and a hammer's own resonance after a long one,
+/// swinging as far down as up; a hammer never pulls. A crest right beside a comparable downward swing is
+/// such ringing: within twice its own width, or three samples, on either side.
+fn is_ringing(main: &Pulse, other: &Crest) -> bool {
+    let force = main.samples;
+    let height = |x: &f64| x - other.base;
+    let above = |x: &&f64| height(x) > 0.5 * other.peak;
+    let (before, after) = force.split_at(other.place.min(force.len()));
+    let width =
+        after.iter().take_while(above).count() + before.iter().rev().take_while(above).count();
+    // Not beyond the crest of the pulse itself.
+    let reach = (2 * width).max(3).min(main.crest.abs_diff(other.place));
+    let beside = before
+        .iter()
+        .rev()
+        .take(reach)
+        .chain(after.iter().take(reach));
+    let lowest = beside.map(height).fold(0.0, f64::min);
+    -lowest > 0.5 * other.peak
+}

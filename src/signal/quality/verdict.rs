@@ -1,8 +1,8 @@
 //! A verdict: what was checked, what came out, why it might be, what helps.
+//!
+//! What a verdict is about: a recording, a tap, a mode, a sensor, or the test.
 
 use std::fmt;
-
-use super::subject::Subject;
 
 /// What is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -338,5 +338,76 @@ impl fmt::Display for Verdict {
             write!(f, " {} {}", self.check.cause(), self.check.remedy())?;
         }
         Ok(())
+    }
+}
+
+/// What a verdict is about.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Subject {
+    /// A recording.
+    Recording {
+        /// Its name.
+        file: String,
+    },
+    /// A tap.
+    Tap {
+        /// The recording.
+        file: String,
+        /// Its number, from 1.
+        tap: usize,
+    },
+    /// A mode, or a peak that has no number.
+    Mode {
+        /// The recording.
+        file: String,
+        /// Its frequency (Hz).
+        frequency: f64,
+        /// Whether it is a mode.
+        is_mode: bool,
+    },
+    /// A sensor.
+    Sensor {
+        /// The recording.
+        file: String,
+        /// Its name.
+        sensor: String,
+    },
+    /// The test as a whole.
+    Test,
+}
+
+impl Subject {
+    /// The recording it belongs to; `None` of the test as a whole.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Subject::Recording { file }
+            | Subject::Tap { file, .. }
+            | Subject::Mode { file, .. }
+            | Subject::Sensor { file, .. } => Some(file),
+            Subject::Test => None,
+        }
+    }
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Subject::Recording { file } => f.write_str(file),
+            Subject::Tap { file, tap } => write!(f, "{file}, tap {tap}"),
+            Subject::Mode {
+                file,
+                frequency,
+                is_mode,
+            } => {
+                let what = if *is_mode {
+                    ""
+                } else {
+                    " (a peak that is no mode)"
+                };
+                write!(f, "{file}, {frequency:.2} Hz{what}")
+            }
+            Subject::Sensor { file, sensor } => write!(f, "{file}, sensor {sensor}"),
+            Subject::Test => f.write_str("test"),
+        }
     }
 }

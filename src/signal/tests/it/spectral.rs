@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tapjoint::spectral::{
+use tapjoint_signal::spectral::{
     DecayCheck, Lines, SpectralAverager, SpectralError, Window, apply_force_window, band_limited,
     chirp_z, choose_window, largest_smooth_block, line_amplitude, measure_decay, noise_beside,
     noise_power, smallest_smooth_block, transform_block,

@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use num_complex::Complex64;
 
-use super::result::{ColumnAmplitude, ModeFit};
+use super::mode_fit::{ColumnAmplitude, ModeFit};
 use crate::recording::ResponseForm;
 
 /// The force of one tap.

@@ -6,8 +6,8 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tapjoint::recording::{Channel, ReadSettings, Recording, WavFormat, write_wav};
-use tapjoint::taps::{Rejection, Tap, TapRemark, TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::recording::{Channel, ReadSettings, Recording, WavFormat, write_wav};
+use tapjoint_signal::taps::{Rejection, Tap, TapRemark, TapSettings, TapSource, Taps, find_taps};
 
 /// Form of a hammer pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]

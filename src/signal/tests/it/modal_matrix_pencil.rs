@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use tapjoint::modal::matrix_pencil::{
+use tapjoint_signal::modal::matrix_pencil::{
     MatrixPencilError, MatrixPencilSettings, PencilPole, pencil_poles,
 };
-use tapjoint::spectral::Window;
+use tapjoint_signal::spectral::Window;
 
 const RATE: f64 = 1024.0;
 const BAND: (f64, f64) = (115.0, 135.0);

@@ -4,16 +4,18 @@
 //! values, R sum of squared residuals, k real parameters): the mode with a pole that does not change
 //! or with one that drifts, each with the listed neighbours and, one by one, with the strongest line
 //! in what is left.
+//!
+//! Sums of complex exponentials, the first with a drifting pole: values and derivatives.
+//!
+//! Least squares of complex exponentials by Levenberg and Marquardt.
 
 use std::f64::consts::TAU;
 
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
 
-use super::band::Band;
-use super::exponentials::Exponentials;
-use super::fit::{Fit, Prior, fit_exponentials};
-use super::sensors::noise_variance;
+use super::band::{Band, noise_variance};
 use super::{AmplitudeVerdict, Companion, Origin};
 
 /// Numbers of exponents tried for the mode: one is a pole that does not change.
@@ -326,4 +328,240 @@ impl Context {
         self.unchanging()
             .then_some(AmplitudeVerdict::Beating { frequency })
     }
+}
+
+/// x(t) = c e^{q1 t + q2 v + q3 v^2 + ...} + sum over k of c_k e^{p_k t}, v(t) = 1 - e^{-rate t}.
+///
+/// A frequency that changes with a power of the amplitude changes exponentially in time, so powers of
+/// v describe it with few terms where powers of t would not. The parameters enter analytically: least
+/// squares may treat them as complex numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Exponentials {
+    /// Amplitude of the mode.
+    pub amplitude: Complex64,
+    /// Its exponents q1 (1/s), q2, q3, ... (1); the first alone is a pole that does not change.
+    pub exponents: Vec<Complex64>,
+    /// Rate of v (1/s).
+    pub rate: f64,
+    /// Amplitude and pole (rad/s) of everything else.
+    pub others: Vec<(Complex64, Complex64)>,
+}
+
+impl Exponentials {
+    /// Number of complex parameters.
+    pub fn parameters(&self) -> usize {
+        1 + self.exponents.len() + 2 * self.others.len()
+    }
+
+    /// The pole at a time: the derivative of the mode's exponent.
+    pub fn pole(&self, t: f64) -> Complex64 {
+        let fall = (-self.rate * t).exp();
+        let v = 1.0 - fall;
+        let mut power = self.rate * fall;
+        let mut sum = self.exponents.first().copied().unwrap_or_default();
+        for (k, q) in self.exponents.iter().skip(1).enumerate() {
+            // d/dt of q v^(k+1).
+            sum += q * power * (k + 1) as f64;
+            power *= v;
+        }
+        sum
+    }
+
+    /// The mode's exponent at `t + s` without its value and slope at t, for a short s: what bends.
+    pub fn bend(&self, t: f64, s: f64) -> Complex64 {
+        self.exponent(t + s) - self.exponent(t) - self.pole(t) * s
+    }
+
+    fn growth(&self, t: f64) -> Complex64 {
+        self.exponent(t).exp()
+    }
+
+    /// q1 t + q2 v + q3 v^2 + ..., the powers by Horner's scheme.
+    fn exponent(&self, t: f64) -> Complex64 {
+        let v = 1.0 - (-self.rate * t).exp();
+        let drift = self.exponents.iter().skip(1).rev();
+        let drift = drift.fold(Complex64::ZERO, |sum, q| (sum + q) * v);
+        self.exponents.first().copied().unwrap_or_default() * t + drift
+    }
+
+    /// The value at a time, and its derivatives: amplitude, exponents, then amplitude and pole of
+    /// every other.
+    pub fn value(&self, t: f64, derivatives: &mut Vec<Complex64>) -> Complex64 {
+        derivatives.clear();
+        let growth = self.growth(t);
+        let mut sum = self.amplitude * growth;
+        derivatives.push(growth);
+        derivatives.push(sum * t);
+        let v = 1.0 - (-self.rate * t).exp();
+        let mut power = sum;
+        for _ in self.exponents.iter().skip(1) {
+            power *= v;
+            derivatives.push(power);
+        }
+        for (amplitude, pole) in &self.others {
+            let growth = (pole * t).exp();
+            sum += amplitude * growth;
+            derivatives.push(growth);
+            derivatives.push(amplitude * growth * t);
+        }
+        sum
+    }
+
+    /// All parameters changed by a step in the order of the derivatives.
+    pub fn moved(&self, step: &[Complex64]) -> Exponentials {
+        let mut step = step.iter().copied();
+        let mut next = || step.next().unwrap_or(Complex64::ZERO);
+        Exponentials {
+            amplitude: self.amplitude + next(),
+            exponents: self.exponents.iter().map(|q| q + next()).collect(),
+            rate: self.rate,
+            others: self
+                .others
+                .iter()
+                .map(|(c, p)| (c + next(), p + next()))
+                .collect(),
+        }
+    }
+}
+
+/// A parameter known beforehand: index, value, and 1/variance (of both parts together).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Prior {
+    pub parameter: usize,
+    pub value: Complex64,
+    pub weight: f64,
+}
+
+/// A fit.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub model: Exponentials,
+    /// Sum of the squared residuals.
+    pub squares: f64,
+    /// (J^H J + priors)^-1; times the noise variance, the parameters' covariance.
+    pub inverse: DMatrix<Complex64>,
+    pub residuals: Vec<Complex64>,
+}
+
+const ITERATIONS: usize = 25;
+/// Change of the sum of squares at which a fit has settled, relative.
+const SETTLED: f64 = 1e-7;
+/// Values beyond this are no amplitude any more.
+const LARGEST: f64 = 1e100;
+
+/// Fits a model to values at times; `None` when the unknowns cannot be told apart at all.
+///
+/// Priors take the noise variance as 1: scale their weights by it.
+pub(super) fn fit_exponentials(
+    times: &[f64],
+    values: &[Complex64],
+    start: Exponentials,
+    priors: &[Prior],
+) -> Option<Fit> {
+    let mut model = start;
+    let mut state = normal_equations(times, values, &model, priors)?;
+    let mut damping = 1e-3;
+    for _ in 0..ITERATIONS {
+        let mut left = state.left.clone();
+        for index in 0..left.nrows() {
+            left[(index, index)] += damping * state.left[(index, index)].re + f64::MIN_POSITIVE;
+        }
+        let step = left.lu().solve(&state.right)?;
+        let trial = model.moved(step.as_slice());
+        let next = normal_equations(times, values, &trial, priors);
+        match next.filter(|next| next.cost <= state.cost) {
+            Some(next) => {
+                let settled = state.cost - next.cost <= SETTLED * state.cost;
+                model = trial;
+                state = next;
+                damping = (damping * 0.1).max(1e-12);
+                if settled {
+                    break;
+                }
+            }
+            None if damping > 1e6 => break,
+            None => damping *= 10.0,
+        }
+    }
+    finish(model, state)
+}
+
+fn finish(model: Exponentials, state: State) -> Option<Fit> {
+    // Scaled to a unit diagonal: amplitudes and poles differ by orders of magnitude.
+    let size = state.left.nrows();
+    let scale: Vec<f64> = (0..size)
+        .map(|k| state.left[(k, k)].re.max(f64::MIN_POSITIVE).sqrt())
+        .collect();
+    let scaled = DMatrix::from_fn(size, size, |i, k| {
+        state.left[(i, k)] / (scale[i] * scale[k])
+    });
+    let inverse = scaled.try_inverse()?;
+    let inverse = DMatrix::from_fn(size, size, |i, k| inverse[(i, k)] / (scale[i] * scale[k]));
+    Some(Fit {
+        model,
+        squares: state.residuals.iter().map(Complex64::norm_sqr).sum(),
+        inverse,
+        residuals: state.residuals,
+    })
+}
+
+struct State {
+    left: DMatrix<Complex64>,
+    right: DVector<Complex64>,
+    cost: f64,
+    residuals: Vec<Complex64>,
+}
+
+fn normal_equations(
+    times: &[f64],
+    values: &[Complex64],
+    model: &Exponentials,
+    priors: &[Prior],
+) -> Option<State> {
+    let size = model.parameters();
+    let mut products = vec![Complex64::ZERO; size * size];
+    let mut right = DVector::zeros(size);
+    let mut cost = 0.0;
+    let mut row = Vec::with_capacity(size);
+    let mut residuals = Vec::with_capacity(times.len());
+    for (t, value) in times.iter().zip(values) {
+        let residual = value - model.value(*t, &mut row);
+        cost += residual.norm_sqr();
+        residuals.push(residual);
+        for ((i, a), sums) in row.iter().enumerate().zip(products.chunks_mut(size)) {
+            let a = a.conj();
+            right[i] += a * residual;
+            for (sum, b) in sums.iter_mut().zip(&row[..=i]) {
+                *sum += a * b;
+            }
+        }
+    }
+    // Only the lower triangle was summed; the matrix is Hermitian.
+    let mut left = DMatrix::from_fn(size, size, |i, k| {
+        if k <= i {
+            products[i * size + k]
+        } else {
+            products[k * size + i].conj()
+        }
+    });
+    let current = flat(model);
+    for prior in priors {
+        let away = prior.value - current[prior.parameter];
+        left[(prior.parameter, prior.parameter)] += prior.weight;
+        right[prior.parameter] += away * prior.weight;
+        cost += away.norm_sqr() * prior.weight;
+    }
+    (cost < LARGEST).then_some(State {
+        left,
+        right,
+        cost,
+        residuals,
+    })
+}
+
+fn flat(model: &Exponentials) -> Vec<Complex64> {
+    let mut all = vec![model.amplitude];
+    all.extend(&model.exponents);
+    all.extend(model.others.iter().flat_map(|(c, p)| [*c, *p]));
+    all
 }

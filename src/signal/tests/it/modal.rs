@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tapjoint::modal::{
+use tapjoint_signal::modal::{
     BandReadings, CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel,
     PeakSettings, find_peaks, interpolate_pole, mains_harmonic, merge_modes, read_peaks,
 };
-use tapjoint::spectral::{Lines, Window, transform_block};
+use tapjoint_signal::spectral::{Lines, Window, transform_block};
 
 /// Sampled free decay, cut off at the block's end.
 fn ring_down(

@@ -7,8 +7,8 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tapjoint::recording::ResponseForm;
-use tapjoint::spectral::{
+use tapjoint_signal::recording::ResponseForm;
+use tapjoint_signal::spectral::{
     AveragedSpectra, DecayCheck, FrfEstimator, LinePowers, Lines, SpectralAverager, TapRecord,
     Transformer, Window, apply_force_window, average_records, choose_window, random_error,
     transform_block,

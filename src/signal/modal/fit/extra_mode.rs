@@ -4,8 +4,8 @@ use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::data::{Basis, ModalData};
-use super::local::{GroupFit, Local};
-use super::result::{ModeFit, report};
+use super::group::{BandData, GroupFit};
+use super::mode_fit::{ModeFit, mode_fits};
 use super::sweep::{Group, Sweeper};
 use super::{FitSettings, PoleStart, Unfit};
 
@@ -72,7 +72,7 @@ impl<'a> Accepted<'a> {
     ) -> (Self, Vec<Result<ModeFit, Unfit>>) {
         let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
         let groups = sweeper.run();
-        let fits = report(&mut sweeper, &groups, settings);
+        let fits = mode_fits(&mut sweeper, &groups, settings);
         let settings = settings.clone();
         (Accepted { sweeper, settings }, fits)
     }
@@ -101,7 +101,7 @@ impl<'a> Accepted<'a> {
     fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
         let mut beside = self.clone();
         beside.sweeper.most_lines = most_lines;
-        let group = beside.sweeper.add(extra, self.settings.added_decay);
+        let group = beside.sweeper.add(extra);
         let stride = group.as_ref().map_or(1, |group| group.fit.lines.stride);
         let test = match group {
             Some(group) => beside.judge(&group),
@@ -118,14 +118,14 @@ impl<'a> Accepted<'a> {
     fn judge(&mut self, group: &Group) -> ExtraMode {
         let last = self.sweeper.modes.len() - 1;
         let groups = std::slice::from_ref(group);
-        let fit = report(&mut self.sweeper, groups, &self.settings)
+        let fit = mode_fits(&mut self.sweeper, groups, &self.settings)
             .pop()
             .unwrap_or(Err(Unfit::NotIndependent));
         let inside = group.members.iter().position(|&index| index == last);
         let (Some(inside), Ok(mode)) = (inside, &fit) else {
             return without_mode(fit);
         };
-        let local = self.sweeper.local(&group.members).ok();
+        let local = self.sweeper.band(&group.members).ok();
         let compared = local.and_then(|local| compare(&local, &group.fit, inside));
         let Some((f_statistic, probability, information_gain)) = compared else {
             return without_mode(fit);
@@ -166,7 +166,7 @@ fn without_mode(fit: Result<ModeFit, Unfit>) -> ExtraMode {
 ///
 /// With residuals S0 and S1 of the models without and with it, k unknowns more (two of the pole, two
 /// amplitudes a column) and n real values: F = (S0 - S1)/k/(S1/freedom); criterion n ln S + k ln n.
-fn compare(local: &Local, fit: &GroupFit, place: usize) -> Option<(f64, f64, f64)> {
+fn compare(local: &BandData, fit: &GroupFit, place: usize) -> Option<(f64, f64, f64)> {
     let mut fewer: Vec<Complex64> = fit.at.poles.clone();
     fewer.remove(place);
     let columns = fit.used.len() as f64;

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use tapjoint::modal::polyreference::{
+use tapjoint_signal::modal::polyreference::{
     PoleStability, PolyreferenceError, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix,
     SubBandSettings, all_modes, find_modes, select_modes, stabilise_poles, sub_bands,
 };

@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use tapjoint::quality::*;
-use tapjoint::recording::ResponseForm;
-use tapjoint::spectral::{DecayCheck, Lines, Window};
-use tapjoint::taps::{Rejection, SecondHit};
+use tapjoint_signal::quality::*;
+use tapjoint_signal::recording::ResponseForm;
+use tapjoint_signal::spectral::{DecayCheck, Lines, Window};
+use tapjoint_signal::taps::{Rejection, SecondHit};
 
 const FREQUENCIES: [f64; 3] = [40.0, 110.0, 210.0];
 const DAMPING: f64 = 0.01;

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::shared::steel_strip;
-use tapjoint::structure::frequency_equation::RootedBeam;
+use tapjoint::structure::roots::RootedBeam;
 use tapjoint::structure::receptance::EndFunctions;
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, ModeShape, Slenderness, StructureError, Symmetry,

@@ -4,38 +4,32 @@
 //! Lengths are in units of the structure's, stiffness and mass in those of its first beam, so that
 //! all numbers stay near 1.
 
-use super::banded::{BandedSymmetric, lowest_eigenvectors};
-use super::element::Element;
-use super::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
+use crate::banded::{BandedSymmetric, lowest_eigenvectors};
+use crate::specimen::element::Element;
+use crate::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
-
-mod attachments;
-mod interface_modes;
-
-use attachments::Place;
-pub use interface_modes::{InterfaceModes, PointAttachment};
 
 /// A model ready to be solved.
 #[derive(Debug, Clone)]
 pub struct FiniteElementModel {
-    stiffness: BandedSymmetric,
-    mass: BandedSymmetric,
-    pieces: Vec<Piece>,
+    pub(crate) stiffness: BandedSymmetric,
+    pub(crate) mass: BandedSymmetric,
+    pub(crate) pieces: Vec<Piece>,
     springs: Vec<JointElement>,
     /// For each node its equations of displacement and rotation, `None` where held.
-    equations: Vec<[Option<usize>; 2]>,
+    pub(crate) equations: Vec<[Option<usize>; 2]>,
     /// Motions at zero frequency.
-    rigid_modes: usize,
+    pub(crate) rigid_modes: usize,
     /// Length unit (m), mass unit (kg), omega unit (rad/s).
-    units: Units,
+    pub(crate) units: Units,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Units {
-    pub(super) length: f64,
-    pub(super) mass: f64,
-    pub(super) omega: f64,
+pub(crate) struct Units {
+    pub(crate) length: f64,
+    pub(crate) mass: f64,
+    pub(crate) omega: f64,
 }
 
 /// A joint between equations, each with its row in the joint's matrix and the sign of its motion.
@@ -47,12 +41,12 @@ struct JointElement {
 
 /// A run of equal elements.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece {
+pub(crate) struct Piece {
     /// Where it starts, and its number of elements.
     start: f64,
     elements: usize,
-    first_node: usize,
-    pub(super) element: Element,
+    pub(crate) first_node: usize,
+    pub(crate) element: Element,
 }
 
 impl FiniteElementModel {
@@ -274,11 +268,11 @@ impl FiniteElementModel {
 
 impl Units {
     /// Unit of stiffness, that of mass times that of omega squared: E I/L^3 (N/m).
-    pub(super) fn stiffness(&self) -> f64 {
+    pub(crate) fn stiffness(&self) -> f64 {
         self.mass * self.omega * self.omega
     }
 
-    pub(super) fn of(beam: &Beam, length: f64) -> Self {
+    pub(crate) fn of(beam: &Beam, length: f64) -> Self {
         let (stiffness, density) = (beam.bending_stiffness(), beam.mass_per_length());
         Self {
             length,
@@ -290,7 +284,7 @@ impl Units {
 
 impl Piece {
     /// `elements` elements of a beam, from (place, node) on.
-    pub(super) fn new(
+    pub(crate) fn new(
         theory: BeamTheory,
         beam: &Beam,
         units: &Units,
@@ -371,4 +365,87 @@ fn joint_matrix(joint: &JointStiffness) -> [[f64; 2]; 2] {
     let rest = 1.0 - c * c * kx * ky;
     let cross = kx * c * ky / rest;
     [[kx / rest, cross], [cross, ky / rest]]
+}
+
+// What is fastened to the beam: masses and support springs anywhere on an element.
+
+/// The equations and displacements that one place on the beam consists of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place {
+    pub(crate) equations: [Option<usize>; 4],
+    pub(crate) shape: [f64; 4],
+}
+
+impl FiniteElementModel {
+    /// Adds a mass (kg) at a position (m) from the joint or the left end, anywhere on an element.
+    /// Of a lap joint, the joint's own place belongs to the right half.
+    ///
+    /// # Errors
+    /// [`StructureError::OffBeam`] for a position outside, [`StructureError::NotPositive`] for a
+    /// negative mass.
+    pub fn with_point_mass(mut self, position: f64, mass: f64) -> Result<Self, StructureError> {
+        let place = self.place(position)?;
+        check_not_negative("point mass", mass)?;
+        let mass = mass / self.units.mass;
+        let shape = place.shape;
+        let matrix = std::array::from_fn(|i| std::array::from_fn(|j| mass * shape[i] * shape[j]));
+        scatter(&mut self.mass, &place.equations, &matrix);
+        Ok(self)
+    }
+
+    /// Adds a spring (N/m) between the ground and a position (m), measured as that of a mass.
+    /// Motions that were rigid without the spring stay uncounted: a free beam on a soft suspension
+    /// begins with its first bending mode.
+    ///
+    /// # Errors
+    /// [`StructureError::OffBeam`] for a position outside, [`StructureError::NotPositive`] for a
+    /// negative stiffness.
+    pub fn with_support_spring(
+        mut self,
+        position: f64,
+        stiffness: f64,
+    ) -> Result<Self, StructureError> {
+        let place = self.place(position)?;
+        check_not_negative("support spring", stiffness)?;
+        // The unit of stiffness is that of mass times that of omega squared.
+        let unit = self.units.mass * self.units.omega.powi(2);
+        let spring = [[stiffness / unit, 0.0], [0.0, 0.0]];
+        let ends: Vec<_> = place
+            .equations
+            .into_iter()
+            .zip(place.shape)
+            .map(|(equation, weight)| (equation, 0, weight))
+            .collect();
+        self.add_joint(&spring, &ends);
+        Ok(self)
+    }
+
+    /// Where on which element a position (m) lies.
+    pub(crate) fn place(&self, position: f64) -> Result<Place, StructureError> {
+        let off = StructureError::OffBeam {
+            position,
+            length: self.units.length,
+        };
+        let along = position / self.units.length;
+        // A sensor at the very end may have been rounded beyond it.
+        if !(0.0..=1.0 + 1e-9).contains(&along) {
+            return Err(off);
+        }
+        let piece = self.pieces.iter().rev().find(|piece| piece.start <= along);
+        let piece = piece.copied().ok_or(off)?;
+        let within = (along - piece.start) / piece.element.length;
+        let index = (within.max(0.0) as usize).min(piece.elements - 1);
+        Ok(Place {
+            equations: self.element_equations(&piece, index),
+            shape: piece.element.displacement(within - index as f64),
+        })
+    }
+}
+
+fn check_not_negative(quantity: &'static str, value: f64) -> Result<(), StructureError> {
+    if value >= 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(StructureError::NotPositive { quantity, value })
+    }
 }

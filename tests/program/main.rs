@@ -8,6 +8,7 @@ mod documents;
 mod export;
 mod first_steps;
 mod leftovers;
+mod outputs;
 mod schema;
 mod updated_model;
 

@@ -190,7 +190,8 @@ fn drawn(
     keep: Option<&Path>,
     terminal: &Terminal,
 ) -> anyhow::Result<(Vec<Case>, Conduct)> {
-    let kept = keep.map(folder_of_kept).transpose()?;
+    let kept = keep.map(|name| folder_of_kept(name, terminal.files().force));
+    let kept = kept.transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
         .map(|index| campaign.draw(index))
@@ -247,12 +248,14 @@ fn drawn(
     Ok((diagnosed, conduct))
 }
 
-/// A folder for kept tests: a new one, or one of earlier kept tests.
-fn folder_of_kept(name: &Path) -> anyhow::Result<OutputFolder> {
+/// A folder for kept tests: a new one, one of earlier kept tests, or with `force` any.
+fn folder_of_kept(name: &Path, force: bool) -> anyhow::Result<OutputFolder> {
     let is_empty = fs::read_dir(name).is_ok_and(|mut entries| entries.next().is_none());
-    if name.exists() && !is_empty && !name.join(CHECKSUMS).is_file() {
+    if name.exists() && !is_empty && !force && !name.join(CHECKSUMS).is_file() {
         let shown = name.display();
-        bail!("{shown}: is there already and holds no kept tests; give the name of a new folder");
+        bail!(
+            "{shown}: is there already and holds no kept tests; give the name of a new folder, or write into it with --force"
+        );
     }
     Ok(OutputFolder::prepare(name)?)
 }

@@ -207,7 +207,7 @@ mod tests {
         use clap::builder::ValueParser;
         let (path, json) = (
             ValueParser::path_buf().type_id(),
-            clap::value_parser!(arguments::JsonDestination).type_id(),
+            ValueParser::from(clap::value_parser!(arguments::JsonDestination)).type_id(),
         );
         let mut line = CommandLine::command();
         line.build();

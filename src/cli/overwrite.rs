@@ -58,7 +58,7 @@ pub(super) struct Files {
     /// Options with what they write.
     outputs: Vec<(String, PathBuf)>,
     /// Files that the program did not make may be replaced.
-    force: bool,
+    pub(super) force: bool,
 }
 
 impl Files {

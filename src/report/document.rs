@@ -18,10 +18,7 @@ pub use super::document_fit::{
 };
 pub use super::document_frf::{FrfResonanceSection, FrfSection};
 pub use super::document_gap::{
-    AlongDecaysSection, BaselineSection, ClosureSection, DecayChangeSection, GapPlaceSection,
-    GapSection, GapVerdictSection, HypothesisSection, JointShiftSection, LeftOutRecordingSection,
-    LeftOutSection, NextTestSection, ParameterSection, PlaceMapSection, PullSection,
-    UnplacedSection, UpdatedModelSection,
+    Baseline, BaselineSection, GapPlaceSection, GapSection, UpdatedModelSection,
 };
 pub use super::document_perturbation::{
     AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,

@@ -9,7 +9,6 @@ mod convert_datasets;
 mod convert_estimate;
 mod convert_figures;
 mod convert_fit;
-mod convert_gap;
 mod convert_perturbation;
 mod convert_quality;
 pub mod deck;
@@ -58,9 +57,9 @@ pub use convert::{
 pub use convert_datasets::datasets as datasets_of;
 pub use convert_figures::{figures as figures_of, frf_figure};
 pub use convert_frf::{frf_document, render_frf_csv};
-pub use convert_gap::gap_section;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use csv_perturbation::render_perturbation_csv;
+pub use document_gap::gap_section;
 pub use earlier::{MODEL_FILE, earlier_files};
 pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;

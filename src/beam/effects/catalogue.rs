@@ -1,9 +1,12 @@
 //! Names, places and groups of the effects.
 
 use super::{EffectError, nearest_name};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// An effect that a model may be missing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum EffectId {
     /// Mass of an accelerometer.
     SensorMass,

@@ -1,7 +1,7 @@
 //! Pictures of the model for the page's script: errors of predicted frequencies, shapes of the modes, the
 //! gap and its places. Each point says its values when hovered.
 
-use super::document::{Document, GapSection, ModeShapeSection};
+use super::document::{Document, GapSection};
 use super::format::{rounded, rounded_to, signed_percent, significant};
 use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointRule, PointSet};
 use super::plot::axis::Axis;
@@ -10,6 +10,7 @@ use super::plot::gap::{Explanation, MOST_BARS, abscissa, errors_panel};
 use super::plot::place_map::{explained_panel, map_panel};
 use super::plot::shapes::{Places, displacement, joint_of, places, shown};
 use super::tables::place_of;
+use tapjoint_analysis::SampledShape;
 use tapjoint_diagnosis::{PlaceMap, Pull};
 
 /// Height of a panel with errors or changes (pixels).
@@ -262,7 +263,7 @@ pub fn live_shapes(document: &Document) -> Option<LivePoints> {
     (!panels.is_empty()).then(|| together(panels))
 }
 
-fn shape_panel(shape: &ModeShapeSection, places: &Places) -> PointPanel {
+fn shape_panel(shape: &SampledShape, places: &Places) -> PointPanel {
     let end = 1e3 * shape.positions.last().copied().unwrap_or(1.0);
     let axis = |range: (f64, f64), label: &str, unit: &str| {
         PointAxis::of(&Axis::linear(range, (0.0, 1.0)), label, unit)

@@ -5,6 +5,8 @@
 //! beam's modulus follows from those with the springs: 1/2 less their sum.
 
 use super::layout::{JointedStructure, Route, elements_for};
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_beam::finite_elements::InterfaceModes;
 use tapjoint_beam::interface::{
     JoinedHalf, JointCompliance, JointedBody, LAST_STEP, interface_root,
@@ -14,7 +16,8 @@ use tapjoint_beam::{
 };
 
 /// What an estimate can be about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Parameter {
     /// Translational stiffness Kt (N/m), through its logarithm.
     Kt,

@@ -5,6 +5,8 @@ use super::identifiability::Identifiability;
 use super::least_squares::StopReason;
 use super::model::Parameter;
 use super::quantities::Quantity;
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_beam::{Beam, JointStiffness};
 
 /// A parameter at the end of its range.
@@ -47,7 +49,7 @@ pub struct EstimatedQuantity {
 }
 
 /// Correlation of two estimated parameters (their logarithms; of the coupling its atanh).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Correlation {
     /// One.
     pub first: Parameter,

@@ -28,3 +28,8 @@ pub use merge::{
 };
 pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};
 pub use reading::read_peaks;
+
+/// Writes a number that counts from 0 as one that counts from 1.
+fn from_one<S: serde::Serializer>(index: &usize, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_u64(*index as u64 + 1)
+}

@@ -1,9 +1,12 @@
 //! What a verdict is about: a recording, a tap, a mode, a sensor, or the test.
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::fmt;
 
 /// What a verdict is about.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "WrittenSubject")]
 pub enum Subject {
     /// A recording.
     Recording {
@@ -47,6 +50,40 @@ impl Subject {
             | Subject::Sensor { file, .. } => Some(file),
             Subject::Test => None,
         }
+    }
+}
+
+/// A subject as `report.json` has it.
+#[derive(Serialize, JsonSchema)]
+struct WrittenSubject {
+    /// On what, in words: "full.wav, tap 2".
+    subject: String,
+    /// File of the recording; null of the test as a whole.
+    recording: Option<String>,
+    /// Number of the tap, from 1; null of anything else.
+    tap: Option<usize>,
+    /// Frequency of the mode (Hz); null of anything else.
+    frequency: Option<f64>,
+    /// Name of the sensor; null of anything else.
+    sensor: Option<String>,
+}
+
+impl From<Subject> for WrittenSubject {
+    fn from(about: Subject) -> Self {
+        let mut written = WrittenSubject {
+            subject: about.to_string(),
+            recording: about.file().map(str::to_owned),
+            tap: None,
+            frequency: None,
+            sensor: None,
+        };
+        match about {
+            Subject::Tap { tap, .. } => written.tap = Some(tap),
+            Subject::Mode { frequency, .. } => written.frequency = Some(frequency),
+            Subject::Sensor { sensor, .. } => written.sensor = Some(sensor),
+            Subject::Recording { .. } | Subject::Test => {}
+        }
+        written
     }
 }
 

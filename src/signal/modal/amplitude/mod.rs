@@ -23,7 +23,10 @@
 //! thousandths of it and is left in. A neighbour that nobody listed nearer than about the half-power width
 //! cannot be told from a drift by one decay.
 
+use super::from_one;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use tapjoint_numerics::stats::median;
 
@@ -96,9 +99,10 @@ impl Default for AmplitudeSettings {
 }
 
 /// One segment of one decay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudePoint {
-    /// Which decay (0-based).
+    /// Number of the tap, from 0; in outputs from 1.
+    #[serde(serialize_with = "from_one")]
     pub tap: usize,
     /// Time after the tap (s).
     pub time: f64,
@@ -109,6 +113,7 @@ pub struct AmplitudePoint {
     /// Its standard uncertainty (Hz).
     pub frequency_std: f64,
     /// Damping ratio (1).
+    #[serde(rename = "damping")]
     pub damping_ratio: f64,
     /// Its standard uncertainty (1).
     pub damping_std: f64,
@@ -137,7 +142,8 @@ pub enum Origin {
 }
 
 /// What a curve says.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "&'static str")]
 pub enum AmplitudeVerdict {
     /// Frequency or damping changes along the decay by more than its uncertainty.
     Changes,
@@ -156,6 +162,18 @@ pub enum AmplitudeVerdict {
     },
     /// Fewer points than a trend needs.
     TooFewPoints,
+}
+
+impl From<AmplitudeVerdict> for &'static str {
+    fn from(verdict: AmplitudeVerdict) -> &'static str {
+        match verdict {
+            AmplitudeVerdict::Changes => "changes",
+            AmplitudeVerdict::Steady => "steady",
+            AmplitudeVerdict::Beating { .. } => "beating",
+            AmplitudeVerdict::Unresolved { .. } => "unresolved",
+            AmplitudeVerdict::TooFewPoints => "too-few-points",
+        }
+    }
 }
 
 /// Frequency and damping of one mode against amplitude.

@@ -2,17 +2,22 @@
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
+use super::super::from_one;
 use super::kernel::{Evaluation, Problem};
 use super::local::GroupFit;
 
 /// What a standard deviation rests on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum UncertaintySource {
     /// The noise that the fit leaves on the lines.
     Residual,
     /// The scatter of the taps, which is more than that noise explains.
+    #[serde(rename = "taps")]
     TapScatter,
 }
 
@@ -37,15 +42,17 @@ pub struct FittedValue {
 }
 
 /// Frequency and damping of one tap alone.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct TapFit {
-    /// Number of the tap.
+    /// Number of the tap, from 0; in outputs from 1.
+    #[serde(serialize_with = "from_one")]
     pub tap: usize,
     /// Natural frequency (Hz).
     pub frequency: f64,
     /// Its standard deviation from the noise (Hz).
     pub frequency_std: f64,
     /// Damping ratio.
+    #[serde(rename = "damping")]
     pub damping_ratio: f64,
     /// Its standard deviation from the noise.
     pub damping_std: f64,

@@ -32,7 +32,6 @@ mod plan;
 mod predicted_shapes;
 mod quality;
 mod real_data;
-mod recording;
 mod recording_uff;
 mod report;
 mod resolution;

@@ -7,6 +7,7 @@ mod diagnose;
 mod documents;
 mod export;
 mod first_steps;
+mod frozen;
 mod leftovers;
 mod schema;
 mod updated_model;

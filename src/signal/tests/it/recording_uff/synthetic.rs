@@ -1,10 +1,11 @@
 //! Time series and the eight cases, from files that the tests write.
 
 use proptest::prelude::*;
-use tapjoint::recording::{Format, UffCoding, list_datasets, read_function};
+use tapjoint_signal::recording::{Format, UffCoding, list_datasets, read_function};
 
-use super::super::recording::{assert_message, file};
 use super::{Made, Store, file_of, function, open, response, samples, series};
+use crate::recording::assert_message;
+use crate::written::file;
 
 /// Numbers about zero that single precision and six digits hold exactly: no tolerance is needed.
 fn exact(count: usize) -> Vec<f64> {
@@ -496,7 +497,7 @@ fn read_everything(bytes: &[u8]) -> Result<(), TestCaseError> {
             }
         }
     }
-    if let Ok(found) = tapjoint::recording::open_frequency_responses(&tested.path) {
+    if let Ok(found) = tapjoint_signal::recording::open_frequency_responses(&tested.path) {
         for response in &found.responses {
             prop_assert_eq!(response.values.len(), found.lines);
         }

@@ -2,13 +2,14 @@
 
 use num_complex::Complex64;
 use proptest::prelude::*;
-use tapjoint::recording::{
+use tapjoint_signal::recording::{
     FrequencyResponse, FrequencyResponses, Point, ResponseForm, UffFormat,
     encode_frequency_responses_uff, open_frequency_responses,
 };
 
-use super::super::recording::{assert_message, file};
 use super::{Made, Store, file_of, open, response, series};
+use crate::recording::assert_message;
+use crate::written::file;
 
 fn responses(path: &std::path::Path) -> FrequencyResponses {
     open_frequency_responses(path).unwrap_or_else(|error| panic!("{error}"))

@@ -1,6 +1,6 @@
 //! CSV files as people and programs write them.
 
-use tapjoint::recording::{
+use tapjoint_signal::recording::{
     Format, ReadSettings, Recording, RecordingWarning, STANDARD_GRAVITY, Separator, Timing,
     channel_unit,
 };

@@ -1,11 +1,11 @@
 //! Universal files that analysers and other programs wrote.
 
-use tapjoint::recording::{
+use tapjoint_signal::recording::{
     Abscissa, FunctionType, ResponseForm, list_datasets, open_frequency_responses,
 };
 
-use super::super::recording::assert_message;
 use super::{data, function, open, samples};
+use crate::recording::assert_message;
 
 fn message(name: &str) -> Option<String> {
     let path = data(name)?;

@@ -6,26 +6,8 @@ mod health;
 mod real;
 mod wav;
 
-use std::path::PathBuf;
-
-use tapjoint::recording::{ReadSettings, Recording, RecordingError};
-
-/// A file in a folder of its own that lasts as long as the value.
-pub struct TestFile {
-    _folder: tempfile::TempDir,
-    pub path: PathBuf,
-}
-
-/// Writes `bytes` into a file called `name`.
-pub fn file(name: &str, bytes: impl AsRef<[u8]>) -> TestFile {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join(name);
-    std::fs::write(&path, bytes).expect("a test file");
-    TestFile {
-        _folder: folder,
-        path,
-    }
-}
+use crate::written::{TestFile, file};
+use tapjoint_signal::recording::{ReadSettings, Recording, RecordingError};
 
 /// Opens bytes as a recording.
 pub fn open(bytes: impl AsRef<[u8]>) -> (TestFile, Result<Recording, RecordingError>) {

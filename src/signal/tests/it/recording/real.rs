@@ -1,7 +1,7 @@
 //! Recordings by others, where the folder of TAPJOINT_DATA has them.
 
 use crate::shared::data;
-use tapjoint::recording::{Format, ReadSettings, Recording, Separator, Timing};
+use tapjoint_signal::recording::{Format, ReadSettings, Recording, Separator, Timing};
 
 /// Opens a file of the data folder; `None` without the folder.
 fn open(name: &str) -> Option<Recording> {

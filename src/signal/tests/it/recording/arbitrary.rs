@@ -1,7 +1,7 @@
 //! Whatever the bytes, opening ends with a recording that can be read or with an error.
 
 use proptest::prelude::*;
-use tapjoint::recording::{ReadSettings, Recording};
+use tapjoint_signal::recording::{ReadSettings, Recording};
 
 use super::file;
 use super::wav::Parts;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use tapjoint::recording::{
+use tapjoint_signal::recording::{
     Channel, Format, ReadSettings, Recording, RecordingWarning, WavFormat, encode_wav, write_wav,
 };
 

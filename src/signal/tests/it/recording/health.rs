@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use approx::assert_relative_eq;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tapjoint::recording::{
+use tapjoint_signal::recording::{
     Channel, ChannelHealth, ReadSettings, Recording, RecordingWarning, WavFormat, write_wav,
 };
 

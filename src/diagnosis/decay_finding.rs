@@ -11,7 +11,9 @@ use super::frame::{Frame, Row};
 use super::hypothesis::Fit;
 use super::noise::{self, Reading};
 use super::solved::Solved;
-use tapjoint_beam::effects::JointLaw;
+use schemars::JsonSchema;
+use serde::Serialize;
+use tapjoint_beam::effects::{EffectId, JointLaw};
 
 /// Probability by chance below which a change counts: a false one in a thousand tests.
 const CHANCE: f64 = 0.001;
@@ -24,14 +26,24 @@ const DIRECTED: f64 = 2.0;
 const TOGETHER: usize = 2;
 
 /// Frequencies that change along the decays, and what joint would do that.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct DecayFinding {
+    /// "joint-nonlinearity" where a joint does that: a law of its rotation explains the changes, or all frequencies
+    /// that change do so the same way, of which there are two at least; else null. Joints soften in translation too,
+    /// which modes feel that do not turn them; the change of the rotation is then unknown.
+    pub effect: Option<EffectId>,
+    /// Whether more than one frequency changes in a certain direction: of one alone the cause stays open.
+    pub enough: bool,
+    /// Whether a law of the joint's rotation explains the changes: only then `ratio` is its size.
+    pub lawful: bool,
     /// Relative change of the joint's rotational stiffness at the largest amplitude (1), over that at
-    /// rest: negative where it softens. No change beyond 0.7 is looked for, see
-    /// [`DecayFinding::is_at_bound`].
+    /// rest: negative where it softens. No change beyond 0.7 is looked for.
     pub ratio: f64,
     /// Its standard uncertainty (1).
     pub ratio_std: f64,
+    /// Whether the changes ask for as much as is looked for: `ratio` is then a bound, and `ratio_std` does
+    /// not hold.
+    pub at_bound: bool,
     /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
     pub exponent: f64,
     /// Probability of changes as large if there were none: noise, and what the model leaves open of them,
@@ -44,7 +56,7 @@ pub struct DecayFinding {
 }
 
 /// How a frequency changes along the decays of a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct DecayChange {
     /// The mode.
     pub mode: usize,
@@ -61,34 +73,35 @@ pub struct DecayChange {
 }
 
 impl DecayFinding {
-    /// Whether a joint does that: a law of its rotation explains the changes, or all frequencies that
-    /// change do so the same way, of which there are two at least. Joints soften in translation too,
-    /// which modes feel that do not turn them; how much the rotation changes is then not told.
-    pub fn is_of_joint(&self) -> bool {
-        let same_way = |change: &&DecayChange| change.percent_per_fold * self.ratio > 0.0;
-        self.is_lawful() || self.is_enough() && self.directed().all(|change| same_way(&change))
-    }
-
-    /// Whether more than one frequency changes in a certain direction: of one alone nobody can tell what does that.
-    pub fn is_enough(&self) -> bool {
-        self.directed().count() >= TOGETHER
-    }
-
-    fn directed(&self) -> impl Iterator<Item = &DecayChange> {
-        let is_directed =
-            |change: &&DecayChange| change.percent_per_fold.abs() > DIRECTED * change.std;
-        self.changes.iter().filter(is_directed)
-    }
-
-    /// Whether the largest change that is looked for explains the changes best: the ratio is then a bound,
-    /// and its uncertainty does not hold.
-    pub fn is_at_bound(&self) -> bool {
-        self.ratio.abs() >= LARGEST
-    }
-
-    /// Whether a law of the joint's rotation explains the changes; not where they are too few to tell.
-    pub fn is_lawful(&self) -> bool {
-        self.goodness_of_fit.is_some_and(|p| p >= MISFIT)
+    /// Judges changes by the law that explains them best.
+    pub fn new(
+        law: JointLaw,
+        ratio_std: f64,
+        chance: f64,
+        goodness_of_fit: Option<f64>,
+        changes: Vec<DecayChange>,
+    ) -> Self {
+        let directed: Vec<&DecayChange> = changes
+            .iter()
+            .filter(|change| change.percent_per_fold.abs() > DIRECTED * change.std)
+            .collect();
+        let lawful = goodness_of_fit.is_some_and(|p| p >= MISFIT);
+        let enough = directed.len() >= TOGETHER;
+        let same_way = directed
+            .iter()
+            .all(|change| change.percent_per_fold * law.ratio > 0.0);
+        DecayFinding {
+            effect: (lawful || enough && same_way).then_some(EffectId::JointNonlinearity),
+            enough,
+            lawful,
+            ratio: law.ratio,
+            ratio_std,
+            at_bound: law.ratio.abs() >= LARGEST,
+            exponent: law.exponent,
+            chance,
+            goodness_of_fit,
+            changes,
+        }
     }
 
     /// "softens" or "stiffens".
@@ -186,12 +199,12 @@ pub(super) fn decay_finding(frame: &Frame, nominal: &Fit) -> Option<DecayFinding
         }),
         _ => None,
     };
-    Some(DecayFinding {
-        ratio: found.law.ratio,
-        ratio_std: found.std,
-        exponent: found.law.exponent,
+    let changes = rows.iter().filter_map(change).collect();
+    Some(DecayFinding::new(
+        found.law,
+        found.std,
         chance,
         goodness_of_fit,
-        changes: rows.iter().filter_map(change).collect(),
-    })
+        changes,
+    ))
 }

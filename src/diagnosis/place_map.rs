@@ -48,18 +48,25 @@ pub(super) fn place_map(frame: &Frame, nominal: &Fit) -> Option<PlaceMap> {
     let (stiffness, stiffness_std) = changes(frame, nominal, &of_stiffness)?;
     let (mass, mass_std) = changes(frame, nominal, &of_mass)?;
     let piece = length / PIECES as f64;
+    // All that the described model leaves.
+    let misfit = 2.0 * nominal.branch.optimum.objective;
     Some(PlaceMap {
         positions: (0..PIECES).map(|j| piece * (j as f64 + 0.5)).collect(),
         stiffness,
         stiffness_std,
-        stiffness_alone: alone(frame, nominal, &of_stiffness)?,
         mass,
         mass_std,
-        mass_alone: alone(frame, nominal, &of_mass)?,
-        misfit: 2.0 * nominal.branch.optimum.objective,
+        stiffness_explains: explained(alone(frame, nominal, &of_stiffness)?, misfit),
+        mass_explains: explained(alone(frame, nominal, &of_mass)?, misfit),
         // Half a wave of the highest mode is what its energy resolves.
         resolution: length / frame.fitted_modes as f64,
     })
+}
+
+/// Shares of the misfit, from the falls of chi square.
+fn explained(falls: Vec<f64>, misfit: f64) -> Vec<f64> {
+    let share = |fall: f64| if misfit > 0.0 { fall / misfit } else { 0.0 };
+    falls.into_iter().map(share).collect()
 }
 
 /// Slope of each row with respect to the change of each piece.

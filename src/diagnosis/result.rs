@@ -3,7 +3,10 @@
 use super::advisor::NextTest;
 use super::decay_finding::DecayFinding;
 use super::unplaced::Unplaced;
-use tapjoint_beam::effects::{Effect, EffectId, Group};
+use schemars::JsonSchema;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
+use tapjoint_beam::effects::{Effect, EffectId, Group, Place};
 
 /// The answer.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,9 +47,11 @@ pub struct Diagnosis {
 }
 
 /// The kind of answer.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "WrittenVerdict")]
 pub enum Verdict {
     /// The nominal model explains the readings within their uncertainty.
+    #[default]
     NoGap,
     /// One effect, or two where both are needed.
     Named(Vec<EffectId>),
@@ -72,12 +77,57 @@ impl Verdict {
             Verdict::NotEnoughData(_) => "not-enough-data",
         }
     }
+
+    /// The hypotheses among which the cause is: one, both effects of which are needed, or several.
+    pub fn hypotheses(&self) -> Vec<Hypothesis> {
+        match self {
+            Verdict::Named(effects) => vec![Hypothesis::Effects(effects.clone())],
+            Verdict::Group(effects) => {
+                let single = |effect: &EffectId| Hypothesis::Effects(vec![*effect]);
+                effects.iter().map(single).collect()
+            }
+            Verdict::Set(list) => list.clone(),
+            Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
+        }
+    }
+}
+
+/// A verdict as `report.json` has it.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Verdict")]
+struct WrittenVerdict {
+    /// "no-gap", "named", "group", "set", "unknown" or "not-enough-data".
+    kind: &'static str,
+    /// The effects it names.
+    effects: Vec<String>,
+    /// Why there is no answer; null where there is one.
+    reason: Option<String>,
+}
+
+impl From<Verdict> for WrittenVerdict {
+    fn from(verdict: Verdict) -> Self {
+        let named = |effects: &[EffectId]| effects.iter().map(|id| id.name().to_owned()).collect();
+        WrittenVerdict {
+            kind: verdict.kind(),
+            effects: match &verdict {
+                Verdict::Named(effects) | Verdict::Group(effects) => named(effects),
+                Verdict::Set(list) => list.iter().map(Hypothesis::name).collect(),
+                _ => Vec::new(),
+            },
+            reason: match verdict {
+                Verdict::NotEnoughData(reason) => Some(reason),
+                _ => None,
+            },
+        }
+    }
 }
 
 /// What was tested.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(into = "String")]
 pub enum Hypothesis {
     /// Nothing is missing in the nominal model.
+    #[default]
     None,
     /// One effect, or two.
     Effects(Vec<EffectId>),
@@ -99,12 +149,21 @@ impl Hypothesis {
     }
 }
 
+impl From<Hypothesis> for String {
+    fn from(hypothesis: Hypothesis) -> String {
+        hypothesis.name()
+    }
+}
+
 /// One hypothesis in the ranking.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct HypothesisResult {
-    /// Which.
+    /// Effect, "none", "unknown", or two effects joined by "+".
+    #[serde(rename = "effect")]
     pub hypothesis: Hypothesis,
-    /// Groups of its effects; empty of `none` and `unknown`.
+    /// Groups of its effects, joined by "+"; null of "none" and "unknown".
+    #[serde(rename = "group", serialize_with = "joined_groups")]
+    #[schemars(with = "Option<String>")]
     pub groups: Vec<Group>,
     /// Its probability (1).
     pub probability: f64,
@@ -112,7 +171,9 @@ pub struct HypothesisResult {
     pub log_bayes_factor: f64,
     /// Effects whose best fit predicts the same within what these readings resolve.
     pub confounded_with: Vec<EffectId>,
-    /// Values of its parameters.
+    /// Its parameters (SI), by name; of two effects "effect.name".
+    #[serde(serialize_with = "by_name")]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: Vec<ParameterValue>,
     /// Root mean square of the fitted frequencies' errors of the nominal model with one joint for all recordings (%).
     pub gap_before: f64,
@@ -136,10 +197,12 @@ pub struct HypothesisResult {
     /// Goodness of fit.
     pub goodness_of_fit: Option<f64>,
     /// What that rests on.
+    #[serde(skip)]
     pub misfit: Option<Misfit>,
-    /// What it does to the joint.
+    /// How much the joint moves when this is added.
     pub joint_shift: JointShift,
     /// The effects with their best values, to predict with.
+    #[serde(skip)]
     pub effects: Vec<Effect>,
     /// The joint's stiffnesses that go with them (N/m, N m/rad); `None` without a joint.
     pub joint: Option<[f64; 2]>,
@@ -147,18 +210,43 @@ pub struct HypothesisResult {
     /// holds, has none.
     pub joint_intervals: [Option<[f64; 2]>; 2],
     /// The coupling of the joint's own model that goes with them (1), without the effects'.
+    #[serde(skip)]
     pub coupling: f64,
     /// Logarithm of the common factor on all frequencies that goes with them, within the tolerance of the
     /// geometry (1).
+    #[serde(skip)]
     pub scale: f64,
 }
 
+fn joined_groups<S: Serializer>(groups: &[Group], to: S) -> Result<S::Ok, S::Error> {
+    let names: Vec<&str> = groups.iter().map(|group| group.name()).collect();
+    (!names.is_empty()).then(|| names.join("+")).serialize(to)
+}
+
+fn by_name<S: Serializer>(parameters: &[ParameterValue], to: S) -> Result<S::Ok, S::Error> {
+    let mut effects = parameters.iter().map(|one| one.effect);
+    let first = effects.next();
+    let alone = effects.all(|effect| Some(effect) == first);
+    let key = |one: &ParameterValue| match alone {
+        true => one.name.to_owned(),
+        false => format!("{}.{}", one.effect.name(), one.name),
+    };
+    to.collect_map(
+        parameters
+            .iter()
+            .map(|one| (key(one), one))
+            .collect::<BTreeMap<_, _>>(),
+    )
+}
+
 /// A parameter of an effect.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ParameterValue {
     /// Of which effect.
+    #[serde(skip)]
     pub effect: EffectId,
     /// Which one.
+    #[serde(skip)]
     pub name: &'static str,
     /// Its value (SI).
     pub value: f64,
@@ -172,7 +260,7 @@ pub struct ParameterValue {
 }
 
 /// Share of a gap that is closed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Closure {
     /// (before^2 - after^2)/(before^2 - floor^2).
     pub value: f64,
@@ -183,10 +271,8 @@ pub struct Closure {
 }
 
 /// Recordings predicted from all others, each in turn.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LeftOutRecordings {
-    /// Each of them.
-    pub recordings: Vec<LeftOutRecording>,
     /// Root mean square of all their frequencies' errors under the nominal model (%).
     pub before: f64,
     /// The same under the hypothesis.
@@ -195,10 +281,12 @@ pub struct LeftOutRecordings {
     pub floor: f64,
     /// Share of the gap that is closed; `None` where the gap is below two floors.
     pub closure: Option<Closure>,
+    /// Each of them.
+    pub recordings: Vec<LeftOutRecording>,
 }
 
 /// A recording predicted from all others.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LeftOutRecording {
     /// Which.
     pub recording: String,
@@ -211,7 +299,7 @@ pub struct LeftOutRecording {
 }
 
 /// Change of the joint's stiffnesses when the effect is added.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct JointShift {
     /// Translation (%); `None` where it is not sought.
     pub kx_percent: Option<f64>,
@@ -220,24 +308,40 @@ pub struct JointShift {
 }
 
 /// Where the gap lies, given that there is one; the six sum to 1.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct PlaceProbabilities {
-    /// The joint (1).
-    pub joint: f64,
-    /// What the joint is fastened to (1).
-    pub fixture: f64,
-    /// The sensors (1).
-    pub sensor: f64,
-    /// The beam (1).
-    pub body: f64,
     /// Clocks and readings (1).
     pub acquisition: f64,
+    /// The beam (1).
+    pub body: f64,
+    /// What the joint is fastened to (1).
+    pub fixture: f64,
+    /// The joint (1).
+    pub joint: f64,
+    /// The sensors (1).
+    pub sensor: f64,
     /// Nowhere that the catalogue knows (1).
     pub unknown: f64,
 }
 
+impl PlaceProbabilities {
+    /// Each place with its probability (1), the most probable first; `None` is a place unknown to the catalogue.
+    pub fn ranked(&self) -> [(Option<Place>, f64); 6] {
+        let mut places = [
+            (Some(Place::Acquisition), self.acquisition),
+            (Some(Place::Body), self.body),
+            (Some(Place::Fixture), self.fixture),
+            (Some(Place::Joint), self.joint),
+            (Some(Place::Sensor), self.sensor),
+            (None, self.unknown),
+        ];
+        places.sort_by(|a, b| b.1.total_cmp(&a.1));
+        places
+    }
+}
+
 /// A frequency's error.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Pull {
     /// The mode.
     pub mode: usize,
@@ -274,7 +378,7 @@ pub struct Block {
 }
 
 /// Local change of stiffness and of mass that the residual of the nominal model calls for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct PlaceMap {
     /// Centres of the pieces of the beam (m).
     pub positions: Vec<f64>,
@@ -282,23 +386,22 @@ pub struct PlaceMap {
     pub stiffness: Vec<f64>,
     /// Its standard uncertainty.
     pub stiffness_std: Vec<f64>,
-    /// By how much chi square falls if the stiffness of this piece alone changes: it peaks where the
-    /// cause sits, while changes of all pieces together share it out among look-alikes.
-    pub stiffness_alone: Vec<f64>,
     /// Relative change of the mass of each piece (1), if mass alone changes.
     pub mass: Vec<f64>,
     /// Its standard uncertainty.
     pub mass_std: Vec<f64>,
-    /// By how much chi square falls if the mass of this piece alone changes.
-    pub mass_alone: Vec<f64>,
-    /// The chi square that is to fall: all that the described model leaves.
-    pub misfit: f64,
+    /// Share of the misfit (1) that each piece would explain if its stiffness alone changed: it peaks where the
+    /// cause sits, while changes of all pieces together share it out among look-alikes.
+    pub stiffness_explains: Vec<f64>,
+    /// Share of the misfit (1) that each piece would explain if its mass alone changed.
+    pub mass_explains: Vec<f64>,
     /// Length over which a local change is smeared (m).
     pub resolution: f64,
 }
 
 /// What decided between the first hypothesis and the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum DecidedBy {
     /// The readings: the likelihood ratio is 3 or more, or they refute what was more probable.
     Readings,

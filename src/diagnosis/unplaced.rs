@@ -5,10 +5,12 @@ use super::quality::Residuals;
 use super::search::{filled, nominal_of};
 use super::settings::GapSettings;
 use super::trial::MISFIT;
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_identify::observation::Observations;
 
 /// What the described model leaves of the readings without the masses whose place nobody said.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Unplaced {
     /// The sensors.
     pub sensors: Vec<String>,

@@ -67,6 +67,7 @@ fn confirmation(effect: EffectId) -> NextTest {
     let step = Step::Confirm { effect };
     NextTest {
         action: step.sentence(),
+        effort: step.effort(),
         step,
         separates: vec![effect.name().to_owned()],
         unpredicted: Vec::new(),
@@ -134,6 +135,7 @@ impl<'a> Runners<'a> {
         Some(NextTest {
             step: step.clone(),
             action: step.sentence(),
+            effort: step.effort(),
             separates: told.separates,
             unpredicted: told.unpredicted,
             bits: told.bits,

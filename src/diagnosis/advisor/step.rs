@@ -1,10 +1,13 @@
 //! What could be done next, in plain words and numbers.
 
 use super::confirm::confirming;
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_beam::effects::EffectId;
 
 /// A test that could be made, or a record that could be read again.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "String")]
 pub enum Step {
     /// Read higher modes.
     HigherModes {
@@ -163,6 +166,12 @@ impl Step {
     }
 }
 
+impl From<Step> for String {
+    fn from(step: Step) -> String {
+        step.id().to_owned()
+    }
+}
+
 /// "15 g", "1.5 kg".
 fn weight(mass: f64) -> String {
     if mass < 1.0 {
@@ -177,9 +186,10 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// A test that would tell more, and how much.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NextTest {
-    /// What to do.
+    /// What to do: "higher-modes", "move-sensor", "known-mass", ...
+    #[serde(rename = "id")]
     pub step: Step,
     /// The same in a sentence, without its full stop.
     pub action: String,
@@ -190,11 +200,13 @@ pub struct NextTest {
     /// Information about which hypothesis is true that it is expected to bring at least (bit); what it might
     /// tell of hypotheses that could not be predicted is no part of it.
     pub bits: f64,
+    /// What it costs, in multiples of reading again what is recorded; tests are ranked by bits over this.
+    pub effort: f64,
 }
 
 impl NextTest {
     /// Information per cost (bit), by which tests are ranked.
     pub fn worth(&self) -> f64 {
-        self.bits / self.step.effort()
+        self.bits / self.effort
     }
 }

@@ -27,3 +27,8 @@ pub use peaks::{
     near_mains,
 };
 pub use reading::{Interpolation, Unfit, interpolate_parabola, interpolate_pole, read_peaks};
+
+/// Writes a number that counts from 0 as one that counts from 1.
+fn from_one<S: serde::Serializer>(index: &usize, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_u64(*index as u64 + 1)
+}

@@ -1,36 +1,71 @@
-//! Frequency response functions as a document and as comma separated values.
+//! Frequency response functions in the document.
 
-use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::Serialize;
 
-use super::ReportError;
-use super::convert::document;
-use super::csv::write;
-use super::document::{Document, FrfResonanceSection, FrfSection, WarningSection};
-use super::format::with_minus_signs;
+use super::recordings::added_decay;
+use super::{Document, WarningSection, document_of};
 use tapjoint_analysis::{Analysis, Frf, FrfResonance, Warning};
 use tapjoint_signal::quality::Check;
-use tapjoint_signal::spectral::Window;
 
-/// Columns of the table of frequency response functions.
-const COLUMNS: [&str; 13] = [
-    "recording",
-    "response",
-    "form",
-    "unit",
-    "frequency_Hz",
-    "h1_real",
-    "h1_imaginary",
-    "h2_real",
-    "h2_imaginary",
-    "hv_real",
-    "hv_imaginary",
-    "coherence",
-    "random_error",
-];
+/// The frequency response function of one sensor in one recording, one value for each line; null
+/// where a value does not exist.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct FrfSection {
+    /// File of the recording.
+    pub recording: String,
+    /// Name of the sensor or channel.
+    pub response: String,
+    /// "accelerance", "mobility" or "receptance"; null for sound and for unknown units.
+    pub form: Option<String>,
+    /// "(m/s2)/N" and the like; "per unit of the file" where nobody stated units.
+    pub unit: String,
+    /// "H1", "H2" or "Hv": the estimator of `real` and `imaginary`.
+    pub estimator: String,
+    /// Taps averaged.
+    pub averages: usize,
+    /// "rectangular", "hann" or "exponential".
+    pub window: String,
+    /// Decay the window adds to every pole (1/s); null for windows that add none.
+    pub window_decay: Option<f64>,
+    /// The recording's resonances on this function.
+    pub resonances: Vec<FrfResonanceSection>,
+    /// Frequencies (Hz).
+    pub frequency: Vec<f64>,
+    /// Real part (unit above), in the convention e^{+j omega t}.
+    pub real: Vec<Option<f64>>,
+    /// Imaginary part (unit above).
+    pub imaginary: Vec<Option<f64>>,
+    /// Coherence; null below two averages.
+    pub coherence: Option<Vec<Option<f64>>>,
+    /// Relative random error (standard deviation) of the magnitude; null below two averages.
+    pub random_error: Option<Vec<Option<f64>>>,
+}
+
+/// A resonance on a frequency response function.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct FrfResonanceSection {
+    /// Number of the mode; null for a peak that belongs to none.
+    pub mode: Option<usize>,
+    /// What a peak that is no mode is.
+    pub label: Option<String>,
+    /// Best reading of its frequency (Hz).
+    pub frequency: f64,
+    /// The nearest line (Hz), on which the following stand.
+    pub line_frequency: f64,
+    /// Magnitude (unit of the function).
+    pub magnitude: Option<f64>,
+    /// Phase (degrees).
+    pub phase: Option<f64>,
+    /// Coherence.
+    pub coherence: Option<f64>,
+    /// Relative random error (standard deviation) of the magnitude.
+    pub random_error: Option<f64>,
+}
 
 /// The document of frequency response functions: of the analysis only what comes before any model.
 pub fn frf_document(analysis: &Analysis, frfs: &[Frf]) -> Document {
-    let whole = document(analysis);
+    let whole = document_of(analysis);
     let measured = analysis.recordings.iter();
     let warnings = measured
         .flat_map(|recording| &recording.measurement.warnings)
@@ -47,11 +82,7 @@ pub fn frf_document(analysis: &Analysis, frfs: &[Frf]) -> Document {
         modes: whole.modes,
         frfs: Some(frfs.iter().map(section).collect()),
         warnings: warnings
-            .map(|warning| WarningSection {
-                code: warning.code().to_string(),
-                text: with_minus_signs(&warning.to_string()),
-                beside: false,
-            })
+            .map(|warning| WarningSection::of(warning, false))
             .collect(),
         ..Document::default()
     }
@@ -71,7 +102,6 @@ fn is_of_function(warning: &Warning) -> bool {
 
 fn section(frf: &Frf) -> FrfSection {
     let values = frf.values();
-    let decay = matches!(frf.window, Window::Exponential { .. });
     FrfSection {
         recording: frf.recording.clone(),
         response: frf.response.clone(),
@@ -80,7 +110,7 @@ fn section(frf: &Frf) -> FrfSection {
         estimator: frf.estimator.name().to_string(),
         averages: frf.averages,
         window: frf.window.name().to_string(),
-        window_decay: decay.then(|| frf.window.added_decay()),
+        window_decay: added_decay(frf.window),
         resonances: frf.resonances.iter().map(resonance).collect(),
         frequency: frf.lines.frequencies(),
         real: values.iter().map(|value| value.map(|v| v.re)).collect(),
@@ -101,40 +131,6 @@ fn resonance(found: &FrfResonance) -> FrfResonanceSection {
         coherence: found.quality.coherence,
         random_error: found.quality.random_error,
     }
-}
-
-/// One row for each line of each function: all estimators, coherence and random error, in full
-/// precision; a cell is empty where a value does not exist.
-///
-/// # Errors
-/// [`ReportError::Csv`] if a row cannot be written.
-pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
-    write(&COLUMNS, frfs.iter().flat_map(rows).collect())
-}
-
-fn rows(frf: &Frf) -> impl Iterator<Item = Vec<String>> {
-    (0..frf.lines.points()).map(move |line| {
-        let on_line = |values: &Option<Vec<Option<f64>>>| {
-            number(values.as_ref().and_then(|values| *values.get(line)?))
-        };
-        let mut row = vec![
-            frf.recording.clone(),
-            frf.response.clone(),
-            frf.form_words.to_string(),
-            frf.unit.clone(),
-            frf.lines.frequency(line).to_string(),
-        ];
-        for values in [&frf.h1, &frf.h2, &frf.hv] {
-            let value: Option<Complex64> = values.get(line).copied().flatten();
-            row.extend([number(value.map(|v| v.re)), number(value.map(|v| v.im))]);
-        }
-        row.extend([on_line(&frf.coherence), on_line(&frf.random_error)]);
-        row
-    })
-}
-
-fn number(value: Option<f64>) -> String {
-    value.map_or(String::new(), |value| value.to_string())
 }
 
 #[cfg(test)]

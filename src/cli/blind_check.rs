@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::input::{TestFile, read_test};
-use super::output::{OutputError, OutputFolder, files_below};
+use super::output::{OutputError, OutputFolder, files_made_in};
 use super::overwrite::Expanded;
 use super::renamed::check_names_elsewhere;
 use super::signature::CHECKSUMS;
@@ -85,7 +85,28 @@ pub(super) struct BlindCheckArguments {
     out: PathBuf,
 }
 
+/// Names of the results.
+const RESULTS: [&str; 8] = [
+    "score.json",
+    "cases.csv",
+    "truth.json",
+    "confusion.png",
+    "confusion.svg",
+    "reliability.png",
+    "reliability.svg",
+    CHECKSUMS,
+];
+
 impl BlindCheckArguments {
+    /// Returns the results, and every file in an earlier folder of kept tests.
+    pub(super) fn expanded(&self) -> Vec<Expanded> {
+        let results = RESULTS.iter().map(|name| self.out.join(name)).collect();
+        let kept = self.keep.iter().flat_map(|folder| files_made_in(folder));
+        let kept = kept.chain(self.keep.iter().map(|folder| folder.join("truth.json")));
+        let kept = kept.collect::<BTreeSet<_>>().into_iter().collect();
+        vec![("out", results), ("keep", kept)]
+    }
+
     fn campaign(&self, seed: u64) -> anyhow::Result<Campaign> {
         if !(self.drift >= 0.0 && self.drift <= 0.2) {
             bail!(
@@ -113,36 +134,6 @@ impl BlindCheckArguments {
             drift: self.drift,
             seed,
         })
-    }
-}
-
-/// Names of the results.
-const RESULTS: [&str; 8] = [
-    "score.json",
-    "cases.csv",
-    "truth.json",
-    "confusion.png",
-    "confusion.svg",
-    "reliability.png",
-    "reliability.svg",
-    CHECKSUMS,
-];
-
-impl BlindCheckArguments {
-    /// Returns the results, and every file in an earlier folder of kept tests.
-    pub(super) fn expanded(&self) -> Vec<Expanded> {
-        let results = RESULTS.iter().map(|name| self.out.join(name)).collect();
-        let earlier = self
-            .keep
-            .iter()
-            .filter(|folder| folder.join(CHECKSUMS).is_file());
-        let kept = earlier.flat_map(|folder| {
-            let names = files_below(folder).unwrap_or_default();
-            names.into_iter().map(|name| folder.join(name))
-        });
-        let kept = kept.chain(self.keep.iter().map(|folder| folder.join("truth.json")));
-        let kept = kept.collect::<BTreeSet<_>>().into_iter().collect();
-        vec![("out", results), ("keep", kept)]
     }
 }
 
@@ -190,7 +181,8 @@ fn drawn(
     keep: Option<&Path>,
     terminal: &Terminal,
 ) -> anyhow::Result<(Vec<Case>, Conduct)> {
-    let kept = keep.map(|name| folder_of_kept(name, terminal.files().force));
+    let force = terminal.files().force;
+    let kept = keep.map(|name| OutputFolder::prepare_own(name, force));
     let kept = kept.transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
@@ -246,18 +238,6 @@ fn drawn(
         kept.publish(terminal.files())?;
     }
     Ok((diagnosed, conduct))
-}
-
-/// A folder for kept tests: a new one, one of earlier kept tests, or with `force` any.
-fn folder_of_kept(name: &Path, force: bool) -> anyhow::Result<OutputFolder> {
-    let is_empty = fs::read_dir(name).is_ok_and(|mut entries| entries.next().is_none());
-    if name.exists() && !is_empty && !force && !name.join(CHECKSUMS).is_file() {
-        let shown = name.display();
-        bail!(
-            "{shown}: is there already and holds no kept tests; give the name of a new folder, or write into it with --force"
-        );
-    }
-    Ok(OutputFolder::prepare(name)?)
 }
 
 /// How many tests are diagnosed again under other names.

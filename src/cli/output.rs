@@ -58,6 +58,12 @@ pub(super) enum OutputError {
         /// What the system says of the first.
         cause: io::Error,
     },
+    /// A folder that the program did not fill.
+    #[error("{}: is there already and was not made by tapjoint; give the name of a new folder, or write into it with --force", path.display())]
+    NotNew {
+        /// That folder.
+        path: PathBuf,
+    },
     /// A file must not be replaced.
     #[error(transparent)]
     NotReplaced(#[from] OverwriteError),
@@ -186,6 +192,20 @@ impl OutputFolder {
         })
     }
 
+    /// Prepares a folder that is new, empty, or has a list of what the program made in it; with `force` any.
+    ///
+    /// # Errors
+    /// [`OutputError`] when it cannot.
+    pub(super) fn prepare_own(path: &Path, force: bool) -> Result<Self, OutputError> {
+        let is_empty = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        if path.exists() && !is_empty && !force && !path.join(CHECKSUMS).is_file() {
+            return Err(OutputError::NotNew {
+                path: path.to_owned(),
+            });
+        }
+        Self::prepare(path)
+    }
+
     /// Adds a file to what will appear in the folder.
     ///
     /// # Errors
@@ -297,11 +317,20 @@ impl OutputFolder {
     }
 }
 
+/// All files in a folder that has a list of what the program made in it; empty for any other folder.
+pub(super) fn files_made_in(folder: &Path) -> Vec<PathBuf> {
+    let names = match folder.join(CHECKSUMS).is_file() {
+        true => files_below(folder).unwrap_or_default(),
+        false => Vec::new(),
+    };
+    names.iter().map(|name| folder.join(name)).collect()
+}
+
 /// Names of all files in a folder and in the folders below it, as seen from the folder, in order.
 ///
 /// # Errors
 /// A folder cannot be read.
-pub(super) fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
+fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);
     let mut files = Vec::new();

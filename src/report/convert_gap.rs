@@ -8,8 +8,8 @@ use super::document::{
 };
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{
-    Closure, DecayFinding, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult,
-    JointShift, LeftOutRecordings, NextTest, PlaceMap, PlaceProbabilities, Pull, Unplaced, Verdict,
+    Closure, AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult,
+    JointShift, CrossValidation, NextTest, LocationMap, LocationProbabilities, Residual, UnlocatedSensors, Verdict,
 };
 
 /// The section of a diagnosis, or of the reason why there is none.
@@ -30,8 +30,8 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
     GapSection {
         verdict: verdict(&found.verdict),
         place: Some(GapPlaceSection {
-            probability: places(&found.places),
-            modes: found.pulls.iter().map(pull).collect(),
+            probability: places(&found.locations),
+            modes: found.residuals.iter().map(pull).collect(),
             worst_block: found.blocks.first().map(|block| block.name.clone()),
         }),
         hypotheses: found.hypotheses.iter().map(hypothesis).collect(),
@@ -39,23 +39,23 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         goodness_of_fit: found.goodness_of_fit,
         joint_shift: Some(shift(&found.joint_shift)),
         fitted_modes: Some(found.fitted_modes),
-        unplaced: found.unplaced.as_ref().map(unplaced),
+        unplaced: found.unlocated.as_ref().map(unplaced),
         decided_by: Some(
             match found.decided_by {
-                DecidedBy::Readings => "readings",
+                DecidedBy::Data => "readings",
                 DecidedBy::Priors => "priors",
             }
             .to_owned(),
         ),
-        along_decays: found.along_decays.as_ref().map(along_decays),
-        map: found.map.as_ref().map(map),
+        along_decays: found.amplitude_dependence.as_ref().map(along_decays),
+        map: found.location_map.as_ref().map(map),
         baselines: baselines(&found.hypotheses),
         next_test: found.next_tests.iter().map(next_test).collect(),
         updated_model: None,
     }
 }
 
-fn unplaced(found: &Unplaced) -> UnplacedSection {
+fn unplaced(found: &UnlocatedSensors) -> UnplacedSection {
     UnplacedSection {
         sensors: found.sensors.clone(),
         mass: found.mass,
@@ -64,7 +64,7 @@ fn unplaced(found: &Unplaced) -> UnplacedSection {
     }
 }
 
-fn along_decays(found: &DecayFinding) -> AlongDecaysSection {
+fn along_decays(found: &AmplitudeDependence) -> AlongDecaysSection {
     AlongDecaysSection {
         effect: found
             .is_of_joint()
@@ -109,7 +109,7 @@ fn verdict(found: &Verdict) -> GapVerdictSection {
     }
 }
 
-fn places(p: &PlaceProbabilities) -> std::collections::BTreeMap<String, f64> {
+fn places(p: &LocationProbabilities) -> std::collections::BTreeMap<String, f64> {
     [
         ("joint", p.joint),
         ("fixture", p.fixture),
@@ -122,7 +122,7 @@ fn places(p: &PlaceProbabilities) -> std::collections::BTreeMap<String, f64> {
     .into()
 }
 
-fn pull(pull: &Pull) -> PullSection {
+fn pull(pull: &Residual) -> PullSection {
     PullSection {
         mode: pull.mode,
         recording: pull.recording.clone(),
@@ -154,7 +154,7 @@ fn hypothesis(found: &HypothesisResult) -> HypothesisSection {
             value: parameter.value,
             std: parameter.std,
             smallest_detectable: parameter.smallest_detectable,
-            smallest_isolable: parameter.smallest_isolable,
+            smallest_isolable: parameter.smallest_separable,
         };
         (name, section)
     });
@@ -171,12 +171,12 @@ fn hypothesis(found: &HypothesisResult) -> HypothesisSection {
         parameters: parameters.collect(),
         gap_before: Some(found.gap_before),
         gap_after: found.gap_after,
-        left_out_after: found.left_out_after,
-        withheld_before: found.withheld_before,
-        withheld_after: found.withheld_after,
-        withheld_floor: found.withheld_floor,
+        left_out_after: found.left_out_modes,
+        withheld_before: found.holdout_before,
+        withheld_after: found.holdout_after,
+        withheld_floor: found.holdout_floor,
         closure: found.closure.as_ref().map(closure),
-        left_out_recordings: found.left_out_recordings.as_ref().map(left_out),
+        left_out_recordings: found.cross_validation.as_ref().map(left_out),
         goodness_of_fit: found.goodness_of_fit,
         joint_shift: shift(&found.joint_shift),
         joint: found.joint,
@@ -192,7 +192,7 @@ fn closure(closure: &Closure) -> ClosureSection {
     }
 }
 
-fn left_out(found: &LeftOutRecordings) -> LeftOutSection {
+fn left_out(found: &CrossValidation) -> LeftOutSection {
     let recordings = found.recordings.iter();
     LeftOutSection {
         before: found.before,
@@ -210,7 +210,7 @@ fn left_out(found: &LeftOutRecordings) -> LeftOutSection {
     }
 }
 
-fn map(map: &PlaceMap) -> PlaceMapSection {
+fn map(map: &LocationMap) -> PlaceMapSection {
     let share = |fall: &f64| match map.misfit > 0.0 {
         true => fall / map.misfit,
         false => 0.0,
@@ -230,12 +230,12 @@ fn map(map: &PlaceMap) -> PlaceMapSection {
 
 fn next_test(test: &NextTest) -> NextTestSection {
     NextTestSection {
-        id: test.step.id().to_owned(),
+        id: test.proposal.id().to_owned(),
         action: test.action.clone(),
         separates: test.separates.clone(),
         unpredicted: test.unpredicted.clone(),
-        bits: test.bits,
-        effort: test.step.effort(),
+        bits: test.expected_information,
+        effort: test.proposal.effort(),
     }
 }
 
@@ -248,7 +248,7 @@ fn baselines(hypotheses: &[HypothesisResult]) -> Vec<BaselineSection> {
         Some(BaselineSection {
             name: name.to_owned(),
             gap_after: found.gap_after,
-            withheld_after: found.withheld_after,
+            withheld_after: found.holdout_after,
         })
     };
     [

@@ -3,7 +3,7 @@
 use super::super::document::{GapSection, HypothesisSection, UnplacedSection};
 use super::super::format::{probability, trimmed};
 use super::hypotheses::{LEAST_PROBABILITY, left, percent, sizes};
-use tapjoint_diagnosis::{MISFIT, SEEN};
+use tapjoint_diagnosis::{DETECTED, MISFIT};
 
 pub(super) fn verdict(gap: &GapSection, has_joint: bool) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));
@@ -68,7 +68,7 @@ fn no_gap(gap: &GapSection) -> String {
     let open = match first.filter(|first| first.effect != "none") {
         Some(_) => format!(
             " No effect is established: {:.0} to 1 against none is asked for.",
-            SEEN.exp()
+            DETECTED.exp()
         ),
         None => String::new(),
     };

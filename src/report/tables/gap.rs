@@ -11,7 +11,7 @@ use super::hypotheses::{left, percent, together};
 use super::next_tests::next_test;
 use super::verdict::{shows_gap, verdict};
 use tapjoint_beam::effects::{EffectId, Place};
-use tapjoint_diagnosis::{Closure, Hypothesis, HypothesisResult, Pull, Verdict};
+use tapjoint_diagnosis::{Closure, Hypothesis, HypothesisResult, Residual, Verdict};
 use tapjoint_numerics::stats::times;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
@@ -102,7 +102,7 @@ fn is_at_sensor(effects: &[EffectId]) -> bool {
 }
 
 /// "high.wav", or "high.wav (level 0.73)" where its taps were softer than the hardest.
-pub fn place_of(pull: &Pull) -> String {
+pub fn place_of(pull: &Residual) -> String {
     match pull.level {
         Some(level) if level < 0.999 => format!("{} (level {level:.2})", pull.recording),
         _ => pull.recording.clone(),
@@ -136,7 +136,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         left(found.gap_after, gap.noise_floor),
     );
     text.push_str(&by_drift(gap, found, has_joint));
-    if let Some((before, after)) = found.withheld_before.zip(found.withheld_after) {
+    if let Some((before, after)) = found.holdout_before.zip(found.holdout_after) {
         text.push_str(&format!(
             "; on frequencies that took no part from {} to {} %",
             percent(Some(before)),
@@ -146,7 +146,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     if let Some(closure) = &found.closure {
         text.push_str(&share(closure));
     }
-    if let Some(left_out) = &found.left_out_recordings {
+    if let Some(left_out) = &found.cross_validation {
         text.push_str(&format!(
             "; on recordings predicted from the others from {} to {} %",
             percent(Some(left_out.before)),

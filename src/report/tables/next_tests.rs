@@ -3,7 +3,7 @@
 use super::super::document::{Document, GapSection};
 use super::super::format::MISSING;
 use super::{Table, number, words};
-use tapjoint_diagnosis::{NextTest, Step, Verdict};
+use tapjoint_diagnosis::{NextTest, Proposal, Verdict};
 
 /// The test that tells most for its effort; what it is for depends on the answer.
 pub(super) fn next_test(gap: &GapSection) -> Option<String> {
@@ -19,7 +19,7 @@ pub(super) fn next_test(gap: &GapSection) -> Option<String> {
     Some(format!(
         "{purpose}: {} (about {:.2} bit{premise}; it tells {} apart{}).",
         test.action,
-        test.bits,
+        test.expected_information,
         test.separates.join(", "),
         not_predicted(test, "; it could not be predicted for ")
     ))
@@ -27,7 +27,7 @@ pub(super) fn next_test(gap: &GapSection) -> Option<String> {
 
 /// Whether a test tells nothing new about which hypothesis holds.
 fn confirms(test: &NextTest) -> bool {
-    matches!(test.step, Step::Confirm { .. })
+    matches!(test.proposal, Proposal::Confirm { .. })
 }
 
 /// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
@@ -57,7 +57,7 @@ pub fn next_tests(document: &Document) -> Option<Table> {
             test.action.clone() + &not_predicted(test, "; could not be predicted for "),
             match confirms(test) {
                 true => MISSING.to_owned(),
-                false => format!("{:.2}", test.bits),
+                false => format!("{:.2}", test.expected_information),
             },
             format!("{:.0}", test.effort),
             test.separates.join(", "),

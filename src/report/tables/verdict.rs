@@ -4,7 +4,7 @@ use super::super::document::GapSection;
 use super::super::format::{probability, trimmed};
 use super::hypotheses::{LEAST_PROBABILITY, left, names, percent, sizes};
 use tapjoint_beam::effects::EffectId;
-use tapjoint_diagnosis::{Hypothesis, HypothesisResult, MISFIT, SEEN, Unplaced, Verdict};
+use tapjoint_diagnosis::{Hypothesis, HypothesisResult, MISFIT, DETECTED, UnlocatedSensors, Verdict};
 
 pub(super) fn verdict(gap: &GapSection, has_joint: bool) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));
@@ -79,7 +79,7 @@ fn no_gap(gap: &GapSection) -> String {
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
             " No effect is established: {:.0} to 1 against none is asked for.",
-            SEEN.exp()
+            DETECTED.exp()
         ),
         None => String::new(),
     };
@@ -123,7 +123,7 @@ pub fn shows_gap(gap: &GapSection) -> bool {
 }
 
 /// What the model misses without masses that sat nobody knows where, if it does.
-fn misfit_unplaced(gap: &GapSection) -> Option<&Unplaced> {
+fn misfit_unplaced(gap: &GapSection) -> Option<&UnlocatedSensors> {
     let unplaced = gap.unplaced.as_ref();
     unplaced.filter(|one| one.goodness_of_fit < MISFIT)
 }

@@ -49,7 +49,11 @@ fn recover_a_sensor_mass_that_the_model_left_out() {
         diagnosis.verdict,
         Verdict::Named(vec![EffectId::SensorMass])
     );
-    assert!(diagnosis.locations.sensor > 0.9, "{:?}", diagnosis.locations);
+    assert!(
+        diagnosis.locations.sensor > 0.9,
+        "{:?}",
+        diagnosis.locations
+    );
     let found = result(&diagnosis, "sensor-mass");
     let mass = &found.parameters[0];
     // Four standard uncertainties: one case in 16 000 misses.

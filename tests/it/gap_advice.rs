@@ -57,7 +57,9 @@ fn with_test(step: &Proposal) -> Option<TestPlan> {
             plan.configurations
                 .push(recording(0.8 * LENGTH, level.min(1.0)));
         }
-        Proposal::MoveSensor { position, .. } => plan.configurations.push(recording(*position, 1.0)),
+        Proposal::MoveSensor { position, .. } => {
+            plan.configurations.push(recording(*position, 1.0))
+        }
         Proposal::KnownMass { mass, position } => {
             let mut heavier = first;
             heavier.masses.push(PointMass {
@@ -110,8 +112,12 @@ fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
             .filter(|test| with_test(&test.proposal).is_some())
             .collect();
         let (Some(first), Some(least)) = (
-            makeable.iter().max_by(|a, b| a.expected_information.total_cmp(&b.expected_information)),
-            makeable.iter().min_by(|a, b| a.expected_information.total_cmp(&b.expected_information)),
+            makeable
+                .iter()
+                .max_by(|a, b| a.expected_information.total_cmp(&b.expected_information)),
+            makeable
+                .iter()
+                .min_by(|a, b| a.expected_information.total_cmp(&b.expected_information)),
         ) else {
             continue;
         };
@@ -205,7 +211,12 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     let none = of("none");
     assert!(none.after > 0.5 * none.before, "{none:?}");
     // What is left to confirm is little: the answer is all but certain.
-    assert!(diagnosis.next_tests.iter().all(|test| test.expected_information < 0.2));
+    assert!(
+        diagnosis
+            .next_tests
+            .iter()
+            .all(|test| test.expected_information < 0.2)
+    );
 }
 
 #[test]

@@ -7,7 +7,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use tapjoint::description::TestDescription;
 use tapjoint::effects::{Effect, EffectId, JointLaw, ModeMotion};
-use tapjoint::gap::{FrequencyChange, AmplitudeDependence, Diagnosis, GapSettings, Hypothesis, Verdict};
+use tapjoint::gap::{
+    AmplitudeDependence, Diagnosis, FrequencyChange, GapSettings, Hypothesis, Verdict,
+};
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::{WavFormat, write_wav};
 use tapjoint::simulate::{Laboratory, TestPlan, VirtualTest, believed_description, plan_test};
@@ -145,7 +147,9 @@ fn val_the_bolted_beam_softens_and_is_no_pair_of_springs() {
     assert!(found.effect.is_some(), "{found:?}");
     // So it does where the band holds four modes.
     let narrow = text.replace("[[recording]]", "[[recording]]\nband = [0, 900]");
-    let narrow = diagnosed(&narrow, Path::new(".")).amplitude_dependence.unwrap();
+    let narrow = diagnosed(&narrow, Path::new("."))
+        .amplitude_dependence
+        .unwrap();
     assert!(narrow.effect.is_some() && narrow.ratio < 0.0, "{narrow:?}");
     let first = found
         .changes

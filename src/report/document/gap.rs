@@ -6,7 +6,7 @@ use serde::Serialize;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{
     AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
-    NextTest, LocationMap, LocationProbabilities, Residual, UnlocatedSensors, Verdict,
+    LocationMap, LocationProbabilities, NextTest, Residual, UnlocatedSensors, Verdict,
 };
 
 /// The gap between model and measurement.

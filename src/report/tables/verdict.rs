@@ -4,7 +4,9 @@ use super::super::document::GapSection;
 use super::super::format::{probability, trimmed};
 use super::hypotheses::{LEAST_PROBABILITY, left, names, percent, sizes};
 use tapjoint_beam::effects::EffectId;
-use tapjoint_diagnosis::{Hypothesis, HypothesisResult, MISFIT, DETECTED, UnlocatedSensors, Verdict};
+use tapjoint_diagnosis::{
+    DETECTED, Hypothesis, HypothesisResult, MISFIT, UnlocatedSensors, Verdict,
+};
 
 pub(super) fn verdict(gap: &GapSection, has_joint: bool) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));

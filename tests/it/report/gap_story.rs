@@ -2,8 +2,8 @@
 
 use tapjoint::effects::EffectId;
 use tapjoint::gap::{
-    FrequencyChange, AmplitudeDependence, Hypothesis, HypothesisResult, JointShift, NextTest, ParameterValue,
-    LocationProbabilities, Residual, Proposal, Verdict,
+    AmplitudeDependence, FrequencyChange, Hypothesis, HypothesisResult, JointShift,
+    LocationProbabilities, NextTest, ParameterValue, Proposal, Residual, Verdict,
 };
 use tapjoint::report::document::{
     Baseline, BaselineSection, Document, GapPlaceSection, GapSection, RecordingSection, TestSection,

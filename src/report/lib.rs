@@ -4,10 +4,11 @@
 
 pub mod blind_check;
 pub mod brief;
+pub mod chart;
+pub mod charts;
 mod convert;
 mod convert_datasets;
 mod convert_estimate;
-mod convert_figures;
 mod convert_fit;
 mod convert_gap;
 mod convert_perturbation;
@@ -27,13 +28,6 @@ pub mod figures;
 pub mod format;
 mod gap_text;
 pub mod html;
-pub mod live;
-pub mod live_amplitude;
-pub mod live_close_up;
-mod live_lines;
-pub mod live_model;
-pub mod live_points;
-pub mod plot;
 pub mod summary;
 pub mod tables;
 pub mod text;
@@ -56,12 +50,12 @@ pub use convert::{
     prediction as prediction_of,
 };
 pub use convert_datasets::datasets as datasets_of;
-pub use convert_figures::{figures as figures_of, frf_figure};
 pub use convert_frf::{frf_document, render_frf_csv};
 pub use convert_gap::gap_section;
 pub use csv::{render_modes_csv, render_parameters_csv};
 pub use csv_perturbation::render_perturbation_csv;
 pub use earlier::{MODEL_FILE, earlier_files};
+pub use figures::{figures as figures_of, frf_figure};
 pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;
 pub use html::render_html;

@@ -4,7 +4,8 @@
 
 pub mod blind_check;
 pub mod brief;
-mod convert_figures;
+pub mod chart;
+pub mod charts;
 pub mod deck;
 pub mod document;
 mod earlier;
@@ -12,13 +13,6 @@ pub mod figures;
 pub mod format;
 mod gap_text;
 pub mod html;
-pub mod live;
-pub mod live_amplitude;
-pub mod live_close_up;
-mod live_lines;
-pub mod live_model;
-pub mod live_points;
-pub mod plot;
 pub mod summary;
 pub mod tables;
 pub mod text;
@@ -33,12 +27,12 @@ mod short_names;
 mod stages;
 mod text_table;
 
-pub use convert_figures::{figures as figures_of, frf_figure};
 pub use csv::{render_frf_csv, render_modes_csv, render_parameters_csv, render_perturbation_csv};
 pub use document::{
     datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
 };
 pub use earlier::{MODEL_FILE, earlier_files};
+pub use figures::{figures as figures_of, frf_figure};
 pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;
 pub use html::render_html;

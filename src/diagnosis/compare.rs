@@ -1,7 +1,7 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
 use crate::amplitude::{set_joint_motions, set_levels};
-use crate::dataset::{Dataset, Observable};
+use crate::dataset::{Dataset, ObservableKind};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, fit_nominal};
@@ -339,11 +339,11 @@ fn with_discrepancy(dataset: &Dataset, spread: f64) -> Dataset {
     let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
     let size = root_mean_square(&values);
     for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
-        let extra = match observable {
-            Observable::Constant { .. } | Observable::Ratio { .. } => 2.0 * spread * size,
+        let extra = match observable.kind {
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => 2.0 * spread * size,
             // Damping may be anything if the cause is not known.
-            Observable::Damping { .. } => 50.0 * spread,
-            Observable::Frequency { .. } | Observable::Slope { .. } => 0.1 * spread,
+            ObservableKind::Damping => 50.0 * spread,
+            ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
         };
         datum.std = datum.std.hypot(extra);
     }

@@ -25,70 +25,66 @@ use tapjoint_numerics::stats::root_mean_square;
 
 /// Quantity that is observed and predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Observable {
+pub struct Observable {
+    /// Kind of quantity.
+    pub kind: ObservableKind,
+    /// Index of its configuration; 0 for a damping ratio, which belongs to all configurations together.
+    pub configuration: usize,
+    /// Number of its mode.
+    pub mode: usize,
+}
+
+/// Kind of an observable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObservableKind {
     /// Logarithm of a natural frequency.
-    Frequency { configuration: usize, mode: usize },
+    Frequency,
     /// Modal constant at a sensor and the tap (1/kg).
-    Constant {
-        configuration: usize,
-        mode: usize,
-        sensor: usize,
-    },
+    Constant { sensor: usize },
     /// Shape at a sensor over that at the reference sensor (1).
-    Ratio {
-        configuration: usize,
-        mode: usize,
-        sensor: usize,
-        reference: usize,
-    },
-    /// Logarithm of a damping ratio, all configurations together.
-    Damping { mode: usize },
+    Ratio { sensor: usize, reference: usize },
+    /// Logarithm of a damping ratio.
+    Damping,
     /// Change of the logarithm of a frequency per e-fold of the amplitude along the decay (1).
-    Slope { configuration: usize, mode: usize },
+    Slope,
 }
 
 impl Observable {
+    /// Returns a natural frequency.
+    pub fn frequency(configuration: usize, mode: usize) -> Self {
+        Observable {
+            kind: ObservableKind::Frequency,
+            configuration,
+            mode,
+        }
+    }
+
+    /// Returns another quantity of the same mode.
+    fn with_kind(self, kind: ObservableKind) -> Self {
+        Observable { kind, ..self }
+    }
+
     /// Returns whether it is a natural frequency.
     pub fn is_frequency(&self) -> bool {
-        matches!(self, Observable::Frequency { .. })
+        self.kind == ObservableKind::Frequency
+    }
+
+    /// Returns whether it is a change along the decay.
+    pub fn is_slope(&self) -> bool {
+        self.kind == ObservableKind::Slope
+    }
+
+    /// Returns whether it is a damping ratio.
+    pub fn is_damping(&self) -> bool {
+        self.kind == ObservableKind::Damping
     }
 
     /// Returns whether it is a modal constant or a ratio of a shape.
     pub fn is_shape(&self) -> bool {
-        matches!(self, Observable::Constant { .. } | Observable::Ratio { .. })
-    }
-
-    /// Returns configuration and mode of a natural frequency.
-    pub fn as_frequency(&self) -> Option<(usize, usize)> {
-        match *self {
-            Observable::Frequency {
-                configuration,
-                mode,
-            } => Some((configuration, mode)),
-            _ => None,
-        }
-    }
-
-    /// Returns configuration and mode of a change along the decay.
-    pub fn as_slope(&self) -> Option<(usize, usize)> {
-        match *self {
-            Observable::Slope {
-                configuration,
-                mode,
-            } => Some((configuration, mode)),
-            _ => None,
-        }
-    }
-
-    /// Returns its configuration; `None` for a damping ratio, which belongs to all.
-    pub fn configuration(&self) -> Option<usize> {
-        match *self {
-            Observable::Frequency { configuration, .. }
-            | Observable::Constant { configuration, .. }
-            | Observable::Ratio { configuration, .. }
-            | Observable::Slope { configuration, .. } => Some(configuration),
-            Observable::Damping { .. } => None,
-        }
+        matches!(
+            self.kind,
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. }
+        )
     }
 }
 
@@ -370,10 +366,7 @@ impl Dataset {
             // Anywhere between the poles of a decay that was split, on either side of this one.
             let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
             datum.inflate_std(split.hypot(average_std(observed)));
-            let observable = Observable::Frequency {
-                configuration,
-                mode,
-            };
+            let observable = Observable::frequency(configuration, mode);
             if mode > self.fitted_modes {
                 self.holdout.push((observable, datum));
             } else {
@@ -396,7 +389,7 @@ impl Dataset {
         for (configuration, one) in observations.configurations.iter().enumerate() {
             let modes = one.modes.iter();
             for observed in modes.filter(|mode| mode.mode <= self.fitted_modes) {
-                let mode = observed.mode;
+                let own = Observable::frequency(configuration, observed.mode);
                 let Some(reference) = observed.reference.filter(|&sensor| is_placed(one, sensor))
                 else {
                     continue;
@@ -407,24 +400,15 @@ impl Dataset {
                 if let (Some(constant), Some(_)) = (observed.constant, one.tap) {
                     let mut datum = Datum::new(constant.value, constant.std, constant.freedom);
                     datum.inflate_std(constant.value * constant_model_std(observed));
-                    let observable = Observable::Constant {
-                        configuration,
-                        mode,
-                        sensor: reference,
-                    };
-                    constants.push((observable, datum));
+                    let kind = ObservableKind::Constant { sensor: reference };
+                    constants.push((own.with_kind(kind), datum));
                 }
                 for value in &observed.shape {
                     let sensor = value.sensor;
                     if sensor != reference && is_placed(one, sensor) && value.std > 0.0 {
-                        let observable = Observable::Ratio {
-                            configuration,
-                            mode,
-                            sensor,
-                            reference,
-                        };
+                        let kind = ObservableKind::Ratio { sensor, reference };
                         let datum = Datum::new(value.value, value.std, observed.freedom);
-                        ratios.push((observable, datum));
+                        ratios.push((own.with_kind(kind), datum));
                     }
                 }
             }
@@ -457,7 +441,8 @@ impl Dataset {
             if weights > 0.0 {
                 let std = weights.powf(-0.5).hypot(settings.damping_scatter);
                 let datum = Datum::new(sum / weights, std, None);
-                self.push(Observable::Damping { mode }, datum);
+                let own = Observable::frequency(0, mode);
+                self.push(own.with_kind(ObservableKind::Damping), datum);
                 self.tilts.push((mode, observed[0].frequency.ln()));
             }
         }
@@ -475,12 +460,8 @@ impl Dataset {
                     && mode.mode <= self.fitted_modes
                 {
                     datum.inflate_std(SLOPE_FLOOR);
-                    let mode = mode.mode;
-                    let slope = Observable::Slope {
-                        configuration,
-                        mode,
-                    };
-                    self.push(slope, datum);
+                    let own = Observable::frequency(configuration, mode.mode);
+                    self.push(own.with_kind(ObservableKind::Slope), datum);
                 }
             }
         }
@@ -555,7 +536,7 @@ impl Dataset {
     fn add_positions_and_gains(&mut self, inventory: &Inventory, settings: &GapSettings) {
         use NuisanceParameter::{Gain, SensorPosition, TapPosition};
         let mut observables = self.observables.iter();
-        let constants = observables.any(|one| matches!(one, Observable::Constant { .. }));
+        let constants = observables.any(|one| matches!(one.kind, ObservableKind::Constant { .. }));
         let shapes = self.observables.iter().any(Observable::is_shape);
         for position in 0..inventory.positions.len() {
             self.add_nuisance(SensorPosition { position }, 0.0, settings.position_std);
@@ -578,7 +559,7 @@ impl Dataset {
     fn add_damping_level(&mut self, settings: &GapSettings) {
         let (mut count, mut sum) = (0.0, 0.0);
         for (observable, datum) in self.observables.iter().zip(&self.data) {
-            if matches!(observable, Observable::Damping { .. }) {
+            if observable.is_damping() {
                 count += 1.0;
                 sum += datum.value;
             }
@@ -629,7 +610,7 @@ impl Dataset {
 
     /// Indices of the changes along the decays among the observables.
     pub fn slopes(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.observables.len()).filter(|&row| self.observables[row].as_slope().is_some())
+        (0..self.observables.len()).filter(|&row| self.observables[row].is_slope())
     }
 
     /// Order of the parameters of a hypothesis with these effects.

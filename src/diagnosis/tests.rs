@@ -2,7 +2,7 @@
 
 use crate::amplitude::{sensitivity, set_joint_motions};
 use crate::compare::{MORE_MODES, set_shear_slopes};
-use crate::dataset::{Dataset, Datum, Observable};
+use crate::dataset::{Dataset, Datum, Observable, ObservableKind};
 use crate::evidence::Fit;
 use crate::fit::fit_nominal;
 use crate::forward::Forward;
@@ -263,16 +263,13 @@ fn datum(dataset: &Dataset, observable: Observable) -> Datum {
 }
 
 fn frequency(configuration: usize, mode: usize) -> Observable {
-    Observable::Frequency {
-        configuration,
-        mode,
-    }
+    Observable::frequency(configuration, mode)
 }
 
 fn slope(configuration: usize, mode: usize) -> Observable {
-    Observable::Slope {
-        configuration,
-        mode,
+    Observable {
+        kind: ObservableKind::Slope,
+        ..frequency(configuration, mode)
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A real cause explains data that took no part in the fit.
 
-use crate::dataset::{Dataset, Datum, Observable, chi_square_tail};
+use crate::dataset::{Dataset, Datum, Observable, ObservableKind, chi_square_tail};
 use crate::evidence::{Fit, log_sum};
 use crate::forward::Forward;
 use crate::least_squares::{Model, maximise};
@@ -124,10 +124,7 @@ impl Residuals {
         for mode in 1..=dataset.fitted_modes {
             let rows: Vec<usize> = dataset
                 .frequencies()
-                .filter(|&row| {
-                    let own = dataset.observables[row].as_frequency();
-                    own.is_some_and(|(_, own)| own == mode)
-                })
+                .filter(|&row| dataset.observables[row].mode == mode)
                 .collect();
             if !rows.is_empty() {
                 let predicted = self.predictor(&rows)? * &self.raw;
@@ -184,21 +181,18 @@ fn block_rows(dataset: &Dataset) -> Vec<(String, Vec<usize>)> {
     let mut blocks: Vec<(String, Vec<usize>)> = Vec::new();
     for (row, observable) in dataset.observables.iter().enumerate() {
         let mut names = Vec::new();
-        match *observable {
-            Observable::Frequency {
-                configuration,
-                mode,
-            } => {
-                names.push(format!("mode {mode}"));
+        match observable.kind {
+            ObservableKind::Frequency => {
+                names.push(format!("mode {}", observable.mode));
                 if dataset.arrangements.len() > 1 {
-                    names.push(dataset.arrangements[configuration].label());
+                    names.push(dataset.arrangements[observable.configuration].label());
                 }
             }
-            Observable::Constant { .. } | Observable::Ratio { .. } => {
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
                 names.push("shapes".to_string());
             }
-            Observable::Damping { .. } => names.push("damping".to_string()),
-            Observable::Slope { .. } => names.push("along the decays".to_string()),
+            ObservableKind::Damping => names.push("damping".to_string()),
+            ObservableKind::Slope => names.push("along the decays".to_string()),
         }
         for name in names {
             match blocks.iter_mut().find(|block| block.0 == name) {
@@ -221,22 +215,21 @@ pub fn frequency_residuals(
     before: &Residuals,
     after: &Residuals,
 ) -> Vec<Residual> {
-    let mut all = Vec::new();
-    for (row, observable) in dataset.observables.iter().enumerate() {
-        if let Some((configuration, mode)) = observable.as_frequency() {
-            let std = dataset.data[row].std;
-            all.push(Residual {
-                mode,
-                recording: dataset.arrangements[configuration].file.clone(),
-                level: dataset.arrangements[configuration].known_level,
-                error_percent: percent_of(before.raw[row]),
-                z: -before.raw[row] / std,
-                error_percent_after: percent_of(after.raw[row]),
-                z_after: -after.raw[row] / std,
-            });
+    let rows = dataset.frequencies();
+    rows.map(|row| {
+        let (observable, std) = (&dataset.observables[row], dataset.data[row].std);
+        let arrangement = &dataset.arrangements[observable.configuration];
+        Residual {
+            mode: observable.mode,
+            recording: arrangement.file.clone(),
+            level: arrangement.known_level,
+            error_percent: percent_of(before.raw[row]),
+            z: -before.raw[row] / std,
+            error_percent_after: percent_of(after.raw[row]),
+            z_after: -after.raw[row] / std,
         }
-    }
-    all
+    })
+    .collect()
 }
 
 /// Errors of one fit on frequencies that took no part in it.
@@ -501,8 +494,8 @@ fn predict_setup(
 ) -> Option<(Vec<usize>, DMatrix<f64>)> {
     let rows: Vec<usize> = (0..dataset.observables.len())
         .filter(|&row| {
-            let configuration = dataset.observables[row].configuration();
-            configuration.is_some_and(|k| dataset.arrangements[k].setup == setup)
+            let one = &dataset.observables[row];
+            !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
         })
         .collect();
     let frequencies: Vec<usize> = (0..rows.len())

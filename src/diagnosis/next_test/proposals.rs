@@ -158,7 +158,10 @@ impl PlannedTests {
         let mut planned = Vec::new();
         for configuration in 0..self.whole.arrangements.len() {
             for mode in first..=last {
-                planned.push((frequency(configuration, mode), std_of(dataset, mode)));
+                planned.push((
+                    Observable::frequency(configuration, mode),
+                    std_of(dataset, mode),
+                ));
             }
         }
         let proposal = Proposal::HigherModes {
@@ -172,8 +175,12 @@ impl PlannedTests {
     /// Plans to read on finer lines.
     fn read_finer(&mut self, dataset: &Dataset) {
         if let Some(bias) = dataset.nominal.reading_bias {
-            let planned = observed_modes(dataset)
-                .map(|mode| (frequency(0, mode), std_without_bias(dataset, mode, bias)));
+            let planned = observed_modes(dataset).map(|mode| {
+                (
+                    Observable::frequency(0, mode),
+                    std_without_bias(dataset, mode, bias),
+                )
+            });
             let proposal = Proposal::FinerLines {
                 spacing: 2.0 * FIT_BIAS * bias,
             };
@@ -308,17 +315,15 @@ impl PlannedTests {
     }
 }
 
-fn frequency(configuration: usize, mode: usize) -> Observable {
-    Observable::Frequency {
-        configuration,
-        mode,
-    }
-}
-
 /// Returns the frequencies of all observed modes in a configuration, as uncertain as so far.
 fn planned_frequencies(dataset: &Dataset, configuration: usize) -> Planned {
     observed_modes(dataset)
-        .map(|mode| (frequency(configuration, mode), std_of(dataset, mode)))
+        .map(|mode| {
+            (
+                Observable::frequency(configuration, mode),
+                std_of(dataset, mode),
+            )
+        })
         .collect()
 }
 
@@ -332,7 +337,7 @@ fn stds_of(dataset: &Dataset, wanted: usize) -> Vec<f64> {
     let fitted = dataset.observables.iter().zip(&dataset.data);
     let held_out = dataset.holdout.iter().map(|(one, datum)| (one, datum));
     let all = fitted.chain(held_out);
-    let own = all.filter(|(one, _)| one.as_frequency().is_some_and(|(_, mode)| mode == wanted));
+    let own = all.filter(|(one, _)| one.is_frequency() && one.mode == wanted);
     own.map(|(_, datum)| datum.std).collect()
 }
 
@@ -348,11 +353,7 @@ fn std_of(dataset: &Dataset, mode: usize) -> f64 {
 fn std_without_bias(dataset: &Dataset, mode: usize, bias: f64) -> f64 {
     let std = std_of(dataset, mode);
     let mut frequencies = dataset.frequencies();
-    let own = frequencies.find(|&row| {
-        let frequency = dataset.observables[row].as_frequency();
-        frequency.is_some_and(|(_, own)| own == mode)
-    });
-    let Some(own) = own else {
+    let Some(own) = frequencies.find(|&row| dataset.observables[row].mode == mode) else {
         return std;
     };
     let line = bias / 3.0_f64.sqrt() / dataset.data[own].value.exp();

@@ -189,15 +189,15 @@ pub fn amplitude_dependence(dataset: &Dataset, nominal: &Fit) -> Option<Amplitud
             explained: 100.0 * explained,
         });
     }
-    Some(AmplitudeDependence {
-        ratio: found.law.ratio,
-        ratio_std: found.std,
-        exponent: found.law.exponent,
+    // Size and exponent were fitted.
+    let goodness_of_fit = chi_square_tail(chi_square, count - 2.0);
+    Some(AmplitudeDependence::new(
+        found.law,
+        found.std,
         chance,
-        // Size and exponent were fitted.
-        goodness_of_fit: chi_square_tail(chi_square, count - 2.0),
+        goodness_of_fit,
         changes,
-    })
+    ))
 }
 
 /// Sets the relative amplitude of the joint's rotation in each configuration. If a tap has no

@@ -36,18 +36,25 @@ pub fn location_map(dataset: &Dataset, nominal: &Fit) -> Option<LocationMap> {
     let (stiffness, stiffness_std) = changes(dataset, nominal, &of_stiffness)?;
     let (mass, mass_std) = changes(dataset, nominal, &of_mass)?;
     let piece = length / PIECES as f64;
+    // All that the described model leaves.
+    let misfit = 2.0 * nominal.best.optimum.objective;
     Some(LocationMap {
         positions: (0..PIECES).map(|j| piece * (j as f64 + 0.5)).collect(),
         stiffness,
         stiffness_std,
-        stiffness_alone: alone(dataset, nominal, &of_stiffness)?,
         mass,
         mass_std,
-        mass_alone: alone(dataset, nominal, &of_mass)?,
-        misfit: 2.0 * nominal.best.optimum.objective,
+        stiffness_explains: explained(alone(dataset, nominal, &of_stiffness)?, misfit),
+        mass_explains: explained(alone(dataset, nominal, &of_mass)?, misfit),
         // The energy of the highest mode resolves half its wave.
         resolution: length / dataset.fitted_modes as f64,
     })
+}
+
+/// Returns shares of the misfit from decreases of chi square.
+fn explained(decreases: Vec<f64>, misfit: f64) -> Vec<f64> {
+    let shares = decreases.into_iter();
+    shares.map(|decrease| if misfit > 0.0 { decrease / misfit } else { 0.0 }).collect()
 }
 
 /// Returns the slope of each observable with respect to the change of each piece.

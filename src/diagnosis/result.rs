@@ -1,7 +1,10 @@
 //! The result of a diagnosis, as plain data.
 
 use crate::thresholds::{DIRECTED_CHANGE, LAW_MISFIT, LEAST_DIRECTED};
-use tapjoint_beam::effects::{Effect, EffectId, Group};
+use schemars::JsonSchema;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
+use tapjoint_beam::effects::{Effect, EffectId, Group, JointLaw, Place};
 
 /// Answer of the diagnosis.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,9 +43,11 @@ pub struct Diagnosis {
 }
 
 /// Kind of answer.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "WrittenVerdict")]
 pub enum Verdict {
     /// The nominal model explains the data within their uncertainty.
+    #[default]
     NoGap,
     /// One effect, or two where both are needed.
     Named(Vec<EffectId>),
@@ -68,12 +73,57 @@ impl Verdict {
             Verdict::NotEnoughData(_) => "not-enough-data",
         }
     }
+
+    /// The hypotheses among which the cause is: one, both effects of which are needed, or several.
+    pub fn hypotheses(&self) -> Vec<Hypothesis> {
+        match self {
+            Verdict::Named(effects) => vec![Hypothesis::Effects(effects.clone())],
+            Verdict::Group(effects) => {
+                let single = |effect: &EffectId| Hypothesis::Effects(vec![*effect]);
+                effects.iter().map(single).collect()
+            }
+            Verdict::Set(list) => list.clone(),
+            Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
+        }
+    }
+}
+
+/// A verdict as `report.json` has it.
+#[derive(Serialize, JsonSchema)]
+#[schemars(rename = "Verdict")]
+struct WrittenVerdict {
+    /// "no-gap", "named", "group", "set", "unknown" or "not-enough-data".
+    kind: &'static str,
+    /// The effects it names.
+    effects: Vec<String>,
+    /// Why there is no answer; null where there is one.
+    reason: Option<String>,
+}
+
+impl From<Verdict> for WrittenVerdict {
+    fn from(verdict: Verdict) -> Self {
+        let named = |effects: &[EffectId]| effects.iter().map(|id| id.name().to_owned()).collect();
+        WrittenVerdict {
+            kind: verdict.kind(),
+            effects: match &verdict {
+                Verdict::Named(effects) | Verdict::Group(effects) => named(effects),
+                Verdict::Set(list) => list.iter().map(Hypothesis::name).collect(),
+                _ => Vec::new(),
+            },
+            reason: match verdict {
+                Verdict::NotEnoughData(reason) => Some(reason),
+                _ => None,
+            },
+        }
+    }
 }
 
 /// Explanation that is tested.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(into = "String")]
 pub enum Hypothesis {
     /// The nominal model misses nothing.
+    #[default]
     None,
     /// One effect, or two.
     Effects(Vec<EffectId>),
@@ -95,12 +145,21 @@ impl Hypothesis {
     }
 }
 
+impl From<Hypothesis> for String {
+    fn from(hypothesis: Hypothesis) -> String {
+        hypothesis.name()
+    }
+}
+
 /// One hypothesis in the ranking.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct HypothesisResult {
     /// The hypothesis.
+    #[serde(rename = "effect")]
     pub hypothesis: Hypothesis,
     /// Groups of its effects; empty for `none` and `unknown`.
+    #[serde(rename = "group", serialize_with = "joined_groups")]
+    #[schemars(with = "Option<String>")]
     pub groups: Vec<Group>,
     /// Probability (1).
     pub probability: f64,
@@ -109,6 +168,8 @@ pub struct HypothesisResult {
     /// Effects whose best fit predicts the same data within what the data resolve.
     pub confounded_with: Vec<EffectId>,
     /// Values of its parameters.
+    #[serde(serialize_with = "by_name")]
+    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: Vec<ParameterValue>,
     /// Root mean square error of the fitted frequencies under the nominal model with one joint for all recordings (%).
     pub gap_before: f64,
@@ -116,26 +177,33 @@ pub struct HypothesisResult {
     /// predicts nothing.
     pub gap_after: Option<f64>,
     /// Root mean square error under this hypothesis, each mode predicted from the others (%).
+    #[serde(rename = "left_out_after")]
     pub left_out_modes: Option<f64>,
     /// Root mean square error of the hold-out frequencies under the nominal model, its joint free to drift between
     /// recordings as under every hypothesis (%).
+    #[serde(rename = "withheld_before")]
     pub holdout_before: Option<f64>,
     /// Root mean square error of the hold-out frequencies under this hypothesis (%).
+    #[serde(rename = "withheld_after")]
     pub holdout_after: Option<f64>,
     /// Root mean square error that the measurement uncertainty of the hold-out frequencies alone would leave (%).
+    #[serde(rename = "withheld_floor")]
     pub holdout_floor: Option<f64>,
     /// Share of the gap on hold-out data that the hypothesis closes; `None` where the gap is below
     /// two noise floors.
     pub closure: Option<Closure>,
     /// Each recording predicted from the others; `None` with fewer than three, and for improbable hypotheses.
+    #[serde(rename = "left_out_recordings")]
     pub cross_validation: Option<CrossValidation>,
     /// Goodness of fit.
     pub goodness_of_fit: Option<f64>,
     /// Chi square and degrees of freedom of that goodness of fit.
+    #[serde(skip)]
     pub misfit: Option<Misfit>,
     /// Change of the joint's stiffnesses.
     pub joint_shift: JointShift,
     /// The effects with their best values, to predict with.
+    #[serde(skip)]
     pub effects: Vec<Effect>,
     /// The joint's best stiffnesses (N/m, N m/rad); `None` without a joint.
     pub joint: Option<[f64; 2]>,
@@ -143,17 +211,42 @@ pub struct HypothesisResult {
     /// bounded by the data.
     pub joint_intervals: [Option<[f64; 2]>; 2],
     /// Best coupling of the joint's own model (1), without that of the effects.
+    #[serde(skip)]
     pub coupling: f64,
     /// Logarithm of the best common factor on all frequencies, within the tolerance of the geometry (1).
+    #[serde(skip)]
     pub scale: f64,
 }
 
+fn joined_groups<S: Serializer>(groups: &[Group], to: S) -> Result<S::Ok, S::Error> {
+    let names: Vec<&str> = groups.iter().map(|group| group.name()).collect();
+    (!names.is_empty()).then(|| names.join("+")).serialize(to)
+}
+
+fn by_name<S: Serializer>(parameters: &[ParameterValue], to: S) -> Result<S::Ok, S::Error> {
+    let mut effects = parameters.iter().map(|one| one.effect);
+    let first = effects.next();
+    let alone = effects.all(|effect| Some(effect) == first);
+    let key = |one: &ParameterValue| match alone {
+        true => one.name.to_owned(),
+        false => format!("{}.{}", one.effect.name(), one.name),
+    };
+    to.collect_map(
+        parameters
+            .iter()
+            .map(|one| (key(one), one))
+            .collect::<BTreeMap<_, _>>(),
+    )
+}
+
 /// Parameter of an effect.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ParameterValue {
     /// The effect.
+    #[serde(skip)]
     pub effect: EffectId,
     /// Name of the parameter.
+    #[serde(skip)]
     pub name: &'static str,
     /// Value (SI).
     pub value: f64,
@@ -163,11 +256,12 @@ pub struct ParameterValue {
     pub smallest_detectable: Option<f64>,
     /// Smallest value at which these data would separate the effect from every other; `None` where
     /// none would, and for parameters other than sizes.
+    #[serde(rename = "smallest_isolable")]
     pub smallest_separable: Option<f64>,
 }
 
 /// Share of a gap that is closed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Closure {
     /// (before^2 - after^2)/(before^2 - floor^2).
     pub value: f64,
@@ -178,10 +272,8 @@ pub struct Closure {
 }
 
 /// Recordings that are predicted from all others, each in turn.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CrossValidation {
-    /// Errors of each recording.
-    pub recordings: Vec<LeftOutRecording>,
     /// Root mean square error of all their frequencies under the nominal model (%).
     pub before: f64,
     /// Root mean square error under the hypothesis (%).
@@ -190,10 +282,12 @@ pub struct CrossValidation {
     pub floor: f64,
     /// Share of the gap that is closed; `None` where the gap is below two floors.
     pub closure: Option<Closure>,
+    /// Errors of each recording.
+    pub recordings: Vec<LeftOutRecording>,
 }
 
 /// Recording that is predicted from all others.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct LeftOutRecording {
     /// Name of the recording.
     pub recording: String,
@@ -206,7 +300,7 @@ pub struct LeftOutRecording {
 }
 
 /// Change of the joint's stiffnesses when the effect is added.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct JointShift {
     /// Translation (%); `None` where it is not fitted.
     pub kx_percent: Option<f64>,
@@ -215,24 +309,40 @@ pub struct JointShift {
 }
 
 /// Probabilities of where the gap lies, given that there is one; the six sum to 1.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LocationProbabilities {
-    /// The joint (1).
-    pub joint: f64,
-    /// The base under the joint (1).
-    pub fixture: f64,
-    /// The sensors (1).
-    pub sensor: f64,
-    /// The beam (1).
-    pub body: f64,
     /// Clocks and readings (1).
     pub acquisition: f64,
+    /// The beam (1).
+    pub body: f64,
+    /// The base under the joint (1).
+    pub fixture: f64,
+    /// The joint (1).
+    pub joint: f64,
+    /// The sensors (1).
+    pub sensor: f64,
     /// Outside the catalogue (1).
     pub unknown: f64,
 }
 
+impl LocationProbabilities {
+    /// Each place with its probability (1), the most probable first; `None` is a place unknown to the catalogue.
+    pub fn ranked(&self) -> [(Option<Place>, f64); 6] {
+        let mut places = [
+            (Some(Place::Acquisition), self.acquisition),
+            (Some(Place::Body), self.body),
+            (Some(Place::Fixture), self.fixture),
+            (Some(Place::Joint), self.joint),
+            (Some(Place::Sensor), self.sensor),
+            (None, self.unknown),
+        ];
+        places.sort_by(|a, b| b.1.total_cmp(&a.1));
+        places
+    }
+}
+
 /// Error of a fitted frequency.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Residual {
     /// Number of the mode.
     pub mode: usize,
@@ -269,33 +379,33 @@ pub struct Block {
 }
 
 /// Local changes of stiffness and of mass that the residual of the nominal model calls for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LocationMap {
     /// Centres of the pieces of the beam (m).
     pub positions: Vec<f64>,
     /// Relative change of the bending stiffness of each piece (1), if stiffness alone changes.
     pub stiffness: Vec<f64>,
-    /// Standard uncertainty of the stiffness changes (1).
+    /// Its standard uncertainty.
     pub stiffness_std: Vec<f64>,
-    /// Decrease of chi square if the stiffness of this piece alone changes. It peaks at the cause, while
-    /// changes of all pieces together are shared out among similar ones.
-    pub stiffness_alone: Vec<f64>,
     /// Relative change of the mass of each piece (1), if mass alone changes.
     pub mass: Vec<f64>,
-    /// Standard uncertainty of the mass changes (1).
+    /// Its standard uncertainty.
     pub mass_std: Vec<f64>,
-    /// Decrease of chi square if the mass of this piece alone changes.
-    pub mass_alone: Vec<f64>,
-    /// Chi square that the described model leaves.
-    pub misfit: f64,
+    /// Share of the misfit (1) that each piece would explain if its stiffness alone changed: it peaks where the
+    /// cause sits, while changes of all pieces together share it out among look-alikes.
+    pub stiffness_explains: Vec<f64>,
+    /// Share of the misfit (1) that each piece would explain if its mass alone changed.
+    pub mass_explains: Vec<f64>,
     /// Length over which a local change is smeared (m).
     pub resolution: f64,
 }
 
 /// Reason for the decision between the first hypothesis and the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum DecidedBy {
     /// The data: the likelihood ratio is 3 or more, or they refute the more probable hypothesis.
+    #[serde(rename = "readings")]
     Data,
     /// The priors: the data alone would leave both.
     Priors,
@@ -308,25 +418,37 @@ pub const LARGEST_STIFFNESS_CHANGE: f64 = 0.7;
 ///
 /// No other effect of the catalogue changes a frequency along a decay. It is therefore stated beside the
 /// verdict: a model may miss the frequencies for another reason while its joint softens.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudeDependence {
+    /// "joint-nonlinearity" where a joint does that: a law of its rotation explains the changes, or all frequencies
+    /// that change do so the same way, of which there are two at least; else null. Joints soften in translation too,
+    /// which modes feel that do not turn them; the change of the rotation is then unknown.
+    pub effect: Option<EffectId>,
+    /// Whether more than one frequency changes in a certain direction: of one alone the cause stays open.
+    pub enough: bool,
+    /// Whether a law of the joint's rotation explains the changes: only then `ratio` is its size.
+    pub lawful: bool,
     /// Relative change of the joint's rotational stiffness at the largest amplitude (1), over that at
-    /// rest: negative where it softens. At most 0.7, see [`AmplitudeDependence::is_at_bound`].
+    /// rest: negative where it softens. No change beyond 0.7 is looked for.
     pub ratio: f64,
-    /// Standard uncertainty of the ratio (1).
+    /// Its standard uncertainty (1).
     pub ratio_std: f64,
-    /// Best power of the amplitude, of 1/2, 1, 3/2 and 2.
+    /// Whether the changes ask for as much as is looked for: `ratio` is then a bound, and `ratio_std` does
+    /// not hold.
+    pub at_bound: bool,
+    /// Power of the amplitude that fits best, of 1/2, 1, 3/2 and 2.
     pub exponent: f64,
-    /// Probability of changes as large by noise and model error alone, which exceeds that by noise alone.
+    /// Probability of changes as large if there were none: noise, and what the model leaves open of them,
+    /// so that it is larger than noise alone would have it.
     pub chance: f64,
-    /// Probability of a misfit as large or larger if this law is true.
+    /// Probability of a misfit as large or larger, if the joint's stiffness changes like that.
     pub goodness_of_fit: Option<f64>,
-    /// Frequencies that were followed.
+    /// The frequencies that were followed.
     pub changes: Vec<FrequencyChange>,
 }
 
 /// Change of a frequency along the decays of a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct FrequencyChange {
     /// Number of the mode.
     pub mode: usize,
@@ -343,34 +465,35 @@ pub struct FrequencyChange {
 }
 
 impl AmplitudeDependence {
-    /// Returns whether the joint causes the changes: a law of its rotation explains them, or all directed
-    /// changes, two at least, have one sign. Joints soften in translation too, which modes feel that do not
-    /// turn them; the change of the rotation is then not determined.
-    pub fn is_of_joint(&self) -> bool {
-        let mut directed = self.directed();
-        self.is_lawful()
-            || self.is_enough() && directed.all(|change| change.percent_per_fold * self.ratio > 0.0)
-    }
-
-    /// Returns whether more than one frequency changes in a certain direction: a single one has no certain cause.
-    pub fn is_enough(&self) -> bool {
-        self.directed().count() >= LEAST_DIRECTED
-    }
-
-    fn directed(&self) -> impl Iterator<Item = &FrequencyChange> {
-        let changes = self.changes.iter();
-        changes.filter(|change| change.percent_per_fold.abs() > DIRECTED_CHANGE * change.std)
-    }
-
-    /// Returns whether the ratio is the largest that is searched: it is then a bound, and its uncertainty
-    /// does not hold.
-    pub fn is_at_bound(&self) -> bool {
-        self.ratio.abs() >= LARGEST_STIFFNESS_CHANGE
-    }
-
-    /// Returns whether a law of the joint's rotation explains the changes; false where they are too few to test it.
-    pub fn is_lawful(&self) -> bool {
-        self.goodness_of_fit.is_some_and(|p| p >= LAW_MISFIT)
+    /// Judges changes by the law that explains them best.
+    pub fn new(
+        law: JointLaw,
+        ratio_std: f64,
+        chance: f64,
+        goodness_of_fit: Option<f64>,
+        changes: Vec<FrequencyChange>,
+    ) -> Self {
+        let directed: Vec<&FrequencyChange> = changes
+            .iter()
+            .filter(|change| change.percent_per_fold.abs() > DIRECTED_CHANGE * change.std)
+            .collect();
+        let lawful = goodness_of_fit.is_some_and(|p| p >= LAW_MISFIT);
+        let enough = directed.len() >= LEAST_DIRECTED;
+        let same_way = directed
+            .iter()
+            .all(|change| change.percent_per_fold * law.ratio > 0.0);
+        AmplitudeDependence {
+            effect: (lawful || enough && same_way).then_some(EffectId::JointNonlinearity),
+            enough,
+            lawful,
+            ratio: law.ratio,
+            ratio_std,
+            at_bound: law.ratio.abs() >= LARGEST_STIFFNESS_CHANGE,
+            exponent: law.exponent,
+            chance,
+            goodness_of_fit,
+            changes,
+        }
     }
 
     /// Returns "softens" or "stiffens".
@@ -384,7 +507,7 @@ impl AmplitudeDependence {
 }
 
 /// Fit of the described model without the sensors of unknown position.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct UnlocatedSensors {
     /// Names of the sensors.
     pub sensors: Vec<String>,
@@ -397,7 +520,8 @@ pub struct UnlocatedSensors {
 }
 
 /// Test that could be made, or recording that could be read again.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "String")]
 pub enum Proposal {
     /// Read higher modes.
     HigherModes {
@@ -497,10 +621,17 @@ impl Proposal {
     }
 }
 
+impl From<Proposal> for String {
+    fn from(proposal: Proposal) -> String {
+        proposal.id().to_owned()
+    }
+}
+
 /// Test that would decide between hypotheses, and its expected information.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NextTest {
     /// The test.
+    #[serde(rename = "id")]
     pub proposal: Proposal,
     /// The test in a sentence, without its full stop.
     pub action: String,
@@ -509,12 +640,15 @@ pub struct NextTest {
     /// Hypotheses that have no prediction of this test.
     pub unpredicted: Vec<String>,
     /// Least expected information about which hypothesis is true (bit), without hypotheses that have no prediction.
+    #[serde(rename = "bits")]
     pub expected_information: f64,
+    /// Cost in multiples of reading again what is recorded. Tests are ranked by bits over this.
+    pub effort: f64,
 }
 
 impl NextTest {
     /// Returns the information per cost (bit), by which tests are ranked.
     pub fn worth(&self) -> f64 {
-        self.expected_information / self.proposal.effort()
+        self.expected_information / self.effort
     }
 }

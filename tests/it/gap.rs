@@ -419,9 +419,9 @@ fn recover_the_place_of_a_crack_and_say_it_on_the_map() {
     );
     let map = diagnosis.location_map.unwrap();
     // From frequencies alone a mirror place does nearly as well; the true one is among the best.
-    let most = map.stiffness_alone.iter().copied().fold(0.0, f64::max);
+    let most = map.stiffness_explains.iter().copied().fold(0.0, f64::max);
     let piece = (12.0 * 0.137 / LENGTH) as usize;
-    assert!(map.stiffness_alone[piece] > 0.9 * most, "{map:?}");
+    assert!(map.stiffness_explains[piece] > 0.9 * most, "{map:?}");
 }
 
 #[test]

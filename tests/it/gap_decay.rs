@@ -142,11 +142,11 @@ fn val_the_bolted_beam_softens_and_is_no_pair_of_springs() {
         found.ratio < 0.0 && found.direction() == "softens",
         "{found:?}"
     );
-    assert!(found.is_of_joint(), "{found:?}");
+    assert!(found.effect.is_some(), "{found:?}");
     // So it does where the band holds four modes.
     let narrow = text.replace("[[recording]]", "[[recording]]\nband = [0, 900]");
     let narrow = diagnosed(&narrow, Path::new(".")).amplitude_dependence.unwrap();
-    assert!(narrow.is_of_joint() && narrow.ratio < 0.0, "{narrow:?}");
+    assert!(narrow.effect.is_some() && narrow.ratio < 0.0, "{narrow:?}");
     let first = found
         .changes
         .iter()
@@ -205,29 +205,31 @@ fn finding(percents: &[f64]) -> AmplitudeDependence {
         std: 0.1 * percent.abs(),
         explained: 0.0,
     };
-    AmplitudeDependence {
+    judged(percents.iter().enumerate().map(change).collect())
+}
+
+fn judged(changes: Vec<FrequencyChange>) -> AmplitudeDependence {
+    let law = JointLaw {
         ratio: -0.1,
-        ratio_std: 0.01,
         exponent: 1.0,
-        chance: 1e-9,
-        goodness_of_fit: None,
-        changes: percents.iter().enumerate().map(change).collect(),
-    }
+    };
+    AmplitudeDependence::new(law, 0.01, 1e-9, None, changes)
 }
 
 #[test]
 fn regress_one_frequency_that_changes_is_no_joint() {
-    assert!(!finding(&[]).is_of_joint());
-    assert!(!finding(&[-0.2]).is_of_joint());
-    assert!(finding(&[-0.2, -0.1]).is_of_joint());
-    assert!(!finding(&[-0.2, 0.1]).is_of_joint());
-    assert!(!finding(&[-0.2]).is_enough() && finding(&[-0.2, 0.1]).is_enough());
+    assert!(!finding(&[]).effect.is_some());
+    assert!(!finding(&[-0.2]).effect.is_some());
+    assert!(finding(&[-0.2, -0.1]).effect.is_some());
+    assert!(!finding(&[-0.2, 0.1]).effect.is_some());
+    assert!(!finding(&[-0.2]).enough && finding(&[-0.2, 0.1]).enough);
     // A change within two standard uncertainties has no direction.
     let mut weak = finding(&[-0.2, 0.1, -0.1]);
     weak.changes[1].std = 0.06;
-    assert!(weak.is_of_joint());
+    assert!(judged(weak.changes.clone()).effect.is_some());
     weak.changes[2].std = 0.06;
-    assert!(!weak.is_of_joint() && !weak.is_enough());
+    let weak = judged(weak.changes);
+    assert!(weak.effect.is_none() && !weak.enough);
 }
 
 // ---------------------------------------------------------------------------------------------

@@ -40,6 +40,7 @@ pub fn next_tests(
             let action = sentence(&proposal);
             if tests.iter().all(|test| test.action != action) {
                 tests.push(NextTest {
+                    effort: proposal.effort(),
                     proposal,
                     action,
                     separates: vec![effect.name().to_owned()],
@@ -146,6 +147,7 @@ impl<'a> Compared<'a> {
         let apart = distances(&data)?;
         Some(NextTest {
             proposal: proposal.clone(),
+            effort: proposal.effort(),
             action: sentence(proposal),
             separates: separated(&probabilities, &names, &apart),
             unpredicted,

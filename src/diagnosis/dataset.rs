@@ -14,12 +14,11 @@ use crate::parameters::{
     CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior, priors, with_drift,
 };
 use crate::settings::GapSettings;
-use crate::structure::{Arrangement, Inventory, Nominal};
+use crate::structure::{Arrangement, ELEMENTS, Inventory, Nominal};
 use crate::thresholds::DISTINCT_AMPLITUDES;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
-use tapjoint_beam::specimen::Mesh;
 use tapjoint_identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
 use tapjoint_numerics::stats::root_mean_square;
 
@@ -263,8 +262,8 @@ pub struct Dataset {
     pub modes: usize,
     /// Number of elements of the structure.
     pub elements: usize,
-    /// Radius of gyration of a sensor (m).
-    pub sensor_radius: f64,
+    /// Settings of the diagnosis.
+    pub settings: GapSettings,
     /// Modes above this one are held out.
     pub fitted_modes: usize,
     /// Frequencies that take no part in the fit.
@@ -316,8 +315,8 @@ impl Dataset {
             data: Vec::new(),
             nuisances: Vec::new(),
             modes: highest,
-            elements: Mesh::DIAGNOSIS.elements,
-            sensor_radius: settings.sensor_radius,
+            elements: ELEMENTS,
+            settings: settings.clone(),
             fitted_modes: highest.saturating_sub(held_out),
             holdout: Vec::new(),
             scatter: Vec::new(),
@@ -326,11 +325,11 @@ impl Dataset {
             tilts: Vec::new(),
             peaks: UnpairedPeaks::new(observations),
         };
-        dataset.add_frequencies(observations, settings);
+        dataset.add_frequencies(observations);
         dataset.add_shapes(observations);
-        dataset.add_damping(observations, settings);
+        dataset.add_damping(observations);
         dataset.add_slopes(observations);
-        dataset.add_nuisances(&inventory, settings);
+        dataset.add_nuisances(&inventory);
         dataset
     }
 
@@ -339,7 +338,7 @@ impl Dataset {
         self.data.push(datum);
     }
 
-    fn add_frequencies(&mut self, observations: &Observations, settings: &GapSettings) {
+    fn add_frequencies(&mut self, observations: &Observations) {
         let mut observed: Vec<(usize, &ObservedMode)> = Vec::new();
         let mut data = Vec::new();
         for (configuration, one) in observations.configurations.iter().enumerate() {
@@ -362,7 +361,7 @@ impl Dataset {
                 datum.std *= (1.0 - share * share).max(0.0).sqrt();
             }
             // The common part of a recording is far below the floor: as good as independent.
-            datum.inflate_std(settings.frequency_floor.hypot(one.common));
+            datum.inflate_std(self.settings.frequency_floor.hypot(one.common));
             // Anywhere between the poles of a decay that was split, on either side of this one.
             let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
             datum.inflate_std(split.hypot(average_std(observed)));
@@ -425,7 +424,7 @@ impl Dataset {
 
     /// Adds one damping ratio for each mode: the weighted mean of all configurations, since only
     /// noise and level distinguish them.
-    fn add_damping(&mut self, observations: &Observations, settings: &GapSettings) {
+    fn add_damping(&mut self, observations: &Observations) {
         for mode in 1..=self.fitted_modes {
             let configurations = observations.configurations.iter();
             let observed: Vec<&ObservedMode> =
@@ -439,7 +438,7 @@ impl Dataset {
                 }
             }
             if weights > 0.0 {
-                let std = weights.powf(-0.5).hypot(settings.damping_scatter);
+                let std = weights.powf(-0.5).hypot(self.settings.damping_scatter);
                 let datum = Datum::new(sum / weights, std, None);
                 let own = Observable::frequency(0, mode);
                 self.push(own.with_kind(ObservableKind::Damping), datum);
@@ -476,17 +475,17 @@ impl Dataset {
         });
     }
 
-    fn add_nuisances(&mut self, inventory: &Inventory, settings: &GapSettings) {
+    fn add_nuisances(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{
             AddedInertia, Amplitude, FastenedMass, FastenedPosition, Scale, Scatter, SensorInertia,
             SensorMass, Shear,
         };
-        let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
+        let scale = self.nominal.scale_std.unwrap_or(self.settings.scale_std);
         self.add_nuisance(Scale, 0.0, scale);
         if self.nominal.specimen.shear_rotary > 0.0 {
-            self.add_nuisance(Shear, 0.0, settings.shear_std);
+            self.add_nuisance(Shear, 0.0, self.settings.shear_std);
         }
-        self.add_drifts(settings);
+        self.add_drifts();
         for configuration in 0..self.arrangements.len() {
             if !self.arrangements[configuration].scatter.is_empty() {
                 self.add_nuisance(Scatter { configuration }, 0.0, 1.0);
@@ -494,16 +493,16 @@ impl Dataset {
         }
         for (name, text) in inventory.names.iter().enumerate() {
             if self.nominal.mass_of(text) > 0.0 {
-                self.add_nuisance(SensorMass { name }, 0.0, settings.sensor_mass_std);
+                self.add_nuisance(SensorMass { name }, 0.0, self.settings.sensor_mass_std);
             }
             self.add_nuisance(SensorInertia { name }, 0.0, 1.0);
         }
         self.add_nuisance(AddedInertia, 0.0, 1.0);
-        self.add_positions_and_gains(inventory, settings);
-        self.add_damping_level(settings);
+        self.add_positions_and_gains(inventory);
+        self.add_damping_level();
         self.add_nuisance(Amplitude, 0.0, AMPLITUDE_STD);
         for fastened in 0..inventory.fastened.len() {
-            let (mass, position) = (settings.fastened_mass_std, settings.position_std);
+            let (mass, position) = (self.settings.fastened_mass_std, self.settings.position_std);
             self.add_nuisance(FastenedMass { fastened }, 0.0, mass);
             self.add_nuisance(FastenedPosition { fastened }, 0.0, position);
         }
@@ -518,45 +517,45 @@ impl Dataset {
     }
 
     /// Adds the joint's stiffness and the temperature, which differ between set-ups.
-    fn add_drifts(&mut self, settings: &GapSettings) {
+    fn add_drifts(&mut self) {
         let setups = self.setups();
         if setups.len() > 1 {
             for setup in setups {
                 for direction in self.nominal.fitted_springs() {
                     let drift = NuisanceParameter::Drift { setup, direction };
-                    self.add_nuisance(drift, 0.0, settings.drift_stds[0]);
+                    self.add_nuisance(drift, 0.0, self.settings.drift_stds[0]);
                 }
                 let temperature = NuisanceParameter::Temperature { setup };
-                self.add_nuisance(temperature, 0.0, settings.temperature_std);
+                self.add_nuisance(temperature, 0.0, self.settings.temperature_std);
             }
         }
     }
 
     /// Adds positions of sensors and of the taps, and calibrations, on which shapes and modal constants depend.
-    fn add_positions_and_gains(&mut self, inventory: &Inventory, settings: &GapSettings) {
+    fn add_positions_and_gains(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{Gain, SensorPosition, TapPosition};
         let mut observables = self.observables.iter();
         let constants = observables.any(|one| matches!(one.kind, ObservableKind::Constant { .. }));
         let shapes = self.observables.iter().any(Observable::is_shape);
         for position in 0..inventory.positions.len() {
-            self.add_nuisance(SensorPosition { position }, 0.0, settings.position_std);
+            self.add_nuisance(SensorPosition { position }, 0.0, self.settings.position_std);
         }
         if constants {
             for setup in self.setups() {
-                self.add_nuisance(TapPosition { setup }, 0.0, settings.position_std);
+                self.add_nuisance(TapPosition { setup }, 0.0, self.settings.position_std);
             }
         }
         if shapes {
             for setup in self.setups() {
                 for name in 0..inventory.names.len() {
-                    self.add_nuisance(Gain { setup, name }, 0.0, settings.gain_std);
+                    self.add_nuisance(Gain { setup, name }, 0.0, self.settings.gain_std);
                 }
             }
         }
     }
 
     /// Adds level and tilt of the nominal damping ratios, where any was observed.
-    fn add_damping_level(&mut self, settings: &GapSettings) {
+    fn add_damping_level(&mut self) {
         let (mut count, mut sum) = (0.0, 0.0);
         for (observable, datum) in self.observables.iter().zip(&self.data) {
             if observable.is_damping() {
@@ -567,7 +566,7 @@ impl Dataset {
         if count > 0.0 {
             // Wide: the damping of a beam is not known beforehand.
             self.add_nuisance(NuisanceParameter::Damping, sum / count, 2.0);
-            let tilt = settings.damping_tilt;
+            let tilt = self.settings.damping_tilt;
             self.add_nuisance(NuisanceParameter::DampingTilt, 0.0, tilt);
         }
     }
@@ -619,8 +618,8 @@ impl Dataset {
     }
 
     /// Priors of all parameters, with the middle spread of the drift.
-    pub fn priors(&self, layout: &Layout, settings: &GapSettings) -> Vec<Prior> {
-        priors(&self.nominal, layout, &self.nuisances, settings)
+    pub fn priors(&self, layout: &Layout) -> Vec<Prior> {
+        priors(&self.nominal, layout, &self.nuisances, &self.settings)
     }
 
     /// Priors with this spread of the drift.

@@ -96,6 +96,11 @@ impl<'a> Forward<'a> {
         }
     }
 
+    /// Priors of all parameters, with the middle spread of the drift.
+    pub fn priors(&self) -> Vec<Prior> {
+        self.dataset.priors(&self.layout)
+    }
+
     /// Returns the columns of one effect and the steps of their finite differences, away from the bounds. They are
     /// small against what data of 0.005 % leave open of a large effect (0.1 % of its size, 0.03 % of the length).
     fn steps(&self, index: usize, parameters: &[f64]) -> Vec<(usize, f64)> {
@@ -575,7 +580,7 @@ impl<'a> ModeInPlace<'a> {
 
     /// Returns d ln f with respect to the rotary inertia of a mass (kg) over its usual one.
     fn inertia_slope(&self, mass: f64, position: f64) -> f64 {
-        let inertia = mass * self.forward.dataset.sensor_radius.powi(2);
+        let inertia = mass * self.forward.dataset.settings.sensor_radius.powi(2);
         -0.5 * inertia * self.slope(position).powi(2)
     }
 

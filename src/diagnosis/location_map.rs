@@ -54,7 +54,9 @@ pub fn location_map(dataset: &Dataset, nominal: &Fit) -> Option<LocationMap> {
 /// Returns shares of the misfit from decreases of chi square.
 fn explained(decreases: Vec<f64>, misfit: f64) -> Vec<f64> {
     let shares = decreases.into_iter();
-    shares.map(|decrease| if misfit > 0.0 { decrease / misfit } else { 0.0 }).collect()
+    shares
+        .map(|decrease| if misfit > 0.0 { decrease / misfit } else { 0.0 })
+        .collect()
 }
 
 /// Returns the slope of each observable with respect to the change of each piece.

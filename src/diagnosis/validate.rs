@@ -515,7 +515,6 @@ fn predict_setup(
 mod tests {
     use super::*;
     use crate::fit::fit_nominal;
-    use crate::settings::GapSettings;
     use crate::tests::fitted;
 
     fn errors(size: f64, std: f64) -> HoldoutErrors {
@@ -544,7 +543,7 @@ mod tests {
         for datum in &mut dataset.data {
             datum.freedom = f64::INFINITY;
         }
-        let fit = fit_nominal(&dataset, &GapSettings::default()).unwrap();
+        let fit = fit_nominal(&dataset).unwrap();
         for (k, (_, datum)) in dataset.holdout.iter_mut().enumerate() {
             datum.value += [3.0, -2.0][k % 2] * datum.std;
         }
@@ -569,11 +568,11 @@ mod tests {
         fit.best.priors[first + dataset.first_drift().unwrap()].std
     }
 
-    /// What only a joint that drifts by more explains is refuted as long as it is known to drift by less.
+    /// A change that needs more drift is refuted as long as the joint is known to drift by less.
     #[test]
     fn regress_a_drift_that_is_as_probable_keeps_an_explanation_from_being_refuted() {
         let (mut dataset, _) = fitted();
-        // Readings so poor that they say nothing of the drift, and nothing else that could move the withheld ones.
+        // Data so poor that the drift is open, and nothing else that could move the held-out ones.
         for datum in &mut dataset.data {
             datum.std *= 1e3;
         }
@@ -582,11 +581,8 @@ mod tests {
                 nuisance.std = 1e-9;
             }
         }
-        let settings = GapSettings {
-            drift_stds: vec![0.002],
-            ..GapSettings::default()
-        };
-        let mut fit = fit_nominal(&dataset, &settings).unwrap();
+        dataset.settings.drift_stds = vec![0.002];
+        let mut fit = fit_nominal(&dataset).unwrap();
         let refutes = |p: f64| p < 1e-3;
         let errors = HoldoutErrors::new(&dataset, &fit).unwrap().errors;
         // Ten times what the smaller drift moves mode 6 by, against each other in both recordings.

@@ -1,7 +1,7 @@
 //! Pictures of the model for the page's script: errors of predicted frequencies, shapes of the modes, the
 //! gap and its places. Each point says its values when hovered.
 
-use super::document::{Document, GapSection, ModeShapeSection, PlaceMapSection, PullSection};
+use super::document::{Document, GapSection};
 use super::format::{rounded, rounded_to, signed_percent, significant};
 use super::live_points::{LivePoints, LiveView, PointAxis, PointPanel, PointRule, PointSet};
 use super::plot::axis::Axis;
@@ -10,6 +10,8 @@ use super::plot::gap::{Explanation, MOST_BARS, abscissa, errors_panel};
 use super::plot::place_map::{explained_panel, map_panel};
 use super::plot::shapes::{Places, displacement, joint_of, places, shown};
 use super::tables::place_of;
+use tapjoint_analysis::SampledShape;
+use tapjoint_diagnosis::{LocationMap, Residual};
 
 /// Height of a panel with errors or changes (pixels).
 const HEIGHT: u32 = 320;
@@ -116,7 +118,7 @@ pub fn live_gap(document: &Document) -> Option<LivePoints> {
     Some(together(vec![pulls_panel(gap, pulls), odds_panel(gap)]))
 }
 
-fn pulls_panel(gap: &GapSection, pulls: &[PullSection]) -> PointPanel {
+fn pulls_panel(gap: &GapSection, pulls: &[Residual]) -> PointPanel {
     let axes = errors_panel(gap, pulls);
     let last = pulls.iter().map(|pull| pull.mode).max().unwrap_or(1);
     let numbers = (1..=last).map(|mode| (mode as f64, mode.to_string()));
@@ -130,7 +132,7 @@ fn pulls_panel(gap: &GapSection, pulls: &[PullSection]) -> PointPanel {
     if let Some(effect) = Explanation::of(gap).effect() {
         let name = format!("with {effect}");
         let after = (name.as_str(), "c0", ("dot", 4.0));
-        let left = |pull: &PullSection| (pull.error_percent_after, pull.z_after);
+        let left = |pull: &Residual| (pull.error_percent_after, pull.z_after);
         sets.push(pulls_set(after, pulls, left));
     }
     PointPanel {
@@ -143,8 +145,8 @@ fn pulls_panel(gap: &GapSection, pulls: &[PullSection]) -> PointPanel {
 /// The errors of all frequencies with one model, each in percent and in standard deviations.
 fn pulls_set(
     (name, color, mark): (&str, &str, (&'static str, f64)),
-    pulls: &[PullSection],
-    value: impl Fn(&PullSection) -> (f64, f64),
+    pulls: &[Residual],
+    value: impl Fn(&Residual) -> (f64, f64),
 ) -> PointSet {
     let points = pulls
         .iter()
@@ -167,20 +169,20 @@ fn odds_panel(gap: &GapSection) -> PointPanel {
     let linear = |range: (f64, f64)| Axis::linear(range, (0.0, 1.0));
     let names = rows
         .iter()
-        .map(|(row, found)| (-(*row as f64), found.effect.clone()));
+        .map(|(row, found)| (-(*row as f64), found.hypothesis.name()));
     let lowest = -(rows.len() as f64) + 1.0 - BAR;
     let x = PointAxis::of(&linear((0.0, 100.0)), "probability", "%");
     let y = PointAxis::of(&linear((lowest, BAR)), "", "").named(names);
     let bars = |name: &str, color: &str, found: bool| {
         let rows = rows
             .iter()
-            .filter(|(_, entry)| gap.verdict.holds(&entry.effect) == found);
+            .filter(|(_, entry)| gap.verdict.hypotheses().contains(&entry.hypothesis) == found);
         let percent = |probability: f64| (1e5 * probability).round() / 1e3;
         let places = rows
             .clone()
             .map(|(row, entry)| (percent(entry.probability), -(*row as f64)));
         let mut set = PointSet::new(name, color, ("bar", 9.0), places);
-        set.words = rows.map(|(_, entry)| entry.effect.clone()).collect();
+        set.words = rows.map(|(_, entry)| entry.hypothesis.name()).collect();
         set
     };
     let sets = vec![
@@ -230,7 +232,7 @@ pub fn live_place_map(document: &Document) -> Option<LivePoints> {
 }
 
 fn change(
-    map: &PlaceMapSection,
+    map: &LocationMap,
     (name, color): (&str, &str),
     (values, stds): (&[f64], &[f64]),
 ) -> PointSet {
@@ -261,7 +263,7 @@ pub fn live_shapes(document: &Document) -> Option<LivePoints> {
     (!panels.is_empty()).then(|| together(panels))
 }
 
-fn shape_panel(shape: &ModeShapeSection, places: &Places) -> PointPanel {
+fn shape_panel(shape: &SampledShape, places: &Places) -> PointPanel {
     let end = 1e3 * shape.positions.last().copied().unwrap_or(1.0);
     let axis = |range: (f64, f64), label: &str, unit: &str| {
         PointAxis::of(&Axis::linear(range, (0.0, 1.0)), label, unit)

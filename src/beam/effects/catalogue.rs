@@ -3,9 +3,12 @@
 use super::{EffectError, nearest_name};
 use Dimension as D;
 use ParameterScale::{Linear, Log};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// An effect that a model may be missing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum EffectId {
     /// Mass of an accelerometer.
     SensorMass,

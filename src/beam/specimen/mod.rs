@@ -15,6 +15,8 @@ pub(crate) mod modes;
 
 use crate::{Assembly, Beam, BeamTheory, StructureError};
 pub use modes::{BeamModes, SpecimenModes};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// The beam, or the two beams that a joint joins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,13 +129,14 @@ pub struct Base {
 }
 
 /// A mass on the beam.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct PointMass {
     /// Distance from the left end (m).
     pub position: f64,
     /// Mass (kg).
     pub mass: f64,
     /// Moment of inertia about the neutral axis (kg m2).
+    #[serde(skip)]
     pub inertia: f64,
 }
 

@@ -5,6 +5,8 @@
 //! all stiffnesses and of degree -1/2 in all masses together, so that its derivative with the
 //! beam's modulus follows from those with the springs: 1/2 less their sum.
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::f64::consts::PI;
 use tapjoint_beam::interface::{
     InterfaceModes, JoinedHalf, JointCompliance, JointedBody, LAST_STEP,
@@ -137,7 +139,8 @@ impl JointedStructure {
 }
 
 /// A quantity that can be estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Parameter {
     /// Translational stiffness Kt (N/m), through its logarithm.
     Kt,

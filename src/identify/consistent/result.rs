@@ -2,6 +2,8 @@
 
 use super::least_squares::{LOG_STIFFNESS, StopReason};
 use super::model::{PARAMETERS, Parameter, Point, log_nondimensional};
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_beam::{Beam, JointStiffness};
 
 /// A parameter at the end of its range.
@@ -44,7 +46,7 @@ pub struct EstimatedQuantity {
 }
 
 /// Correlation of two estimated parameters (their logarithms; of the coupling its atanh).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Correlation {
     /// One.
     pub first: Parameter,

@@ -39,11 +39,11 @@ pub(crate) fn clouds(document: &Document) -> Vec<Cloud> {
 
 fn cloud(document: &Document, method: &str) -> Cloud {
     let spans = document.resolution_span.iter().flatten();
-    let spans = spans.filter(|span| span.method == method);
+    let spans = spans.filter(|span| span.method.name() == method);
     let random = document.monte_carlo.iter().flatten();
-    let random = random.filter(|found| found.method == method);
+    let random = random.filter(|found| found.method.name() == method);
     let rows = document.perturbation.iter().flatten();
-    let rows = rows.filter(|row| row.percent != 0.0 && row.method == method);
+    let rows = rows.filter(|row| row.percent != 0.0 && row.method.name() == method);
     let estimate = document.estimate.as_ref().and_then(Option::as_ref);
     let shifted = rows.filter_map(|row| Some((row.percent, (row.kx?, row.ky?))));
     Cloud {
@@ -70,7 +70,7 @@ fn estimate_of(estimate: &EstimateSection, method: &str) -> Option<Point> {
     let own = || Some((estimate.kx.as_ref()?.value, estimate.ky.as_ref()?.value));
     let point = match &estimate.pairs {
         Some(pairs) if method == "pairs" => (pairs.kx?, pairs.ky?),
-        _ if estimate.method == method => own()?,
+        _ if estimate.method.name() == method => own()?,
         _ => return None,
     };
     is_finite(&point).then_some(point)
@@ -79,7 +79,7 @@ fn estimate_of(estimate: &EstimateSection, method: &str) -> Option<Point> {
 /// All places (ln Kx, ln Ky) with d^T C^-1 d = 5.99 about the estimate: with L L^T = C they are
 /// L (cos t, sin t) times the root of that.
 fn ellipse(estimate: &EstimateSection, method: &str) -> Vec<Point> {
-    let own = estimate.method == method;
+    let own = estimate.method.name() == method;
     let middle = estimate_of(estimate, method).filter(|(x, y)| own && *x > 0.0 && *y > 0.0);
     let Some(((x, y), [[xx, xy], [_, yy]])) = middle.zip(estimate.log_covariance) else {
         return Vec::new();

@@ -1,7 +1,7 @@
 //! The picture of the gap: errors with the described model and with the effect that is held for the cause, and
 //! the odds.
 
-use super::super::document::{Document, GapSection, PullSection};
+use super::super::document::{Document, GapSection};
 use super::super::format::{probability, signed_percent};
 use super::super::tables::place_of;
 use super::axis::{Axis, extent, padded};
@@ -9,6 +9,7 @@ use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{BLUE, GRID, INK, SKY, SOFT, VERMILION};
 use super::panel::{LABEL_SIZE, Panel, Sample, TICK_SIZE, crisp, draw_legend, draw_title};
 use super::spectrum::{LEFT, WIDTH};
+use tapjoint_diagnosis::{Hypothesis, Residual, Verdict};
 
 const HEIGHT: u32 = 520;
 /// Right edge of the errors, left and right edge of the odds (pixels).
@@ -22,30 +23,30 @@ pub const MOST_BARS: usize = 9;
 const LEAST_SPAN: f64 = 0.02;
 
 /// What stands beside the errors of the described model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Explanation<'a> {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Explanation {
     /// The errors that this effect leaves: the most probable one of those that the verdict names.
-    Effect(&'a str),
+    Effect(String),
     /// Nothing, because of this: what nobody holds for the cause explains nothing.
     Nothing(&'static str),
 }
 
-impl<'a> Explanation<'a> {
+impl Explanation {
     /// What the verdict lets a picture show.
-    pub fn of(gap: &'a GapSection) -> Explanation<'a> {
-        match gap.verdict.kind.as_str() {
-            "named" | "group" | "set" => leader(gap).map_or(
+    pub fn of(gap: &GapSection) -> Explanation {
+        match gap.verdict {
+            Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => leader(gap).map_or(
                 Explanation::Nothing("no effect is more probable than none"),
                 Explanation::Effect,
             ),
-            "no-gap" => Explanation::Nothing("nothing is missing"),
-            "unknown" => Explanation::Nothing("nothing in the catalogue explains the rest"),
+            Verdict::NoGap => Explanation::Nothing("nothing is missing"),
+            Verdict::Unknown => Explanation::Nothing("nothing in the catalogue explains the rest"),
             _ => Explanation::Nothing("these data do not decide what is missing"),
         }
     }
 
     /// The effect, where there is one.
-    pub fn effect(self) -> Option<&'a str> {
+    pub fn effect(self) -> Option<String> {
         match self {
             Explanation::Effect(name) => Some(name),
             Explanation::Nothing(_) => None,
@@ -63,10 +64,10 @@ impl<'a> Explanation<'a> {
 
 /// The hypothesis whose errors the diagnosis gives: the most probable one that predicts anything. `None` where
 /// that is the described model itself.
-fn leader(gap: &GapSection) -> Option<&str> {
-    let mut predicting = gap.hypotheses.iter().map(|found| found.effect.as_str());
-    let first = predicting.find(|effect| *effect != "unknown");
-    first.filter(|effect| *effect != "none")
+fn leader(gap: &GapSection) -> Option<String> {
+    let mut predicting = gap.hypotheses.iter().map(|found| &found.hypothesis);
+    let first = predicting.find(|one| **one != Hypothesis::Unknown)?;
+    (*first != Hypothesis::None).then(|| first.name())
 }
 
 /// What the picture shows, for the page.
@@ -96,7 +97,7 @@ pub fn draw_gap(document: &Document) -> Option<Drawing> {
     Some(drawing)
 }
 
-fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
+fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[Residual]) {
     let panel = errors_panel(gap, pulls);
     let last = last_mode(pulls);
     panel.draw_y_ticks(drawing, &panel.y.ticks(36.0));
@@ -108,7 +109,7 @@ fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[PullSection]) {
     panel.draw_frame(drawing);
     let effect = Explanation::of(gap).effect();
     for pull in pulls {
-        draw_pull(drawing, &panel, (pulls, pull), effect);
+        draw_pull(drawing, &panel, (pulls, pull), effect.as_deref());
     }
     for mode in 1..=last {
         let at = (panel.x.place(mode as f64), BOTTOM + 18.0);
@@ -141,7 +142,7 @@ fn legend(gap: &GapSection, last: usize) -> Vec<(Sample, String)> {
 fn draw_pull(
     drawing: &mut Drawing,
     panel: &Panel,
-    (pulls, pull): (&[PullSection], &PullSection),
+    (pulls, pull): (&[Residual], &Residual),
     effect: Option<&str>,
 ) {
     let x = abscissa(pulls, pull);
@@ -169,9 +170,9 @@ fn draw_pull(
 }
 
 /// The axes: mode numbers, and errors of their frequencies (%).
-pub fn errors_panel(gap: &GapSection, pulls: &[PullSection]) -> Panel {
+pub fn errors_panel(gap: &GapSection, pulls: &[Residual]) -> Panel {
     let explained = Explanation::of(gap).effect().is_some();
-    let after = |pull: &PullSection| explained.then_some(pull.error_percent_after);
+    let after = |pull: &Residual| explained.then_some(pull.error_percent_after);
     let ends = pulls
         .iter()
         .flat_map(|pull| [pull.error_percent, after(pull).unwrap_or(0.0), 0.0]);
@@ -186,15 +187,15 @@ pub fn errors_panel(gap: &GapSection, pulls: &[PullSection]) -> Panel {
     }
 }
 
-fn last_mode(pulls: &[PullSection]) -> usize {
+fn last_mode(pulls: &[Residual]) -> usize {
     pulls.iter().map(|pull| pull.mode).max().unwrap_or(1)
 }
 
 /// Where an error stands: the tap levels of all recordings that saw a mode stand beside each other over half
 /// its width.
-pub fn abscissa(pulls: &[PullSection], pull: &PullSection) -> f64 {
+pub fn abscissa(pulls: &[Residual], pull: &Residual) -> f64 {
     // One recording can hold taps of two levels, which saw the mode apart.
-    let seat = |pull: &PullSection| (pull.recording.clone(), pull.level);
+    let seat = |pull: &Residual| (pull.recording.clone(), pull.level);
     let mut seats = Vec::new();
     for other in pulls.iter().filter(|other| other.mode == pull.mode) {
         if !seats.contains(&seat(other)) {
@@ -215,7 +216,7 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
         let bottom = top + step - 12.0;
         drawing.rectangle((ODDS.0, top), (ODDS.1, bottom), GRID, 0.6);
         let end = ODDS.0 + found.probability * (ODDS.1 - ODDS.0);
-        let named = gap.verdict.holds(&found.effect);
+        let named = gap.verdict.hypotheses().contains(&found.hypothesis);
         drawing.rectangle(
             (ODDS.0, top),
             (end, bottom),
@@ -223,10 +224,10 @@ fn draw_odds(drawing: &mut Drawing, gap: &GapSection) {
             1.0,
         );
         let middle = 0.5 * (top + bottom);
-        let name = Text::new(&found.effect, (ODDS.0 - 10.0, middle), TICK_SIZE);
+        let name = Text::new(found.hypothesis.name(), (ODDS.0 - 10.0, middle), TICK_SIZE);
         drawing.text(name.aligned(Align::End));
         let value = probability(found.probability);
-        let words = format!("{}: probability {value}", found.effect);
+        let words = format!("{}: probability {value}", found.hypothesis.name());
         drawing.note((ERRORS_RIGHT + 20.0, top), (ODDS.1, bottom), words);
         drawing.text(Text::new(value, (ODDS.1 + 8.0, middle), TICK_SIZE).colored(SOFT));
     }

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use super::super::document::{Document, ModeShapeSection};
+use super::super::document::Document;
 use super::super::format::significant;
 use super::axis::Axis;
 use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{BLUE, GRID, INK, ORANGE, SOFT, VERMILION, WHITE};
 use super::panel::{Panel, Sample, TICK_SIZE, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
+use tapjoint_analysis::SampledShape;
 
 /// Panels in a row.
 const ACROSS: usize = 3;
@@ -33,7 +34,7 @@ pub struct Places {
 }
 
 /// The modes that are drawn.
-pub fn shown(document: &Document) -> &[ModeShapeSection] {
+pub fn shown(document: &Document) -> &[SampledShape] {
     let shapes = document.mode_shapes.as_deref().unwrap_or_default();
     &shapes[..shapes.len().min(MOST)]
 }
@@ -61,7 +62,7 @@ pub fn draw_shapes(document: &Document) -> Option<Drawing> {
     Some(drawing)
 }
 
-fn panel(shape: &ModeShapeSection, column: usize, top: f64) -> Panel {
+fn panel(shape: &SampledShape, column: usize, top: f64) -> Panel {
     let width = (RIGHT - LEFT - SPACE * (ACROSS - 1) as f64) / ACROSS as f64;
     let left = LEFT + column as f64 * (width + SPACE);
     let end = shape.positions.last().copied().unwrap_or(1.0);
@@ -92,7 +93,7 @@ fn draw_ground(drawing: &mut Drawing, panel: &Panel, kind: Option<&str>, lap: Op
     }
 }
 
-fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, places: &Places) {
+fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &SampledShape, places: &Places) {
     let points = shape.positions.iter().zip(&shape.displacements);
     let points: Vec<(f64, f64)> = points.map(|(x, y)| (*x, *y)).collect();
     // A lap joint's halves end at one place and need not meet.
@@ -133,7 +134,7 @@ fn draw_shape(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection, pl
 }
 
 /// "mode 1 at 120 mm: 0.43 of its largest displacement".
-fn words_at(shape: &ModeShapeSection, place: f64) -> String {
+fn words_at(shape: &SampledShape, place: f64) -> String {
     let value = significant(displacement(shape, place), 2);
     let place = significant(1e3 * place, 3);
     format!(
@@ -142,7 +143,7 @@ fn words_at(shape: &ModeShapeSection, place: f64) -> String {
     )
 }
 
-fn note_pieces(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection) {
+fn note_pieces(drawing: &mut Drawing, panel: &Panel, shape: &SampledShape) {
     let step = (panel.x.high - panel.x.low) / PIECES as f64;
     for piece in 0..PIECES {
         let middle = panel.x.low + (piece as f64 + 0.5) * step;
@@ -158,7 +159,7 @@ fn note_pieces(drawing: &mut Drawing, panel: &Panel, shape: &ModeShapeSection) {
 fn note_site(
     drawing: &mut Drawing,
     panel: &Panel,
-    shape: &ModeShapeSection,
+    shape: &SampledShape,
     (name, place): (&str, f64),
 ) {
     let (x, y) = panel.place(place, displacement(shape, place));
@@ -167,14 +168,14 @@ fn note_site(
 }
 
 /// Where a lap joint sits (m): its place stands twice.
-pub fn joint_of(shape: &ModeShapeSection) -> Option<f64> {
+pub fn joint_of(shape: &SampledShape) -> Option<f64> {
     let mut pairs = shape.positions.windows(2);
     let twice = pairs.find(|pair| pair[0] == pair[1])?;
     twice.first().copied()
 }
 
 /// Displacement at a place, between the points next to it.
-pub fn displacement(shape: &ModeShapeSection, place: f64) -> f64 {
+pub fn displacement(shape: &SampledShape, place: f64) -> f64 {
     let after = shape.positions.partition_point(|x| *x < place);
     let point = |index: usize| {
         Some((

@@ -9,7 +9,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use tapjoint::identify::MeasuredMode;
 use tapjoint::identify::consistent::{ConsistentEstimator, ConsistentSettings, JointedStructure};
 use tapjoint::identify::pairs::{ModeLambda, estimate_three_parameter, estimate_two_parameter};
-use tapjoint::structure::roots::RootedBeam;
+use tapjoint::structure::interface::{JointWeights, JointedBody};
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, Slenderness, natural_lambdas,
 };
@@ -26,17 +26,22 @@ fn exact(kx: f64, ky: f64) -> Vec<f64> {
 
 /// What one writes first: walk along lambda, bisect where the sign changes. Finds nothing that lies
 /// between two steps, and does not know it.
-fn scan_and_bisect(beam: &RootedBeam, step: f64) -> Vec<f64> {
+fn scan_and_bisect(joint: &JointStiffness, step: f64) -> Vec<f64> {
+    let (body, weights) = (
+        JointedBody::Rooted(Slenderness::EULER),
+        JointWeights::from(joint),
+    );
+    let equation = |lambda: f64| body.functions(lambda).equation(&weights).0;
     let mut found = Vec::new();
-    let (mut low, mut below) = (step, beam.frequency_equation(step));
+    let (mut low, mut below) = (step, equation(step));
     while found.len() < MODES && low < 100.0 {
         let high = low + step;
-        let above = beam.frequency_equation(high);
+        let above = equation(high);
         if below * above < 0.0 {
             let (mut a, mut b) = (low, high);
             for _ in 0..50 {
                 let middle = 0.5 * (a + b);
-                if below * beam.frequency_equation(middle) < 0.0 {
+                if below * equation(middle) < 0.0 {
                     b = middle;
                 } else {
                     a = middle;
@@ -86,9 +91,8 @@ fn gauss_newton(measured: &[f64], guess: (f64, f64)) -> (f64, f64) {
 
 fn forward(criterion: &mut Criterion) {
     let joint = JointStiffness::two_parameter(KX, KY);
-    let beam = RootedBeam::new(&joint, Slenderness::EULER);
     let found = exact(KX, KY);
-    for (a, b) in found.iter().zip(scan_and_bisect(&beam, 1e-3)) {
+    for (a, b) in found.iter().zip(scan_and_bisect(&joint, 1e-3)) {
         // Bisection ends at 1e-3/2^50; the rest is rounding of the frequency equation.
         assert!((a - b).abs() < 1e-9, "the two searches differ: {a} and {b}");
     }
@@ -98,7 +102,7 @@ fn forward(criterion: &mut Criterion) {
     });
     for step in [1e-3, 1e-2] {
         group.bench_function(format!("scan in steps of {step}, bisect"), |b| {
-            b.iter(|| scan_and_bisect(black_box(&beam), step));
+            b.iter(|| scan_and_bisect(black_box(&joint), step));
         });
     }
     group.finish();

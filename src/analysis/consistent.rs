@@ -1,8 +1,8 @@
 //! The consistent estimate of a described test: what the description says, in the estimator's terms.
 
 use super::model::TestedStructure;
-use tapjoint_beam::interface::PointAttachment;
 use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::PointMass;
 use tapjoint_beam::{Assembly, Beam, JointStiffness};
 use tapjoint_description::described::{fastened_masses, lap_layout};
 use tapjoint_description::{
@@ -24,7 +24,7 @@ pub struct StructureDetails {
     /// Where a lap joint's halves differ from two equal pieces.
     pub lap: LapLayout,
     /// Masses (kg) of the sensors, where they sit in the reference configuration, and what is fastened there.
-    pub masses: Vec<PointAttachment>,
+    pub masses: Vec<PointMass>,
     /// Relative standard uncertainties of the beam's properties.
     pub tolerances: BeamTolerances,
     /// What is estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
@@ -57,21 +57,18 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
 pub(super) fn masses_in(
     test: &TestDescription,
     recording: Option<&RecordingDescription>,
-) -> Vec<PointAttachment> {
+) -> Vec<PointMass> {
     let sensors = test.sensors.iter().filter(|sensor| {
         test.analysis.sensor_mass && sensor.kind != SensorKind::Sound && sensor.mass > Some(0.0)
     });
     let sensors = sensors.filter_map(|sensor| {
-        Some(PointAttachment {
+        Some(PointMass {
             position: recording.map_or(sensor.position, |one| one.place_of(sensor))?,
-            size: sensor.mass?,
+            mass: sensor.mass?,
+            inertia: 0.0,
         })
     });
     let fastened = recording.map(fastened_masses).unwrap_or_default();
-    let fastened = fastened.iter().map(|mass| PointAttachment {
-        position: mass.position,
-        size: mass.mass,
-    });
     sensors.chain(fastened).collect()
 }
 

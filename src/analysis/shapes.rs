@@ -6,7 +6,7 @@ use super::model::TestedStructure;
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Body, Mesh, Specimen, SpecimenJoint};
 use tapjoint_beam::{Assembly, Beam, JointStiffness};
 
 /// Points along the beam: enough for five half waves between two of them to look smooth.
@@ -88,20 +88,5 @@ pub(super) fn predicted_specimen(
             coupling: joint.coupling(),
         },
     };
-    let mut specimen = Specimen::jointed(
-        there.theory,
-        (&there.beam, there.assembly),
-        &there.lap,
-        held,
-    );
-    specimen.masses = there
-        .masses
-        .iter()
-        .map(|mass| PointMass {
-            position: mass.position,
-            mass: mass.size,
-            inertia: 0.0,
-        })
-        .collect();
-    specimen
+    there.specimen(held)
 }

@@ -2,6 +2,17 @@
 
 use super::{Beam, StructureError};
 
+/// Kind of jointed structure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Assembly {
+    /// A beam held at one end by the joint.
+    Cantilever,
+    /// Two halves of one beam joined in the middle by relative springs, free otherwise.
+    Lap,
+    /// A free beam; the joint is ignored.
+    Free,
+}
+
 /// Stiffness of a joint, non-dimensional by the beam it holds (Ingole & Chatterjee):
 /// Kx = Kt L^3/(E I), Ky = Kr L/(E I), Kz = Ktr L^2/(E I); of a lap joint L is the total length.
 ///

@@ -20,24 +20,22 @@
 pub mod beam;
 pub mod effects;
 
-pub mod finite_elements;
-
 pub mod interface;
 pub mod joint;
 pub mod mode_shape;
+pub mod natural_modes;
 pub mod receptance;
-pub mod roots;
 pub mod specimen;
 
 mod banded;
 mod eigen;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
-pub use joint::JointStiffness;
+pub use joint::{Assembly, JointStiffness};
 pub use mode_shape::{ModeShape, mode_shapes};
-pub use roots::{
-    Assembly, NaturalMode, Symmetry, natural_frequencies, natural_lambdas,
-    natural_lambdas_of_any_joint, natural_modes,
+pub use natural_modes::{
+    NaturalMode, Symmetry, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint,
+    natural_modes,
 };
 
 /// Why a question about a structure has no answer.

@@ -4,8 +4,8 @@
 //! exponentials from either end keep every digit at high modes, where the usual difference of
 //! cosh and cos loses them all.
 
-use super::roots::{Symmetry, natural_modes};
-use super::{Assembly, Beam, JointStiffness, NaturalMode, Slenderness, StructureError};
+use super::natural_modes::{NaturalMode, Symmetry, natural_modes};
+use super::{Assembly, Beam, JointStiffness, Slenderness, StructureError};
 
 /// The displacement of one natural mode along a beam, of unit modal mass.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -72,8 +72,8 @@ pub fn assembly_of(kind: JointKind) -> Assembly {
 
 /// The specimen on this joint, without sensors and what is fastened for single recordings.
 pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
-    let held = (&described_beam(test), assembly_of(test.joint.kind));
-    Specimen::jointed(test.joint.beam, held, &lap_layout(test), joint)
+    let (beam, assembly) = (described_beam(test), assembly_of(test.joint.kind));
+    Specimen::jointed(test.joint.beam, &beam, assembly, &lap_layout(test), joint)
 }
 
 /// The known masses that are fastened to the beam for a recording.

@@ -14,9 +14,9 @@ use super::IdentifyError;
 use super::perturbation::Stiffnesses;
 use nalgebra::{DMatrix, DVector, SVD};
 use std::fmt;
+use tapjoint_beam::interface::{Coefficients, JointedBody};
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::receptance::EndFunctions;
-use tapjoint_beam::{Beam, JointStiffness};
+use tapjoint_beam::{Beam, JointStiffness, Slenderness};
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// A singular value below this part of the largest is taken for zero. Frequencies are never
@@ -64,31 +64,29 @@ impl PairsModel {
         self.unknowns() + 1
     }
 
-    /// One mode's equation: coefficients of the unknowns, and the right-hand side. The product,
-    /// with coefficient 1, stands on the left as well.
-    fn equation(self, lambda: f64) -> Equation {
-        let power = lambda.powi(4);
-        let ends = EndFunctions::euler(lambda);
+    fn body(self) -> JointedBody {
         match self {
-            // product + Kx lambda F5/F4 - Ky lambda^3 F6/F4 = lambda^4 F3/F4.
-            Self::TwoParameter => Equation {
-                coefficients: vec![power * ends.f5 / ends.f4, -power * ends.f6 / ends.f4],
-                right: power * power * ends.f3 / ends.f4,
+            Self::TwoParameter | Self::ThreeParameter => JointedBody::Rooted(Slenderness::EULER),
+            Self::Lap => JointedBody::halves(&Slenderness::EULER),
+        }
+    }
+
+    /// One mode's equation, from the frequency equation of [`tapjoint_beam::interface`]: coefficients
+    /// of the unknowns, and the right-hand side. The product, with coefficient 1, stands on the left
+    /// as well.
+    fn equation(self, lambda: f64) -> Equation {
+        let Coefficients { p, x, y, z, q } = self.body().coefficients(lambda);
+        match self {
+            // Divided by ab Q: product + Kx X/Q + Ky Y/Q = -P/Q.
+            Self::TwoParameter | Self::Lap => Equation {
+                coefficients: vec![x / q, y / q],
+                right: -p / q,
             },
-            // product + a eta22 + b eta11 - 2c eta12 = F4/(lambda^4 F3).
+            // Divided by P: product + a Y/P + b X/P - 2c Z/P = -Q/P.
             Self::ThreeParameter => Equation {
-                coefficients: vec![ends.eta22(), ends.eta11(), -2.0 * ends.eta12()],
-                right: ends.f4 / (power * power * ends.f3),
+                coefficients: vec![y / p, x / p, -2.0 * z / p],
+                right: -q / p,
             },
-            // product + Kx/B + Ky/A = -1/(AB).
-            Self::Lap => {
-                let half = EndFunctions::euler(0.5 * lambda);
-                let (a, b) = (half.eta11() / 4.0, half.eta22());
-                Equation {
-                    coefficients: vec![1.0 / b, 1.0 / a],
-                    right: -1.0 / (a * b),
-                }
-            }
         }
     }
 }
@@ -351,13 +349,9 @@ pub fn single_mode_stiffness(
                 value: lambda,
             });
         }
-        let half = EndFunctions::euler(0.5 * lambda);
-        let possible = |value: f64| (value > 0.0 && value.is_finite()).then_some(value);
-        Ok(SingleModeStiffness {
-            mode,
-            kx: possible(-4.0 / half.eta11()),
-            ky: possible(-1.0 / half.eta22()),
-        })
+        let Coefficients { p, x, y, .. } = PairsModel::Lap.body().coefficients(lambda);
+        let [kx, ky] = [-p / x, -p / y].map(|k| (k > 0.0 && k.is_finite()).then_some(k));
+        Ok(SingleModeStiffness { mode, kx, ky })
     };
     modes.iter().map(single).collect()
 }

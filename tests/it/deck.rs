@@ -8,8 +8,8 @@ use tapjoint::pipeline::{
     tested_structure,
 };
 use tapjoint::report::deck::{Deck, deck_of, render_nastran, source_of};
-use tapjoint::structure::interface::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
+use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness};
 
 const LAP: &str = "[beam]\nlength = 0.423\nwidth = 0.05\nthickness = 0.005\nmodulus = 207e9
@@ -52,9 +52,10 @@ fn rebuilt(deck: &Deck) -> (JointedStructure, JointStiffness) {
         right: Some(right.beam),
         overlap: None,
     };
-    let masses = deck.masses.iter().map(|own| PointAttachment {
+    let masses = deck.masses.iter().map(|own| PointMass {
         position: deck.nodes[own.node],
-        size: own.mass,
+        mass: own.mass,
+        inertia: 0.0,
     });
     structure.masses = masses.collect();
     let (joint, units) = (deck.joint.unwrap(), StiffnessUnits::of(&beam));

@@ -13,9 +13,8 @@ use tapjoint::identify::consistent::{
     Point, Quantity, Route, Verdict, estimate_consistently, exceedance,
 };
 use tapjoint::identify::{IdentifyError, MeasuredMode};
-use tapjoint::structure::finite_elements::FiniteElementModel;
-use tapjoint::structure::interface::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
+use tapjoint::structure::specimen::{Mesh, PointMass, PointSpring, SpecimenJoint};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
 
 /// Natural frequencies of the strip on a joint, by Euler's theory (Hz).
@@ -165,13 +164,14 @@ fn prop_closed_form_and_finite_elements_agree() {
 #[test]
 fn prop_slopes_are_those_of_the_frequencies() {
     let mut loaded = JointedStructure::new(BeamTheory::Euler, steel_strip(), Assembly::Cantilever);
-    loaded.masses.push(PointAttachment {
+    loaded.masses.push(PointMass {
         position: 0.3,
-        size: 0.024,
+        mass: 0.024,
+        inertia: 0.0,
     });
-    loaded.springs.push(PointAttachment {
+    loaded.springs.push(PointSpring {
         position: 0.4,
-        size: 3e3,
+        stiffness: 3e3,
     });
     let mut all = vec![loaded];
     all.extend(structures(BeamTheory::Euler));
@@ -212,31 +212,30 @@ fn limit_finite_elements_with_attachments_are_those_solved_directly() {
     let mut structure =
         JointedStructure::new(BeamTheory::Timoshenko, steel_strip(), Assembly::Cantilever);
     structure.route = Route::FiniteElements(40);
-    structure.masses.push(PointAttachment {
+    structure.masses.push(PointMass {
         position: 0.31,
-        size: 0.024,
+        mass: 0.024,
+        inertia: 0.0,
     });
-    structure.springs.push(PointAttachment {
+    structure.springs.push(PointSpring {
         position: 0.2,
-        size: 5e3,
+        stiffness: 5e3,
     });
     let model = FrequencyModel::new(&structure, 6).unwrap();
     let found = frequencies_at(&model, &point_of(&model, &joint), 6);
-    let direct = FiniteElementModel::new(
-        BeamTheory::Timoshenko,
-        &steel_strip(),
-        Assembly::Cantilever,
-        &joint,
-        40,
-    )
-    .unwrap()
-    .with_point_mass(0.31, 0.024)
-    .unwrap()
-    .with_support_spring(0.2, 5e3)
-    .unwrap();
-    for (found, direct) in found.iter().zip(direct.natural_frequencies(6).unwrap()) {
-        // Two eigenvalue routines on the same matrices; rounding grows with the division.
-        close(*found, direct, 1e-9, "the same model solved twice");
+    let units = StiffnessUnits::of(&steel_strip());
+    let held = SpecimenJoint::Springs {
+        kt: joint.kx * units.kt,
+        kr: joint.ky * units.kr,
+        coupling: joint.coupling(),
+    };
+    let direct = structure
+        .specimen(held)
+        .modes(6, Mesh { elements: 40 })
+        .unwrap();
+    for (found, direct) in found.iter().zip(direct.frequencies()) {
+        // The direct solution adds what the elements' static shapes miss.
+        close(*found, *direct, 1e-4, "the same model solved twice");
     }
 }
 
@@ -247,9 +246,9 @@ fn limit_automatic_elements_are_right_to_a_millionth() {
         let closed = JointedStructure::new(theory, steel_strip(), Assembly::Cantilever);
         let mut loaded = closed.clone();
         // A spring so soft that it changes nothing asks for finite elements.
-        loaded.springs.push(PointAttachment {
+        loaded.springs.push(PointSpring {
             position: 0.2,
-            size: 1e-9,
+            stiffness: 1e-9,
         });
         let closed = FrequencyModel::new(&closed, 4).unwrap();
         let loaded = FrequencyModel::new(&loaded, 4).unwrap();
@@ -572,9 +571,10 @@ fn prop_repetitions_do_not_depend_on_threads() {
 /// The strip with a sensor on it, on a known joint.
 fn loaded_strip() -> JointedStructure {
     JointedStructure {
-        masses: vec![PointAttachment {
+        masses: vec![PointMass {
             position: 0.338,
-            size: 0.024,
+            mass: 0.024,
+            inertia: 0.0,
         }],
         ..cantilever()
     }
@@ -750,9 +750,10 @@ fn limit_a_short_overlap_is_a_mass_on_either_side() {
     overlapped.lap.overlap = Some((1e-6, 0.05));
     let mut loaded = JointedStructure::new(BeamTheory::Euler, steel_strip(), Assembly::Lap);
     for position in [0.2115 - 1e-9, 0.2115 + 1e-9] {
-        loaded.masses.push(PointAttachment {
+        loaded.masses.push(PointMass {
             position,
-            size: 0.025,
+            mass: 0.025,
+            inertia: 0.0,
         });
     }
     let (a, b) = (

@@ -12,8 +12,8 @@ use tapjoint::identify::perturbation::{
     PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly,
 };
 use tapjoint::identify::{MeasuredMode, Stiffnesses};
-use tapjoint::structure::interface::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
+use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory};
 
 const KX: f64 = 1415.0;
@@ -27,9 +27,10 @@ fn cantilever() -> JointedStructure {
 fn with_tip_sensor(beam: &Beam) -> JointedStructure {
     JointedStructure {
         beam: *beam,
-        masses: vec![PointAttachment {
+        masses: vec![PointMass {
             position: beam.length,
-            size: 0.024,
+            mass: 0.024,
+            inertia: 0.0,
         }],
         ..cantilever()
     }

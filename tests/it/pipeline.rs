@@ -14,7 +14,7 @@ use tapjoint::pipeline::{
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
-use tapjoint::structure::interface::PointAttachment;
+use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
 
 const KX: f64 = 1400.0;
@@ -378,9 +378,10 @@ fn recover_a_joint_under_the_masses_of_its_sensors() {
     let beam = steel_strip();
     let mut structure = JointedStructure::new(BeamTheory::Timoshenko, beam, Assembly::Cantilever);
     structure.masses = [0.338, 0.2]
-        .map(|position| PointAttachment {
+        .map(|position| PointMass {
             position,
-            size: 0.024,
+            mass: 0.024,
+            inertia: 0.0,
         })
         .to_vec();
     let (kt, kr) = (2.0e6, 1230.0);

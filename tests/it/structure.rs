@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::shared::steel_strip;
+use tapjoint::structure::interface::{JointWeights, JointedBody};
 use tapjoint::structure::receptance::EndFunctions;
-use tapjoint::structure::roots::RootedBeam;
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, ModeShape, Slenderness, StructureError, Symmetry,
     mode_shapes, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint, natural_modes,
@@ -140,8 +140,12 @@ fn modal_mass(beam: &Beam, first: &ModeShape, second: &ModeShape) -> f64 {
 }
 
 /// Sign changes of the frequency equation on a fine grid: slow, but knows nothing of counting.
-fn scan(beam: &RootedBeam, below: f64, steps: usize) -> Vec<f64> {
-    let value = |step: usize| beam.frequency_equation(below * step as f64 / steps as f64);
+fn scan(joint: &JointStiffness, slenderness: Slenderness, below: f64, steps: usize) -> Vec<f64> {
+    let (body, weights) = (JointedBody::Rooted(slenderness), JointWeights::from(joint));
+    let value = |step: usize| {
+        let lambda = below * step as f64 / steps as f64;
+        body.functions(lambda).equation(&weights).0
+    };
     (1..steps)
         .filter(|&step| value(step) * value(step + 1) < 0.0)
         .map(|step| below * (step as f64 + 0.5) / steps as f64)
@@ -178,9 +182,8 @@ fn prop_no_root_is_missed_or_invented_from_soft_to_stiff() {
                 "kx {kx} ky {ky}"
             );
             // The scan sees what its step of 0.01 resolves: all roots but those of weak springs.
-            let beam = RootedBeam::new(&joint(kx, ky), Slenderness::EULER);
             let end = found[11] + 0.5;
-            let seen = scan(&beam, end, 4000);
+            let seen = scan(&joint(kx, ky), Slenderness::EULER, end, 4000);
             let above: Vec<&f64> = found.iter().filter(|&&lambda| lambda > 0.02).collect();
             assert_eq!(
                 seen.len(),
@@ -347,10 +350,9 @@ fn prop_stocky_beams_miss_no_root_of_the_second_spectrum() {
         for ky in [0.0, 1e-3, 1.0, 300.0, 1e6, f64::INFINITY] {
             let joint = joint(kx, ky);
             let found = natural_modes(Assembly::Cantilever, &joint, &stocky, 12).unwrap();
-            let beam = RootedBeam::new(&joint, stocky);
             let end = found[11].lambda + 1e-3;
             assert!(end > 7.5, "{end}");
-            let seen = scan(&beam, end, 20_000);
+            let seen = scan(&joint, stocky, end, 20_000);
             let above = found.iter().filter(|mode| mode.lambda > end / 20_000.0);
             assert_eq!(
                 above.count(),
@@ -441,8 +443,7 @@ fn prop_unphysical_joints_have_their_oscillations_counted_from_zero() {
     ];
     for joint in cases {
         let found = natural_lambdas_of_any_joint(&joint, 8).unwrap();
-        let beam = RootedBeam::new(&joint, Slenderness::EULER);
-        let seen = scan(&beam, found[7] + 0.3, 5000);
+        let seen = scan(&joint, Slenderness::EULER, found[7] + 0.3, 5000);
         assert_eq!(
             found.len(),
             seen.len(),
@@ -453,7 +454,10 @@ fn prop_unphysical_joints_have_their_oscillations_counted_from_zero() {
 
 mod finite_elements {
     use super::*;
-    use tapjoint::structure::finite_elements::FiniteElementModel;
+    use tapjoint::structure::joint::StiffnessUnits;
+    use tapjoint::structure::specimen::{
+        Body, LapLayout, Mesh, PointMass, Specimen, SpecimenJoint,
+    };
 
     fn assemblies() -> Vec<(Assembly, JointStiffness)> {
         vec![
@@ -487,10 +491,34 @@ mod finite_elements {
         case: &(Assembly, JointStiffness),
         n: usize,
     ) -> Vec<f64> {
-        FiniteElementModel::new(theory, beam, case.0, &case.1, n)
+        let specimen = specimen(beam, theory, case.0, &case.1);
+        specimen
+            .modes(5, Mesh { elements: n })
             .unwrap()
-            .natural_frequencies(5)
-            .unwrap()
+            .frequencies()
+            .to_vec()
+    }
+
+    fn springs(beam: &Beam, joint: &JointStiffness) -> SpecimenJoint {
+        let units = StiffnessUnits::of(beam);
+        SpecimenJoint::Springs {
+            kt: joint.kx * units.kt,
+            kr: joint.ky * units.kr,
+            coupling: joint.coupling(),
+        }
+    }
+
+    fn specimen(
+        beam: &Beam,
+        theory: BeamTheory,
+        assembly: Assembly,
+        joint: &JointStiffness,
+    ) -> Specimen {
+        let held = match assembly {
+            Assembly::Free => SpecimenJoint::Free,
+            Assembly::Cantilever | Assembly::Lap => springs(beam, joint),
+        };
+        Specimen::jointed(theory, beam, assembly, &LapLayout::default(), held)
     }
 
     #[test]
@@ -538,17 +566,14 @@ mod finite_elements {
         // (Bishop & Johnson 1960).
         let beam = steel_strip();
         let ratio = 0.03;
-        let tipped = FiniteElementModel::new(
-            BeamTheory::Euler,
-            &beam,
-            Assembly::Cantilever,
-            &JointStiffness::RIGID,
-            200,
-        )
-        .unwrap()
-        .with_point_mass(beam.length, ratio * beam.mass())
-        .unwrap();
-        for frequency in tipped.natural_frequencies(4).unwrap() {
+        let rigid = JointStiffness::RIGID;
+        let mut tipped = specimen(&beam, BeamTheory::Euler, Assembly::Cantilever, &rigid);
+        tipped.masses.push(PointMass {
+            position: beam.length,
+            mass: ratio * beam.mass(),
+            inertia: 0.0,
+        });
+        for &frequency in tipped.modes(4, Mesh::SIMULATION).unwrap().frequencies() {
             let lambda = beam.lambda_of(frequency);
             let left = |lambda: f64| {
                 let (s, c) = lambda.sin_cos();
@@ -566,19 +591,19 @@ mod finite_elements {
     #[test]
     fn limit_masses_off_the_beam_or_negative_are_refused() {
         let beam = steel_strip();
-        let model = || {
-            let rigid = JointStiffness::RIGID;
-            FiniteElementModel::new(BeamTheory::Euler, &beam, Assembly::Cantilever, &rigid, 10)
-        };
+        let rigid = JointStiffness::RIGID;
+        let model = specimen(&beam, BeamTheory::Euler, Assembly::Cantilever, &rigid);
         for (position, mass) in [(0.5, 0.1), (-0.1, 0.1), (f64::NAN, 0.1), (0.1, -1.0)] {
-            let refused = model().unwrap().with_point_mass(position, mass);
+            let mut loaded = model.clone();
+            loaded.masses.push(PointMass {
+                position,
+                mass,
+                inertia: 0.0,
+            });
+            let refused = loaded.modes(1, Mesh { elements: 10 });
             assert!(refused.is_err(), "{position} {mass}");
         }
-        let rigid = JointStiffness::RIGID;
-        let theory = BeamTheory::Euler;
-        let none = FiniteElementModel::new(theory, &beam, Assembly::Cantilever, &rigid, 0);
-        assert!(none.is_err());
-        let error = model().unwrap().natural_frequencies(21).unwrap_err();
+        let error = model.modes(21, Mesh { elements: 10 }).unwrap_err();
         assert!(error.to_string().contains("finer"), "{error}");
     }
 
@@ -586,18 +611,18 @@ mod finite_elements {
     fn prop_a_mass_counts_the_same_wherever_the_element_borders_lie() {
         let beam = steel_strip();
         let with_mass = |elements: usize| {
-            FiniteElementModel::new(
-                BeamTheory::Euler,
-                &beam,
-                Assembly::Cantilever,
-                &joint(500.0, 100.0),
-                elements,
-            )
-            .unwrap()
-            .with_point_mass(0.317, 0.024)
-            .unwrap()
-            .natural_frequencies(4)
-            .unwrap()
+            let (theory, joint) = (BeamTheory::Euler, joint(500.0, 100.0));
+            let mut loaded = specimen(&beam, theory, Assembly::Cantilever, &joint);
+            loaded.masses.push(PointMass {
+                position: 0.317,
+                mass: 0.024,
+                inertia: 0.0,
+            });
+            loaded
+                .modes(4, Mesh { elements })
+                .unwrap()
+                .frequencies()
+                .to_vec()
         };
         for (even, odd) in with_mass(120).iter().zip(&with_mass(127)) {
             // A mass inside an element kinks the shear force, which the cubic does not follow.
@@ -613,13 +638,11 @@ mod finite_elements {
             ..beam
         };
         let joint = joint(500.0, 50.0);
-        let halves = FiniteElementModel::lap(BeamTheory::Euler, [&half, &half], &joint, 80)
-            .unwrap()
-            .natural_frequencies(6)
-            .unwrap();
+        let halves = Specimen::new(Body::Joined([half, half]), springs(&beam, &joint));
+        let halves = halves.modes(6, Mesh { elements: 160 }).unwrap();
         let exact =
             natural_frequencies(BeamTheory::Euler, &beam, Assembly::Lap, &joint, 6).unwrap();
-        for (found, exact) in halves.iter().zip(&exact) {
+        for (found, exact) in halves.frequencies().iter().zip(&exact) {
             assert!(
                 (found / exact - 1.0).abs() < 1e-6,
                 "{found} against {exact}"
@@ -631,13 +654,11 @@ mod finite_elements {
             ..beam
         });
         let rigid = JointStiffness::RIGID;
-        let split = FiniteElementModel::lap(BeamTheory::Euler, [&short, &long], &rigid, 100)
-            .unwrap()
-            .natural_frequencies(4)
-            .unwrap();
+        let split = Specimen::new(Body::Joined([short, long]), SpecimenJoint::RIGID);
+        let split = split.modes(4, Mesh::SIMULATION).unwrap();
         let free =
             natural_frequencies(BeamTheory::Euler, &beam, Assembly::Free, &rigid, 4).unwrap();
-        for (found, exact) in split.iter().zip(&free) {
+        for (found, exact) in split.frequencies().iter().zip(&free) {
             assert!(
                 (found / exact - 1.0).abs() < 1e-6,
                 "{found} against {exact}"

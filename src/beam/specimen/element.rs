@@ -1,26 +1,87 @@
-//! The two-node beam element, with the displacement that a beam takes under end loads (cubic; with
-//! shear, the factor phi = 12 E I/(k G A h^2) enters), consistent mass and rotary inertia
-//! (Przemieniecki, "Theory of Matrix Structural Analysis", 5.6 and 11.5).
+//! The two-node beam element: its shape under end loads, its matrices, and what the shape misses.
+//!
+//! Between its nodes an element takes the displacement that a beam takes under end loads: a cubic,
+//! with shear the factor phi = 12 E I/(k G A h^2) enters. Mass and rotary inertia are consistent
+//! with it (Przemieniecki, "Theory of Matrix Structural Analysis", 5.6 and 11.5).
+//!
+//! Inertia loads the element inside as well, and bends it a little further. That motion has no load
+//! on the nodes, and to second order in omega^2 it adds `omega^4 v^T S v` to the mass term, with
+//! S = [`Section::second_order`]: the leading term of the exact dynamic stiffness (Przemieniecki,
+//! 10.5). With it the error of a frequency falls with the eighth power of the element's length
+//! instead of the fourth.
 
-use crate::StructureError;
+use crate::{Beam, BeamTheory, StructureError};
 use nalgebra::DMatrix;
 
-/// One beam element, in the model's units.
+/// Matrix for (w, theta) near and (w, theta) far.
+pub(super) type Square = [[f64; 4]; 4];
+
+/// Units of a model: those in which the first beam has E I = rho A = 1 and the structure length 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Element {
+pub(crate) struct Units {
+    /// Length (m).
     pub(crate) length: f64,
-    pub(crate) bending_stiffness: f64,
-    pub(crate) mass_per_length: f64,
-    pub(crate) rotary_inertia: f64,
+    /// Mass (kg).
+    pub(crate) mass: f64,
+    /// Angular frequency (rad/s).
+    pub(crate) omega: f64,
+}
+
+impl Units {
+    pub(super) fn of(beam: &Beam, length: f64) -> Self {
+        let (stiffness, density) = (beam.bending_stiffness(), beam.mass_per_length());
+        Self {
+            length,
+            mass: density * length,
+            omega: (stiffness / density).sqrt() / (length * length),
+        }
+    }
+
+    /// Stiffness, that of mass times that of omega squared: E I/L^3 (N/m).
+    pub(crate) fn stiffness(&self) -> f64 {
+        self.mass * self.omega * self.omega
+    }
+
+    /// Rotational stiffness (N m/rad).
+    pub(super) fn rotational_stiffness(&self) -> f64 {
+        self.stiffness() * self.length.powi(2)
+    }
+}
+
+/// A uniform beam element, in the model's units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Element {
+    pub(super) length: f64,
+    bending_stiffness: f64,
+    mass_per_length: f64,
+    rotary_inertia: f64,
     /// phi = 12 E I / (k G A h^2); 0 without shear.
-    pub(crate) shear: f64,
+    shear: f64,
 }
 
 impl Element {
+    /// One of `elements` equal elements of a beam. `shear_rotary` is the share of shear flexibility
+    /// and rotary inertia (1).
+    fn of(beam: &Beam, elements: usize, shear_rotary: f64, units: &Units) -> Self {
+        // The unit of bending stiffness is that in which the unit of omega is 1.
+        let mass_unit = units.mass / units.length;
+        let stiffness_unit = units.omega.powi(2) * mass_unit * units.length.powi(4);
+        let length = beam.length / units.length / elements.max(1) as f64;
+        let mass_per_length = beam.mass_per_length() / mass_unit;
+        let slenderness = beam.slenderness(BeamTheory::Timoshenko);
+        let scale = (beam.length / units.length).powi(2);
+        Self {
+            length,
+            bending_stiffness: beam.bending_stiffness() / stiffness_unit,
+            mass_per_length,
+            rotary_inertia: shear_rotary * (mass_per_length * slenderness.rotary * scale),
+            shear: shear_rotary * (12.0 * slenderness.shear * scale / (length * length)),
+        }
+    }
+
     /// Stiffness for (w, theta) at either node.
-    pub(crate) fn stiffness(&self) -> [[f64; 4]; 4] {
+    fn stiffness(&self) -> Square {
         let (h, phi) = (self.length, self.shear);
-        let scale = self.bending_stiffness / (h.powi(3) * (1.0 + phi));
         let terms = EndTerms {
             ww: 12.0,
             wt: 6.0 * h,
@@ -29,12 +90,12 @@ impl Element {
             tt: (4.0 + phi) * h * h,
             tt_far: (2.0 - phi) * h * h,
         };
-        terms.matrix(scale)
+        terms.matrix(self.bending_stiffness / (h.powi(3) * (1.0 + phi)))
     }
 
-    /// Twice the energy of one bent and one sheared shape: a difference of rotations gives the
+    /// Twice the energy of one bent and one sheared shape. A difference of rotations gives the
     /// first, their mean against the chord the second.
-    pub(crate) fn strain_energy(&self, [w0, t0, w1, t1]: &[f64; 4]) -> f64 {
+    fn strain_energy(&self, [w0, t0, w1, t1]: &[f64; 4]) -> f64 {
         let bend = t1 - t0;
         let shear = 0.5 * (t0 + t1) - (w1 - w0) / self.length;
         self.bending_stiffness / self.length
@@ -42,7 +103,7 @@ impl Element {
     }
 
     /// Consistent mass: translation of the element's displacement, rotation of its sections.
-    pub(crate) fn mass(&self) -> [[f64; 4]; 4] {
+    fn mass(&self) -> Square {
         let (h, phi) = (self.length, self.shear);
         let scale = (1.0 + phi).powi(-2);
         let translation = EndTerms {
@@ -62,12 +123,11 @@ impl Element {
             tt_far: (-1.0 / 30.0 - phi / 6.0 + phi * phi / 6.0) * h * h,
         };
         let of_mass = translation.matrix(scale * self.mass_per_length * h);
-        let of_inertia = rotation.matrix(scale * self.rotary_inertia / h);
-        std::array::from_fn(|i| std::array::from_fn(|j| of_mass[i][j] + of_inertia[i][j]))
+        sum(&of_mass, &rotation.matrix(scale * self.rotary_inertia / h))
     }
 
-    /// Displacement at x, from 0 to 1, for a unit of each of the four end motions.
-    pub(crate) fn displacement(&self, x: f64) -> [f64; 4] {
+    /// Displacement at x from 0 to 1 for a unit of each end motion.
+    fn displacement(&self, x: f64) -> [f64; 4] {
         let (h, phi) = (self.length, self.shear);
         let (x2, x3) = (x * x, x * x * x);
         let scale = 1.0 / (1.0 + phi);
@@ -77,6 +137,121 @@ impl Element {
             scale * (3.0 * x2 - 2.0 * x3 + phi * x),
             scale * h * (x3 - x2 - 0.5 * phi * (x - x2)),
         ]
+    }
+
+    /// dw/dx at x from 0 to 1 for a unit of each end motion.
+    fn slopes(&self, x: f64) -> [f64; 4] {
+        let (h, phi) = (self.length, self.shear);
+        let scale = 1.0 / ((1.0 + phi) * h);
+        let bend = 6.0 * (x - x * x);
+        [
+            scale * (-bend - phi),
+            scale * h * (1.0 - 4.0 * x + 3.0 * x * x + 0.5 * phi * (1.0 - 2.0 * x)),
+            scale * (bend + phi),
+            scale * h * (3.0 * x * x - 2.0 * x - 0.5 * phi * (1.0 - 2.0 * x)),
+        ]
+    }
+
+    /// Shear strain dw/dx - theta for a unit of each end motion, constant along the element.
+    fn shear_strains(&self) -> [f64; 4] {
+        let (h, phi) = (self.length, self.shear);
+        let share = phi / (1.0 + phi);
+        [-share / h, -0.5 * share, share / h, -0.5 * share]
+    }
+
+    /// Stiffness of an axial force P: P times the integral of the product of slopes.
+    fn geometric_stiffness(&self, axial_force: f64) -> Square {
+        let mut matrix = [[0.0; 4]; 4];
+        if axial_force == 0.0 {
+            return matrix;
+        }
+        // Three of Gauss's points integrate the fourth power exactly.
+        let off = 0.5 * 0.6f64.sqrt();
+        let points = [
+            (0.5 - off, 5.0 / 18.0),
+            (0.5, 8.0 / 18.0),
+            (0.5 + off, 5.0 / 18.0),
+        ];
+        for (x, weight) in points {
+            let slope = self.slopes(x);
+            for (row, a) in matrix.iter_mut().zip(slope) {
+                for (entry, b) in row.iter_mut().zip(slope) {
+                    *entry += axial_force * self.length * weight * a * b;
+                }
+            }
+        }
+        matrix
+    }
+
+    /// Displacement and rotation along the element for a unit of each end motion.
+    fn end_motions(&self) -> [Motion; 4] {
+        let (h, phi) = (self.length, self.shear);
+        let s = 1.0 / (1.0 + phi);
+        let shapes = [
+            [s * (1.0 + phi), -s * phi, -3.0 * s, 2.0 * s],
+            [
+                0.0,
+                s * h * (1.0 + 0.5 * phi),
+                -s * h * (2.0 + 0.5 * phi),
+                s * h,
+            ],
+            [0.0, s * phi, 3.0 * s, -2.0 * s],
+            [0.0, -0.5 * s * h * phi, s * h * (0.5 * phi - 1.0), s * h],
+        ];
+        let strains = self.shear_strains();
+        std::array::from_fn(|i| {
+            let mut motion = Motion {
+                displacement: [0.0; 8],
+                rotation: [0.0; 8],
+            };
+            motion.displacement[..4].copy_from_slice(&shapes[i]);
+            for (power, coefficient) in shapes[i].iter().enumerate().skip(1) {
+                motion.rotation[power - 1] = power as f64 * coefficient / h;
+            }
+            motion.rotation[0] -= strains[i];
+            motion
+        })
+    }
+
+    /// Static motion of the element held at both ends under the inertia of a motion, over omega^2.
+    ///
+    /// The inertia is a distributed force q and moment m. With the shear force V: V' = -h q,
+    /// theta'' = -h^2/(E I) (V + m), w' = h (theta + V/S) and 1/S = phi h^2/(12 E I). All motions
+    /// vanish at 0 and 1.
+    fn inertia_response(&self, motion: &Motion) -> Motion {
+        let (h, phi) = (self.length, self.shear);
+        let force = motion.displacement.map(|c| self.mass_per_length * c);
+        let moment = motion.rotation.map(|c| self.rotary_inertia * c);
+        let flexibility = h * h / self.bending_stiffness;
+        let once = integral(&force);
+        let bent = integral(&integral(&std::array::from_fn(|i| h * once[i] - moment[i])));
+        let (at_end, area) = (value_at_end(&bent), value_at_end(&integral(&bent)));
+        let sheared = h * value_at_end(&integral(&once));
+        let c1 = near_shear_force(phi, at_end, area, sheared);
+        let c3 = 0.5 * c1 - at_end;
+        let mut rotation = bent;
+        rotation[2] -= 0.5 * c1;
+        rotation[1] += c3;
+        let mut slope: Polynomial =
+            std::array::from_fn(|i| rotation[i] + -h * phi / 12.0 * once[i]);
+        slope[0] += c1 * phi / 12.0;
+        Motion {
+            displacement: integral(&slope).map(|c| h * flexibility * c),
+            rotation: rotation.map(|c| flexibility * c),
+        }
+    }
+
+    /// S of the chapter's text: the work of each end motion's inertia on the response to another's.
+    fn second_order(&self, motions: &[Motion; 4], responses: &[Motion; 4]) -> Square {
+        let (m, j) = (self.mass_per_length, self.rotary_inertia);
+        std::array::from_fn(|i| {
+            std::array::from_fn(|k| {
+                let (motion, response) = (&motions[k], &responses[i]);
+                self.length
+                    * (m * integral_of_product(&motion.displacement, &response.displacement)
+                        + j * integral_of_product(&motion.rotation, &response.rotation))
+            })
+        })
     }
 }
 
@@ -91,9 +266,9 @@ struct EndTerms {
 }
 
 impl EndTerms {
-    /// The matrix for (w, theta) near and (w, theta) far; seen from the far end x runs backwards,
+    /// The matrix for (w, theta) near and (w, theta) far. Seen from the far end x runs backwards,
     /// which turns the sign of every rotation.
-    fn matrix(&self, scale: f64) -> [[f64; 4]; 4] {
+    fn matrix(&self, scale: f64) -> Square {
         let rows = [
             [self.ww, self.wt, self.ww_far, self.wt_far],
             [self.wt, self.tt, -self.wt_far, self.tt_far],
@@ -104,64 +279,58 @@ impl EndTerms {
     }
 }
 
-// One beam element of a specimen: its matrices, its shape, and what the shape misses.
-//
-// Between its nodes an element takes its static shape under end loads. Inertia loads it inside as
-// well, and bends it a little further; that motion has no load on the nodes, and to second order
-// in omega^2 it adds `omega^4 v^T S v` to the mass term, with S = [`Section::second_order`]: the
-// leading term of the exact dynamic stiffness (Przemieniecki, "Theory of Matrix Structural
-// Analysis", 10.5). With it the error of a frequency falls with the eighth power of the element's
-// length instead of the fourth.
-
-/// Matrix for (w, theta) near and (w, theta) far.
-pub(crate) type Square = [[f64; 4]; 4];
-
-/// An element and the axial force in it (both in the model's units), with its matrices.
+/// An element and the axial force in it, with its matrices, in the model's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Section {
-    pub(crate) element: Element,
-    pub(crate) axial_force: f64,
+pub(super) struct Section {
+    pub(super) element: Element,
+    pub(super) axial_force: f64,
     /// Elastic stiffness and that of the axial force.
-    pub(crate) stiffness: Square,
-    /// Of the axial force alone.
+    pub(super) stiffness: Square,
+    /// Stiffness of the axial force alone.
     geometric: Square,
-    pub(crate) mass: Square,
-    /// S of the module's text.
-    pub(crate) second_order: Square,
+    pub(super) mass: Square,
+    /// S of the chapter's text.
+    pub(super) second_order: Square,
     /// Displacement inside, over omega^2, for each end motion.
     inner: [Polynomial; 4],
 }
 
 /// Displacement and rotation of the section at one place for a unit of each end motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Weights {
-    pub(crate) displacement: [f64; 4],
-    pub(crate) rotation: [f64; 4],
+pub(super) struct Weights {
+    pub(super) displacement: [f64; 4],
+    pub(super) rotation: [f64; 4],
 }
 
 impl Section {
-    pub(crate) fn new(element: Element, axial_force: f64) -> Self {
-        let geometric = if axial_force == 0.0 {
-            [[0.0; 4]; 4]
-        } else {
-            geometric_stiffness(&element, axial_force)
-        };
-        let elastic = element.stiffness();
-        let motions = end_motions(&element);
-        let responses = motions.map(|motion| inertia_response(&element, &motion));
+    /// One of `elements` equal elements of a beam, with a share of shear flexibility and rotary
+    /// inertia (1) and an axial force (N).
+    pub(super) fn new(
+        beam: &Beam,
+        elements: usize,
+        shear_rotary: f64,
+        axial_force: f64,
+        units: &Units,
+    ) -> Self {
+        let element = Element::of(beam, elements, shear_rotary, units);
+        // The unit of force: that of bending stiffness over length squared.
+        let axial_force = axial_force / (units.stiffness() * units.length);
+        let geometric = element.geometric_stiffness(axial_force);
+        let motions = element.end_motions();
+        let responses = motions.map(|motion| element.inertia_response(&motion));
         Self {
             element,
             axial_force,
-            stiffness: sum(&elastic, &geometric),
+            stiffness: sum(&element.stiffness(), &geometric),
             geometric,
             mass: element.mass(),
-            second_order: second_order(&element, &motions, &responses),
+            second_order: element.second_order(&motions, &responses),
             inner: responses.map(|response| response.displacement),
         }
     }
 
     /// Twice the strain energy, without the small differences that v^T K v consists of.
-    pub(crate) fn strain_energy(&self, ends: &[f64; 4]) -> f64 {
+    pub(super) fn strain_energy(&self, ends: &[f64; 4]) -> f64 {
         let elastic = self.element.strain_energy(ends);
         if self.axial_force == 0.0 {
             elastic
@@ -170,10 +339,10 @@ impl Section {
         }
     }
 
-    /// At x from 0 to 1.
-    pub(crate) fn weights(&self, x: f64) -> Weights {
-        let slope = slopes(&self.element, x);
-        let strain = shear_strains(&self.element);
+    /// Motions at x from 0 to 1.
+    pub(super) fn weights(&self, x: f64) -> Weights {
+        let slope = self.element.slopes(x);
+        let strain = self.element.shear_strains();
         Weights {
             displacement: self.element.displacement(x),
             rotation: std::array::from_fn(|i| slope[i] - strain[i]),
@@ -181,21 +350,15 @@ impl Section {
     }
 
     /// Displacement at x (0 to 1) over omega^2 that the inertia of each end motion adds inside.
-    pub(crate) fn inner_displacement(&self, x: f64) -> [f64; 4] {
-        let value =
-            |polynomial: &Polynomial| polynomial.iter().rev().fold(0.0, |sum, c| sum * x + c);
-        std::array::from_fn(|i| value(&self.inner[i]))
+    pub(super) fn inner_displacement(&self, x: f64) -> [f64; 4] {
+        self.inner
+            .map(|inner| inner.iter().rev().fold(0.0, |sum, c| sum * x + c))
     }
 
     /// Displacement at x (0 to 1) for a unit force at another place of the element held at both
-    /// ends: [`inner_response`] for a force at one point.
-    pub(crate) fn inner_compliance(&self, x: f64, force: f64) -> f64 {
-        let Element {
-            length: h,
-            bending_stiffness,
-            shear: phi,
-            ..
-        } = self.element;
+    /// ends: [`Element::inertia_response`] for a force at one point.
+    pub(super) fn inner_compliance(&self, x: f64, force: f64) -> f64 {
+        let (h, phi) = (self.element.length, self.element.shear);
         let rest = 1.0 - force;
         let at_end = 0.5 * rest * rest;
         let c1 = near_shear_force(phi, at_end, rest * rest * rest / 6.0, rest);
@@ -203,26 +366,21 @@ impl Section {
         let behind = (x - force).max(0.0);
         let bent = (behind.powi(3) - c1 * x.powi(3)) / 6.0 + 0.5 * c3 * x * x;
         let sheared = (c1 * x - behind) * phi / 12.0;
-        h.powi(3) / bending_stiffness * (bent + sheared)
+        h.powi(3) / self.element.bending_stiffness * (bent + sheared)
     }
 
     /// Bending moment at x from 0 to 1, from the two ways the element is strained.
-    pub(crate) fn moment(&self, x: f64) -> [f64; 4] {
-        let Element {
-            length: h,
-            bending_stiffness,
-            shear: phi,
-            ..
-        } = self.element;
+    fn moment(&self, x: f64) -> [f64; 4] {
+        let (h, phi) = (self.element.length, self.element.shear);
         // M = E I/h (theta1 - theta0 + 6 (2x - 1)/(1 + phi) ((theta0 + theta1)/2 - (w1 - w0)/h)).
         let tilt = 6.0 * (2.0 * x - 1.0) / (1.0 + phi);
         [tilt / h, 0.5 * tilt - 1.0, -tilt / h, 0.5 * tilt + 1.0]
-            .map(|entry| bending_stiffness / h * entry)
+            .map(|entry| self.element.bending_stiffness / h * entry)
     }
 }
 
 /// v^T A v of a symmetric matrix.
-pub(crate) fn quadratic(matrix: &Square, v: &[f64; 4]) -> f64 {
+pub(super) fn quadratic(matrix: &Square, v: &[f64; 4]) -> f64 {
     let (mut diagonal, mut beside) = (0.0, 0.0);
     for i in 0..4 {
         diagonal += matrix[i][i] * v[i] * v[i];
@@ -233,49 +391,13 @@ pub(crate) fn quadratic(matrix: &Square, v: &[f64; 4]) -> f64 {
     diagonal + 2.0 * beside
 }
 
+/// Inner product.
+pub(super) fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
 fn sum(a: &Square, b: &Square) -> Square {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
-}
-
-/// dw/dx at x from 0 to 1 for a unit of each end motion.
-pub(crate) fn slopes(element: &Element, x: f64) -> [f64; 4] {
-    let (h, phi) = (element.length, element.shear);
-    let scale = 1.0 / ((1.0 + phi) * h);
-    let bend = 6.0 * (x - x * x);
-    [
-        scale * (-bend - phi),
-        scale * h * (1.0 - 4.0 * x + 3.0 * x * x + 0.5 * phi * (1.0 - 2.0 * x)),
-        scale * (bend + phi),
-        scale * h * (3.0 * x * x - 2.0 * x - 0.5 * phi * (1.0 - 2.0 * x)),
-    ]
-}
-
-/// Shear strain dw/dx - theta, the same all along the element.
-fn shear_strains(element: &Element) -> [f64; 4] {
-    let (h, phi) = (element.length, element.shear);
-    let share = phi / (1.0 + phi);
-    [-share / h, -0.5 * share, share / h, -0.5 * share]
-}
-
-/// P times the integral of the product of slopes.
-fn geometric_stiffness(element: &Element, axial_force: f64) -> Square {
-    // Three of Gauss's points integrate the fourth power exactly.
-    let off = 0.5 * 0.6f64.sqrt();
-    let points = [
-        (0.5 - off, 5.0 / 18.0),
-        (0.5, 8.0 / 18.0),
-        (0.5 + off, 5.0 / 18.0),
-    ];
-    let mut matrix = [[0.0; 4]; 4];
-    for (x, weight) in points {
-        let slope = slopes(element, x);
-        for (row, a) in matrix.iter_mut().zip(slope) {
-            for (entry, b) in row.iter_mut().zip(slope) {
-                *entry += axial_force * element.length * weight * a * b;
-            }
-        }
-    }
-    matrix
 }
 
 /// Coefficients of a polynomial, constant first.
@@ -288,95 +410,18 @@ struct Motion {
     rotation: Polynomial,
 }
 
-fn end_motions(element: &Element) -> [Motion; 4] {
-    let (h, phi) = (element.length, element.shear);
-    let s = 1.0 / (1.0 + phi);
-    let shapes = [
-        [s * (1.0 + phi), -s * phi, -3.0 * s, 2.0 * s],
-        [
-            0.0,
-            s * h * (1.0 + 0.5 * phi),
-            -s * h * (2.0 + 0.5 * phi),
-            s * h,
-        ],
-        [0.0, s * phi, 3.0 * s, -2.0 * s],
-        [0.0, -0.5 * s * h * phi, s * h * (0.5 * phi - 1.0), s * h],
-    ];
-    let strains = shear_strains(element);
-    std::array::from_fn(|i| {
-        let mut motion = Motion {
-            displacement: [0.0; 8],
-            rotation: [0.0; 8],
-        };
-        motion.displacement[..4].copy_from_slice(&shapes[i]);
-        for (power, coefficient) in shapes[i].iter().enumerate().skip(1) {
-            motion.rotation[power - 1] = power as f64 * coefficient / h;
-        }
-        motion.rotation[0] -= strains[i];
-        motion
-    })
-}
-
-/// What the inertia of an end motion causes inside, over omega^2.
-fn inertia_response(element: &Element, motion: &Motion) -> Motion {
-    let (m, j) = (element.mass_per_length, element.rotary_inertia);
-    let force = motion.displacement.map(|c| m * c);
-    inner_response(element, &force, &motion.rotation.map(|c| j * c))
-}
-
-fn second_order(element: &Element, motions: &[Motion; 4], responses: &[Motion; 4]) -> Square {
-    let (m, j) = (element.mass_per_length, element.rotary_inertia);
-    std::array::from_fn(|i| {
-        std::array::from_fn(|k| {
-            element.length
-                * (m * integral_of_product(&motions[k].displacement, &responses[i].displacement)
-                    + j * integral_of_product(&motions[k].rotation, &responses[i].rotation))
-        })
-    })
-}
-
-/// Static motion of the element held at both ends, under a distributed force and moment.
-///
-/// With the shear force V: V' = -h q, theta'' = -h^2/(E I) (V + moment), w' = h (theta + V/S) and
-/// 1/S = phi h^2/(12 E I); all motions vanish at 0 and 1.
-fn inner_response(element: &Element, force: &Polynomial, moment: &Polynomial) -> Motion {
-    let (h, phi) = (element.length, element.shear);
-    let flexibility = h * h / element.bending_stiffness;
-    let once = integral(force);
-    let bent = integral(&integral(&combine((h, &once), (-1.0, moment))));
-    let (at_end, area) = (value_at_end(&bent), value_at_end(&integral(&bent)));
-    let sheared = h * value_at_end(&integral(&once));
-    let c1 = near_shear_force(phi, at_end, area, sheared);
-    let c3 = 0.5 * c1 - at_end;
-    let mut rotation = bent;
-    rotation[2] -= 0.5 * c1;
-    rotation[1] += c3;
-    let mut slope = combine((1.0, &rotation), (-h * phi / 12.0, &once));
-    slope[0] += c1 * phi / 12.0;
-    Motion {
-        displacement: integral(&slope).map(|c| h * flexibility * c),
-        rotation: rotation.map(|c| flexibility * c),
-    }
-}
-
 /// Shear force at the near end, so that both motions vanish at the far end.
 fn near_shear_force(phi: f64, at_end: f64, area: f64, sheared: f64) -> f64 {
     12.0 / (1.0 + phi) * (0.5 * at_end - area + sheared * phi / 12.0)
 }
 
-fn combine((a, x): (f64, &Polynomial), (b, y): (f64, &Polynomial)) -> Polynomial {
-    std::array::from_fn(|i| a * x[i] + b * y[i])
-}
-
-/// Integral from 0; the highest coefficient is never in use before.
+/// Integral from 0. The highest coefficient is never in use before.
 fn integral(polynomial: &Polynomial) -> Polynomial {
-    std::array::from_fn(|i| {
-        if i == 0 {
-            0.0
-        } else {
-            polynomial[i - 1] / i as f64
-        }
-    })
+    let mut integral = [0.0; 8];
+    for (i, coefficient) in polynomial[..7].iter().enumerate() {
+        integral[i + 1] = coefficient / (i + 1) as f64;
+    }
+    integral
 }
 
 fn value_at_end(polynomial: &Polynomial) -> f64 {
@@ -394,8 +439,8 @@ const INVERSES: [f64; 11] = {
     inverses
 };
 
+/// Integral from 0 to 1 of the product of a cubic, as end motions are, and another polynomial.
 fn integral_of_product(a: &Polynomial, b: &Polynomial) -> f64 {
-    // Shapes of end motions are cubic.
     let mut sum = 0.0;
     for (i, x) in a[..4].iter().enumerate() {
         for (y, inverse) in b.iter().zip(&INVERSES[i..]) {
@@ -405,32 +450,179 @@ fn integral_of_product(a: &Polynomial, b: &Polynomial) -> f64 {
     sum
 }
 
-// An element with hinges inside, condensed exactly: the element takes its static shape under end
-// loads, kinks included, so that nothing jumps when a hinge moves across a node.
-//
-// With the element held at both ends, a unit kink at x_k bends it by kappa_k and causes the moment
-// M_k(x). A hinge of compliance c turns by `alpha = c (moment there)`, the moment being that of the
-// end motions, b v, and of all kinks:
-//
-// ```text
-// alpha = C (B v + M alpha)   =>   alpha = (1 - C M)^-1 C B v = A v,   K = K0 - B^T A.
-// ```
+/// A hinge inside an element.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ElementHinge {
+    /// Place within the element (0 to 1).
+    pub(super) within: f64,
+    /// Rotation per moment, in the model's units.
+    pub(super) compliance: f64,
+}
 
-/// An element with its hinges: place within it (0 to 1) and compliance.
+/// An element with hinges inside, condensed exactly. The element takes its static shape under end
+/// loads, kinks included, so that nothing jumps when a hinge moves across a node.
+///
+/// With the element held at both ends, a unit kink at x_k bends it by kappa_k and causes the moment
+/// M_k(x). A hinge of compliance c turns by `alpha = c (moment there)`, the moment being that of
+/// the end motions, b v, and of all kinks:
+///
+/// ```text
+/// alpha = C (B v + M alpha)   =>   alpha = (1 - C M)^-1 C B v = A v,   K = K0 - B^T A.
+/// ```
 #[derive(Debug, Clone)]
-pub(crate) struct HingedElement {
-    pub(crate) run: usize,
-    pub(crate) index: usize,
-    pub(crate) hinges: Vec<(f64, f64)>,
+pub(super) struct HingedElement {
+    /// The element's near node.
+    pub(super) node: usize,
+    pub(super) hinges: Vec<ElementHinge>,
     /// A: kink of each hinge for a unit of each end motion.
     kinks: Vec<[f64; 4]>,
-    pub(crate) stiffness: Square,
-    pub(crate) mass: Square,
+    pub(super) stiffness: Square,
+    pub(super) mass: Square,
+}
+
+impl HingedElement {
+    /// # Errors
+    /// [`StructureError::FiniteElements`] where the hinges have no solution.
+    pub(super) fn new(
+        section: &Section,
+        node: usize,
+        hinges: Vec<ElementHinge>,
+    ) -> Result<Self, StructureError> {
+        let kinks = kinks_per_end_motion(section, &hinges)?;
+        let mut stiffness = section.element.stiffness();
+        for (kink, hinge) in kinks.iter().zip(&hinges) {
+            for (row, moment) in stiffness.iter_mut().zip(section.moment(hinge.within)) {
+                for (entry, turn) in row.iter_mut().zip(kink) {
+                    *entry -= moment * turn;
+                }
+            }
+        }
+        let mut element = Self {
+            node,
+            hinges,
+            kinks,
+            stiffness,
+            mass: [[0.0; 4]; 4],
+        };
+        element.integrate(section);
+        Ok(element)
+    }
+
+    /// Mass and stiffness of the axial force, piece by piece between the kinks.
+    fn integrate(&mut self, section: &Section) {
+        let element = &section.element;
+        for (x, weight) in self.gauss_points() {
+            let scale = weight * element.length;
+            let mut weights = section.weights(x);
+            self.add_weights(section, x, &mut weights);
+            let slope = self.slopes(section, x);
+            let (w, t) = (weights.displacement, weights.rotation);
+            for i in 0..4 {
+                for j in 0..4 {
+                    self.mass[i][j] += scale
+                        * (element.mass_per_length * w[i] * w[j]
+                            + element.rotary_inertia * t[i] * t[j]);
+                    self.stiffness[i][j] += scale * section.axial_force * slope[i] * slope[j];
+                }
+            }
+        }
+    }
+
+    /// Places (0 to 1) and weights that integrate exactly to the seventh power between the kinks.
+    fn gauss_points(&self) -> Vec<(f64, f64)> {
+        let mut borders: Vec<f64> = self.hinges.iter().map(|hinge| hinge.within).collect();
+        borders.extend([0.0, 1.0]);
+        borders.sort_by(f64::total_cmp);
+        let mut points = Vec::with_capacity(4 * borders.len());
+        for piece in borders.windows(2) {
+            let width = piece[1] - piece[0];
+            points.extend(GAUSS.map(|(x, weight)| (piece[0] + width * x, width * weight)));
+        }
+        points
+    }
+
+    fn kinks(&self, section: &Section) -> impl Iterator<Item = (Kink, &[f64; 4])> {
+        let hinges = self.hinges.iter().zip(&self.kinks);
+        hinges.map(|(hinge, turns)| (Kink::new(&section.element, hinge.within), turns))
+    }
+
+    /// Adds to the motion of the whole element what the kinks add.
+    pub(super) fn add_weights(&self, section: &Section, x: f64, weights: &mut Weights) {
+        for (kink, per_motion) in self.kinks(section) {
+            for (i, share) in per_motion.iter().enumerate() {
+                weights.displacement[i] += share * kink.displacement(x);
+                weights.rotation[i] += share * kink.rotation(x);
+            }
+        }
+    }
+
+    fn slopes(&self, section: &Section, x: f64) -> [f64; 4] {
+        let mut slope = section.element.slopes(x);
+        for (kink, per_motion) in self.kinks(section) {
+            for (total, share) in slope.iter_mut().zip(per_motion) {
+                *total += share * kink.slope(x);
+            }
+        }
+        slope
+    }
+
+    /// Twice the strain energy: that of the whole element less what the kinks release.
+    pub(super) fn strain_energy(&self, section: &Section, ends: &[f64; 4]) -> f64 {
+        let mut released = 0.0;
+        for (kink, hinge) in self.kinks.iter().zip(&self.hinges) {
+            released += dot(&section.moment(hinge.within), ends) * dot(kink, ends);
+        }
+        let mut axial = 0.0;
+        if section.axial_force != 0.0 {
+            for (x, weight) in self.gauss_points() {
+                let along = dot(&self.slopes(section, x), ends);
+                axial += weight * along * along;
+            }
+        }
+        section.element.strain_energy(ends) - released
+            + axial * section.axial_force * section.element.length
+    }
+}
+
+/// Gauss's four points from 0 to 1 and their weights.
+const GAUSS: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
+/// A of the text of [`HingedElement`].
+fn kinks_per_end_motion(
+    section: &Section,
+    hinges: &[ElementHinge],
+) -> Result<Vec<[f64; 4]>, StructureError> {
+    let count = hinges.len();
+    let scale = section.element.bending_stiffness / section.element.length;
+    let mut matrix = DMatrix::identity(count, count);
+    let mut right = DMatrix::zeros(count, 4);
+    for (i, hinge) in hinges.iter().enumerate() {
+        for (j, other) in hinges.iter().enumerate() {
+            let kink = Kink::new(&section.element, other.within);
+            matrix[(i, j)] -= hinge.compliance * scale * kink.moment(hinge.within);
+        }
+        for (j, moment) in section.moment(hinge.within).iter().enumerate() {
+            right[(i, j)] = hinge.compliance * moment;
+        }
+    }
+    // The moments of unit kinks form a negative semidefinite matrix, so that there is a solution.
+    let solution = matrix.lu().solve(&right);
+    let solution = solution.ok_or_else(|| StructureError::FiniteElements {
+        reason: "the hinges in one element have no solution".to_owned(),
+    })?;
+    Ok((0..count)
+        .map(|i| std::array::from_fn(|j| solution[(i, j)]))
+        .collect())
 }
 
 /// The shape that a unit kink gives the element held at both ends.
 struct Kink {
-    place: f64,
+    within: f64,
     /// theta = a x + b x^2/2, and 1 more behind the kink.
     a: f64,
     b: f64,
@@ -440,31 +632,27 @@ struct Kink {
 }
 
 impl Kink {
-    fn new(section: &Section, place: f64) -> Self {
-        let phi = section.element.shear;
+    fn new(element: &Element, within: f64) -> Self {
+        let phi = element.shear;
         // Rotation and displacement vanish at the far end:
         // a + b/2 + 1 = 0, a/2 + b/6 + 1 - x_k - b phi/12 = 0.
-        let b = 6.0 * (1.0 - 2.0 * place) / (1.0 + phi);
+        let b = 6.0 * (1.0 - 2.0 * within) / (1.0 + phi);
         Self {
-            place,
+            within,
             a: -1.0 - 0.5 * b,
             b,
             shear: phi / 12.0,
-            length: section.element.length,
+            length: element.length,
         }
-    }
-
-    fn behind(&self, x: f64) -> f64 {
-        (x - self.place).max(0.0)
     }
 
     fn displacement(&self, x: f64) -> f64 {
         let bent = 0.5 * self.a * x * x + self.b * x * x * x / 6.0 - self.b * self.shear * x;
-        self.length * (bent + self.behind(x))
+        self.length * (bent + (x - self.within).max(0.0))
     }
 
     fn rotation(&self, x: f64) -> f64 {
-        let turned = if x > self.place { 1.0 } else { 0.0 };
+        let turned = if x > self.within { 1.0 } else { 0.0 };
         self.a * x + 0.5 * self.b * x * x + turned
     }
 
@@ -477,154 +665,4 @@ impl Kink {
     fn moment(&self, x: f64) -> f64 {
         self.a + self.b * x
     }
-}
-
-impl HingedElement {
-    pub(crate) fn new(
-        section: &Section,
-        (run, index): (usize, usize),
-        hinges: Vec<(f64, f64)>,
-    ) -> Result<Self, StructureError> {
-        let kinks = kinks_per_end_motion(section, &hinges)?;
-        let mut element = Self {
-            run,
-            index,
-            hinges,
-            kinks,
-            stiffness: section.element.stiffness(),
-            mass: [[0.0; 4]; 4],
-        };
-        for (kink, &(place, _)) in element.kinks.iter().zip(&element.hinges) {
-            let moment = section.moment(place);
-            for (row, moment) in element.stiffness.iter_mut().zip(moment) {
-                for (entry, turn) in row.iter_mut().zip(kink) {
-                    *entry -= moment * turn;
-                }
-            }
-        }
-        element.integrate(section);
-        Ok(element)
-    }
-
-    /// Mass and stiffness of the axial force, piece by piece between the kinks.
-    fn integrate(&mut self, section: &Section) {
-        let mut borders: Vec<f64> = self.hinges.iter().map(|(place, _)| *place).collect();
-        borders.extend([0.0, 1.0]);
-        borders.sort_by(f64::total_cmp);
-        let element = &section.element;
-        for piece in borders.windows(2) {
-            for (point, weight) in GAUSS {
-                let x = piece[0] + (piece[1] - piece[0]) * point;
-                let scale = (piece[1] - piece[0]) * weight * element.length;
-                let mut weights = section.weights(x);
-                self.add_weights(section, x, &mut weights);
-                let slope = self.slopes(section, x);
-                let (w, t) = (weights.displacement, weights.rotation);
-                for i in 0..4 {
-                    for j in 0..4 {
-                        self.mass[i][j] += scale
-                            * (element.mass_per_length * w[i] * w[j]
-                                + element.rotary_inertia * t[i] * t[j]);
-                        self.stiffness[i][j] += scale * section.axial_force * slope[i] * slope[j];
-                    }
-                }
-            }
-        }
-    }
-
-    fn kinks(&self, section: &Section) -> impl Iterator<Item = (Kink, &[f64; 4])> {
-        let shapes = self
-            .hinges
-            .iter()
-            .map(|(place, _)| Kink::new(section, *place));
-        shapes.zip(&self.kinks)
-    }
-
-    /// Adds to the motion of the whole element what the kinks add.
-    pub(crate) fn add_weights(&self, section: &Section, x: f64, weights: &mut Weights) {
-        for (kink, per_motion) in self.kinks(section) {
-            for (i, share) in per_motion.iter().enumerate() {
-                weights.displacement[i] += share * kink.displacement(x);
-                weights.rotation[i] += share * kink.rotation(x);
-            }
-        }
-    }
-
-    fn slopes(&self, section: &Section, x: f64) -> [f64; 4] {
-        let mut slope = slopes(&section.element, x);
-        for (kink, per_motion) in self.kinks(section) {
-            for (total, share) in slope.iter_mut().zip(per_motion) {
-                *total += share * kink.slope(x);
-            }
-        }
-        slope
-    }
-
-    /// Twice the strain energy: that of the whole element less what the kinks release.
-    pub(crate) fn strain_energy(&self, section: &Section, ends: &[f64; 4]) -> f64 {
-        let dot = |row: &[f64; 4]| row.iter().zip(ends).map(|(a, b)| a * b).sum::<f64>();
-        let released = self
-            .kinks
-            .iter()
-            .zip(&self.hinges)
-            .map(|(kink, (place, _))| dot(&section.moment(*place)) * dot(kink));
-        let elastic = section.element.strain_energy(ends) - released.sum::<f64>();
-        elastic + self.axial_energy(section, ends)
-    }
-
-    fn axial_energy(&self, section: &Section, ends: &[f64; 4]) -> f64 {
-        if section.axial_force == 0.0 {
-            return 0.0;
-        }
-        let mut borders: Vec<f64> = self.hinges.iter().map(|(place, _)| *place).collect();
-        borders.extend([0.0, 1.0]);
-        borders.sort_by(f64::total_cmp);
-        let mut sum = 0.0;
-        for piece in borders.windows(2) {
-            let width = piece[1] - piece[0];
-            for (point, weight) in GAUSS {
-                let slope = self.slopes(section, piece[0] + width * point);
-                let along: f64 = slope.iter().zip(ends).map(|(a, b)| a * b).sum();
-                sum += width * weight * along * along;
-            }
-        }
-        sum * section.axial_force * section.element.length
-    }
-}
-
-/// Gauss's four points from 0 to 1 and their weights: exact to the seventh power.
-const GAUSS: [(f64, f64); 4] = [
-    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
-    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
-    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
-    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
-];
-
-/// A of the module's text.
-fn kinks_per_end_motion(
-    section: &Section,
-    hinges: &[(f64, f64)],
-) -> Result<Vec<[f64; 4]>, StructureError> {
-    let count = hinges.len();
-    let scale = section.element.bending_stiffness / section.element.length;
-    let mut matrix = DMatrix::identity(count, count);
-    let mut right = DMatrix::zeros(count, 4);
-    for (i, (place, compliance)) in hinges.iter().enumerate() {
-        for (j, (other, _)) in hinges.iter().enumerate() {
-            matrix[(i, j)] -= compliance * scale * Kink::new(section, *other).moment(*place);
-        }
-        for (j, moment) in section.moment(*place).iter().enumerate() {
-            right[(i, j)] = compliance * moment;
-        }
-    }
-    // The moments of unit kinks form a negative semidefinite matrix, so that there is a solution.
-    let solution = matrix
-        .lu()
-        .solve(&right)
-        .ok_or_else(|| StructureError::FiniteElements {
-            reason: "the hinges in one element have no solution".to_owned(),
-        })?;
-    Ok((0..count)
-        .map(|i| std::array::from_fn(|j| solution[(i, j)]))
-        .collect())
 }

@@ -6,12 +6,12 @@
 //!
 //! Finite elements on a banded matrix. What lies between two nodes is not moved to the nearest one:
 //! masses and springs act through the element's shape, a hinge changes the element's own static
-//! shape, and what the static shapes miss is added to second order (`section.rs`). So frequencies
+//! shape, and what the static shapes miss is added to second order (`element.rs`). So frequencies
 //! are smooth in every position and good on a coarse mesh.
 
-pub(crate) mod element;
-mod model;
-mod modes;
+mod element;
+pub(crate) mod model;
+pub(crate) mod modes;
 
 use crate::{Assembly, Beam, BeamTheory, StructureError};
 pub use modes::{BeamModes, SpecimenModes};
@@ -28,7 +28,24 @@ pub enum Body {
 }
 
 impl Body {
-    /// Its beams from left to right.
+    /// The beam, cut at the joint where that is a lap joint.
+    pub fn of(beam: &Beam, assembly: Assembly, lap: &LapLayout) -> Self {
+        if assembly != Assembly::Lap {
+            return Self::One(*beam);
+        }
+        let position = lap.position.unwrap_or(0.5 * beam.length);
+        let left = Beam {
+            length: position,
+            ..*beam
+        };
+        let right = Beam {
+            length: beam.length - position,
+            ..lap.right.unwrap_or(*beam)
+        };
+        Self::Joined([left, right])
+    }
+
+    /// The beams from left to right.
     pub fn beams(&self) -> &[Beam] {
         match self {
             Self::One(beam) => std::slice::from_ref(beam),
@@ -36,7 +53,7 @@ impl Body {
         }
     }
 
-    /// Its beams from left to right.
+    /// The beams from left to right, to be changed.
     pub fn beams_mut(&mut self) -> &mut [Beam] {
         match self {
             Self::One(beam) => std::slice::from_mut(beam),
@@ -50,7 +67,7 @@ impl Body {
     }
 }
 
-/// What holds the beam's left end, or the two halves of a lap joint together.
+/// The joint: it holds the beam's left end, or the two halves of a lap joint together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SpecimenJoint {
     /// Nothing.
@@ -96,7 +113,7 @@ pub struct PointInertia {
 /// adds in stiffness belongs to the joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LapOverlap {
-    /// Its length (m), half on either side of the joint.
+    /// Length (m), half on either side of the joint.
     pub length: f64,
     /// The mass it adds, bolts included (kg).
     pub mass: f64,
@@ -141,7 +158,7 @@ pub struct Hinge {
     pub compliance: f64,
 }
 
-/// How finely the beams are divided.
+/// Division of the beams into finite elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Mesh {
     /// Elements over the whole length; shared among two beams by their lengths.
@@ -154,6 +171,26 @@ impl Mesh {
     /// For a reference: with 200 elements the first seven frequencies are right to 1e-8, beyond
     /// which rounding takes over.
     pub const SIMULATION: Self = Self { elements: 200 };
+
+    /// Number of elements of each beam.
+    pub(crate) fn divide(self, body: &Body) -> Vec<usize> {
+        let beams = body.beams().iter();
+        let shares = beams.map(|beam| self.elements as f64 * beam.length / body.length());
+        shares
+            .map(|share| (share.round() as usize).max(1))
+            .collect()
+    }
+}
+
+/// Differences of a lap joint's halves from two equal pieces of one beam.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LapLayout {
+    /// The joint's place (m) from the left end; `None` = the middle.
+    pub position: Option<f64>,
+    /// The right half, where it differs; its `length` is not used.
+    pub right: Option<Beam>,
+    /// Length (m) of the overlap and the mass (kg) it adds.
+    pub overlap: Option<(f64, f64)>,
 }
 
 /// The tested structure.
@@ -161,15 +198,14 @@ impl Mesh {
 pub struct Specimen {
     /// The beam or beams.
     pub body: Body,
-    /// How much of shear flexibility and rotary inertia there is (1): 0 = Euler's beam,
-    /// 1 = Timoshenko's.
+    /// Share of shear flexibility and rotary inertia (1): 0 = Euler's beam, 1 = Timoshenko's.
     pub shear_rotary: f64,
-    /// What holds it.
+    /// The joint.
     pub joint: SpecimenJoint,
     /// Mass and inertia that move with the beam's end at the joint; of a lap joint half of it with
     /// either end.
     pub joint_mass: PointInertia,
-    /// Lap joint: its overlapping piece.
+    /// Overlapping piece of a lap joint.
     pub overlap: Option<LapOverlap>,
     /// The fixture under the joint where it gives.
     pub base: Option<Base>,
@@ -200,6 +236,25 @@ impl Specimen {
         }
     }
 
+    /// A beam on its joint, with nothing on it but a lap joint's overlap. Of a lap joint `beam` has the
+    /// left half's properties and the total length; `lap` has no meaning for one beam.
+    pub fn jointed(
+        theory: BeamTheory,
+        beam: &Beam,
+        assembly: Assembly,
+        lap: &LapLayout,
+        joint: SpecimenJoint,
+    ) -> Self {
+        let mut specimen = Self::new(Body::of(beam, assembly, lap), joint);
+        if theory == BeamTheory::Timoshenko {
+            specimen.shear_rotary = 1.0;
+        }
+        if let (Assembly::Lap, Some((length, mass))) = (assembly, lap.overlap) {
+            specimen.overlap = Some(LapOverlap { length, mass });
+        }
+        specimen
+    }
+
     /// The lowest `count` modes, ascending. Motions that are rigid but for the springs to the ground
     /// are left out and listed apart ([`SpecimenModes::suspension_frequencies`]).
     ///
@@ -209,56 +264,15 @@ impl Specimen {
     pub fn modes(&self, count: usize, mesh: Mesh) -> Result<SpecimenModes, StructureError> {
         SpecimenModes::new(self, count, mesh)
     }
-}
 
-// From a beam and how it is held to the specimen: the one place where halves of a lap joint are cut.
-
-/// Where a lap joint's halves differ from two equal pieces of one beam.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct LapLayout {
-    /// The joint's place (m) from the left end; `None` = the middle.
-    pub position: Option<f64>,
-    /// The right half, where it differs; its `length` is not used.
-    pub right: Option<Beam>,
-    /// Length (m) of the overlap and the mass (kg) it adds.
-    pub overlap: Option<(f64, f64)>,
-}
-
-impl Specimen {
-    /// A beam (of a lap joint the left half's properties and the total length) on its joint, with nothing
-    /// on it but a lap joint's overlap; `lap` is of no meaning for one beam.
-    pub fn jointed(
-        theory: BeamTheory,
-        (beam, assembly): (&Beam, Assembly),
-        lap: &LapLayout,
-        joint: SpecimenJoint,
-    ) -> Self {
-        let mut specimen = Self::new(body(beam, assembly, lap), joint);
-        specimen.shear_rotary = match theory {
-            BeamTheory::Euler => 0.0,
-            BeamTheory::Timoshenko => 1.0,
-        };
-        let overlap = lap.overlap.filter(|_| assembly == Assembly::Lap);
-        specimen.overlap = overlap.map(|(length, mass)| LapOverlap { length, mass });
-        specimen
+    /// The lowest `count` modes of the beam, on a fixture that may give.
+    ///
+    /// # Errors
+    /// As [`Specimen::modes`].
+    pub fn beam_modes(&self, count: usize, mesh: Mesh) -> Result<BeamModes, StructureError> {
+        BeamModes::new(self, count, mesh)
     }
-}
 
-fn body(beam: &Beam, assembly: Assembly, lap: &LapLayout) -> Body {
-    if assembly != Assembly::Lap {
-        return Body::One(*beam);
-    }
-    let position = lap.position.unwrap_or(0.5 * beam.length);
-    let piece = |beam: Beam, length: f64| Beam { length, ..beam };
-    Body::Joined([
-        piece(*beam, position),
-        piece(lap.right.unwrap_or(*beam), beam.length - position),
-    ])
-}
-
-// Whether a specimen can exist.
-
-impl Specimen {
     /// Checks that every part can exist and lies on the beam.
     ///
     /// # Errors

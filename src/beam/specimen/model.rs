@@ -1,20 +1,126 @@
-//! A specimen divided into elements: its matrices, and the energies of any motion.
+//! A specimen divided into elements: its equations, its matrices, and the energies of any motion.
 //!
 //! Lengths are in units of the specimen's, stiffness and mass in those of its first beam, so that
 //! all numbers stay near 1. Rotations are dw/dx with x in units of the length.
 
-use super::element::{Element, HingedElement, Section, Square, Weights, quadratic};
-use super::{Body, Mesh, Specimen, SpecimenJoint};
-use crate::banded::Band;
-use crate::finite_elements::{Piece, Units};
-use crate::{BeamTheory, StructureError};
+use super::element::{
+    ElementHinge, HingedElement, Section, Square, Units, Weights, dot, quadratic,
+};
+use super::{Body, Specimen, SpecimenJoint};
+use crate::StructureError;
+use crate::banded::BandedMatrix;
+use std::f64::consts::PI;
+
+/// Equation of a motion that does not exist.
+const HELD: usize = usize::MAX;
+
+/// Equations of a specimen's motions.
+///
+/// About a lap joint the order is chosen so that merged motions stay within the half-bandwidth of an
+/// element: left end's own, shared, right end's own.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Numbering {
+    /// For each node displacement and rotation.
+    nodes: Vec<[usize; 2]>,
+    /// Rotation of the base.
+    base: Option<usize>,
+    /// Number of equations.
+    size: usize,
+}
+
+impl Numbering {
+    /// `elements` of each beam; `has_base` where the fixture has a motion of its own.
+    fn new(specimen: &Specimen, elements: &[usize], has_base: bool) -> Self {
+        let rigid = specimen.joint.stiffnesses().map(f64::is_infinite);
+        let mut numbering = Self {
+            nodes: Vec::new(),
+            base: None,
+            size: 0,
+        };
+        if has_base {
+            numbering.base = Some(numbering.next());
+        }
+        match specimen.body {
+            Body::One(_) => {
+                let first = rigid.map(|rigid| if rigid { HELD } else { numbering.next() });
+                numbering.nodes.push(first);
+                numbering.add_nodes(elements[0]);
+            }
+            Body::Joined(_) => {
+                numbering.add_nodes(elements[0]);
+                numbering.add_lap_joint(rigid);
+                numbering.add_nodes(elements[1]);
+            }
+        }
+        numbering
+    }
+
+    fn next(&mut self) -> usize {
+        self.size += 1;
+        self.size - 1
+    }
+
+    fn add_nodes(&mut self, count: usize) {
+        for _ in 0..count {
+            let node = [self.next(), self.next()];
+            self.nodes.push(node);
+        }
+    }
+
+    /// The two nodes of a lap joint.
+    fn add_lap_joint(&mut self, rigid: [bool; 2]) {
+        let mut left = [HELD; 2];
+        for shared in [false, true] {
+            for motion in [0, 1] {
+                if rigid[motion] == shared {
+                    left[motion] = self.next();
+                }
+            }
+        }
+        let mut right = left;
+        for motion in [0, 1] {
+            if !rigid[motion] {
+                right[motion] = self.next();
+            }
+        }
+        self.nodes.extend([left, right]);
+    }
+}
 
 /// Displacement and rotation of every node, and the rotation of the base.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Motion {
+pub(crate) struct Motion {
     pub(super) nodes: Vec<[f64; 2]>,
     /// `None` where the base does not move on its own.
     pub(super) base: Option<f64>,
+}
+
+impl Motion {
+    /// Returns self + factor other.
+    pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
+        let mut sum = self.clone();
+        for (node, other) in sum.nodes.iter_mut().zip(&other.nodes) {
+            *node = [node[0] + factor * other[0], node[1] + factor * other[1]];
+        }
+        if let Some(turn) = &mut sum.base {
+            *turn += factor * other.base.unwrap_or(0.0);
+        }
+        sum
+    }
+
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
+        let values = self.nodes.as_flattened_mut().iter_mut();
+        values
+            .chain(&mut self.base)
+            .for_each(|value| *value *= factor);
+        self
+    }
+
+    /// Motions of both ends of the element behind a node.
+    pub(crate) fn ends(&self, node: usize) -> [f64; 4] {
+        let ([w0, t0], [w1, t1]) = (self.nodes[node], self.nodes[node + 1]);
+        [w0, t0, w1, t1]
+    }
 }
 
 /// Twice the strain energy, twice the kinetic energy over omega squared, and what omega^4 adds.
@@ -46,9 +152,10 @@ impl Energies {
     }
 }
 
-/// Of a beam: equal elements from node `first_node` on.
+/// The equal elements of one beam.
 #[derive(Debug, Clone)]
 pub(super) struct Run {
+    /// Where it begins, in the model's units.
     pub(super) start: f64,
     pub(super) elements: usize,
     pub(super) first_node: usize,
@@ -62,53 +169,81 @@ pub(super) struct RotatingBase {
     pub(super) stiffness: f64,
 }
 
+/// A place on the beam: an element's near node, and the element's motion there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    pub(crate) node: usize,
+    /// From 0 to 1.
+    within: f64,
+    weights: Weights,
+    /// Displacement over omega^2 that the element's inertia adds; none in an element with a hinge.
+    pub(super) inner: [f64; 4],
+}
+
+impl Place {
+    pub(crate) fn displacement(&self, ends: &[f64; 4]) -> f64 {
+        dot(&self.weights.displacement, ends)
+    }
+
+    pub(super) fn rotation(&self, ends: &[f64; 4]) -> f64 {
+        dot(&self.weights.rotation, ends)
+    }
+}
+
+/// A mass with its inertia.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AttachedMass {
+    pub(crate) place: Place,
+    pub(crate) mass: f64,
+    inertia: f64,
+    /// Compliance of the element, held at both ends, at this place.
+    compliance: f64,
+}
+
+/// A spring to the ground.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AttachedSpring {
+    pub(crate) place: Place,
+    pub(crate) stiffness: f64,
+}
+
+/// A specimen divided into elements.
 #[derive(Debug, Clone)]
-pub(super) struct Model {
+pub(crate) struct Model {
     pub(super) runs: Vec<Run>,
     pub(super) numbering: Numbering,
     pub(super) units: Units,
     /// Stiffness of the joint for (w, theta), infinite where rigid.
     pub(super) joint: [[f64; 2]; 2],
     pub(super) base: Option<RotatingBase>,
-    pub(super) masses: Vec<Mass>,
-    pub(super) springs: Vec<Spring>,
+    pub(crate) masses: Vec<AttachedMass>,
+    pub(crate) springs: Vec<AttachedSpring>,
     hinged: Vec<HingedElement>,
 }
 
 impl Model {
-    pub(super) fn new(specimen: &Specimen, mesh: Mesh) -> Result<Self, StructureError> {
+    /// A specimen whose beams, from left to right, have so many elements each.
+    ///
+    /// # Errors
+    /// As [`Specimen::check`].
+    pub(crate) fn new(specimen: &Specimen, elements: &[usize]) -> Result<Self, StructureError> {
         specimen.check()?;
         let beams = specimen.body.beams();
-        let length = specimen.body.length();
-        let units = Units::of(&beams[0], length);
+        let units = Units::of(&beams[0], specimen.body.length());
         let mut runs: Vec<Run> = Vec::new();
-        for beam in beams {
-            let share = mesh.elements as f64 * beam.length / length;
-            let elements = (share.round() as usize).max(1);
-            let (start, node) = runs
-                .last()
-                .map_or((0.0, 0), |run| (beams[0].length / length, run.elements + 1));
-            let theory = BeamTheory::Timoshenko;
-            let piece = Piece::new(theory, beam, &units, elements, (start, node));
-            let element = Element {
-                rotary_inertia: specimen.shear_rotary * piece.element.rotary_inertia,
-                shear: specimen.shear_rotary * piece.element.shear,
-                ..piece.element
-            };
-            // The unit of force: that of bending stiffness over length squared.
-            let force = units.stiffness() * length;
-            let section = Section::new(element, specimen.axial_force / force);
+        for (beam, &elements) in beams.iter().zip(elements) {
+            let last = runs.last();
+            let (shear_rotary, axial_force) = (specimen.shear_rotary, specimen.axial_force);
             runs.push(Run {
-                start,
+                start: last.map_or(0.0, |_| beams[0].length / units.length),
                 elements,
-                first_node: node,
-                section,
+                first_node: last.map_or(0, |run| run.elements + 1),
+                section: Section::new(beam, elements, shear_rotary, axial_force, &units),
             });
         }
         let base = rotating_base(specimen, &units);
-        let elements: Vec<usize> = runs.iter().map(|run| run.elements).collect();
         let mut model = Self {
-            numbering: Numbering::new(specimen, &elements, base.map(|_| ())),
+            numbering: Numbering::new(specimen, elements, base.is_some()),
             runs,
             joint: joint_matrix(&specimen.joint, &units),
             base,
@@ -121,65 +256,175 @@ impl Model {
         Ok(model)
     }
 
-    /// Motions at zero frequency but for springs to the ground and the axial force.
-    pub(super) fn rigid_motions(&self) -> usize {
+    /// Adds what is fastened to the beams: hinges first, which change the shape by which the others
+    /// move.
+    fn attach(&mut self, specimen: &Specimen) -> Result<(), StructureError> {
+        for hinge in specimen
+            .hinges
+            .iter()
+            .filter(|hinge| hinge.compliance > 0.0)
+        {
+            let compliance = hinge.compliance * self.units.rotational_stiffness();
+            self.add_hinge(hinge.position, compliance)?;
+        }
+        for item in &specimen.masses {
+            self.add_mass(self.place(item.position), item.mass, item.inertia);
+        }
+        let (mass, inertia) = (specimen.joint_mass.mass, specimen.joint_mass.inertia);
+        match &specimen.body {
+            Body::One(_) => self.add_mass(self.place_in(0, 0, 0.0), mass, inertia),
+            Body::Joined([left, _]) => {
+                let last = self.runs[0].elements - 1;
+                self.add_mass(self.place_in(0, last, 1.0), 0.5 * mass, 0.5 * inertia);
+                self.add_mass(self.place_in(1, 0, 0.0), 0.5 * mass, 0.5 * inertia);
+                // Two points in either half, where Gauss's rule puts them, carry the overlap's
+                // uniform mass as a cubic shape feels it.
+                let gauss = 0.25 / 3f64.sqrt();
+                if let Some(overlap) = &specimen.overlap {
+                    for point in [-0.25 + gauss, -0.25 - gauss, 0.25 - gauss, 0.25 + gauss] {
+                        let place = self.place(left.length + point * overlap.length);
+                        self.add_mass(place, 0.25 * overlap.mass, 0.0);
+                    }
+                }
+            }
+        }
+        for item in specimen.springs.iter().filter(|item| item.stiffness > 0.0) {
+            self.springs.push(AttachedSpring {
+                place: self.place(item.position),
+                stiffness: item.stiffness / self.units.stiffness(),
+            });
+        }
+        Ok(())
+    }
+
+    fn add_hinge(&mut self, position: f64, compliance: f64) -> Result<(), StructureError> {
+        let (run, index, within) = self.locate(position);
+        let node = self.runs[run].first_node + index;
+        let known = self.hinged.iter().position(|hinged| hinged.node == node);
+        let mut hinges = known.map_or_else(Vec::new, |known| self.hinged.remove(known).hinges);
+        hinges.push(ElementHinge { within, compliance });
+        let section = &self.runs[run].section;
+        self.hinged.push(HingedElement::new(section, node, hinges)?);
+        Ok(())
+    }
+
+    /// Adds a mass (kg) and its inertia (kg m2).
+    fn add_mass(&mut self, place: Place, mass: f64, inertia: f64) {
+        if mass == 0.0 && inertia == 0.0 {
+            return;
+        }
+        let right = self
+            .runs
+            .iter()
+            .rposition(|run| run.first_node <= place.node);
+        let section = &self.runs[right.unwrap_or(0)].section;
+        self.masses.push(AttachedMass {
+            compliance: section.inner_compliance(place.within, place.within),
+            place,
+            mass: mass / self.units.mass,
+            inertia: inertia / (self.units.mass * self.units.length.powi(2)),
+        });
+    }
+
+    /// Run, element and place within it (0 to 1) of a position (m). A lap joint's own place belongs
+    /// to the right half.
+    fn locate(&self, position: f64) -> (usize, usize, f64) {
+        let along = position / self.units.length;
+        let right = self.runs.iter().rposition(|run| run.start <= along);
+        let run_index = right.unwrap_or(0);
+        let run = &self.runs[run_index];
+        let within = ((along - run.start) / run.section.element.length).max(0.0);
+        let index = (within as usize).min(run.elements - 1);
+        (run_index, index, (within - index as f64).min(1.0))
+    }
+
+    /// The place at a position (m).
+    pub(super) fn place(&self, position: f64) -> Place {
+        let (run, index, within) = self.locate(position);
+        self.place_in(run, index, within)
+    }
+
+    fn place_in(&self, run: usize, index: usize, within: f64) -> Place {
+        let Run {
+            first_node,
+            section,
+            ..
+        } = &self.runs[run];
+        let node = first_node + index;
+        let mut weights = section.weights(within);
+        let mut inner = [0.0; 4];
+        match self.hinged_at(node) {
+            Some(hinged) => hinged.add_weights(section, within, &mut weights),
+            None => inner = section.inner_displacement(within),
+        }
+        Place {
+            node,
+            within,
+            weights,
+            inner,
+        }
+    }
+
+    fn hinged_at(&self, node: usize) -> Option<&HingedElement> {
+        self.hinged.iter().find(|hinged| hinged.node == node)
+    }
+
+    /// Number of motions at zero frequency but for springs to the ground and the axial force.
+    pub(crate) fn rigid_motions(&self) -> usize {
         let loose = (0..2).filter(|&i| self.joint[i][i] == 0.0).count();
         2 * (self.runs.len() - 1) + loose
     }
 
+    /// Returns true where something beside the joint withstands rigid motions.
+    pub(super) fn is_supported(&self) -> bool {
+        !self.springs.is_empty() || self.runs.iter().any(|run| run.section.axial_force != 0.0)
+    }
+
+    /// Magnitude of the highest omega^2: that of an element's end alone.
+    pub(super) fn highest_square(&self) -> f64 {
+        let ratios = self
+            .runs
+            .iter()
+            .map(|run| run.section.stiffness[0][0] / run.section.mass[0][0]);
+        ratios.fold(0.0, f64::max)
+    }
+
+    /// Frequency (Hz) of an omega^2 in the model's units.
+    pub(super) fn frequency(&self, square: f64) -> f64 {
+        square.max(0.0).sqrt() * self.units.omega / (2.0 * PI)
+    }
+
     /// Stiffness and mass matrix.
-    pub(super) fn matrices(&self) -> (Band, Band) {
+    pub(crate) fn matrices(&self) -> (BandedMatrix, BandedMatrix) {
         let size = self.numbering.size;
-        let (mut stiffness, mut mass) = (Band::zeros(size), Band::zeros(size));
-        for (run_index, run) in self.runs.iter().enumerate() {
-            for index in 0..run.elements {
-                let nodes = self.equations(run.first_node + index);
-                let hinged = self.hinged_at(run_index, index);
-                let own = hinged.map_or((&run.section.stiffness, &run.section.mass), |h| {
-                    (&h.stiffness, &h.mass)
-                });
-                scatter(&mut stiffness, &nodes, own.0);
-                scatter(&mut mass, &nodes, own.1);
+        let (mut stiffness, mut mass) = (BandedMatrix::zeros(size), BandedMatrix::zeros(size));
+        for run in &self.runs {
+            for node in run.first_node..run.first_node + run.elements {
+                let hinged = self.hinged_at(node);
+                let (of_stiffness, of_mass) = match hinged {
+                    Some(hinged) => (&hinged.stiffness, &hinged.mass),
+                    None => (&run.section.stiffness, &run.section.mass),
+                };
+                self.scatter(&mut stiffness, node, of_stiffness);
+                self.scatter(&mut mass, node, of_mass);
             }
         }
         for item in &self.masses {
-            scatter(
-                &mut mass,
-                &self.place_equations(&item.place),
-                &item.matrix(),
-            );
+            let Weights {
+                displacement: w,
+                rotation: t,
+            } = item.place.weights;
+            let matrix = std::array::from_fn(|i| {
+                std::array::from_fn(|j| item.mass * w[i] * w[j] + item.inertia * t[i] * t[j])
+            });
+            self.scatter(&mut mass, item.place.node, &matrix);
         }
         for item in &self.springs {
-            scatter(
-                &mut stiffness,
-                &self.place_equations(&item.place),
-                &item.matrix(),
-            );
+            let w = item.place.weights.displacement;
+            let matrix =
+                std::array::from_fn(|i| std::array::from_fn(|j| item.stiffness * w[i] * w[j]));
+            self.scatter(&mut stiffness, item.place.node, &matrix);
         }
-        self.scatter_joint(&mut stiffness);
-        if let (Some(base), Some(row)) = (&self.base, self.numbering.base) {
-            stiffness.add(row, row, base.stiffness);
-            mass.add(row, row, base.inertia);
-        }
-        (stiffness, mass)
-    }
-
-    fn equations(&self, node: usize) -> [usize; 4] {
-        let (near, far) = (self.numbering.nodes[node], self.numbering.nodes[node + 1]);
-        [near[0], near[1], far[0], far[1]]
-    }
-
-    fn place_equations(&self, place: &Place) -> [usize; 4] {
-        self.equations(place.node)
-    }
-
-    fn hinged_at(&self, run: usize, index: usize) -> Option<&HingedElement> {
-        self.hinged
-            .iter()
-            .find(|h| h.run == run && h.index == index)
-    }
-
-    fn scatter_joint(&self, stiffness: &mut Band) {
         let ends = self.joint_ends();
         for &(row, i, row_sign) in &ends {
             for &(column, j, column_sign) in &ends {
@@ -189,10 +434,28 @@ impl Model {
                 }
             }
         }
+        if let (Some(base), Some(row)) = (&self.base, self.numbering.base) {
+            stiffness.add(row, row, base.stiffness);
+            mass.add(row, row, base.inertia);
+        }
+        (stiffness, mass)
+    }
+
+    /// Adds the matrix of the element behind a node.
+    fn scatter(&self, target: &mut BandedMatrix, node: usize, matrix: &Square) {
+        let [near, far] = [self.numbering.nodes[node], self.numbering.nodes[node + 1]];
+        let equations = [near[0], near[1], far[0], far[1]];
+        for (&row, values) in equations.iter().zip(matrix) {
+            for (&column, value) in equations.iter().zip(values) {
+                if row != HELD && column != HELD {
+                    target.add(row, column, *value);
+                }
+            }
+        }
     }
 
     /// Equations whose motion deforms the joint, its component, and the sign.
-    pub(super) fn joint_ends(&self) -> Vec<(usize, usize, f64)> {
+    fn joint_ends(&self) -> Vec<(usize, usize, f64)> {
         let nodes = &self.numbering.nodes;
         if let [left, right] = self.runs.as_slice() {
             let (before, after) = (nodes[left.elements], nodes[right.first_node]);
@@ -210,8 +473,19 @@ impl Model {
         ends
     }
 
+    /// The load of a unit moment on the beam's end, and its opposite on what the joint fastens it to.
+    pub(super) fn joint_moment(&self) -> Vec<f64> {
+        let mut load = vec![0.0; self.numbering.size];
+        for (row, component, sign) in self.joint_ends() {
+            if component == 1 && row != HELD {
+                load[row] += sign;
+            }
+        }
+        load
+    }
+
     /// Deformation of the joint's springs: displacement and rotation.
-    pub(super) fn joint_motion(&self, motion: &Motion) -> [f64; 2] {
+    pub(crate) fn joint_motion(&self, motion: &Motion) -> [f64; 2] {
         if let [left, right] = self.runs.as_slice() {
             let (before, after) = (motion.nodes[left.elements], motion.nodes[right.first_node]);
             return [after[0] - before[0], after[1] - before[1]];
@@ -226,23 +500,22 @@ impl Model {
         let mut sum = 0.0;
         for (row, a) in self.joint.iter().zip(u) {
             for (entry, b) in row.iter().zip(u) {
-                sum += if entry.is_finite() {
-                    entry * a * b
-                } else {
-                    0.0
-                };
+                if entry.is_finite() {
+                    sum += entry * a * b;
+                }
             }
         }
         sum
     }
 
+    /// Energies of a motion.
     pub(super) fn energies(&self, motion: &Motion) -> Energies {
         let mut sum = Energies::default();
-        for (run_index, run) in self.runs.iter().enumerate() {
-            for index in 0..run.elements {
-                let ends = motion.ends(run.first_node + index);
+        for run in &self.runs {
+            for node in run.first_node..run.first_node + run.elements {
+                let ends = motion.ends(node);
                 sum.second_order += quadratic(&run.section.second_order, &ends);
-                if let Some(hinged) = self.hinged_at(run_index, index) {
+                if let Some(hinged) = self.hinged_at(node) {
                     sum.strain += hinged.strain_energy(&run.section, &ends);
                     sum.kinetic += quadratic(&hinged.mass, &ends);
                 } else {
@@ -253,11 +526,17 @@ impl Model {
         }
         for item in &self.masses {
             let ends = motion.ends(item.place.node);
-            sum.kinetic += item.energy(&ends);
-            sum.second_order += item.second_order(&ends);
+            let (w, t) = (item.place.displacement(&ends), item.place.rotation(&ends));
+            sum.kinetic += item.mass * w * w + item.inertia * t * t;
+            // Its load inside the element: its own motion m^2 w^2 times the compliance, and the work
+            // on what the element's inertia moves.
+            let load = item.mass * w;
+            sum.second_order +=
+                load * (load * item.compliance + 2.0 * dot(&item.place.inner, &ends));
         }
         for item in &self.springs {
-            sum.strain += item.energy(&motion.ends(item.place.node));
+            let w = item.place.displacement(&motion.ends(item.place.node));
+            sum.strain += item.stiffness * w.powi(2);
         }
         sum.strain += self.joint_energy(motion);
         if let (Some(base), Some(turn)) = (&self.base, motion.base) {
@@ -267,22 +546,25 @@ impl Model {
         sum
     }
 
+    /// Twice the strain and the kinetic energy that two motions have in common.
+    pub(super) fn products(&self, a: &Motion, b: &Motion) -> [f64; 2] {
+        let [with, without] = [1.0, -1.0].map(|sign| self.energies(&a.plus(sign, b)));
+        [
+            0.25 * (with.strain - without.strain),
+            0.25 * (with.kinetic - without.kinetic),
+        ]
+    }
+
     /// A vector of the equations as motions of the nodes.
-    pub(super) fn motion(&self, vector: &[f64]) -> Motion {
+    pub(crate) fn motion(&self, vector: &[f64]) -> Motion {
         let at = |row: usize| if row == HELD { 0.0 } else { vector[row] };
+        let nodes = self.numbering.nodes.iter();
         Motion {
-            nodes: self
-                .numbering
-                .nodes
-                .iter()
-                .map(|node| node.map(at))
-                .collect(),
+            nodes: nodes.map(|node| node.map(at)).collect(),
             base: self.numbering.base.map(at),
         }
     }
-}
 
-impl Model {
     /// The equations' vector of a motion.
     pub(super) fn vector(&self, motion: &Motion) -> Vec<f64> {
         let mut vector = vec![0.0; self.numbering.size];
@@ -290,50 +572,56 @@ impl Model {
         let moved = nodes.flat_map(|(rows, values)| rows.iter().copied().zip(*values));
         let base = self.numbering.base.zip(motion.base);
         for (row, value) in moved.chain(base) {
-            if let Some(entry) = vector.get_mut(row) {
-                *entry = value;
+            if row != HELD {
+                vector[row] = value;
             }
         }
         vector
     }
-}
 
-impl Motion {
-    /// self + factor other.
-    pub(super) fn plus(&self, factor: f64, other: &Self) -> Self {
-        let nodes = self.nodes.iter().zip(&other.nodes);
-        Self {
-            nodes: nodes
-                .map(|(a, b)| [a[0] + factor * b[0], a[1] + factor * b[1]])
-                .collect(),
-            base: self
-                .base
-                .map(|turn| turn + factor * other.base.unwrap_or(0.0)),
-        }
-    }
-
-    pub(super) fn scaled(mut self, factor: f64) -> Self {
-        self.nodes
-            .as_flattened_mut()
-            .iter_mut()
-            .for_each(|value| *value *= factor);
-        self.base = self.base.map(|turn| factor * turn);
-        self
-    }
-
-    pub(super) fn ends(&self, node: usize) -> [f64; 4] {
-        let ([w0, t0], [w1, t1]) = (self.nodes[node], self.nodes[node + 1]);
-        [w0, t0, w1, t1]
-    }
-}
-
-fn scatter(target: &mut Band, equations: &[usize; 4], matrix: &Square) {
-    for (&row, values) in equations.iter().zip(matrix) {
-        for (&column, value) in equations.iter().zip(values) {
-            if row != HELD && column != HELD {
-                target.add(row, column, *value);
+    /// Unit motions without strain energy where only the joint could withstand them.
+    pub(super) fn rigid_vectors(&self) -> Vec<Vec<f64>> {
+        let mut motions = Vec::new();
+        for kind in 0..2 {
+            if self.runs.len() > 1 {
+                motions.push(self.rigid_vector(kind, 0));
+            }
+            if self.joint[kind][kind] == 0.0 {
+                motions.push(self.rigid_vector(kind, self.runs.len() - 1));
             }
         }
+        motions
+    }
+
+    /// Up and down, and rocking about the centre of mass, both of unit modal mass.
+    pub(super) fn rigid_pair(&self) -> [Motion; 2] {
+        let [up, turn] = [0, 1].map(|kind| self.motion(&self.rigid_vector(kind, 0)));
+        let [_, first] = self.products(&up, &turn);
+        let centre = first / self.energies(&up).kinetic;
+        let rock = turn.plus(-centre, &up);
+        [up, rock].map(|motion| {
+            let size = self.energies(&motion).kinetic.sqrt();
+            motion.scaled(size.recip())
+        })
+    }
+
+    /// Translation (0) or rotation (1) of the runs from `first` on, about the first one's left end.
+    fn rigid_vector(&self, kind: usize, first: usize) -> Vec<f64> {
+        let mut motion = Motion {
+            nodes: vec![[0.0; 2]; self.numbering.nodes.len()],
+            base: None,
+        };
+        for run in &self.runs[first..] {
+            for index in 0..=run.elements {
+                let x = run.start + index as f64 * run.section.element.length;
+                motion.nodes[run.first_node + index] = if kind == 0 {
+                    [1.0, 0.0]
+                } else {
+                    [x - self.runs[first].start, 1.0]
+                };
+            }
+        }
+        self.vector(&motion)
     }
 }
 
@@ -344,9 +632,9 @@ fn joint_matrix(joint: &SpecimenJoint, units: &Units) -> [[f64; 2]; 2] {
         return [[0.0; 2]; 2];
     };
     let kx = kt / units.stiffness();
-    let ky = kr / (units.stiffness() * units.length.powi(2));
-    let coupled = |k: f64| k > 0.0 && k.is_finite();
-    if coupling == 0.0 || !coupled(kx) || !coupled(ky) {
+    let ky = kr / units.rotational_stiffness();
+    let coupled = [kx, ky].iter().all(|&k| k > 0.0 && k.is_finite());
+    if coupling == 0.0 || !coupled {
         return [[kx, 0.0], [0.0, ky]];
     }
     // With r = sqrt(Kx Ky)/Kz: [[Kx, r sqrt(Kx Ky)], [r sqrt(Kx Ky), Ky]]/(1 - r^2).
@@ -362,299 +650,10 @@ fn rotating_base(specimen: &Specimen, units: &Units) -> Option<RotatingBase> {
         return None;
     }
     let [_, kr] = specimen.joint.stiffnesses();
-    let stiffness = kr / (units.stiffness() * units.length.powi(2)) / base.ratio;
-    let omega = 2.0 * std::f64::consts::PI * base.frequency / units.omega;
+    let stiffness = kr / units.rotational_stiffness() / base.ratio;
+    let omega = 2.0 * PI * base.frequency / units.omega;
     Some(RotatingBase {
         stiffness,
         inertia: stiffness / (omega * omega),
     })
-}
-
-// What is fastened to the beam, anywhere on an element.
-
-/// A place on the beam: an element's near node, and the element's motion there.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
-    pub(super) node: usize,
-    /// From 0 to 1.
-    pub(super) within: f64,
-    pub(super) weights: Weights,
-    /// Displacement over omega^2 that the element's inertia adds; none in an element with a hinge.
-    pub(super) inner: [f64; 4],
-}
-
-/// A mass with its inertia.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Mass {
-    pub(super) place: Place,
-    mass: f64,
-    inertia: f64,
-    /// Compliance of the element, held at both ends, at this place.
-    compliance: f64,
-}
-
-/// A spring to the ground.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Spring {
-    pub(super) place: Place,
-    stiffness: f64,
-}
-
-impl Place {
-    pub(super) fn displacement(&self, ends: &[f64; 4]) -> f64 {
-        dot(&self.weights.displacement, ends)
-    }
-
-    pub(super) fn rotation(&self, ends: &[f64; 4]) -> f64 {
-        dot(&self.weights.rotation, ends)
-    }
-}
-
-impl Mass {
-    pub(super) fn matrix(&self) -> Square {
-        let Weights {
-            displacement: w,
-            rotation: t,
-        } = self.place.weights;
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| self.mass * w[i] * w[j] + self.inertia * t[i] * t[j])
-        })
-    }
-
-    pub(super) fn energy(&self, ends: &[f64; 4]) -> f64 {
-        let (w, t) = (self.place.displacement(ends), self.place.rotation(ends));
-        self.mass * w * w + self.inertia * t * t
-    }
-
-    /// What its load inside the element adds to the term with omega^4: its own motion
-    /// m^2 w^2 times the compliance, and the work on what the element's inertia moves.
-    pub(super) fn second_order(&self, ends: &[f64; 4]) -> f64 {
-        let load = self.mass * self.place.displacement(ends);
-        load * (load * self.compliance + 2.0 * dot(&self.place.inner, ends))
-    }
-}
-
-impl Spring {
-    pub(super) fn matrix(&self) -> Square {
-        let w = self.place.weights.displacement;
-        std::array::from_fn(|i| std::array::from_fn(|j| self.stiffness * w[i] * w[j]))
-    }
-
-    pub(super) fn energy(&self, ends: &[f64; 4]) -> f64 {
-        self.stiffness * self.place.displacement(ends).powi(2)
-    }
-}
-
-fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-impl Model {
-    /// Adds hinges first: they change the shape by which the others move.
-    pub(super) fn attach(&mut self, specimen: &Specimen) -> Result<(), StructureError> {
-        for hinge in specimen
-            .hinges
-            .iter()
-            .filter(|hinge| hinge.compliance > 0.0)
-        {
-            let (run, index, within) = self.locate(hinge.position);
-            // The unit of rotational compliance.
-            let unit = self.units.stiffness() * self.units.length.powi(2);
-            let compliance = hinge.compliance * unit;
-            self.add_hinge((run, index), (within, compliance))?;
-        }
-        for item in &specimen.masses {
-            self.add_mass(self.place(item.position), (item.mass, item.inertia));
-        }
-        self.add_joint_mass(specimen);
-        self.add_overlap(specimen);
-        for item in specimen.springs.iter().filter(|item| item.stiffness > 0.0) {
-            let spring = Spring {
-                place: self.place(item.position),
-                stiffness: item.stiffness / self.units.stiffness(),
-            };
-            self.springs.push(spring);
-        }
-        Ok(())
-    }
-
-    /// Run, element and place within it (0 to 1) of a position (m). Of a lap joint, the joint's own
-    /// place belongs to the right half.
-    fn locate(&self, position: f64) -> (usize, usize, f64) {
-        let along = position / self.units.length;
-        let right = self.runs.iter().rposition(|run| run.start <= along);
-        let run_index = right.unwrap_or(0);
-        let run = &self.runs[run_index];
-        let within = ((along - run.start) / run.section.element.length).max(0.0);
-        let index = (within as usize).min(run.elements - 1);
-        (run_index, index, (within - index as f64).min(1.0))
-    }
-
-    pub(super) fn place(&self, position: f64) -> Place {
-        let (run, index, within) = self.locate(position);
-        self.place_in((run, index), within)
-    }
-
-    fn place_in(&self, (run_index, index): (usize, usize), within: f64) -> Place {
-        let run = &self.runs[run_index];
-        let mut weights = run.section.weights(within);
-        let hinged = self.hinged_at(run_index, index);
-        let inner = match hinged {
-            Some(hinged) => {
-                hinged.add_weights(&run.section, within, &mut weights);
-                [0.0; 4]
-            }
-            None => run.section.inner_displacement(within),
-        };
-        Place {
-            node: run.first_node + index,
-            within,
-            weights,
-            inner,
-        }
-    }
-
-    /// Section of the element that begins at a node.
-    pub(super) fn section_at(&self, node: usize) -> &Section {
-        let right = self.runs.iter().rev().find(|run| run.first_node <= node);
-        &right.unwrap_or(&self.runs[0]).section
-    }
-
-    fn add_mass(&mut self, place: Place, (mass, inertia): (f64, f64)) {
-        if mass == 0.0 && inertia == 0.0 {
-            return;
-        }
-        let section = self.section_at(place.node);
-        self.masses.push(Mass {
-            compliance: section.inner_compliance(place.within, place.within),
-            place,
-            mass: mass / self.units.mass,
-            inertia: inertia / (self.units.mass * self.units.length.powi(2)),
-        });
-    }
-
-    fn add_joint_mass(&mut self, specimen: &Specimen) {
-        let (mass, inertia) = (specimen.joint_mass.mass, specimen.joint_mass.inertia);
-        match specimen.body {
-            Body::One(_) => self.add_mass(self.place_in((0, 0), 0.0), (mass, inertia)),
-            Body::Joined(_) => {
-                let last = self.runs[0].elements - 1;
-                let half = (0.5 * mass, 0.5 * inertia);
-                self.add_mass(self.place_in((0, last), 1.0), half);
-                self.add_mass(self.place_in((1, 0), 0.0), half);
-            }
-        }
-    }
-
-    /// Two points in either half, where Gauss's rule puts them, carry the overlap's uniform mass as
-    /// a cubic shape feels it.
-    fn add_overlap(&mut self, specimen: &Specimen) {
-        let (Some(overlap), Body::Joined([left, _])) = (&specimen.overlap, &specimen.body) else {
-            return;
-        };
-        let gauss = 0.25 / 3f64.sqrt();
-        for side in [-1.0, 1.0] {
-            for point in [0.25 - gauss, 0.25 + gauss] {
-                let place = self.place(left.length + side * point * overlap.length);
-                self.add_mass(place, (0.25 * overlap.mass, 0.0));
-            }
-        }
-    }
-
-    fn add_hinge(
-        &mut self,
-        (run, index): (usize, usize),
-        hinge: (f64, f64),
-    ) -> Result<(), StructureError> {
-        let section = self.runs[run].section;
-        let known = self
-            .hinged
-            .iter()
-            .position(|h| h.run == run && h.index == index);
-        let mut hinges = known.map_or_else(Vec::new, |known| self.hinged.remove(known).hinges);
-        hinges.push(hinge);
-        self.hinged
-            .push(HingedElement::new(&section, (run, index), hinges)?);
-        Ok(())
-    }
-}
-
-// Which equation each motion of each node has.
-//
-// About a lap joint the order is chosen so that merged motions stay within the half-bandwidth of an
-// element: left end's own, shared, right end's own.
-
-/// Equation of a motion that does not exist.
-pub(super) const HELD: usize = usize::MAX;
-
-/// Equations of a specimen's motions.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Numbering {
-    /// For each node displacement and rotation.
-    pub(super) nodes: Vec<[usize; 2]>,
-    /// Rotation of the base.
-    pub(super) base: Option<usize>,
-    /// Number of equations.
-    pub(super) size: usize,
-}
-
-impl Numbering {
-    /// `elements` of each beam; `base` whether the fixture has a motion of its own.
-    pub(super) fn new(specimen: &Specimen, elements: &[usize], base: Option<()>) -> Self {
-        let rigid = specimen.joint.stiffnesses().map(f64::is_infinite);
-        let mut numbering = Self {
-            nodes: Vec::new(),
-            base: None,
-            size: 0,
-        };
-        numbering.base = base.map(|()| numbering.next());
-        match specimen.body {
-            Body::One(_) => {
-                let first = [0, 1].map(|motion| {
-                    if rigid[motion] {
-                        HELD
-                    } else {
-                        numbering.next()
-                    }
-                });
-                numbering.nodes.push(first);
-                numbering.run(elements[0]);
-            }
-            Body::Joined(_) => {
-                numbering.run(elements[0]);
-                let (left, right) = numbering.joined(rigid);
-                numbering.nodes.extend([left, right]);
-                numbering.run(elements[1]);
-            }
-        }
-        numbering
-    }
-
-    fn next(&mut self) -> usize {
-        self.size += 1;
-        self.size - 1
-    }
-
-    fn run(&mut self, nodes: usize) {
-        for _ in 0..nodes {
-            let node = [self.next(), self.next()];
-            self.nodes.push(node);
-        }
-    }
-
-    /// The two nodes of a lap joint.
-    fn joined(&mut self, rigid: [bool; 2]) -> ([usize; 2], [usize; 2]) {
-        let mut left = [HELD; 2];
-        for motion in [0, 1].into_iter().filter(|&motion| !rigid[motion]) {
-            left[motion] = self.next();
-        }
-        for motion in [0, 1].into_iter().filter(|&motion| rigid[motion]) {
-            left[motion] = self.next();
-        }
-        let mut right = left;
-        for motion in [0, 1].into_iter().filter(|&motion| !rigid[motion]) {
-            right[motion] = self.next();
-        }
-        (left, right)
-    }
 }

@@ -1,44 +1,47 @@
-//! The modes of a specimen, and what they say of changes to it.
+//! The modes of a specimen, what they say of changes to it, and of what else holds it.
 
-use super::model::{Energies, HELD, Model, Motion, Run};
+use super::model::{Energies, Model, Motion};
 use super::{Mesh, Specimen};
 use crate::StructureError;
-use crate::eigen::{Pairs, dot, lowest_pairs};
+use crate::eigen::{Eigenpairs, dot, lowest_pairs};
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::f64::consts::PI;
 
 /// Added to a singular stiffness matrix, in units of mass: about the first elastic eigenvalue of a
 /// free beam, lambda^4 = 500.
-pub(super) const SHIFT: f64 = 500.0;
+pub(crate) const SHIFT: f64 = 500.0;
 
 /// Below this eigenvalue (the first elastic one of a free beam is 500) nothing withstands a motion.
-pub(super) const NO_STIFFNESS: f64 = 1e-6;
+const NO_STIFFNESS: f64 = 1e-6;
+
+/// Turns of the eigenvalue iteration for each row; two or three are usual.
+const MOST_TURNS: usize = 60;
 
 /// The lowest elastic modes of a specimen. Modes count from 0; positions run from the left end (m).
 /// Shapes are mass-normalised: their modal mass is 1 kg.
 #[derive(Debug, Clone)]
 pub struct SpecimenModes {
-    pub(super) model: Model,
-    pub(super) mesh: Mesh,
-    pub(super) suspension: Vec<f64>,
-    pub(super) frequencies: Vec<f64>,
+    model: Model,
+    mesh: Mesh,
+    suspension: Vec<f64>,
+    frequencies: Vec<f64>,
     /// Motions that are rigid but for springs to the ground and the axial force.
-    pub(super) loose: Vec<Mode>,
-    pub(super) modes: Vec<Mode>,
+    loose: Vec<Mode>,
+    modes: Vec<Mode>,
 }
 
 /// A mode in the model's units.
 #[derive(Debug, Clone)]
-pub(super) struct Mode {
+struct Mode {
     /// omega^2.
-    pub(super) square: f64,
+    square: f64,
     /// Of unit modal mass.
-    pub(super) motion: Motion,
-    pub(super) energies: Energies,
+    motion: Motion,
+    energies: Energies,
 }
 
 impl Mode {
-    pub(super) fn new(model: &Model, vector: &[f64]) -> Self {
+    fn new(model: &Model, vector: &[f64]) -> Self {
         let motion = model.motion(vector);
         let energies = model.energies(&motion);
         let square = energies.quotient();
@@ -57,52 +60,60 @@ impl SpecimenModes {
         count: usize,
         mesh: Mesh,
     ) -> Result<Self, StructureError> {
-        let model = Model::new(specimen, mesh)?;
+        let model = Model::new(specimen, &mesh.divide(&specimen.body))?;
         let (stiffness, mass) = model.matrices();
-        let loose = model.rigid_motions();
-        let singular = loose > 0 && !model.is_supported();
-        let shift = if loose > 0 { SHIFT } else { 0.0 };
-        let bounds = (shift, model.highest_square());
-        let locked = if singular {
+        let rigid = model.rigid_motions();
+        let shift = if rigid > 0 { SHIFT } else { 0.0 };
+        let highest = model.highest_square();
+        let locked = if rigid > 0 && !model.is_supported() {
             model.rigid_vectors()
         } else {
             Vec::new()
         };
-        let pairs = lowest_pairs(&stiffness, &mass, bounds, &locked, count + loose)?;
-        let Pairs { values, vectors } = pairs;
+        let Eigenpairs { values, vectors } =
+            lowest_pairs(&stiffness, &mass, shift, highest, &locked, count + rigid)?;
         // Rounding moves each value by some parts in 1e16 of the highest one.
-        let rounding = NO_STIFFNESS + 1e-7 * SHIFT + 1e-15 * bounds.1;
-        if values[..loose].iter().any(|value| *value < -rounding) {
+        let rounding = NO_STIFFNESS + 1e-7 * SHIFT + 1e-15 * highest;
+        let slow = &values[..rigid];
+        if slow.iter().any(|value| *value < -rounding) {
             return Err(StructureError::FiniteElements {
                 reason: "it is not stable: the axial force buckles it".to_owned(),
             });
         }
-        let frequency = |square: f64| model.frequency(square);
-        let suspension = values[..loose]
-            .iter()
-            .filter(|value| **value >= NO_STIFFNESS);
-        let all: Vec<Mode> = vectors
-            .iter()
-            .map(|vector| Mode::new(&model, vector))
-            .collect();
-        let (loose, modes) = all.split_at(loose);
+        let held = slow.iter().filter(|value| **value >= NO_STIFFNESS);
+        let suspension = held.map(|square| model.frequency(*square)).collect();
+        let vectors = vectors.iter();
+        let mut loose: Vec<Mode> = vectors.map(|vector| Mode::new(&model, vector)).collect();
+        let modes = loose.split_off(rigid);
         Ok(Self {
-            suspension: suspension.map(|square| frequency(*square)).collect(),
-            frequencies: modes.iter().map(|mode| frequency(mode.square)).collect(),
-            loose: loose.to_vec(),
-            modes: modes.to_vec(),
-            model,
-            mesh,
+            suspension,
+            loose,
+            ..Self::elastic(model, mesh, modes)
         })
     }
 
-    /// Natural frequencies (Hz), ascending; of [`SpecimenModes::near`] in the order of the modes they came from.
+    /// These modes, without any motions that are nearly rigid.
+    fn elastic(model: Model, mesh: Mesh, modes: Vec<Mode>) -> Self {
+        let frequencies = modes.iter().map(|mode| model.frequency(mode.square));
+        Self {
+            frequencies: frequencies.collect(),
+            suspension: Vec::new(),
+            loose: Vec::new(),
+            modes,
+            mesh,
+            model,
+        }
+    }
+
+    /// Natural frequencies (Hz), ascending; of [`SpecimenModes::near`] in the order of the modes they
+    /// came from.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
     }
 
     /// Frequencies (Hz) of the motions that only springs to the ground or the axial force keep from
-    /// being rigid: a free beam's suspension. Empty where there are none, and of hung modes, which hold them.
+    /// being rigid: a free beam's suspension. Empty where there are none, and after
+    /// [`SpecimenModes::hung`], which counts them among the modes.
     pub fn suspension_frequencies(&self) -> &[f64] {
         &self.suspension
     }
@@ -112,7 +123,7 @@ impl SpecimenModes {
         self.frequencies.len()
     }
 
-    /// Whether no mode was asked for.
+    /// Returns true where no mode was asked for.
     pub fn is_empty(&self) -> bool {
         self.frequencies.is_empty()
     }
@@ -168,161 +179,84 @@ impl SpecimenModes {
     /// As [`Specimen::modes`], and where the other specimen has other beams or other rigid springs.
     pub fn rayleigh_frequencies(&self, other: &Specimen) -> Result<Vec<f64>, StructureError> {
         let model = self.model_of(other)?;
-        Ok((0..self.len())
-            .map(|mode| self.quotient_frequency(&model, mode))
-            .collect())
-    }
-
-    fn model_of(&self, other: &Specimen) -> Result<Model, StructureError> {
-        let model = Model::new(other, self.mesh)?;
-        let rigid = |model: &Model| [0, 1].map(|i| model.joint[i][i].is_infinite());
-        let nodes =
-            |model: &Model| -> Vec<usize> { model.runs.iter().map(|run| run.elements).collect() };
-        if nodes(&model) != nodes(&self.model) || rigid(&model) != rigid(&self.model) {
+        let same_runs = model.runs.len() == self.model.runs.len()
+            && (model.runs.iter().zip(&self.model.runs)).all(|(a, b)| a.elements == b.elements);
+        let same_springs =
+            (0..2).all(|i| model.joint[i][i].is_infinite() == self.model.joint[i][i].is_infinite());
+        if !same_runs || !same_springs {
             return Err(StructureError::FiniteElements {
                 reason: "a shape serves specimens of the same beams and rigid springs only"
                     .to_owned(),
             });
         }
-        Ok(model)
+        let quotients = self.modes.iter().map(|mode| {
+            let motion = &mode.motion;
+            let energies = match (&model.base, motion.base) {
+                // The base that the other has moves as the joint's moment turns it.
+                (Some(base), None) => {
+                    let [w, theta] = motion.nodes[0];
+                    let moment = model.joint[1][0] * w + model.joint[1][1] * theta;
+                    let dynamic = base.stiffness + model.joint[1][1] - mode.square * base.inertia;
+                    model.energies(&Motion {
+                        base: Some(moment / dynamic),
+                        ..motion.clone()
+                    })
+                }
+                _ => model.energies(motion),
+            };
+            model.frequency(energies.quotient())
+        });
+        Ok(quotients.collect())
     }
 
-    fn quotient_frequency(&self, model: &Model, mode: usize) -> f64 {
-        let motion = &self.modes[mode].motion;
-        let energies = match (&model.base, motion.base) {
-            // The base that the other has moves as the joint's moment turns it.
-            (Some(base), None) => {
-                let [row_w, row_t] = [motion.nodes[0][0], motion.nodes[0][1]];
-                let moment = model.joint[1][0] * row_w + model.joint[1][1] * row_t;
-                let dynamic =
-                    base.stiffness + model.joint[1][1] - self.modes[mode].square * base.inertia;
-                model.energies(&Motion {
-                    base: Some(moment / dynamic),
-                    ..motion.clone()
-                })
-            }
-            _ => model.energies(motion),
-        };
-        model.frequency(energies.quotient())
-    }
-}
-
-impl Model {
-    /// Frequency (Hz) of an omega^2 in the model's units.
-    pub(super) fn frequency(&self, square: f64) -> f64 {
-        square.max(0.0).sqrt() * self.units.omega / (2.0 * PI)
+    fn model_of(&self, other: &Specimen) -> Result<Model, StructureError> {
+        Model::new(other, &self.mesh.divide(&other.body))
     }
 
-    /// Magnitude of the highest omega^2: that of an element's end alone.
-    fn highest_square(&self) -> f64 {
-        let ratio = |run: &Run| run.section.stiffness[0][0] / run.section.mass[0][0];
-        self.runs.iter().map(ratio).fold(0.0, f64::max)
-    }
-
-    /// Whether something beside the joint withstands rigid motions.
-    pub(super) fn is_supported(&self) -> bool {
-        !self.springs.is_empty() || self.runs.iter().any(|run| run.section.axial_force != 0.0)
-    }
-
-    /// Unit motions without strain energy where only the joint could withstand them.
-    fn rigid_vectors(&self) -> Vec<Vec<f64>> {
-        let whole = self.runs.len() > 1;
-        let mut motions = Vec::new();
-        for kind in 0..2 {
-            if whole {
-                motions.push(self.rigid_vector(kind, 0));
-            }
-            if self.joint[kind][kind] == 0.0 {
-                motions.push(self.rigid_vector(kind, self.runs.len() - 1));
-            }
-        }
-        motions
-    }
-
-    /// Translation (0) or rotation (1) of the runs from `first` on, about the first one's left end.
-    pub(super) fn rigid_vector(&self, kind: usize, first: usize) -> Vec<f64> {
-        let mut motion = Motion {
-            nodes: vec![[0.0; 2]; self.numbering.nodes.len()],
-            base: None,
-        };
-        for run in &self.runs[first..] {
-            for index in 0..=run.elements {
-                let x = run.start + index as f64 * run.section.element.length;
-                motion.nodes[run.first_node + index] = if kind == 0 {
-                    [1.0, 0.0]
-                } else {
-                    [x - self.runs[first].start, 1.0]
-                };
-            }
-        }
-        self.vector(&motion)
-    }
-}
-
-// Modes of a specimen that differs little from one that is solved.
-
-impl SpecimenModes {
-    /// The modes of another specimen that differs little, in the order of these: one step of Rayleigh quotient
-    /// iteration from each. A shape that is off by a small e is off by about e^3 afterwards (Parlett 1998, 4.7), so
-    /// that differences over small steps are those of exact modes, for less than their price.
+    /// The modes of another specimen that differs little, in the order of these: one step of Rayleigh
+    /// quotient iteration from each. A shape that is off by a small e is off by about e^3 afterwards
+    /// (Parlett 1998, 4.7), so that differences over small steps are those of exact modes, for less
+    /// than their price.
     ///
     /// `None` where the other has other motions (rigid springs, a base) or where some are loose: there
-    /// [`Specimen::modes`] has to solve anew. Of [`SpecimenModes::hung`] modes the suspension is lost.
+    /// [`Specimen::modes`] has to solve anew. Modes after [`SpecimenModes::hung`] lose the suspension.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
     pub fn near(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
-        let model = Model::new(other, self.mesh)?;
+        let model = self.model_of(other)?;
         if model.numbering != self.model.numbering || !self.loose.is_empty() {
             return Ok(None);
         }
         let (stiffness, mass) = model.matrices();
-        let modes: Option<Vec<Mode>> = (self.modes.iter())
-            .map(|mode| {
-                let vector = self.model.vector(&mode.motion);
-                let pulled = mass.times(&vector);
-                let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
-                let shifted = stiffness.plus(-square, &mass).indefinite();
-                let moved = shifted.solve(pulled.clone());
-                let along = dot(&moved, &pulled);
-                (along.is_finite() && along != 0.0).then(|| {
-                    // As long as the matrix is near to singular, and of either sign.
-                    let shape: Vec<f64> = moved.iter().map(|value| value / along).collect();
-                    Mode::new(&model, &shape)
-                })
-            })
-            .collect();
-        Ok(modes.map(|modes| Self {
-            suspension: Vec::new(),
-            frequencies: modes
-                .iter()
-                .map(|mode| model.frequency(mode.square))
-                .collect(),
-            loose: Vec::new(),
-            modes,
-            mesh: self.mesh,
-            model,
-        }))
+        let mut modes = Vec::with_capacity(self.modes.len());
+        for mode in &self.modes {
+            let vector = self.model.vector(&mode.motion);
+            let pulled = mass.times(&vector);
+            let square = dot(&stiffness.times(&vector), &vector) / dot(&pulled, &vector);
+            let mut moved = stiffness.plus(-square, &mass).ldl().solve(pulled.clone());
+            let along = dot(&moved, &pulled);
+            if !along.is_finite() || along == 0.0 {
+                return Ok(None);
+            }
+            // As long as the matrix is near to singular, and of either sign.
+            moved.iter_mut().for_each(|value| *value /= along);
+            modes.push(Mode::new(&model, &moved));
+        }
+        Ok(Some(Self::elastic(model, self.mesh, modes)))
     }
-}
 
-// What holds a loose specimen beside its joint: a soft suspension, springs to the ground; and what
-// the joint's spring gives by all modes that were not computed.
-//
-// A suspension that gives a free specimen its two rigid motions R (of unit modal mass) the
-// frequencies Omega, and leaves everything else as it is, has the stiffness `M R Omega^2 R^T M`. In
-// the coordinates of the specimen's own modes, which cables may have bent and tilted, that is
-// `B Omega^2 B^T` with `B = Phi^T M R`, so that all modes follow from one small matrix. Of a free
-// specimen B is the identity for the rigid motions and 0 for the elastic ones, which then stay.
-
-/// Turns of the eigenvalue iteration for each row; two or three are usual.
-const MOST_TURNS: usize = 60;
-
-impl SpecimenModes {
-    /// These modes, preceded by the motions that are rigid but for springs to the ground, the axial
-    /// force and the suspension, and the number of those. `suspension`: frequencies (Hz), up and down
-    /// and rocking, that it would give the specimen with nothing else to hold it; `None` where there
-    /// is none. What nothing withstands is left out.
+    /// Returns these modes, preceded by the motions that are rigid but for springs to the ground, the
+    /// axial force and the suspension, and the number of those. `suspension`: frequencies (Hz), up and
+    /// down and rocking, that it would give the specimen with nothing else to hold it; `None` where
+    /// there is none. What nothing withstands is left out.
+    ///
+    /// A suspension that gives a free specimen its two rigid motions R (of unit modal mass) the
+    /// frequencies Omega, and leaves everything else as it is, has the stiffness
+    /// `M R Omega^2 R^T M`. In the coordinates of the specimen's own modes, which cables may have bent
+    /// and tilted, that is `B Omega^2 B^T` with `B = Phi^T M R`, so that all modes follow from one
+    /// small matrix. Of a free specimen B is the identity for the rigid motions and 0 for the elastic
+    /// ones, which then stay.
     ///
     /// # Errors
     /// [`StructureError`] where the modes do not settle.
@@ -352,32 +286,32 @@ impl SpecimenModes {
         };
         let free = order[..self.loose.len()].iter();
         let free = free.filter(|&&i| pairs.eigenvalues[i] < nothing).count();
-        let hung = order[free..].iter().map(|&index| {
-            let shares = pairs.eigenvectors.column(index);
-            self.mixed(&basis, pairs.eigenvalues[index], shares.as_slice())
-        });
-        let modes: Vec<Mode> = hung.chain(others.iter().cloned()).collect();
-        let frequencies = modes.iter().map(|mode| self.model.frequency(mode.square));
-        let hung = Self {
-            frequencies: frequencies.collect(),
-            model: self.model.clone(),
-            mesh: self.mesh,
-            suspension: Vec::new(),
-            loose: Vec::new(),
-            modes,
-        };
+        let mut modes = Vec::with_capacity(basis.len() + others.len());
+        for &index in &order[free..] {
+            // The basis is orthonormal, so that a mode has unit modal mass where its shares do.
+            let mut motion = basis[0].motion.clone().scaled(0.0);
+            for (mode, share) in basis.iter().zip(pairs.eigenvectors.column(index).iter()) {
+                motion = motion.plus(*share, &mode.motion);
+            }
+            modes.push(Mode {
+                square: pairs.eigenvalues[index],
+                energies: self.model.energies(&motion),
+                motion,
+            });
+        }
+        modes.extend(others.iter().cloned());
+        let hung = Self::elastic(self.model.clone(), self.mesh, modes);
         Ok((hung, self.loose.len() - free))
     }
 
     /// Stiffness of specimen and suspension in the coordinates of its motions.
     fn stiffness_among(&self, basis: &[&Mode], suspension: Option<[f64; 2]>) -> DMatrix<f64> {
-        let loose = self.loose.len();
         let mut matrix = DMatrix::zeros(basis.len(), basis.len());
         for (index, mode) in basis.iter().enumerate() {
             matrix[(index, index)] = mode.square;
         }
         // Loose motions lie so close together that the method that found them mixes them.
-        for i in 0..loose {
+        for i in 0..self.loose.len() {
             for j in 0..i {
                 let [strain, _] = self.model.products(&basis[i].motion, &basis[j].motion);
                 matrix[(i, j)] = strain;
@@ -389,8 +323,10 @@ impl SpecimenModes {
         };
         for (rigid, frequency) in self.model.rigid_pair().iter().zip(frequencies) {
             let square = (2.0 * PI * frequency / self.model.units.omega).powi(2);
-            let of = |mode: &&Mode| self.model.products(&mode.motion, rigid)[1];
-            let shares: Vec<f64> = basis.iter().map(of).collect();
+            let shares = basis.iter();
+            let shares: Vec<f64> = shares
+                .map(|mode| self.model.products(&mode.motion, rigid)[1])
+                .collect();
             for (i, a) in shares.iter().enumerate() {
                 for (j, b) in shares.iter().enumerate() {
                     matrix[(i, j)] += square * a * b;
@@ -400,22 +336,10 @@ impl SpecimenModes {
         matrix
     }
 
-    /// The basis is orthonormal, so that a mode has unit modal mass where its shares do.
-    fn mixed(&self, basis: &[&Mode], square: f64, shares: &[f64]) -> Mode {
-        let none = basis[0].motion.clone().scaled(0.0);
-        let parts = basis.iter().zip(shares);
-        let motion = parts.fold(none, |sum, (mode, share)| sum.plus(*share, &mode.motion));
-        Mode {
-            square,
-            energies: self.model.energies(&motion),
-            motion,
-        }
-    }
-
     /// Rotation of the joint's spring per moment on both its ends (rad/(N m)) by all modes beyond
     /// these: the sum of psi^2/omega^2, which falls too slowly to be added up. It is the static
-    /// compliance less that of the modes here. A suspension does not change it, but the modes
-    /// of [`Self::hung`] no longer say which motions are loose: ask the modes before.
+    /// compliance less that of the modes here. A suspension does not change it, but the modes after
+    /// [`Self::hung`] no longer say which motions are loose: ask the modes before.
     pub fn joint_compliance_beyond(&self) -> f64 {
         // Loose motions make K singular, and s M is added: sum psi^2/(omega^2 + s).
         let shift = if self.loose.is_empty() { 0.0 } else { SHIFT };
@@ -427,7 +351,6 @@ impl SpecimenModes {
         let mut answer = moment.clone();
         factor.solve_lower(&mut answer);
         factor.solve_upper(&mut answer);
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let mut sum = dot(&moment, &answer);
         let mut squares = dot(&answer, &mass.times(&answer));
         for mode in self.loose.iter().chain(&self.modes) {
@@ -436,91 +359,55 @@ impl SpecimenModes {
             squares -= (psi / (mode.square + shift)).powi(2);
         }
         // 1/omega^2 = 1/(omega^2 + s) + s/(omega^2 + s)^2 up to (s/omega^2)^2, 1e-8 beyond ten modes.
-        let units = &self.model.units;
-        let compliance = (sum + shift * squares) / (units.stiffness() * units.length.powi(2));
+        let compliance = (sum + shift * squares) / self.model.units.rotational_stiffness();
         compliance.max(0.0)
     }
 }
 
-impl Model {
-    /// Twice the strain and the kinetic energy that two motions have in common.
-    fn products(&self, a: &Motion, b: &Motion) -> [f64; 2] {
-        let [with, without] = [1.0, -1.0].map(|sign| self.energies(&a.plus(sign, b)));
-        [
-            0.25 * (with.strain - without.strain),
-            0.25 * (with.kinetic - without.kinetic),
-        ]
-    }
-
-    /// Up and down, and rocking about the centre of mass, both of unit modal mass.
-    fn rigid_pair(&self) -> [Motion; 2] {
-        let [up, turn] = [0, 1].map(|kind| self.motion(&self.rigid_vector(kind, 0)));
-        let size = |motion: &Motion| self.energies(motion).kinetic.sqrt();
-        let [_, first] = self.products(&up, &turn);
-        let centre = first / self.energies(&up).kinetic;
-        let rock = turn.plus(-centre, &up);
-        [&up, &rock].map(|motion| motion.clone().scaled(size(motion).recip()))
-    }
-
-    /// A unit moment on the beam's end, and its opposite on what the joint fastens it to.
-    fn joint_moment(&self) -> Vec<f64> {
-        let mut load = vec![0.0; self.numbering.size];
-        for (row, component, sign) in self.joint_ends() {
-            if component == 1 && row != HELD {
-                load[row] += sign;
-            }
-        }
-        load
-    }
-}
-
-// The beam's own modes on a fixture that gives: the fixture's mode has no number.
-
-/// All modes up to some of the beam's own.
+/// All modes up to some of the beam's own, on a fixture that may give. The fixture's own mode has no
+/// number.
 #[derive(Debug, Clone)]
 pub struct BeamModes {
     /// All modes.
     pub modes: SpecimenModes,
-    /// Which of them is the beam's first, second, and so on (from 0).
+    /// Indices of the beam's first, second and further modes among all (from 0).
     pub numbers: Vec<usize>,
-    /// Which of them is the fixture's own; `None` on a fixture that does not give.
+    /// Index of the fixture's own mode; `None` on a fixture that does not give.
     pub fixture: Option<usize>,
 }
 
 impl BeamModes {
-    /// Those of another specimen that differs little, by [`SpecimenModes::near`]: every mode keeps its number.
+    /// The lowest `count` modes of a specimen's beam. On a fixture that gives, the mode in which it
+    /// moves most is its own.
+    pub(super) fn new(
+        specimen: &Specimen,
+        count: usize,
+        mesh: Mesh,
+    ) -> Result<Self, StructureError> {
+        let gives = specimen.base.is_some_and(|base| base.ratio > 0.0);
+        let modes = SpecimenModes::new(specimen, count + usize::from(gives), mesh)?;
+        let all = 0..modes.len();
+        let moving = |mode: &usize| modes.base_participation(*mode);
+        let fixture =
+            (all.clone().filter(|_| gives)).max_by(|a, b| moving(a).total_cmp(&moving(b)));
+        Ok(Self {
+            numbers: all.filter(|mode| Some(*mode) != fixture).collect(),
+            modes,
+            fixture,
+        })
+    }
+
+    /// Modes of another specimen that differs little, by [`SpecimenModes::near`]. Every mode keeps
+    /// its number.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
     pub fn near(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
         let near = self.modes.near(other)?;
-        Ok(near.map(|modes| BeamModes {
+        Ok(near.map(|modes| Self {
             modes,
             numbers: self.numbers.clone(),
             fixture: self.fixture,
         }))
-    }
-}
-
-impl Specimen {
-    /// The lowest `count` modes of the beam. On a fixture that gives, the mode in which it moves most is its
-    /// own; the others keep the beam's numbers.
-    ///
-    /// # Errors
-    /// As [`Specimen::modes`].
-    pub fn beam_modes(&self, count: usize, mesh: Mesh) -> Result<BeamModes, StructureError> {
-        let based = self.base.is_some_and(|base| base.ratio > 0.0);
-        let all = count + usize::from(based);
-        let modes = self.modes(all, mesh)?;
-        let moving = |mode: &usize| modes.base_participation(*mode);
-        let fixture = (0..all)
-            .filter(|_| based)
-            .max_by(|a, b| moving(a).total_cmp(&moving(b)));
-        let own = (0..all).filter(|mode| Some(*mode) != fixture);
-        Ok(BeamModes {
-            numbers: own.collect(),
-            modes,
-            fixture,
-        })
     }
 }

@@ -19,6 +19,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use tapjoint_beam::interface::LAST_STEP;
 use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::Body;
 use tapjoint_beam::{Assembly, Beam, JointStiffness};
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
@@ -176,8 +177,14 @@ impl ConsistentEstimator {
             }
             // Every piece's mass rises by the same factor as rho L b h of the described beam, of which
             // unequal halves together are another multiple.
-            let pieces = self.model.structure().pieces().unwrap_or_default();
-            let described: f64 = pieces.iter().map(Beam::mass).sum();
+            let JointedStructure {
+                beam,
+                assembly,
+                lap,
+                ..
+            } = self.model.structure();
+            let body = Body::of(beam, *assembly, lap);
+            let described: f64 = body.beams().iter().map(Beam::mass).sum();
             let terms = gradient.iter().zip(&nominal);
             let product: f64 = terms
                 .map(|(g, x)| if *g == 0.0 { 0.0 } else { g * x })

@@ -1,4 +1,5 @@
-//! The model: natural frequencies of a jointed structure and their exact derivatives.
+//! The tested structure without its joint, its natural frequencies on any joint, and their exact
+//! derivatives.
 //!
 //! Every stiffness and inertia enters as its logarithm. A frequency is homogeneous of degree 1/2 in
 //! all stiffnesses and of degree -1/2 in all masses together, so that its derivative with the
@@ -7,17 +8,137 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::f64::consts::PI;
-use tapjoint_beam::interface::{InterfaceModes, PointAttachment};
 use tapjoint_beam::interface::{
-    JoinedHalf, JointCompliance, JointedBody, LAST_STEP, interface_root,
+    InterfaceModes, JoinedHalf, JointCompliance, JointedBody, LAST_STEP,
 };
-use tapjoint_beam::specimen::LapLayout;
-use tapjoint_beam::{
-    Assembly, Beam, BeamTheory, JointStiffness, Slenderness, StructureError, natural_lambdas,
-    natural_modes,
-};
+use tapjoint_beam::specimen::{Body, LapLayout, PointMass, PointSpring, Specimen, SpecimenJoint};
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError, natural_modes};
 
-/// What an estimate can be about.
+/// Route by which frequencies are computed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Route {
+    /// In closed form where that exists, else by finite elements.
+    #[default]
+    Automatic,
+    /// By finite elements, so many to each beam.
+    FiniteElements(usize),
+}
+
+/// The tested structure without its joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointedStructure {
+    /// The beam; of a lap joint the left half's properties and the total length.
+    pub beam: Beam,
+    /// Theory of bending.
+    pub theory: BeamTheory,
+    /// Kind of structure.
+    pub assembly: Assembly,
+    /// Layout of a lap joint.
+    pub lap: LapLayout,
+    /// Masses on the beam: sensors, and what is fastened.
+    pub masses: Vec<PointMass>,
+    /// Springs between beam and ground: suspension, cables.
+    pub springs: Vec<PointSpring>,
+    /// Route by which its frequencies are computed.
+    pub route: Route,
+}
+
+impl JointedStructure {
+    /// A beam with nothing on it; a lap joint in its middle.
+    pub fn new(theory: BeamTheory, beam: Beam, assembly: Assembly) -> Self {
+        Self {
+            beam,
+            theory,
+            assembly,
+            lap: LapLayout::default(),
+            masses: Vec::new(),
+            springs: Vec::new(),
+            route: Route::Automatic,
+        }
+    }
+
+    /// Returns the structure on a joint.
+    pub fn specimen(&self, joint: SpecimenJoint) -> Specimen {
+        Specimen {
+            masses: self.masses.clone(),
+            springs: self.springs.clone(),
+            ..Specimen::jointed(self.theory, &self.beam, self.assembly, &self.lap, joint)
+        }
+    }
+
+    /// Returns the same structure of another beam: places and the overlap in proportion to its length,
+    /// the right half's section and material by the same factors.
+    #[must_use]
+    pub fn with_beam(&self, beam: &Beam) -> Self {
+        let longer = beam.length / self.beam.length;
+        let mut there = self.clone();
+        if let Some(right) = &mut there.lap.right {
+            right.length = beam.length;
+            right.width *= beam.width / self.beam.width;
+            right.thickness *= beam.thickness / self.beam.thickness;
+            right.modulus *= beam.modulus / self.beam.modulus;
+            right.density *= beam.density / self.beam.density;
+        }
+        if let Some(position) = &mut there.lap.position {
+            *position *= longer;
+        }
+        if let Some((length, _)) = &mut there.lap.overlap {
+            *length *= longer;
+        }
+        let masses = there.masses.iter_mut().map(|mass| &mut mass.position);
+        let springs = there.springs.iter_mut().map(|spring| &mut spring.position);
+        for position in masses.chain(springs) {
+            // A point at the end stays on the beam, whatever the last digit of the product.
+            *position = (*position * longer).min(beam.length);
+        }
+        there.beam = *beam;
+        there
+    }
+
+    /// Returns the beams between which the joint sits, or the one beam.
+    ///
+    /// # Errors
+    /// [`StructureError`] of a beam that cannot exist, or a joint off the beam.
+    pub fn body(&self) -> Result<Body, StructureError> {
+        self.beam.check()?;
+        let position = self.lap.position.unwrap_or(0.5 * self.beam.length);
+        if self.assembly == Assembly::Lap && !(position > 0.0 && position < self.beam.length) {
+            return Err(StructureError::OffBeam {
+                position,
+                length: self.beam.length,
+            });
+        }
+        let body = Body::of(&self.beam, self.assembly, &self.lap);
+        body.beams().iter().try_for_each(Beam::check)?;
+        Ok(body)
+    }
+
+    /// Returns true where something is fastened to the beam.
+    fn is_loaded(&self) -> bool {
+        let overlap = self.lap.overlap.filter(|_| self.assembly == Assembly::Lap);
+        let masses = self.masses.iter().map(|mass| mass.mass);
+        !self.springs.is_empty()
+            || masses
+                .chain(overlap.map(|(_, mass)| mass))
+                .any(|mass| mass != 0.0)
+    }
+
+    /// Elements of each beam for this highest mode, so that its frequency is right to about 1e-6. By
+    /// Euler's theory the relative error is (k h)^4/1440 for the wave number k and the element length
+    /// h; with shear and rotary inertia it falls as h^2 only.
+    fn elements_for(&self, highest: usize, body: &Body) -> usize {
+        let size = match self.theory {
+            BeamTheory::Euler => 0.18,
+            BeamTheory::Timoshenko => 0.09,
+        };
+        let lengths = body.beams().iter().map(|beam| beam.length);
+        let longest = lengths.fold(0.0, f64::max);
+        let wave = (highest as f64 + 0.5) * PI * longest / body.length();
+        ((wave / size).ceil() as usize).max(8)
+    }
+}
+
+/// A quantity that can be estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parameter {
@@ -41,7 +162,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// All, in the order of [`Point`].
+    /// All parameters, in the order of [`Point`].
     pub const ALL: [Self; PARAMETERS] = [
         Self::Kt,
         Self::Kr,
@@ -72,7 +193,7 @@ impl Parameter {
     }
 }
 
-/// How many parameters there are.
+/// Number of parameters.
 pub const PARAMETERS: usize = 8;
 
 /// A place in parameter space: logarithms of the SI values, atanh of the coupling. An infinite
@@ -107,36 +228,30 @@ impl FrequencyModel {
     /// # Errors
     /// [`StructureError`] where beam, lap joint or attachments cannot exist.
     pub fn new(structure: &JointedStructure, highest: usize) -> Result<Self, StructureError> {
-        let pieces = structure.pieces()?;
-        let masses = structure.all_masses();
-        let closed = structure.route == Route::Automatic
-            && masses.is_empty()
-            && structure.springs.is_empty();
-        let body = match (&pieces[..], closed) {
-            ([beam], true) => JointedBody::Rooted(beam.slenderness(structure.theory)),
-            ([left, right], true) => {
-                let unit = (left, structure.beam.length);
-                JointedBody::Joined(
-                    [left, right].map(|half| JoinedHalf::new(structure.theory, half, unit)),
-                )
+        let beams = structure.body()?;
+        let elements = match structure.route {
+            Route::FiniteElements(elements) => Some(elements),
+            Route::Automatic if structure.is_loaded() => {
+                Some(structure.elements_for(highest, &beams))
             }
-            _ => {
-                let elements = match structure.route {
-                    Route::FiniteElements(elements) => elements,
-                    Route::Automatic => elements_for(structure.theory, highest, &pieces),
-                };
-                let attached = (&masses[..], &structure.springs[..]);
-                JointedBody::Elements(Box::new(InterfaceModes::new(
-                    structure.theory,
-                    &pieces,
-                    attached,
-                    elements,
-                )?))
+            Route::Automatic => None,
+        };
+        let theory = structure.theory;
+        let body = match (elements, &beams) {
+            (Some(elements), _) => {
+                let free = structure.specimen(SpecimenJoint::Free);
+                JointedBody::Elements(Box::new(InterfaceModes::new(&free, elements)?))
+            }
+            (None, Body::One(beam)) => JointedBody::Rooted(beam.slenderness(theory)),
+            (None, Body::Joined([left, right])) => {
+                let total = structure.beam.length;
+                let halves = [left, right].map(|half| JoinedHalf::new(theory, half, left, total));
+                JointedBody::Joined(halves)
             }
         };
         let free = match structure.assembly {
             Assembly::Free => Some(free_lambdas(&body, highest)?),
-            _ => None,
+            Assembly::Cantilever | Assembly::Lap => None,
         };
         Ok(Self {
             structure: structure.clone(),
@@ -186,25 +301,17 @@ impl FrequencyModel {
         }
     }
 
-    /// How far the ratios of attached masses to the beam's, and of support springs to the beam's
-    /// stiffness, have moved from those of the body, as logarithms.
+    /// Change of the ratios of attached masses to the beam's, and of support springs to the beam's
+    /// stiffness, from those of the body, as logarithms.
     fn attachment_ratios(&self, point: &Point) -> (f64, f64) {
-        let moved = |parameter: Parameter| {
-            let index = parameter.index();
-            point[index] - self.built_at[index]
-        };
-        let (length, width, thickness) = (
-            moved(Parameter::Length),
-            moved(Parameter::Width),
-            moved(Parameter::Thickness),
-        );
-        let mass = -(moved(Parameter::Density) + length + width + thickness);
-        let support = 3.0 * length - moved(Parameter::Modulus) - width - 3.0 * thickness;
-        (mass, support)
+        let moved: Point = std::array::from_fn(|i| point[i] - self.built_at[i]);
+        let [_, _, _, modulus, density, length, width, thickness] = moved;
+        let mass = -(density + length + width + thickness);
+        (mass, 3.0 * length - modulus - width - 3.0 * thickness)
     }
 
-    /// Whether the attachments' shares at this point differ from the body's so much that it has to
-    /// be built anew: to first order they are followed exactly.
+    /// Returns true where the attachments' shares at this point differ from the body's so much that it
+    /// has to be built anew. To first order they are followed exactly.
     pub(super) fn is_far(&self, point: &Point) -> bool {
         // The error left is the square of this, and half of it again.
         const FAR: f64 = 1e-4;
@@ -215,7 +322,7 @@ impl FrequencyModel {
         attached && (mass.abs() > FAR || support.abs() > FAR)
     }
 
-    /// The same model built for the beam at this point.
+    /// Returns the model built for the beam at this point.
     pub(super) fn rebuilt(&self, point: &Point, highest: usize) -> Result<Self, StructureError> {
         let there = self
             .structure
@@ -283,7 +390,7 @@ impl ModelAt<'_> {
     /// d ln f = 2 d ln lambda, with a = 1/Kx, b = 1/Ky and c = coupling sqrt(ab).
     fn jointed_mode(&self, mode: usize, guess: f64) -> (f64, [f64; 3], [f64; 2]) {
         let (joint, body) = (&self.joint, &self.model.body);
-        let root = interface_root(body, joint, mode, (guess, self.last_step));
+        let root = body.root(joint, mode, guess, self.last_step);
         let [by_a, by_b, by_c] = root.by_compliance;
         let scale = 2.0 / root.lambda;
         let springs = [
@@ -301,48 +408,38 @@ impl ModelAt<'_> {
 
 /// ln Kx and ln Ky at a point: Kx = Kt L^3/(E I), Ky = Kr L/(E I), I = b h^3/12.
 pub(super) fn log_nondimensional(point: &Point) -> [f64; 2] {
-    let at = |parameter: Parameter| point[parameter.index()];
-    let length = at(Parameter::Length);
-    let stiffness =
-        at(Parameter::Modulus) + at(Parameter::Width) + 3.0 * at(Parameter::Thickness) - 12f64.ln();
-    [
-        at(Parameter::Kt) + 3.0 * length - stiffness,
-        at(Parameter::Kr) + length - stiffness,
-    ]
+    let [kt, kr, _, modulus, _, length, width, thickness] = *point;
+    let stiffness = modulus + width + 3.0 * thickness - 12f64.ln();
+    [kt + 3.0 * length - stiffness, kr + length - stiffness]
 }
 
 fn nominal_point(beam: &Beam) -> Point {
-    let mut point = [0.0; PARAMETERS];
-    let known = [
-        (Parameter::Modulus, beam.modulus),
-        (Parameter::Density, beam.density),
-        (Parameter::Length, beam.length),
-        (Parameter::Width, beam.width),
-        (Parameter::Thickness, beam.thickness),
-    ];
-    for (parameter, value) in known {
-        point[parameter.index()] = value.ln();
-    }
-    point
+    [
+        0.0,
+        0.0,
+        0.0,
+        beam.modulus.ln(),
+        beam.density.ln(),
+        beam.length.ln(),
+        beam.width.ln(),
+        beam.thickness.ln(),
+    ]
 }
 
 pub(super) fn beam_at(beam: &Beam, point: &Point) -> Beam {
-    let at = |parameter: Parameter| point[parameter.index()].exp();
+    let [_, _, _, modulus, density, length, width, thickness] = point.map(f64::exp);
     Beam {
-        modulus: at(Parameter::Modulus),
-        density: at(Parameter::Density),
-        length: at(Parameter::Length),
-        width: at(Parameter::Width),
-        thickness: at(Parameter::Thickness),
+        modulus,
+        density,
+        length,
+        width,
+        thickness,
         poisson: beam.poisson,
     }
 }
 
 fn free_lambdas(body: &JointedBody, highest: usize) -> Result<Vec<f64>, StructureError> {
     match body {
-        JointedBody::Rooted(slenderness) if *slenderness == Slenderness::EULER => {
-            natural_lambdas(Assembly::Free, &JointStiffness::FREE, highest)
-        }
         JointedBody::Rooted(slenderness) => {
             let modes = natural_modes(Assembly::Free, &JointStiffness::FREE, slenderness, highest)?;
             Ok(modes.iter().map(|mode| mode.lambda).collect())
@@ -355,140 +452,4 @@ fn free_lambdas(body: &JointedBody, highest: usize) -> Result<Vec<f64>, Structur
             reason: "it has fewer modes than were measured; divide finer".to_owned(),
         }),
     }
-}
-
-// The tested structure without its joint: beams, what is fastened to them, and by which route its
-// frequencies are computed.
-
-/// By which route frequencies are computed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Route {
-    /// In closed form where that exists, else by finite elements.
-    #[default]
-    Automatic,
-    /// By finite elements, so many to each beam.
-    FiniteElements(usize),
-}
-
-/// The tested structure without its joint.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointedStructure {
-    /// The beam; of a lap joint the left half's properties and the total length.
-    pub beam: Beam,
-    /// Theory of bending.
-    pub theory: BeamTheory,
-    /// How it is held.
-    pub assembly: Assembly,
-    /// Of a lap joint.
-    pub lap: LapLayout,
-    /// Masses (kg) on the beam: sensors, and what is fastened.
-    pub masses: Vec<PointAttachment>,
-    /// Springs (N/m) between beam and ground: suspension, cables.
-    pub springs: Vec<PointAttachment>,
-    /// How frequencies are computed.
-    pub route: Route,
-}
-
-impl JointedStructure {
-    /// A beam with nothing on it; a lap joint in its middle.
-    pub fn new(theory: BeamTheory, beam: Beam, assembly: Assembly) -> Self {
-        Self {
-            beam,
-            theory,
-            assembly,
-            lap: LapLayout::default(),
-            masses: Vec::new(),
-            springs: Vec::new(),
-            route: Route::Automatic,
-        }
-    }
-
-    /// The same structure of another beam: places and the overlap in proportion to its length, the right
-    /// half's section and material by the same factors.
-    #[must_use]
-    pub fn with_beam(&self, beam: &Beam) -> Self {
-        let longer = beam.length / self.beam.length;
-        let mut there = self.clone();
-        if let Some(right) = &mut there.lap.right {
-            right.length = beam.length;
-            right.width *= beam.width / self.beam.width;
-            right.thickness *= beam.thickness / self.beam.thickness;
-            right.modulus *= beam.modulus / self.beam.modulus;
-            right.density *= beam.density / self.beam.density;
-        }
-        there.lap.position = there.lap.position.map(|position| position * longer);
-        there.lap.overlap = there
-            .lap
-            .overlap
-            .map(|(length, mass)| (length * longer, mass));
-        for attached in there.masses.iter_mut().chain(&mut there.springs) {
-            // A point at the end stays on the beam, whatever the last digit of the product.
-            attached.position = (attached.position * longer).min(beam.length);
-        }
-        there.beam = *beam;
-        there
-    }
-
-    /// The beams between which the joint sits, or the one beam.
-    ///
-    /// # Errors
-    /// [`StructureError`] of a beam that cannot exist, or a joint off the beam.
-    pub fn pieces(&self) -> Result<Vec<Beam>, StructureError> {
-        self.beam.check()?;
-        if self.assembly != Assembly::Lap {
-            return Ok(vec![self.beam]);
-        }
-        let position = self.lap.position.unwrap_or(0.5 * self.beam.length);
-        if !(position > 0.0 && position < self.beam.length) {
-            return Err(StructureError::OffBeam {
-                position,
-                length: self.beam.length,
-            });
-        }
-        let left = Beam {
-            length: position,
-            ..self.beam
-        };
-        let right = Beam {
-            length: self.beam.length - position,
-            ..self.lap.right.unwrap_or(self.beam)
-        };
-        right.check()?;
-        Ok(vec![left, right])
-    }
-
-    /// Masses on the beam, the overlap's included: two points in either half, where Gauss's rule
-    /// puts them, carry a uniform mass as a cubic shape feels it.
-    pub fn all_masses(&self) -> Vec<PointAttachment> {
-        let mut masses = self.masses.clone();
-        if let Some((length, mass)) = self.lap.overlap.filter(|_| self.assembly == Assembly::Lap) {
-            let joint = self.lap.position.unwrap_or(0.5 * self.beam.length);
-            // Half of the overlap reaches from 0 to 1/2: its points are 1/4 -+ 1/(4 sqrt 3).
-            let gauss = 0.25 / 3f64.sqrt();
-            for side in [-1.0, 1.0] {
-                for point in [0.25 - gauss, 0.25 + gauss] {
-                    masses.push(PointAttachment {
-                        position: joint + side * point * length,
-                        size: 0.25 * mass,
-                    });
-                }
-            }
-        }
-        masses.retain(|mass| mass.size != 0.0);
-        masses
-    }
-}
-
-/// Elements of each piece for this highest mode, so that its frequency is right to about 1e-6. By
-/// Euler's theory the relative error is (k h)^4/1440 for the wave number k and the element length
-/// h; with shear and rotary inertia it falls as h^2 only.
-pub(super) fn elements_for(theory: BeamTheory, highest: usize, pieces: &[Beam]) -> usize {
-    let size = match theory {
-        BeamTheory::Euler => 0.18,
-        BeamTheory::Timoshenko => 0.09,
-    };
-    let total: f64 = pieces.iter().map(|piece| piece.length).sum();
-    let longest = pieces.iter().map(|piece| piece.length).fold(0.0, f64::max);
-    let wave = (highest as f64 + 0.5) * PI * longest / total;
-    ((wave / size).ceil() as usize).max(8)
 }

@@ -7,7 +7,7 @@
 use super::least_squares::Problem;
 use super::model::{Parameter, Point, log_nondimensional};
 use std::f64::consts::{LN_10, PI};
-use tapjoint_beam::interface::{InterfaceFunctions, JointCompliance};
+use tapjoint_beam::interface::{InterfaceFunctions, JointWeights};
 
 /// Decades of Kx and Ky tried: below the first a joint is hardly one, above the last hardly one
 /// mode feels that it gives.
@@ -136,7 +136,7 @@ fn neighbours(index: [usize; 3], sizes: [usize; 3]) -> impl Iterator<Item = [usi
 }
 
 fn approximate_cost(problem: &Problem<'_>, functions: &[InterfaceFunctions], point: &Point) -> f64 {
-    let joint = problem.model.compliance(point);
+    let joint = JointWeights::from(&problem.model.compliance(point));
     let uncounted = problem.model.body.uncounted();
     problem
         .data
@@ -150,9 +150,8 @@ fn approximate_cost(problem: &Problem<'_>, functions: &[InterfaceFunctions], poi
 }
 
 /// About how far (1, relative) a predicted frequency is from the place of these functions.
-fn approximate_miss(at: &InterfaceFunctions, joint: &JointCompliance, number: usize) -> f64 {
-    let equation = at.equation(joint);
-    let (value, _) = equation;
+fn approximate_miss(at: &InterfaceFunctions, joint: &JointWeights, number: usize) -> f64 {
+    let (value, slope) = at.equation(joint);
     let count = at.count(joint, value);
     // Neighbouring roots are about pi apart in lambda; f grows as its square.
     let spacing = 2.0 * PI / at.lambda;
@@ -161,6 +160,6 @@ fn approximate_miss(at: &InterfaceFunctions, joint: &JointCompliance, number: us
     } else {
         number - 1 - count
     };
-    let newton = 2.0 * (at.newton_step(equation) / at.lambda).abs();
+    let newton = 2.0 * (at.newton_step(value, slope) / at.lambda).abs();
     newton.min(0.5 * spacing) + modes_off as f64 * spacing
 }

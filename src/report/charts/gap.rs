@@ -2,10 +2,11 @@
 
 use super::super::chart::axis::{Axis, extent, padded};
 use super::super::chart::{Block, Chart, Color, Mark, Panel, Series};
-use super::super::document::{Document, GapSection, PlaceMapSection, PullSection};
+use super::super::document::{Document, GapSection};
 use super::super::format::{probability, rounded, signed_percent};
 use super::super::tables::place_of;
 use super::HIGH;
+use tapjoint_diagnosis::{Hypothesis, LocationMap, Residual, Verdict};
 
 /// Hypotheses shown.
 const MOST_BARS: usize = 9;
@@ -13,28 +14,29 @@ const MOST_BARS: usize = 9;
 const LEAST_SPAN: f64 = 0.02;
 
 /// What stands beside the errors of the described model.
-enum Explanation<'a> {
+enum Explanation {
     /// The errors that this effect leaves: the most probable one of those that the verdict names.
-    Effect(&'a str),
+    Effect(String),
     /// Nothing, for this reason: an effect that is probably not the cause explains nothing.
     Nothing(&'static str),
 }
 
-impl<'a> Explanation<'a> {
-    fn of(gap: &'a GapSection) -> Explanation<'a> {
-        match gap.verdict.kind.as_str() {
-            "named" | "group" | "set" => {
+impl Explanation {
+    fn of(gap: &GapSection) -> Explanation {
+        match gap.verdict {
+            Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => {
                 // The diagnosis gives the errors of the most probable hypothesis that predicts anything.
-                let mut effects = gap.hypotheses.iter().map(|found| found.effect.as_str());
-                let first = effects.find(|effect| *effect != "unknown");
-                match first.filter(|effect| *effect != "none") {
-                    Some(effect) => Explanation::Effect(effect),
-                    None => Explanation::Nothing("no effect is more probable than none"),
+                let mut hypotheses = gap.hypotheses.iter().map(|found| &found.hypothesis);
+                match hypotheses.find(|one| **one != Hypothesis::Unknown) {
+                    Some(effects @ Hypothesis::Effects(_)) => Explanation::Effect(effects.name()),
+                    _ => Explanation::Nothing("no effect is more probable than none"),
                 }
             }
-            "no-gap" => Explanation::Nothing("nothing is missing"),
-            "unknown" => Explanation::Nothing("nothing in the catalogue explains the rest"),
-            _ => Explanation::Nothing("these data do not decide what is missing"),
+            Verdict::NoGap => Explanation::Nothing("nothing is missing"),
+            Verdict::Unknown => Explanation::Nothing("nothing in the catalogue explains the rest"),
+            Verdict::NotEnoughData(_) => {
+                Explanation::Nothing("these data do not decide what is missing")
+            }
         }
     }
 
@@ -71,7 +73,7 @@ pub fn gap(document: &Document) -> Option<Chart> {
     })
 }
 
-fn errors_panel(gap: &GapSection, pulls: &[PullSection]) -> Panel {
+fn errors_panel(gap: &GapSection, pulls: &[Residual]) -> Panel {
     let last = pulls.iter().map(|pull| pull.mode).max().unwrap_or(1);
     let names = (1..=last).map(|mode| (mode as f64, mode.to_string()));
     let x = Axis::linear(0.4, last as f64 + 0.6)
@@ -113,7 +115,7 @@ fn errors_panel(gap: &GapSection, pulls: &[PullSection]) -> Panel {
 /// The series with the errors of all frequencies with one model, each in percent and in standard deviations.
 fn with_errors(
     mut series: Series,
-    pulls: &[PullSection],
+    pulls: &[Residual],
     places: &[f64],
     errors: impl Iterator<Item = (f64, f64)>,
 ) -> Series {
@@ -131,7 +133,7 @@ fn with_errors(
 
 /// Where an error stands: the tap levels of all recordings that saw a mode stand beside each other over half
 /// its width.
-fn abscissa(pulls: &[PullSection], pull: &PullSection) -> f64 {
+fn abscissa(pulls: &[Residual], pull: &Residual) -> f64 {
     // One recording can hold taps of two levels, which saw the mode apart.
     let mut seats: Vec<(&str, Option<f64>)> = Vec::new();
     for other in pulls.iter().filter(|other| other.mode == pull.mode) {
@@ -149,7 +151,9 @@ fn abscissa(pulls: &[PullSection], pull: &PullSection) -> f64 {
 fn odds_panel(gap: &GapSection) -> Panel {
     let rows = gap.hypotheses.iter().take(MOST_BARS).enumerate();
     let rows = rows.map(|(row, found)| (-(row as f64), found));
-    let names = rows.clone().map(|(row, found)| (row, found.effect.clone()));
+    let names = rows
+        .clone()
+        .map(|(row, found)| (row, found.hypothesis.name()));
     let lowest = 0.4 - gap.hypotheses.len().min(MOST_BARS) as f64;
     let y = Axis::linear(lowest, 0.6).named(names);
     let x = Axis::linear(0.0, 100.0).of("probability", "%");
@@ -160,12 +164,15 @@ fn odds_panel(gap: &GapSection) -> Panel {
     ] {
         let own = rows
             .clone()
-            .filter(|(_, found)| gap.verdict.holds(&found.effect) == held);
+            .filter(|(_, found)| gap.verdict.hypotheses().contains(&found.hypothesis) == held);
         let bars = own
             .clone()
             .map(|(row, found)| (100.0 * found.probability, row));
         let mut set = Series::points(name, color, Mark::Bar(9.0), bars);
-        set.words = own.clone().map(|(_, found)| found.effect.clone()).collect();
+        set.words = own
+            .clone()
+            .map(|(_, found)| found.hypothesis.name())
+            .collect();
         set.labels = own
             .map(|(_, found)| probability(found.probability))
             .collect();
@@ -236,7 +243,7 @@ pub fn place_map(document: &Document) -> Option<Chart> {
 }
 
 /// One value (1, shown in %) for each place.
-fn along(map: &PlaceMapSection, name: &str, color: Color, values: &[f64]) -> Series {
+fn along(map: &LocationMap, name: &str, color: Color, values: &[f64]) -> Series {
     let places = map.positions.iter().zip(values);
     let places = places.map(|(at, value)| (1e3 * at, 100.0 * value));
     Series::points(name, color, Mark::Curve(2.0), places)

@@ -226,11 +226,11 @@ fn trials(document: &Document, drawn: usize) -> String {
 impl Cloud {
     fn of(document: &Document, method: &str) -> Cloud {
         let spans = document.resolution_span.iter().flatten();
-        let spans = spans.filter(|span| span.method == method);
+        let spans = spans.filter(|span| span.method.name() == method);
         let random = document.monte_carlo.iter().flatten();
-        let random = random.filter(|found| found.method == method);
+        let random = random.filter(|found| found.method.name() == method);
         let rows = document.perturbation.iter().flatten();
-        let rows = rows.filter(|row| row.percent != 0.0 && row.method == method);
+        let rows = rows.filter(|row| row.percent != 0.0 && row.method.name() == method);
         let shifted = rows.filter_map(|row| Some((row.percent, (row.kx?, row.ky?))));
         let mut cloud = Cloud {
             patterns: finite(spans.flat_map(|span| &span.cloud)),
@@ -244,7 +244,7 @@ impl Cloud {
             .sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
         if let Some(estimate) = document.estimate.as_ref().and_then(Option::as_ref) {
             cloud.estimate = estimate_by(estimate, method);
-            if estimate.method == method {
+            if estimate.method.name() == method {
                 let covariance = cloud.estimate.zip(estimate.log_covariance);
                 let region = covariance.map(|(place, covariance)| ellipse(place, covariance));
                 cloud.ellipse = region.unwrap_or_default();
@@ -305,7 +305,7 @@ fn finite<'a>(places: impl Iterator<Item = &'a [f64; 2]>) -> Vec<(f64, f64)> {
 fn estimate_by(estimate: &EstimateSection, method: &str) -> Option<(f64, f64)> {
     let place = match &estimate.pairs {
         Some(pairs) if method == "pairs" => (pairs.kx?, pairs.ky?),
-        _ if estimate.method == method => {
+        _ if estimate.method.name() == method => {
             (estimate.kx.as_ref()?.value, estimate.ky.as_ref()?.value)
         }
         _ => return None,

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::super::chart::{Axis, Block, Chart, Color, Mark, Panel, Series};
-use super::super::document::{Document, ModeShapeSection};
+use super::super::document::Document;
 use super::super::format::significant;
+use tapjoint_analysis::SampledShape;
 
 /// Panels in a row.
 const ACROSS: usize = 3;
@@ -42,7 +43,7 @@ pub fn shapes(document: &Document) -> Option<Chart> {
 }
 
 fn panel(
-    shape: &ModeShapeSection,
+    shape: &SampledShape,
     sensors: &BTreeMap<&str, Vec<f64>>,
     taps: &[f64],
     kind: Option<&str>,
@@ -106,7 +107,7 @@ fn panel(
 }
 
 /// Displacement at a place, between the points next to it.
-fn displacement(shape: &ModeShapeSection, place: f64) -> f64 {
+fn displacement(shape: &SampledShape, place: f64) -> f64 {
     let after = shape.positions.partition_point(|x| *x < place);
     let point = |index: usize| {
         let position = shape.positions.get(index)?;

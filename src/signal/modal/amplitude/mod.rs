@@ -23,21 +23,19 @@
 //! thousandths of it and is left in. A neighbour that nobody listed nearer than about the half-power width
 //! cannot be told from a drift by one decay.
 
-use rayon::prelude::*;
-
-use tapjoint_numerics::stats::median;
-
+use super::from_one;
+use schemars::JsonSchema;
+use serde::Serialize;
 mod band;
-mod context;
-mod exponentials;
-mod fit;
-mod polynomial;
-mod segment;
-mod sensors;
+mod decay_model;
 mod trend;
 mod walk;
 
 pub use trend::{AmplitudeReading, Trend};
+
+use rayon::prelude::*;
+
+use tapjoint_numerics::stats::median;
 
 /// The ringing after one tap, force no longer acting.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,9 +94,10 @@ impl Default for AmplitudeSettings {
 }
 
 /// One segment of one decay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudePoint {
-    /// Which decay (0-based).
+    /// Number of the tap, from 0; in outputs from 1.
+    #[serde(serialize_with = "from_one")]
     pub tap: usize,
     /// Time after the tap (s).
     pub time: f64,
@@ -109,6 +108,7 @@ pub struct AmplitudePoint {
     /// Its standard uncertainty (Hz).
     pub frequency_std: f64,
     /// Damping ratio (1).
+    #[serde(rename = "damping")]
     pub damping_ratio: f64,
     /// Its standard uncertainty (1).
     pub damping_std: f64,
@@ -137,7 +137,8 @@ pub enum Origin {
 }
 
 /// What a curve says.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "&'static str")]
 pub enum AmplitudeVerdict {
     /// Frequency or damping changes along the decay by more than its uncertainty.
     Changes,
@@ -156,6 +157,18 @@ pub enum AmplitudeVerdict {
     },
     /// Fewer points than a trend needs.
     TooFewPoints,
+}
+
+impl From<AmplitudeVerdict> for &'static str {
+    fn from(verdict: AmplitudeVerdict) -> &'static str {
+        match verdict {
+            AmplitudeVerdict::Changes => "changes",
+            AmplitudeVerdict::Steady => "steady",
+            AmplitudeVerdict::Beating { .. } => "beating",
+            AmplitudeVerdict::Unresolved { .. } => "unresolved",
+            AmplitudeVerdict::TooFewPoints => "too-few-points",
+        }
+    }
 }
 
 /// Frequency and damping of one mode against amplitude.
@@ -229,17 +242,17 @@ fn follow_mode(
         verdict: AmplitudeVerdict::TooFewPoints,
     };
     let bands = band::extract_bands(decays, modes, index, settings);
-    curve.sensor = sensors::strongest(&bands);
+    curve.sensor = band::strongest(&bands);
     let Some(sensor) = curve.sensor else {
         return curve;
     };
     curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
     let (mut doubts, mut followed) = (Vec::new(), 0);
     for band in &bands {
-        let Some(series) = sensors::combine(band, sensor) else {
+        let Some(series) = band::combine(band, sensor) else {
             continue;
         };
-        let context = context::explain(&series, band);
+        let context = decay_model::explain(&series, band);
         let mut points = walk::walk_decay(&series, band, &context, settings);
         let found = !points.is_empty();
         points.retain(|point| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST);

@@ -10,8 +10,7 @@ use super::format::unit_words;
 use super::plot::amplitude::AmplitudeFigure;
 use super::short_names::ends_of_paths;
 use tapjoint_analysis::{
-    AmplitudeChange, Analysis, CloseUp, Frf, FrfSettings, MeasuredSpectra, RecordingResult,
-    Response, frfs_of,
+    Analysis, CloseUp, Frf, FrfSettings, MeasuredSpectra, RecordingResult, Response, frfs_of,
 };
 use tapjoint_description::SensorKind;
 use tapjoint_signal::modal::amplitude::AmplitudeCurve;
@@ -119,9 +118,8 @@ fn stabilisation_figure(searches: &[BandSearch]) -> Option<StabilisationFigure> 
 fn amplitude_figure(recording: &RecordingResult, name: &str) -> Option<AmplitudeFigure> {
     let spectra = recording.measurement.spectra.as_ref()?;
     let numbered = || spectra.readings.iter().zip(&recording.mode_numbers);
-    numbered().find(|(reading, mode)| {
-        mode.is_some() && AmplitudeChange::of(reading, recording).is_some()
-    })?;
+    numbered()
+        .find(|(reading, mode)| mode.is_some() && recording.amplitude_change(reading).is_some())?;
     let modes: Vec<(usize, AmplitudeCurve)> = numbered()
         .filter_map(|(reading, &mode)| {
             Some((mode?, reading.fit.as_ref()?.amplitude.as_ref()?.clone()))

@@ -2,9 +2,9 @@
 
 use super::super::document::{Document, EstimateSection, Method, ValueSection};
 use super::super::format::{
-    MISSING, RIGID, Rounded, last_place, optional, prefix, rounded_to, signed_percent, significant,
+    MISSING, RIGID, Rounded, capital, last_place, optional, prefix, rounded_to, signed_percent,
+    significant,
 };
-use super::super::summary::capital;
 use super::{Table, number, words};
 
 /// Most significant digits of an estimate.

@@ -1,6 +1,8 @@
-//! Tables of what was recorded: recordings and their channels.
+//! Tables of what was recorded: recordings, their channels and taps; datasets of universal files.
 
-use super::super::document::{ChannelSection, Document, RecordingSection};
+use super::super::document::{
+    ChannelSection, DatasetSection, Document, RecordingSection, TapSection,
+};
 use super::super::format::{MISSING, optional, significant, trimmed, unit_words};
 use super::{Table, number, words};
 
@@ -205,5 +207,203 @@ fn channel_row(file: &str, channel: &ChannelSection) -> Vec<String> {
         channel.full_scale_samples.to_string(),
         channel.flat_tops.to_string(),
         channel.dropped_samples.to_string(),
+    ]
+}
+
+/// Unit of the taps' peaks, in words where nobody said.
+pub fn peak_unit(recording: &RecordingSection) -> String {
+    unit_words(recording.tap_unit.as_deref().unwrap_or("unit of the file"))
+}
+
+/// One row for each tap; `None` where none was looked for or found.
+pub fn taps(document: &Document) -> Option<Table> {
+    taps_of(document, "Taps", |_| true)
+}
+
+/// One row for each tap that was not used; `None` without any.
+pub fn rejected_taps(document: &Document) -> Option<Table> {
+    taps_of(document, "Rejected taps", |tap| !tap.accepted)
+}
+
+fn taps_of(
+    document: &Document,
+    caption: &str,
+    wanted: impl Fn(&TapSection) -> bool,
+) -> Option<Table> {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let rows: Vec<Vec<String>> = recordings
+        .iter()
+        .flat_map(|recording| {
+            let taps = recording.taps.iter().enumerate();
+            taps.filter(|(_, tap)| wanted(tap))
+                .map(|(index, tap)| tap_row(recording, index + 1, tap))
+        })
+        .collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let rows = without_single_name(rows, recordings);
+    let table = Table {
+        caption: caption.to_owned(),
+        columns: vec![
+            words("Recording"),
+            number("Tap"),
+            number("Time (s)"),
+            number("Peak"),
+            words("Unit"),
+            words("Used"),
+            words("Reason"),
+        ],
+        rows,
+        note: peaks_note(recordings),
+    };
+    Some(table.without_empty_columns())
+}
+
+/// Rows without the recording's name where there is only one: the table of recordings has it.
+fn without_single_name(
+    mut rows: Vec<Vec<String>>,
+    recordings: &[RecordingSection],
+) -> Vec<Vec<String>> {
+    if recordings.len() == 1 {
+        for name in rows.iter_mut().filter_map(|row| row.first_mut()) {
+            name.clear();
+        }
+    }
+    rows
+}
+
+fn tap_row(recording: &RecordingSection, number: usize, tap: &TapSection) -> Vec<String> {
+    vec![
+        recording.file.clone(),
+        number.to_string(),
+        format!("{:.3}", tap.time),
+        peak(tap).map_or(MISSING.to_owned(), |peak| significant(peak, 3)),
+        peak_unit(recording),
+        if tap.accepted { "yes" } else { "no" }.to_owned(),
+        tap.reason.clone().unwrap_or_default(),
+    ]
+}
+
+fn peak(tap: &TapSection) -> Option<f64> {
+    tap.peak_force.or(tap.peak_response)
+}
+
+fn peaks_note(recordings: &[RecordingSection]) -> String {
+    let with = recordings.iter().any(|recording| recording.has_hammer);
+    let without = recordings.iter().any(|recording| !recording.has_hammer);
+    match (with, without) {
+        (true, false) => "Peak: of the force.",
+        (false, true) => "Peak: of the response on which the tap stands out most.",
+        _ => "Peak: of the force, or without a hammer of the response on which the tap stands out most.",
+    }
+    .to_owned()
+}
+
+/// One row for each recording: how many taps were used, when, and how hard they were; `None`
+/// without any tap.
+pub fn taps_used(document: &Document) -> Option<Table> {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let rows: Vec<Vec<String>> = recordings
+        .iter()
+        .filter(|recording| !recording.taps.is_empty())
+        .map(used_row)
+        .collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let rows = without_single_name(rows, recordings);
+    let table = Table {
+        caption: "Taps used".to_owned(),
+        columns: vec![
+            words("Recording"),
+            number("Used"),
+            number("First (s)"),
+            number("Last (s)"),
+            number("Smallest peak"),
+            number("Largest peak"),
+            words("Unit"),
+        ],
+        rows,
+        note: peaks_note(recordings),
+    };
+    Some(table.without_empty_columns())
+}
+
+fn used_row(recording: &RecordingSection) -> Vec<String> {
+    let used: Vec<&TapSection> = recording.taps.iter().filter(|tap| tap.accepted).collect();
+    let time = |tap: Option<&&TapSection>| {
+        tap.map_or(MISSING.to_owned(), |tap| format!("{:.3}", tap.time))
+    };
+    let peaks = || used.iter().filter_map(|tap| peak(tap));
+    let written = |peak: Option<f64>| peak.map_or(MISSING.to_owned(), |peak| significant(peak, 3));
+    vec![
+        recording.file.clone(),
+        format!("{} of {}", used.len(), recording.taps.len()),
+        time(used.first()),
+        time(used.last()),
+        written(peaks().min_by(f64::total_cmp)),
+        written(peaks().max_by(f64::total_cmp)),
+        peak_unit(recording),
+    ]
+}
+
+/// One row for each dataset; `None` without any.
+pub fn datasets(document: &Document) -> Option<Table> {
+    let datasets = document.datasets.as_deref().filter(|d| !d.is_empty())?;
+    let first = datasets.first().map(|dataset| &dataset.file);
+    let several = datasets.iter().any(|dataset| Some(&dataset.file) != first);
+    let rows = datasets.iter().map(|dataset| dataset_row(dataset, several));
+    let table = Table {
+        caption: "Datasets".to_owned(),
+        columns: vec![
+            words("File"),
+            number("Number"),
+            words("Kind"),
+            number("Points"),
+            number("Step"),
+            words("Response"),
+            words("Reference"),
+            words("Unit"),
+            words("Values").on_page(),
+            words("Stored as").on_page(),
+            words("Description").on_page(),
+        ],
+        rows: rows.collect(),
+        note: "As the headers say; values were not read.".to_owned(),
+    };
+    Some(table.without_empty_columns())
+}
+
+fn dataset_row(dataset: &DatasetSection, several: bool) -> Vec<String> {
+    let words = |text: &Option<String>| text.clone().unwrap_or_else(|| MISSING.to_owned());
+    let step = match (dataset.spacing, &dataset.spacing_unit) {
+        (Some(step), Some(unit)) => format!("{} {unit}", trimmed(step, 6)),
+        (Some(step), None) => trimmed(step, 6),
+        (None, _) if dataset.points.is_some() => "uneven".to_owned(),
+        (None, _) => MISSING.to_owned(),
+    };
+    let unit = match (&dataset.unit, &dataset.denominator_unit) {
+        (Some(above), Some(below)) => format!("({above})/({below})"),
+        (above, _) => words(above),
+    };
+    vec![
+        if several {
+            dataset.file.clone()
+        } else {
+            String::new()
+        },
+        dataset.dataset.to_string(),
+        dataset.kind.clone(),
+        dataset
+            .points
+            .map_or(MISSING.to_owned(), |points| points.to_string()),
+        step,
+        words(&dataset.response),
+        words(&dataset.reference),
+        unit,
+        words(&dataset.values),
+        words(&dataset.coding),
+        words(&dataset.description),
     ]
 }

@@ -1,11 +1,144 @@
-//! What was found, in a few plain sentences.
+//! What was found: in five lines for a terminal, and in a few plain sentences for the page.
 
-use super::document::{
+use super::super::document::{
     Document, EstimateSection, ModeSection, PredictionSection, ReadBy, RecordingSection,
 };
-use super::format::{bound_percent, signed_or_below, significant, trimmed};
-use super::tables::{Parameter, estimated, gap_in_short, gap_story, quality_count, reading_bound};
+use super::super::format::{bound_percent, capital, signed_or_below, significant, trimmed};
+use super::super::tables::{Parameter, estimated, quality_count, reading_bound};
+use super::gap::{gap_in_short, gap_story, joint_with, missing, shows_gap};
+use tapjoint_diagnosis::Verdict;
 use tapjoint_identify::observation::UNPAIRED;
+
+/// At most five lines, each with what it is about; what was not computed has none.
+pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
+    let lines = [
+        ("Taps", taps_in_short(document)),
+        ("Modes", modes_in_short(document)),
+        (
+            if document.has_joint() {
+                "Joint"
+            } else {
+                "Beam"
+            },
+            joint(document),
+        ),
+        ("Model", model(document)),
+        ("Doubts", doubts(document)),
+        ("Next", described(document)),
+    ];
+    lines
+        .into_iter()
+        .filter_map(|(about, words)| Some((about, words?)))
+        .collect()
+}
+
+fn taps_in_short(document: &Document) -> Option<String> {
+    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+    let files = match recordings.len() {
+        1 => "1 recording".to_owned(),
+        count => format!("{count} recordings"),
+    };
+    // Functions from a file have no taps to judge.
+    if recordings
+        .iter()
+        .all(|recording| recording.sample_rate.is_none())
+    {
+        return Some(format!("none: {files} of frequency response functions"));
+    }
+    let all = recordings.iter().flat_map(|recording| &recording.taps);
+    let used = all.clone().filter(|tap| tap.accepted).count();
+    let could = if document.modes.is_some() {
+        "used"
+    } else {
+        "can be used"
+    };
+    // Without a hammer it matters on what taps were looked for.
+    let channels = channels(document).map_or(String::new(), |words| format!(". {words}"));
+    Some(format!(
+        "{used} of {} taps {could}, in {files}{channels}",
+        all.count()
+    ))
+}
+
+fn modes_in_short(document: &Document) -> Option<String> {
+    let modes = document.modes.as_deref()?;
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let frequencies: Vec<f64> = numbered.map(|mode| mode.frequency).collect();
+    let low = frequencies.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = frequencies.iter().copied().fold(0.0, f64::max);
+    Some(match frequencies.len() {
+        0 => "none".to_owned(),
+        1 => format!("1 mode at {} Hz", significant(low, 4)),
+        count => format!(
+            "{count} modes from {} to {} Hz",
+            significant(low, 4),
+            significant(high, 4)
+        ),
+    })
+}
+
+fn joint(document: &Document) -> Option<String> {
+    let Some(estimate) = document.estimate.as_ref()? else {
+        let reason = document.estimate_reason.as_deref();
+        return Some(format!(
+            "no estimate: {}",
+            reason.unwrap_or("no reason was recorded")
+        ));
+    };
+    let physical: Vec<String> = estimated(estimate)
+        .iter()
+        .filter(|parameter| parameter.unit != "1")
+        .map(with_bounds)
+        .collect();
+    (!physical.is_empty()).then(|| physical.join(", "))
+}
+
+/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
+/// gives limits these are said, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
+fn with_bounds(parameter: &Parameter<'_>) -> String {
+    let [value, _, _, _, unit] = parameter.written();
+    let rounded = parameter.written_together();
+    if let Some([low, high]) = parameter.written_scaled_limits() {
+        let own = format!("{} = {} {unit}", parameter.symbol, rounded.value);
+        let limits = format!("(95 %: {low} to {high})");
+        return [own, limits]
+            .map(|part| part.replace(' ', "\u{a0}"))
+            .join(" ");
+    }
+    let shown = if rounded.uncertainty.is_some() {
+        rounded.joined()
+    } else {
+        value
+    };
+    // A number stays on the line of its unit.
+    format!("{} = {shown} {unit}", parameter.symbol).replace(' ', "\u{a0}")
+}
+
+fn model(document: &Document) -> Option<String> {
+    let worst = most_missed(document)?;
+    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
+        let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
+        let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
+        format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
+    });
+    Some(format!(
+        "largest frequency error of the model {} % (mode {}){gap}",
+        signed_or_below(worst.error_percent?),
+        worst.mode
+    ))
+}
+
+fn doubts(document: &Document) -> Option<String> {
+    let warnings = match document.main_warnings().count() {
+        0 => "no warnings".to_owned(),
+        1 => "1 warning, see above".to_owned(),
+        count => format!("{count} warnings, see above"),
+    };
+    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
+    // Where nothing was computed there is nothing to doubt.
+    let computed = document.modes.is_some() || document.recordings.is_some();
+    computed.then_some(warnings + &checks)
+}
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
@@ -27,7 +160,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
 }
 
 /// What a description would add to a bare recording; `None` where there is one, and of what was not analysed.
-pub(super) fn described(document: &Document) -> Option<String> {
+fn described(document: &Document) -> Option<String> {
     let bare = document
         .test
         .as_ref()
@@ -99,7 +232,7 @@ fn counted(count: usize, word: &str) -> String {
 }
 
 /// On what taps were looked for where there is no hammer.
-pub(super) fn channels(document: &Document) -> Option<String> {
+fn channels(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref()?;
     let mut names: Vec<&str> = Vec::new();
     for recording in recordings.iter().filter(|recording| !recording.has_hammer) {
@@ -252,14 +385,8 @@ fn stiffness(parameter: &Parameter<'_>) -> String {
     )
 }
 
-pub(super) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
-}
-
 /// The mode that the model misses most.
-pub(super) fn most_missed(document: &Document) -> Option<&PredictionSection> {
+fn most_missed(document: &Document) -> Option<&PredictionSection> {
     let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
     let rows = document.prediction.as_deref()?.iter();
     rows.filter(|row| row.error_percent.is_some_and(f64::is_finite))

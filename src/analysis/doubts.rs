@@ -6,7 +6,7 @@ use super::structure::TestedStructure;
 use super::warning::Warning;
 use tapjoint_beam::BeamTheory;
 use tapjoint_description::{FitParameter, SensorKind, TestDescription, Weights};
-use tapjoint_identify::consistent::goodness::NOTABLE_MISFIT;
+use tapjoint_identify::consistent::NOTABLE_MISFIT;
 use tapjoint_identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
 };

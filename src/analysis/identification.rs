@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::Beam;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
-use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodness};
+use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
 use tapjoint_identify::perturbation::{
     average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates, spans_of,
 };
@@ -67,7 +67,7 @@ impl IdentifySettings {
 
 /// A misfit is worth a warning beyond this error (%): what a beam's stated dimensions usually leave
 /// open in its frequencies.
-const NOTABLE_MISFIT: f64 = 100.0 * goodness::NOTABLE_MISFIT;
+const NOTABLE_MISFIT: f64 = 100.0 * tapjoint_identify::consistent::NOTABLE_MISFIT;
 
 /// Estimates the joint from numbered modes, predicts with it and perturbs it.
 pub fn identify(

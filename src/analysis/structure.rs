@@ -1,6 +1,6 @@
 //! The tested structure: from its description, for the consistent estimate and for predictions.
 
-use tapjoint_beam::finite_elements::PointAttachment;
+use tapjoint_beam::interface::PointAttachment;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};

@@ -11,7 +11,7 @@ use super::plot::place_map::{explained_panel, map_panel};
 use super::plot::shapes::{Places, displacement, joint_of, places, shown};
 use super::tables::place_of;
 use tapjoint_analysis::SampledShape;
-use tapjoint_diagnosis::{PlaceMap, Pull};
+use tapjoint_diagnosis::{LocationMap, Residual};
 
 /// Height of a panel with errors or changes (pixels).
 const HEIGHT: u32 = 320;
@@ -118,7 +118,7 @@ pub fn live_gap(document: &Document) -> Option<LivePoints> {
     Some(together(vec![pulls_panel(gap, pulls), odds_panel(gap)]))
 }
 
-fn pulls_panel(gap: &GapSection, pulls: &[Pull]) -> PointPanel {
+fn pulls_panel(gap: &GapSection, pulls: &[Residual]) -> PointPanel {
     let axes = errors_panel(gap, pulls);
     let last = pulls.iter().map(|pull| pull.mode).max().unwrap_or(1);
     let numbers = (1..=last).map(|mode| (mode as f64, mode.to_string()));
@@ -132,7 +132,7 @@ fn pulls_panel(gap: &GapSection, pulls: &[Pull]) -> PointPanel {
     if let Some(effect) = Explanation::of(gap).effect() {
         let name = format!("with {effect}");
         let after = (name.as_str(), "c0", ("dot", 4.0));
-        let left = |pull: &Pull| (pull.error_percent_after, pull.z_after);
+        let left = |pull: &Residual| (pull.error_percent_after, pull.z_after);
         sets.push(pulls_set(after, pulls, left));
     }
     PointPanel {
@@ -145,8 +145,8 @@ fn pulls_panel(gap: &GapSection, pulls: &[Pull]) -> PointPanel {
 /// The errors of all frequencies with one model, each in percent and in standard deviations.
 fn pulls_set(
     (name, color, mark): (&str, &str, (&'static str, f64)),
-    pulls: &[Pull],
-    value: impl Fn(&Pull) -> (f64, f64),
+    pulls: &[Residual],
+    value: impl Fn(&Residual) -> (f64, f64),
 ) -> PointSet {
     let points = pulls
         .iter()
@@ -232,7 +232,7 @@ pub fn live_place_map(document: &Document) -> Option<LivePoints> {
 }
 
 fn change(
-    map: &PlaceMap,
+    map: &LocationMap,
     (name, color): (&str, &str),
     (values, stds): (&[f64], &[f64]),
 ) -> PointSet {

@@ -9,6 +9,7 @@ mod export;
 mod first_steps;
 mod frozen;
 mod leftovers;
+mod outputs;
 mod schema;
 mod updated_model;
 

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use tapjoint_beam::effects::EffectId;
 use tapjoint_diagnosis::{
-    DecayFinding, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
-    NextTest, PlaceMap, PlaceProbabilities, Pull, Unplaced, Verdict,
+    AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
+    LocationMap, LocationProbabilities, NextTest, Residual, UnlocatedSensors, Verdict,
 };
 
 /// The gap between model and measurement.
@@ -29,14 +29,14 @@ pub struct GapSection {
     pub fitted_modes: Option<usize>,
     /// The described model without sensors that have a mass but no stated position; null where every position is
     /// known.
-    pub unplaced: Option<Unplaced>,
+    pub unplaced: Option<UnlocatedSensors>,
     /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
     pub decided_by: Option<DecidedBy>,
     /// What the decays by themselves say of a joint whose stiffness depends on the amplitude, whatever the
     /// verdict; null where no frequency changes along them.
-    pub along_decays: Option<DecayFinding>,
+    pub along_decays: Option<AmplitudeDependence>,
     /// What the residual of the nominal model calls for along the beam.
-    pub map: Option<PlaceMap>,
+    pub map: Option<LocationMap>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
     pub baselines: Vec<BaselineSection>,
     /// Tests that would tell more, those first that tell most for their effort.
@@ -50,9 +50,9 @@ pub struct GapSection {
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct GapPlaceSection {
     /// Probability (1) of joint, fixture, sensor, body, acquisition, unknown.
-    pub probability: PlaceProbabilities,
+    pub probability: LocationProbabilities,
     /// Every frequency's error.
-    pub modes: Vec<Pull>,
+    pub modes: Vec<Residual>,
     /// The readings that fit worst.
     pub worst_block: Option<String>,
 }
@@ -65,7 +65,8 @@ pub struct BaselineSection {
     /// Errors of the fitted frequencies (%, rms).
     pub gap_after: Option<f64>,
     /// Errors of withheld frequencies (%, rms).
-    pub withheld_after: Option<f64>,
+    #[serde(rename = "withheld_after")]
+    pub holdout_after: Option<f64>,
 }
 
 /// What a plain answer adds to the model.
@@ -114,14 +115,14 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         Some(BaselineSection {
             name,
             gap_after: answer.gap_after,
-            withheld_after: answer.withheld_after,
+            holdout_after: answer.holdout_after,
         })
     });
     GapSection {
         verdict: found.verdict.clone(),
         place: Some(GapPlaceSection {
-            probability: found.places,
-            modes: found.pulls.clone(),
+            probability: found.locations,
+            modes: found.residuals.clone(),
             worst_block: found.blocks.first().map(|block| block.name.clone()),
         }),
         hypotheses: found.hypotheses.clone(),
@@ -129,10 +130,10 @@ pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
         goodness_of_fit: found.goodness_of_fit,
         joint_shift: Some(found.joint_shift),
         fitted_modes: Some(found.fitted_modes),
-        unplaced: found.unplaced.clone(),
+        unplaced: found.unlocated.clone(),
         decided_by: Some(found.decided_by),
-        along_decays: found.along_decays.clone(),
-        map: found.map.clone(),
+        along_decays: found.amplitude_dependence.clone(),
+        map: found.location_map.clone(),
         baselines: baselines.collect(),
         next_test: found.next_tests.clone(),
         updated_model: None,

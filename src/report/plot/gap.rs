@@ -9,7 +9,7 @@ use super::drawing::{Align, Drawing, Stroke, Text};
 use super::palette::{BLUE, GRID, INK, SKY, SOFT, VERMILION};
 use super::panel::{LABEL_SIZE, Panel, Sample, TICK_SIZE, crisp, draw_legend, draw_title};
 use super::spectrum::{LEFT, WIDTH};
-use tapjoint_diagnosis::{Hypothesis, Pull, Verdict};
+use tapjoint_diagnosis::{Hypothesis, Residual, Verdict};
 
 const HEIGHT: u32 = 520;
 /// Right edge of the errors, left and right edge of the odds (pixels).
@@ -97,7 +97,7 @@ pub fn draw_gap(document: &Document) -> Option<Drawing> {
     Some(drawing)
 }
 
-fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[Pull]) {
+fn draw_errors(drawing: &mut Drawing, gap: &GapSection, pulls: &[Residual]) {
     let panel = errors_panel(gap, pulls);
     let last = last_mode(pulls);
     panel.draw_y_ticks(drawing, &panel.y.ticks(36.0));
@@ -142,7 +142,7 @@ fn legend(gap: &GapSection, last: usize) -> Vec<(Sample, String)> {
 fn draw_pull(
     drawing: &mut Drawing,
     panel: &Panel,
-    (pulls, pull): (&[Pull], &Pull),
+    (pulls, pull): (&[Residual], &Residual),
     effect: Option<&str>,
 ) {
     let x = abscissa(pulls, pull);
@@ -170,9 +170,9 @@ fn draw_pull(
 }
 
 /// The axes: mode numbers, and errors of their frequencies (%).
-pub fn errors_panel(gap: &GapSection, pulls: &[Pull]) -> Panel {
+pub fn errors_panel(gap: &GapSection, pulls: &[Residual]) -> Panel {
     let explained = Explanation::of(gap).effect().is_some();
-    let after = |pull: &Pull| explained.then_some(pull.error_percent_after);
+    let after = |pull: &Residual| explained.then_some(pull.error_percent_after);
     let ends = pulls
         .iter()
         .flat_map(|pull| [pull.error_percent, after(pull).unwrap_or(0.0), 0.0]);
@@ -187,15 +187,15 @@ pub fn errors_panel(gap: &GapSection, pulls: &[Pull]) -> Panel {
     }
 }
 
-fn last_mode(pulls: &[Pull]) -> usize {
+fn last_mode(pulls: &[Residual]) -> usize {
     pulls.iter().map(|pull| pull.mode).max().unwrap_or(1)
 }
 
 /// Where an error stands: the tap levels of all recordings that saw a mode stand beside each other over half
 /// its width.
-pub fn abscissa(pulls: &[Pull], pull: &Pull) -> f64 {
+pub fn abscissa(pulls: &[Residual], pull: &Residual) -> f64 {
     // One recording can hold taps of two levels, which saw the mode apart.
-    let seat = |pull: &Pull| (pull.recording.clone(), pull.level);
+    let seat = |pull: &Residual| (pull.recording.clone(), pull.level);
     let mut seats = Vec::new();
     for other in pulls.iter().filter(|other| other.mode == pull.mode) {
         if !seats.contains(&seat(other)) {

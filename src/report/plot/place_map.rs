@@ -7,7 +7,7 @@ use super::drawing::{Drawing, Point, Stroke};
 use super::palette::{BLUE, INK, VERMILION};
 use super::panel::{Panel, Sample, X_SPACING, crisp, draw_legend, draw_title};
 use super::spectrum::{LEFT, RIGHT, WIDTH};
-use tapjoint_diagnosis::PlaceMap;
+use tapjoint_diagnosis::LocationMap;
 
 /// How far a bar stands beside its point (px).
 const BESIDE: f64 = 3.0;
@@ -83,14 +83,14 @@ pub fn draw_place_map(document: &Document) -> Option<Drawing> {
 }
 
 /// One value (1, shown in %) for each place.
-fn points(panel: &Panel, map: &PlaceMap, values: &[f64]) -> Vec<Point> {
+fn points(panel: &Panel, map: &LocationMap, values: &[f64]) -> Vec<Point> {
     let places = map.positions.iter().zip(values);
     let point = |(x, value): (&f64, &f64)| panel.place(1e3 * x, 100.0 * value);
     places.map(point).collect()
 }
 
 /// The axes: the position (mm) and the share of the misfit (%); `None` without a place.
-pub fn explained_panel(map: &PlaceMap) -> Option<Panel> {
+pub fn explained_panel(map: &LocationMap) -> Option<Panel> {
     Some(Panel {
         x: along(map)?,
         y: Axis::linear((0.0, 105.0), (288.0, 108.0)),
@@ -98,7 +98,7 @@ pub fn explained_panel(map: &PlaceMap) -> Option<Panel> {
 }
 
 /// The axes: the position (mm) and the local change (%); `None` without a value.
-pub fn map_panel(map: &PlaceMap) -> Option<Panel> {
+pub fn map_panel(map: &LocationMap) -> Option<Panel> {
     let curves = [
         (&map.stiffness, &map.stiffness_std),
         (&map.mass, &map.mass_std),
@@ -114,13 +114,13 @@ pub fn map_panel(map: &PlaceMap) -> Option<Panel> {
     })
 }
 
-fn along(map: &PlaceMap) -> Option<Axis> {
+fn along(map: &LocationMap) -> Option<Axis> {
     let end = 1e3 * (map.positions.last()? + 0.5 * step(map));
     Some(Axis::linear((0.0, end), (LEFT + 8.0, RIGHT)))
 }
 
 /// Distance of the places (m).
-fn step(map: &PlaceMap) -> f64 {
+fn step(map: &LocationMap) -> f64 {
     match map.positions.as_slice() {
         [first, second, ..] => second - first,
         [only] => *only,
@@ -129,7 +129,7 @@ fn step(map: &PlaceMap) -> f64 {
 }
 
 /// Every place says both changes, alone and together.
-fn note_places(drawing: &mut Drawing, [explained, panel]: &[Panel; 2], map: &PlaceMap) {
+fn note_places(drawing: &mut Drawing, [explained, panel]: &[Panel; 2], map: &LocationMap) {
     let half = 0.5 * step(map);
     for (index, at) in map.positions.iter().enumerate() {
         let change = |values: &[f64], stds: &[f64]| {

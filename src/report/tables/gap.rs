@@ -49,7 +49,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
 /// and why the errors are not those of the estimate.
 fn note(document: &Document, gap: &GapSection) -> String {
     let described = percent(Some(gap.hypotheses[0].gap_before));
-    let withheld = gap.hypotheses[0].withheld_before;
+    let withheld = gap.hypotheses[0].holdout_before;
     let withheld = withheld.map_or_else(String::new, |before| {
         format!(" and {} %", significant(before, 2))
     });
@@ -79,7 +79,7 @@ fn one_factor(gap: &GapSection) -> String {
     let scale = gap.baselines.iter().find(|one| one.name == Baseline::Scale);
     let floor = gap.noise_floor;
     scale.map_or_else(String::new, |scale| {
-        let withheld = scale.withheld_after.map_or_else(String::new, |after| {
+        let withheld = scale.holdout_after.map_or_else(String::new, |after| {
             format!(", of the withheld ones {} %", left(Some(after), floor))
         });
         format!(
@@ -102,7 +102,7 @@ fn row(found: &HypothesisResult, floor: Option<f64>) -> Vec<String> {
         together(&found.hypothesis),
         probability(found.probability),
         left(found.gap_after, floor),
-        left(found.withheld_after, floor),
+        left(found.holdout_after, floor),
         sizes(found),
         told_apart(found),
         looks_like(&found.confounded_with),
@@ -113,7 +113,7 @@ fn row(found: &HypothesisResult, floor: Option<f64>) -> Vec<String> {
 fn told_apart(found: &HypothesisResult) -> String {
     let least = |parameter: &ParameterValue| {
         let (unit, factor) = unit_of(parameter.name);
-        let least = factor * parameter.smallest_isolable?;
+        let least = factor * parameter.smallest_separable?;
         Some(format!("{}{unit}", significant(least, 2)))
     };
     let is_pair = matches!(&found.hypothesis, Hypothesis::Effects(effects) if effects.len() > 1);
@@ -151,7 +151,7 @@ pub fn next_tests(document: &Document) -> Option<Table> {
             test.action.clone() + &not_predicted(test, "; could not be predicted for "),
             match confirms(test) {
                 true => MISSING.to_owned(),
-                false => format!("{:.2}", test.bits),
+                false => format!("{:.2}", test.expected_information),
             },
             format!("{:.0}", test.effort),
             test.separates.join(", "),

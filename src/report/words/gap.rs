@@ -8,8 +8,8 @@ use super::super::format::{
 };
 use tapjoint_beam::effects::{EffectId, Place};
 use tapjoint_diagnosis::{
-    Closure, Hypothesis, HypothesisResult, MISFIT, NextTest, ParameterValue, Pull, SEEN, Step,
-    Unplaced, Verdict,
+    Closure, DETECTED, Hypothesis, HypothesisResult, MISFIT, NextTest, ParameterValue, Proposal,
+    Residual, UnlocatedSensors, Verdict,
 };
 use tapjoint_numerics::stats::times;
 
@@ -101,7 +101,7 @@ fn is_at_sensor(effects: &[EffectId]) -> bool {
 }
 
 /// "high.wav", or "high.wav (level 0.73)" where its taps were softer than the hardest.
-pub fn place_of(pull: &Pull) -> String {
+pub fn place_of(pull: &Residual) -> String {
     match pull.level {
         Some(level) if level < 0.999 => format!("{} (level {level:.2})", pull.recording),
         _ => pull.recording.clone(),
@@ -135,7 +135,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         left(found.gap_after, gap.noise_floor),
     );
     text.push_str(&by_drift(gap, found, has_joint));
-    if let Some((before, after)) = found.withheld_before.zip(found.withheld_after) {
+    if let Some((before, after)) = found.holdout_before.zip(found.holdout_after) {
         text.push_str(&format!(
             "; on frequencies that took no part from {} to {} %",
             percent(Some(before)),
@@ -145,7 +145,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     if let Some(closure) = &found.closure {
         text.push_str(&share(closure));
     }
-    if let Some(left_out) = &found.left_out_recordings {
+    if let Some(left_out) = &found.cross_validation {
         text.push_str(&format!(
             "; on recordings predicted from the others from {} to {} %",
             percent(Some(left_out.before)),
@@ -412,7 +412,7 @@ fn no_gap(gap: &GapSection) -> String {
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
             " No effect is established: {:.0} to 1 against none is asked for.",
-            SEEN.exp()
+            DETECTED.exp()
         ),
         None => String::new(),
     };
@@ -456,7 +456,7 @@ pub(crate) fn shows_gap(gap: &GapSection) -> bool {
 }
 
 /// What the model misses without masses that sat nobody knows where, if it does.
-fn misfit_unplaced(gap: &GapSection) -> Option<&Unplaced> {
+fn misfit_unplaced(gap: &GapSection) -> Option<&UnlocatedSensors> {
     let unplaced = gap.unplaced.as_ref();
     unplaced.filter(|one| one.goodness_of_fit < MISFIT)
 }
@@ -574,7 +574,7 @@ fn next_test(gap: &GapSection) -> Option<String> {
     Some(format!(
         "{purpose}: {} (about {:.2} bit{premise}; it tells {} apart{}).",
         test.action,
-        test.bits,
+        test.expected_information,
         test.separates.join(", "),
         not_predicted(test, "; it could not be predicted for ")
     ))
@@ -582,7 +582,7 @@ fn next_test(gap: &GapSection) -> Option<String> {
 
 /// Whether a test tells nothing new about which hypothesis holds.
 pub(crate) fn confirms(test: &NextTest) -> bool {
-    matches!(test.step, Step::Confirm { .. })
+    matches!(test.proposal, Proposal::Confirm { .. })
 }
 
 /// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
@@ -706,7 +706,7 @@ mod tests {
                 value,
                 std,
                 smallest_detectable: None,
-                smallest_isolable: None,
+                smallest_separable: None,
             };
         let of = |parameters: Vec<ParameterValue>| {
             sizes(&HypothesisResult {

@@ -12,22 +12,21 @@
 
 pub mod amplitude;
 pub mod fit;
-mod interpolation;
-mod mains;
 pub mod matrix_pencil;
-mod merge;
+mod mode;
 mod peaks;
 pub mod polyreference;
 mod projection;
 mod reading;
 
-pub use interpolation::{Interpolation, Unfit, interpolate_parabola, interpolate_pole};
-pub use mains::{LineAmplitudes, MainsSettings, mains_harmonic, near_mains};
-pub use merge::{
+pub use mode::{
     BandReadings, FittedReading, FrequencySource, MergedMode, ModeReading, PeakLabel, merge_modes,
 };
-pub use peaks::{CompositeLevel, Peak, PeakSettings, find_peaks};
-pub use reading::read_peaks;
+pub use peaks::{
+    CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,
+    near_mains,
+};
+pub use reading::{Interpolation, Unfit, interpolate_parabola, interpolate_pole, read_peaks};
 
 /// Writes a number that counts from 0 as one that counts from 1.
 fn from_one<S: serde::Serializer>(index: &usize, to: S) -> Result<S::Ok, S::Error> {

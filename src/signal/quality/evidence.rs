@@ -1,4 +1,6 @@
 //! What the checks look at: plain data that the earlier stages produce.
+//!
+//! Limits of good practice.
 
 use num_complex::Complex64;
 
@@ -134,5 +136,93 @@ impl RecordingEvidence {
             .iter()
             .filter(|sensor| sensor.coherence.is_some())
             .max_by(|a, b| known(a).unwrap_or(0.0).total_cmp(&known(b).unwrap_or(0.0)))
+    }
+}
+
+/// Limits, each with its source. "ISO 7626-5" is ISO 7626-5:2019, impact excitation, in the reading of
+/// field practice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QualitySettings {
+    /// Second hit over the first that rejects a tap. 0.1: a ripple of 1.7 dB in the force spectrum
+    /// (field practice after ISO 7626-5: one impact per record).
+    pub double_hit: f64,
+    /// Fall of the force spectrum over the band (dB). 20: 10 to 20 dB are common, beyond that the far end
+    /// is hardly excited (ISO 7626-5).
+    pub force_fall: f64,
+    /// Force over its noise below which the noise shows in H1 (dB). 10: noise in the force makes H1 too
+    /// small by the share of its power, here a tenth.
+    pub force_over_noise: f64,
+    /// Largest over smallest accepted tap. 3: 10 dB, one range of an amplifier; wider, a joint that is not
+    /// linear shows in the averages.
+    pub tap_levels: f64,
+    /// Fewest taps that are enough. 3 (ISO 7626-5: 3 to 5).
+    pub averages: usize,
+    /// Fewest taps from which a coherence is trusted. 5: chance alone gives 1 - 0.05^(1/(n-1)), 0.53 for 5
+    /// taps and 0.78 for 3.
+    pub trusted_averages: usize,
+    /// High coherence. 0.9 (ISO 7626-5).
+    pub coherence: f64,
+    /// Random error of an FRF's magnitude at a resonance. 5 % (ISO 7626-5).
+    pub random_error: f64,
+    /// Level left at the record's end. 1 % (ISO 7626-5: 10 % at half time).
+    pub remaining: f64,
+    /// Natural decay from which an exponential window may be used. 25 % (ISO 7626-5): beyond, the window
+    /// and not the structure decides what is measured.
+    pub remaining_for_window: f64,
+    /// Share of a window in the damping read under it, from which that damping is doubtful. 0.5: the
+    /// structure's own share is then the smaller one, and carries the error of both.
+    pub window_share: f64,
+    /// Relative scatter of a frequency from tap to tap. 1 % (ASTM E1876: readings agree within 1 %).
+    pub frequency_scatter: f64,
+    /// The same below which it is none to doubt, whatever noise explains: 0.005 %, what a third of a kelvin does to
+    /// steel.
+    pub least_scatter: f64,
+    /// Standard deviations by which two frequencies must differ. 3: one in 370 by chance.
+    pub deviations: f64,
+    /// Relative change of a frequency that time, and taking a sensor off, may leave between recordings.
+    /// 0.5 %: bolted joints drift by some 1 % of their stiffness, and no frequency changes by more than half
+    /// of that, f^2 being at most proportional to the stiffness.
+    pub drift: f64,
+    /// Agreement of two FRFs that should be equal, |sum H1 conj(H2)|^2/(sum |H1|^2 sum |H2|^2). 0.9: they
+    /// share nine tenths of their power.
+    pub reciprocity: f64,
+    /// Relative difference of their levels. 0.2: twice the 10 % to which hammer and accelerometer are
+    /// usually calibrated together.
+    pub reciprocity_gain: f64,
+    /// Distance within which two positions are the same (m). 5 mm: about the size of a hammer tip or an
+    /// accelerometer's base.
+    pub same_position: f64,
+    /// Ratio of two tap levels from which they can show a non-linearity. 1.5: below, one series scatters as
+    /// much.
+    pub two_levels: f64,
+    /// Relative difference within which two resonances of two recordings are the same mode. 3 %: what an
+    /// accelerometer's mass or a joint's level usually move, and less than modes lie apart.
+    pub same_mode: f64,
+}
+
+impl Default for QualitySettings {
+    fn default() -> Self {
+        QualitySettings {
+            double_hit: 0.1,
+            force_fall: 20.0,
+            force_over_noise: 10.0,
+            tap_levels: 3.0,
+            averages: 3,
+            trusted_averages: 5,
+            coherence: 0.9,
+            random_error: 0.05,
+            remaining: 0.01,
+            remaining_for_window: 0.25,
+            window_share: 0.5,
+            frequency_scatter: 0.01,
+            least_scatter: 5e-5,
+            deviations: 3.0,
+            drift: 5e-3,
+            reciprocity: 0.9,
+            reciprocity_gain: 0.2,
+            same_position: 0.005,
+            two_levels: 1.5,
+            same_mode: 0.03,
+        }
     }
 }

@@ -4,31 +4,29 @@
 //! changes no result. [`judge_recording`] makes the checks of one recording, [`judge_test`] those that
 //! need several. Limits are in [`QualitySettings`], each with its source.
 
-mod across;
 mod averages;
-mod decay;
-mod driving_point;
 mod evidence;
-mod force;
-mod levels;
-mod settings;
-mod subject;
-mod tap;
+mod recordings;
+mod taps;
 mod verdict;
 
-pub use across::{check_linearity, check_mass_loading, check_reciprocity};
-pub use averages::{check_averages, check_coherence, check_frequency_scatter, check_random_error};
-pub use decay::{check_decay, check_exponential_window, check_window_damping};
-pub use driving_point::{check_antiresonances, check_driving_point};
-pub use evidence::{
-    DampingSource, ForceEvidence, RecordingEvidence, ResonanceEvidence, SensorEvidence, TapEvidence,
+pub use averages::{
+    check_averages, check_coherence, check_decay, check_exponential_window,
+    check_frequency_scatter, check_random_error, check_window_damping,
 };
-pub use force::{check_force_fall, check_force_noise};
-pub use levels::check_tap_levels;
-pub use settings::QualitySettings;
-pub use subject::Subject;
-pub use tap::{check_double_hit, check_force_ripple, check_overload, check_weak};
-pub use verdict::{Check, Outcome, Verdict};
+pub use evidence::{
+    DampingSource, ForceEvidence, QualitySettings, RecordingEvidence, ResonanceEvidence,
+    SensorEvidence, TapEvidence,
+};
+pub use recordings::{
+    check_antiresonances, check_driving_point, check_linearity, check_mass_loading,
+    check_reciprocity,
+};
+pub use taps::{
+    check_double_hit, check_force_fall, check_force_noise, check_force_ripple, check_overload,
+    check_tap_levels, check_weak,
+};
+pub use verdict::{Check, Outcome, Subject, Verdict};
 
 /// All checks of one recording.
 pub fn judge_recording(recording: &RecordingEvidence, settings: &QualitySettings) -> Vec<Verdict> {

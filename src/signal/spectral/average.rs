@@ -1,4 +1,9 @@
 //! Averages over taps: power spectra, cross spectra and H1.
+//!
+//! Estimators of a frequency response function from averaged spectra, and how well it is known.
+//!
+//! All take the averaged spectra of one force and one response on one line: Gff = mean |F|^2,
+//! Gxx = mean |X|^2 and Gfx = mean conj(F) X, in the convention e^{+j omega t}.
 
 use num_complex::Complex64;
 use rayon::prelude::*;
@@ -208,4 +213,154 @@ fn add_record(
         of_force.as_slice()
     });
     sum.add(force, of_responses);
+}
+
+/// Which noise an estimator takes to be there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FrfEstimator {
+    /// Gfx/Gff: right where noise is on the response alone; of noise on the force it reads low. The
+    /// default: the force window leaves little noise on a hammer's force.
+    #[default]
+    H1,
+    /// Gxx/Gxf: right where noise is on the force alone; of noise on the response it reads high.
+    H2,
+    /// Total least squares: the same noise power on both, each in its unit.
+    Hv,
+}
+
+impl FrfEstimator {
+    /// All estimators.
+    pub const ALL: [FrfEstimator; 3] = [FrfEstimator::H1, FrfEstimator::H2, FrfEstimator::Hv];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            FrfEstimator::H1 => "H1",
+            FrfEstimator::H2 => "H2",
+            FrfEstimator::Hv => "Hv",
+        }
+    }
+}
+
+/// Averaged spectra of force and response on one line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinePowers {
+    /// Gff, mean |F|^2 (N2 s2).
+    pub force: f64,
+    /// Gxx, mean |X|^2 (square of the response's unit times s2).
+    pub response: f64,
+    /// Gfx, mean conj(F) X (N times the response's unit times s2).
+    pub cross: Complex64,
+}
+
+impl LinePowers {
+    /// Response per force (unit of the response per N); `None` where the estimator divides by
+    /// nothing.
+    pub fn frf(&self, estimator: FrfEstimator) -> Option<Complex64> {
+        let value = match estimator {
+            // H1 = Gfx/Gff.
+            FrfEstimator::H1 => self.cross / self.force,
+            // H2 = Gxx/Gxf, Gxf = conj(Gfx).
+            FrfEstimator::H2 => self.response / self.cross.conj(),
+            FrfEstimator::Hv => self.total_least_squares(),
+        };
+        value.is_finite().then_some(value)
+    }
+
+    /// Hv = (Gxx - Gff + sqrt((Gff - Gxx)^2 + 4 |Gfx|^2)) / (2 Gxf): Shin & Hammond, "Fundamentals of
+    /// Signal Processing for Sound and Vibration Engineers", page 293, with equal noise powers, as in
+    /// pyFRF 1.5.0 (`get_Hv`). (1, Hv) is the eigenvector of [[Gff, Gfx], [Gxf, Gxx]] transposed that
+    /// belongs to its largest eigenvalue. |H1| <= |Hv| <= |H2|. Equal powers of N and m/s2 are a
+    /// matter of units: where |H| is much above 1 Hv goes towards H2, much below towards H1.
+    fn total_least_squares(&self) -> Complex64 {
+        let difference = self.force - self.response;
+        let root = difference.hypot(2.0 * self.cross.norm());
+        if difference > 0.0 {
+            // The same number without the difference of two nearly equal ones:
+            // (root - difference)(root + difference) = 4 |Gfx|^2.
+            2.0 * self.cross / (root + difference)
+        } else {
+            (root - difference) / (2.0 * self.cross.conj())
+        }
+    }
+
+    /// Coherence g2 = |Gfx|^2/(Gff Gxx), the share of the response's power that follows the force.
+    ///
+    /// One average always gives 1, whatever the noise, so that there is none below two; from few
+    /// averages it reads high (of pure noise 1/averages on the mean). `None` also without power.
+    pub fn coherence(&self, averages: usize) -> Option<f64> {
+        let power = self.force * self.response;
+        let value = self.cross.norm_sqr() / power;
+        // Rounding alone can take a perfect one above 1.
+        (averages >= 2 && value.is_finite()).then_some(value.min(1.0))
+    }
+}
+
+/// Relative random error (standard deviation) of an FRF's magnitude, sqrt((1 - g2)/(2 n g2)) (Bendat &
+/// Piersol, "Random Data", 9.3); `None` without coherence.
+pub fn random_error(coherence: f64, averages: usize) -> Option<f64> {
+    let error = ((1.0 - coherence) / (2.0 * averages as f64 * coherence)).sqrt();
+    (averages >= 2 && error.is_finite()).then_some(error)
+}
+
+/// How well a line is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LineQuality {
+    /// Coherence; `None` below two averages and without a hammer.
+    pub coherence: Option<f64>,
+    /// Relative random error of the FRF's magnitude; `None` where there is no coherence.
+    pub random_error: Option<f64>,
+}
+
+impl AveragedSpectra {
+    /// Averaged spectra of the force and one response on a line; `None` without a hammer, and for a
+    /// response or a line that does not exist.
+    pub fn powers(&self, response: usize, line: usize) -> Option<LinePowers> {
+        Some(LinePowers {
+            force: *self.force_power.as_ref()?.get(line)?,
+            response: *self.response_power.get(response)?.get(line)?,
+            cross: *self.cross.as_ref()?.get(response)?.get(line)?,
+        })
+    }
+
+    /// Frequency response function of one response (its unit per N), `None` on lines where it does not
+    /// exist; `None` without a hammer. Of functions that an analyser has averaged only its own estimate is there,
+    /// taken as H1.
+    pub fn frf(&self, response: usize, estimator: FrfEstimator) -> Option<Vec<Option<Complex64>>> {
+        if self.powers(response, 0).is_none() {
+            let stated = self.h1.as_ref().filter(|_| estimator == FrfEstimator::H1);
+            return Some(stated?.get(response)?.iter().copied().map(Some).collect());
+        }
+        let value = |line| self.powers(response, line)?.frf(estimator);
+        Some((0..self.lines.points()).map(value).collect())
+    }
+
+    /// Coherence of one response with the force on each line; `None` below two averages and without a
+    /// hammer.
+    pub fn coherence(&self, response: usize) -> Option<Vec<Option<f64>>> {
+        self.powers(response, 0).filter(|_| self.taps >= 2)?;
+        let value = |line| self.powers(response, line)?.coherence(self.taps);
+        Some((0..self.lines.points()).map(value).collect())
+    }
+
+    /// Coherence and random error of one response on the line nearest to `frequency` (Hz).
+    pub fn quality(&self, response: usize, frequency: f64) -> LineQuality {
+        let powers = self.powers(response, self.lines.nearest(frequency));
+        let coherence = powers.and_then(|powers| powers.coherence(self.taps));
+        LineQuality {
+            coherence,
+            random_error: coherence.and_then(|g2| random_error(g2, self.taps)),
+        }
+    }
+
+    /// The same of the response that knows the line best: a sensor on a node tells nothing of a mode.
+    pub fn best_quality(&self, frequency: f64) -> LineQuality {
+        (0..self.response_power.len())
+            .map(|response| self.quality(response, frequency))
+            .max_by(|a, b| {
+                let rank = |quality: &LineQuality| quality.coherence.unwrap_or(-1.0);
+                rank(a).total_cmp(&rank(b))
+            })
+            .unwrap_or_default()
+    }
 }

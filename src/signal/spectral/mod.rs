@@ -5,27 +5,21 @@
 //! padding adds lines, never resolution.
 
 mod average;
-mod block;
-mod chirp;
-mod decay;
-mod frf;
 mod lines;
-mod noise;
 mod transform;
 mod window;
-mod zoom;
 
-pub use average::{AveragedSpectra, SpectralAverager, TapRecord, average_records};
-pub use block::{largest_smooth_block, smallest_smooth_block};
-pub use chirp::chirp_z;
-pub use decay::{DecayCheck, RUNG_DOWN, choose_window, exponential_to, measure_decay};
-pub use frf::{FrfEstimator, LinePowers, LineQuality, random_error};
-pub use lines::{DISPLAY_RATIO, Lines};
-pub use noise::{line_amplitude, noise_beside, noise_power};
-pub use transform::{Transformer, Workspace, transform_block};
-pub use window::{Window, apply_force_window};
-pub(crate) use zoom::Decimator;
-pub use zoom::band_limited;
+pub use average::{
+    AveragedSpectra, FrfEstimator, LinePowers, LineQuality, SpectralAverager, TapRecord,
+    average_records, random_error,
+};
+pub use lines::{DISPLAY_RATIO, Lines, largest_smooth_block, smallest_smooth_block};
+pub(crate) use transform::Decimator;
+pub use transform::{Transformer, Workspace, band_limited, chirp_z, transform_block};
+pub use window::{
+    DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,
+    line_amplitude, measure_decay, noise_beside, noise_power,
+};
 
 /// What makes a spectrum impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -5,18 +5,15 @@
 //! recording block by block. A tap's record begins a little before the trigger and ends where the
 //! next tap comes.
 
-mod answer;
-mod copy;
 mod double_hit;
-mod force;
 mod hammer;
 mod judge;
 mod response;
 
+pub use double_hit::SecondHit;
+
 use std::fmt;
 use std::ops::Range;
-
-pub use double_hit::SecondHit;
 
 use crate::recording::{Recording, RecordingError};
 

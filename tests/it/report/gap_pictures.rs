@@ -1,7 +1,7 @@
 //! Pictures of the gap: where its errors stand, and what each point says.
 
 use tapjoint::effects::EffectId;
-use tapjoint::gap::{Hypothesis, HypothesisResult, PlaceMap, Pull, Verdict};
+use tapjoint::gap::{Hypothesis, HypothesisResult, LocationMap, Residual, Verdict};
 use tapjoint::report::document::{Document, GapPlaceSection, GapSection};
 use tapjoint::report::live_model::{live_gap, live_place_map};
 use tapjoint::report::live_points::PointSet;
@@ -17,12 +17,12 @@ fn document(gap: GapSection) -> Document {
 
 /// One mode, seen in a hard and in a soft level of one recording and in another recording.
 fn of_three_levels() -> Document {
-    let pull = |recording: &str, level: f64, error_percent: f64| Pull {
+    let pull = |recording: &str, level: f64, error_percent: f64| Residual {
         mode: 1,
         recording: recording.into(),
         level: Some(level),
         error_percent,
-        ..Pull::default()
+        ..Residual::default()
     };
     document(GapSection {
         place: Some(GapPlaceSection {
@@ -140,11 +140,11 @@ fn regress_an_effect_that_nobody_holds_for_the_cause_is_not_shown() {
 
 #[test]
 fn regress_local_changes_have_the_digits_of_their_uncertainty() {
-    let map = PlaceMap {
+    let map = LocationMap {
         positions: vec![0.1, 0.2],
         stiffness: vec![0.034_12, 0.123_45],
         stiffness_std: vec![0.12, 0.000_005],
-        ..PlaceMap::default()
+        ..LocationMap::default()
     };
     let document = document(GapSection {
         map: Some(map),

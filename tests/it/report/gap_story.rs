@@ -2,8 +2,8 @@
 
 use tapjoint::effects::EffectId;
 use tapjoint::gap::{
-    DecayChange, DecayFinding, Hypothesis, HypothesisResult, JointShift, NextTest, ParameterValue,
-    PlaceProbabilities, Pull, Step, Verdict,
+    AmplitudeDependence, FrequencyChange, Hypothesis, HypothesisResult, JointShift,
+    LocationProbabilities, NextTest, ParameterValue, Proposal, Residual, Verdict,
 };
 use tapjoint::report::document::{
     Baseline, BaselineSection, Document, GapPlaceSection, GapSection, RecordingSection, TestSection,
@@ -74,22 +74,22 @@ fn gap_with(verdict: Verdict) -> Document {
             found(Hypothesis::None, 0.277, 0.0),
         ],
         place: Some(GapPlaceSection {
-            modes: vec![Pull {
+            modes: vec![Residual {
                 mode: 4,
                 recording: "high.wav".into(),
                 level: Some(0.73),
                 error_percent: -0.962,
                 z: -9.0,
-                ..Pull::default()
+                ..Residual::default()
             }],
             ..GapPlaceSection::default()
         }),
         next_test: vec![NextTest {
-            step: Step::WeighSensor,
+            proposal: Proposal::WeighSensor,
             action: "weigh the sensor".into(),
             separates: Vec::new(),
             unpredicted: Vec::new(),
-            bits: 3.26,
+            expected_information: 3.26,
             effort: 2.0,
         }],
         ..GapSection::default()
@@ -158,7 +158,7 @@ fn size_of(name: &'static str, value: f64, std: Option<f64>) -> String {
             value,
             std,
             smallest_detectable: None,
-            smallest_isolable: None,
+            smallest_separable: None,
         }];
     }
     let said = gap_story(&document).remove(0);
@@ -197,9 +197,9 @@ fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
         gap.hypotheses[0].joint = Some([1.9954e6, 1222.6]);
         gap.hypotheses[0].joint_shift.kx_percent = Some(11.46);
         if let Some(place) = &mut gap.place {
-            place.probability = PlaceProbabilities {
+            place.probability = LocationProbabilities {
                 sensor: 0.997,
-                ..PlaceProbabilities::default()
+                ..LocationProbabilities::default()
             };
         }
     }
@@ -236,18 +236,18 @@ fn regress_a_change_as_large_as_is_looked_for_is_a_bound() {
     let told = |at_bound: bool| {
         let mut document = gap_with(Verdict::Unknown);
         if let Some(gap) = &mut document.gap {
-            gap.along_decays = Some(DecayFinding {
+            gap.along_decays = Some(AmplitudeDependence {
                 effect: Some(EffectId::JointNonlinearity),
                 lawful: true,
                 ratio: -0.7,
                 ratio_std: 0.01,
                 at_bound,
-                changes: vec![DecayChange {
+                changes: vec![FrequencyChange {
                     mode: 1,
                     std: 0.1,
-                    ..DecayChange::default()
+                    ..FrequencyChange::default()
                 }],
-                ..DecayFinding::default()
+                ..AmplitudeDependence::default()
             });
         }
         gap_story(&document).join("\n")
@@ -291,7 +291,7 @@ fn regress_the_table_says_why_none_leaves_less_than_the_described_model() {
     let gap = document.gap.as_mut().unwrap();
     gap.fitted_modes = Some(5);
     let pulls = &mut gap.place.as_mut().unwrap().modes;
-    pulls.push(Pull {
+    pulls.push(Residual {
         recording: "low.wav".into(),
         ..pulls[0].clone()
     });
@@ -370,13 +370,13 @@ fn regress_a_joint_that_has_moved_is_said_where_nothing_is_missing() {
 fn regress_a_change_of_one_frequency_alone_is_nobodys() {
     let told = |enough: bool| {
         let mut document = gap_with(Verdict::Unknown);
-        document.gap.as_mut().unwrap().along_decays = Some(DecayFinding {
+        document.gap.as_mut().unwrap().along_decays = Some(AmplitudeDependence {
             enough,
-            changes: vec![DecayChange {
+            changes: vec![FrequencyChange {
                 std: 0.1,
-                ..DecayChange::default()
+                ..FrequencyChange::default()
             }],
-            ..DecayFinding::default()
+            ..AmplitudeDependence::default()
         });
         gap_story(&document).join("\n")
     };
@@ -395,12 +395,12 @@ fn regress_the_table_has_the_size_told_apart_and_the_baseline() {
         value: 0.024,
         std: Some(0.001),
         smallest_detectable: None,
-        smallest_isolable: Some(0.0051),
+        smallest_separable: Some(0.0051),
     }];
     gap.baselines = vec![BaselineSection {
         name: Baseline::Scale,
         gap_after: Some(0.71),
-        withheld_after: Some(0.93),
+        holdout_after: Some(0.93),
     }];
     let table = hypotheses(&document).unwrap();
     let place = |name: &str| {

@@ -24,23 +24,18 @@
 //! cannot be told from a drift by one decay.
 
 use super::from_one;
-use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-
-use tapjoint_numerics::stats::median;
-
 mod band;
-mod context;
-mod exponentials;
-mod fit;
-mod polynomial;
-mod segment;
-mod sensors;
+mod decay_model;
 mod trend;
 mod walk;
 
 pub use trend::{AmplitudeReading, Trend};
+
+use rayon::prelude::*;
+
+use tapjoint_numerics::stats::median;
 
 /// The ringing after one tap, force no longer acting.
 #[derive(Debug, Clone, PartialEq)]
@@ -247,17 +242,17 @@ fn follow_mode(
         verdict: AmplitudeVerdict::TooFewPoints,
     };
     let bands = band::extract_bands(decays, modes, index, settings);
-    curve.sensor = sensors::strongest(&bands);
+    curve.sensor = band::strongest(&bands);
     let Some(sensor) = curve.sensor else {
         return curve;
     };
     curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
     let (mut doubts, mut followed) = (Vec::new(), 0);
     for band in &bands {
-        let Some(series) = sensors::combine(band, sensor) else {
+        let Some(series) = band::combine(band, sensor) else {
             continue;
         };
-        let context = context::explain(&series, band);
+        let context = decay_model::explain(&series, band);
         let mut points = walk::walk_decay(&series, band, &context, settings);
         let found = !points.is_empty();
         points.retain(|point| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST);

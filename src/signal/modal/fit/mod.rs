@@ -10,27 +10,23 @@
 //! standard deviation from the noise that remains, or from the scatter of the taps where that is
 //! larger. Columns come from a [`FreeDecayCollector`], or are frequency response functions.
 
-mod background;
-mod band;
-mod collector;
 mod data;
-mod extra;
-mod function;
-mod kernel;
-mod local;
-mod residue;
-mod result;
+mod extra_mode;
+mod group;
+mod modal_constant;
+mod mode_fit;
 mod sweep;
-mod uncertainty;
+mod variable_projection;
 
-pub use band::bands_for;
-pub use collector::FreeDecayCollector;
-pub use data::{Basis, Column, ModalData};
-pub use extra::{Accepted, ExtraMode, ExtraVerdict};
-pub use kernel::StopReason;
-pub use residue::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
-pub use result::{ColumnAmplitude, ModeFit, fit_modes};
-pub use uncertainty::{FittedValue, TapFit, UncertaintySource, scatter_about_mean, weighted_mean};
+pub use data::{Basis, Column, FreeDecayCollector, ModalData};
+pub use extra_mode::{Accepted, ExtraMode, ExtraVerdict};
+pub use group::bands_for;
+pub use modal_constant::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
+pub use mode_fit::{
+    ColumnAmplitude, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
+    scatter_about_mean, weighted_mean,
+};
+pub use variable_projection::StopReason;
 
 /// Where the search for a mode begins.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,11 +1,14 @@
-//! Sweeps over the groups until the poles stay.
+//! Sweeps over the groups of modes until the poles stay.
+//!
+//! A sweep fits one group after the other, with the amplitudes that the other groups had before.
+
+use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::background::settled_fit;
 use super::data::ModalData;
-use super::local::{GroupFit, Local, Neighbour};
-use super::{PoleStart, Unfit, band};
+use super::group::{BandData, GroupFit, Neighbour, groups, half_band, half_width, lines_between};
+use super::{PoleStart, Unfit};
 
 /// Most sweeps in which no start fails; two suffice for modes far apart.
 const MOST_SWEEPS: usize = 8;
@@ -13,17 +16,67 @@ const MOST_SWEEPS: usize = 8;
 const STILL: f64 = 0.02;
 /// Terms of the background while neighbours have not been fitted.
 const FIRST_TERMS: usize = 2;
+
 /// State of one mode between the sweeps.
 #[derive(Debug, Clone)]
-pub(super) struct Mode {
-    pub start: Complex64,
-    /// Whether the start has a damping of its own.
-    pub damping_known: bool,
-    pub pole: Complex64,
-    pub amplitudes: Option<Vec<Complex64>>,
+pub(super) struct ModeState {
+    start: Complex64,
+    /// True where the start has a damping of its own.
+    damping_known: bool,
+    pole: Complex64,
+    amplitudes: Option<Vec<Complex64>>,
     /// Noise of every column in its band; 0 where a column was not used.
     noise: Vec<f64>,
     pub failed: Option<Unfit>,
+}
+
+impl ModeState {
+    /// Begins at a start; `added` is a window's decay (1/s).
+    fn new(data: &ModalData, start: &PoleStart, added: f64) -> Self {
+        let position = start.frequency / data.spacing();
+        let unknown = 0.3 * data.resolution() / data.spacing();
+        let decay = start
+            .damping_ratio
+            .filter(|ratio| *ratio > 0.0)
+            .map_or(unknown, |ratio| ratio * position);
+        let pole = Complex64::new(-decay - added / TAU / data.spacing(), position);
+        let possible = position > 0.0 && start.frequency < data.highest() && pole.is_finite();
+        ModeState {
+            start: pole,
+            damping_known: start.damping_ratio.is_some(),
+            pole,
+            amplitudes: None,
+            noise: Vec::new(),
+            failed: (!possible).then_some(Unfit::OutsideBand),
+        }
+    }
+
+    /// Returns the reason why the fitted pole is no mode near its start.
+    ///
+    /// `deviations` are the standard deviations of position and decay (lines).
+    fn refusal(&self, data: &ModalData, deviations: [f64; 2]) -> Option<Unfit> {
+        let spacing = data.spacing();
+        let line = data.resolution() / spacing;
+        let pole = self.pole;
+        let allowed = 3.0 * line + 3.0 * self.start.re.abs().max(pole.re.abs());
+        let first = data.frequencies().first().copied().unwrap_or(0.0);
+        let last = data.frequencies().last().copied().unwrap_or(0.0);
+        let away = (pole.im - self.start.im).abs();
+        if pole.im < first / spacing || pole.im > last / spacing || away > allowed {
+            return Some(Unfit::LeftStart {
+                frequency: pole.im * spacing,
+                distance: away * spacing,
+            });
+        }
+        if pole.re >= 0.0 {
+            return Some(Unfit::NoDecay);
+        }
+        let wide = line.max(pole.re.abs());
+        let vague = deviations.iter().any(|std| std.is_nan() || *std > wide);
+        vague.then_some(Unfit::Undetermined {
+            std: deviations[0] * spacing,
+        })
+    }
 }
 
 /// A group after the last sweep.
@@ -33,43 +86,54 @@ pub(super) struct Group {
     pub fit: GroupFit,
 }
 
-/// All modes and what surrounds them.
+/// All modes and their surroundings.
 #[derive(Debug, Clone)]
 pub(super) struct Sweeper<'a> {
     pub data: &'a ModalData,
-    pub modes: Vec<Mode>,
+    pub modes: Vec<ModeState>,
     /// Positions of undamped lines (lines).
-    pub steady: Vec<f64>,
+    steady: Vec<f64>,
+    /// Decay that a window has added (1/s).
+    added_decay: f64,
     /// Most lines of a band that are taken.
     pub most_lines: usize,
 }
 
 impl<'a> Sweeper<'a> {
-    pub fn new(data: &'a ModalData, starts: &[PoleStart], steady: &[f64], added: f64) -> Self {
-        let lines = |hertz: f64| hertz / data.spacing();
-        let modes = starts
-            .iter()
-            .map(|start| mode(data, start, added / std::f64::consts::TAU))
-            .collect();
+    /// Begins at `starts`. `steady` are frequencies of undamped lines (Hz).
+    pub fn new(
+        data: &'a ModalData,
+        starts: &[PoleStart],
+        steady: &[f64],
+        added_decay: f64,
+    ) -> Self {
+        let modes = starts.iter();
+        let modes = modes.map(|start| ModeState::new(data, start, added_decay));
         Sweeper {
             data,
-            modes,
-            steady: steady.iter().map(|&f| lines(f)).collect(),
+            modes: modes.collect(),
+            steady: steady.iter().map(|&f| f / data.spacing()).collect(),
+            added_decay,
             most_lines: usize::MAX,
         }
     }
 
-    /// One more start beside modes that were swept: its group once it stays, or nothing where it fails. Modes of
-    /// other groups stay as they are.
-    pub fn add(&mut self, start: &PoleStart, added: f64) -> Option<Group> {
+    /// Fits one more start beside modes that were swept; `None` where it fails.
+    ///
+    /// Returns its group once the poles stay. Modes of other groups do not change.
+    pub fn add(&mut self, start: &PoleStart) -> Option<Group> {
         let place = self.modes.len();
         self.modes
-            .push(mode(self.data, start, added / std::f64::consts::TAU));
+            .push(ModeState::new(self.data, start, self.added_decay));
         let mut fitted = Vec::new();
         for sweep in 0..MOST_SWEEPS {
-            let groups = band::groups(&self.alive());
-            let own = groups.into_iter().find(|group| group.contains(&place))?;
-            let own = self.resolved(own, place);
+            let groups = groups(&self.alive());
+            let mut own = groups.into_iter().find(|group| group.contains(&place))?;
+            // Other modes of the group stay as they are where they are too narrow for thinned lines.
+            let stride = 2.0 * half_band(self.modes[place].pole) / self.most_lines as f64;
+            own.retain(|&index| {
+                index == place || stride <= 1.0 || half_width(self.modes[index].pole) >= stride
+            });
             let moved = self.sweep(vec![own], &mut fitted);
             if sweep > 0 && moved < STILL {
                 break;
@@ -79,35 +143,24 @@ impl<'a> Sweeper<'a> {
         fitted.pop().filter(|_| settled)
     }
 
-    /// Of a group those that lines thinned for the mode at `place` still resolve: the others, far narrower than
-    /// it, keep their poles.
-    fn resolved(&self, mut group: Vec<usize>, place: usize) -> Vec<usize> {
-        let lines = 2.0 * band::half_band(self.modes[place].pole);
-        let stride = lines / self.most_lines as f64;
-        let width = |index: usize| band::half_width(self.modes[index].pole);
-        group.retain(|&index| index == place || stride <= 1.0 || width(index) >= stride);
-        group
-    }
-
+    /// Indices and poles of the modes that have not failed.
     fn alive(&self) -> Vec<(usize, Complex64)> {
-        self.modes
-            .iter()
-            .enumerate()
-            .filter(|(_, mode)| mode.failed.is_none())
-            .map(|(index, mode)| (index, mode.pole))
-            .collect()
+        let modes = self.modes.iter().enumerate();
+        let alive = modes.filter(|(_, mode)| mode.failed.is_none());
+        alive.map(|(index, mode)| (index, mode.pole)).collect()
     }
 
-    /// Sweeps until the poles stay; the groups of the last sweep.
+    /// Sweeps until the poles stay; returns the groups of the last sweep.
     pub fn run(&mut self) -> Vec<Group> {
         let mut fitted = Vec::new();
         let mut sweeps = 0;
-        // A sweep in which a start fails is one more: what was fitted together with it begins again.
+        // A sweep in which a start fails adds one: modes that were fitted together with it begin again.
         let mut most = MOST_SWEEPS;
         while sweeps < most {
-            let mut groups = band::groups(&self.alive());
+            let mut groups = groups(&self.alive());
             if sweeps == 0 {
-                self.strongest_first(&mut groups);
+                // Strong modes first: their flanks disturb the weak ones.
+                groups.sort_by(|a, b| self.power(b[0]).total_cmp(&self.power(a[0])));
             }
             let before = self.alive().len();
             let moved = self.sweep(groups, &mut fitted);
@@ -117,12 +170,25 @@ impl<'a> Sweeper<'a> {
                 break;
             }
         }
-        let settled = |&index: &usize| self.modes[index].amplitudes.is_some();
-        fitted.retain(|group: &Group| group.members.iter().all(settled));
+        fitted.retain(|group: &Group| {
+            let mut members = group.members.iter();
+            members.all(|&index| self.modes[index].amplitudes.is_some())
+        });
         fitted
     }
 
-    /// One sweep over the groups; how far the poles moved, in their standard deviations.
+    /// Power of all columns within half a line of a mode.
+    fn power(&self, index: usize) -> f64 {
+        let position = self.modes[index].pole.im;
+        let lines = lines_between(self.data, position - 0.5, position + 0.5);
+        let columns = self.data.columns().iter();
+        columns
+            .flat_map(|column| &column.values[lines.clone()])
+            .map(Complex64::norm_sqr)
+            .sum()
+    }
+
+    /// Fits each group once. Returns how far the poles moved, in their standard deviations.
     fn sweep(&mut self, groups: Vec<Vec<usize>>, fitted: &mut Vec<Group>) -> f64 {
         fitted.clear();
         let mut moved: f64 = 0.0;
@@ -134,243 +200,117 @@ impl<'a> Sweeper<'a> {
                 }
                 Err(reason) => {
                     moved = f64::INFINITY;
-                    let last = members.iter().copied().max();
-                    self.give_up(&members, last.map(|index| (index, reason)));
+                    if let Some(&last) = members.iter().max() {
+                        self.give_up(&members, last, reason);
+                    }
                 }
             }
         }
         moved
     }
 
-    /// One start fails; those fitted together with it begin again without it.
-    fn give_up(&mut self, members: &[usize], failure: Option<(usize, Unfit)>) {
+    /// Drops one start; the modes fitted together with it begin again.
+    fn give_up(&mut self, members: &[usize], failed: usize, reason: Unfit) {
         for &index in members {
             let mode = &mut self.modes[index];
             mode.pole = mode.start;
             mode.amplitudes = None;
         }
-        if let Some((index, reason)) = failure {
-            self.modes[index].failed = Some(reason);
-        }
+        self.modes[failed].failed = Some(reason);
     }
 
-    /// Strong modes first: their flanks disturb the weak ones.
-    fn strongest_first(&self, groups: &mut [Vec<usize>]) {
-        let height = |group: &Vec<usize>| {
-            let index = group.first().copied().unwrap_or(0);
-            let position = self.modes[index].pole.im;
-            let (first, end) = band::within(self.data, (position - 0.5, position + 0.5));
-            let columns = self.data.columns().iter();
-            columns
-                .flat_map(|column| &column.values[first..end])
-                .map(Complex64::norm_sqr)
-                .sum::<f64>()
-        };
-        groups.sort_by(|a, b| height(b).total_cmp(&height(a)));
-    }
-
-    /// Takes the poles of a fit over; how far they moved in standard deviations.
+    /// Takes over the poles of a fit. Returns how far they moved in standard deviations.
     fn accept(&mut self, members: &[usize], fit: &GroupFit) -> f64 {
-        let deviations = super::uncertainty::deviations(fit);
+        let deviations = fit.deviations();
+        let columns = self.data.columns().len();
         let mut most: f64 = 0.0;
+        let mut refused: Option<(usize, Unfit)> = None;
         for (place, &index) in members.iter().enumerate() {
             let mode = &mut self.modes[index];
             let pole = fit.at.poles[place];
-            let (of_position, of_decay) = deviations[place];
             let change = pole - mode.pole;
             most = most
-                .max(change.im.abs() / of_position)
-                .max(change.re.abs() / of_decay);
+                .max(change.im.abs() / deviations[place][0])
+                .max(change.re.abs() / deviations[place][1]);
             mode.pole = pole;
-            mode.amplitudes = Some(fit.amplitudes(place, self.data.columns().len()));
-            mode.noise = fit.noise_by_column(self.data.columns().len());
+            mode.amplitudes = Some(fit.amplitudes(place, columns));
+            mode.noise = fit.noise_by_column(columns);
+            // The latest start of several doubtful poles goes: two poles for one resonance make each
+            // other doubtful.
+            if let Some(reason) = mode.refusal(self.data, deviations[place])
+                && refused.as_ref().is_none_or(|(other, _)| index >= *other)
+            {
+                refused = Some((index, reason));
+            }
         }
-        // Of several doubtful poles the one whose start came last goes: two poles for one resonance
-        // make each other doubtful.
-        let refused = members.iter().enumerate().filter_map(|(place, &index)| {
-            let reason = refusal(self.data, &self.modes[index], deviations[place])?;
-            Some((index, reason))
-        });
-        let worst = refused.max_by_key(|(index, _)| *index);
-        if worst.is_some() {
-            self.give_up(members, worst);
+        if let Some((index, reason)) = refused {
+            self.give_up(members, index, reason);
             return f64::INFINITY;
         }
         if most.is_nan() { f64::INFINITY } else { most }
     }
 
+    /// Fits a group from its present poles.
     fn fit_group(&self, members: &[usize]) -> Result<GroupFit, Unfit> {
+        let band = self.band(members)?;
+        let mut poles = self.poles(members);
         let new = |&index: &usize| self.modes[index].amplitudes.is_none();
-        let poles: Vec<Complex64> = members
-            .iter()
-            .map(|&index| self.modes[index].pole)
-            .collect();
-        let local = self.local(members)?;
-        if members.iter().any(new) {
-            self.first_fit(&local, members, poles)
-        } else {
-            let noise = self.noise_before(&local, members);
-            let noise = match noise {
+        if !members.iter().any(new) {
+            let noise = match self.noise_before(&band, members) {
                 Some(noise) => noise,
-                None => local.noise_of(&local.fit(&poles, 0, &local.scale())?),
+                None => band.noise_of(&band.fit(&poles, 0, &band.scale())?),
             };
-            settled_fit(&local, &poles, &noise)
+            return band.settled_fit(&poles, &noise);
         }
+        let mut numbers = (0..=FIRST_TERMS).rev();
+        let terms = numbers
+            .find(|&terms| band.has_room(&poles, terms))
+            .unwrap_or(0);
+        let scale = band.scale();
+        for (place, &index) in members.iter().enumerate() {
+            let known = self.modes[index].damping_known;
+            band.improve_start(&mut poles, place, known, terms, &scale);
+        }
+        let fit = band.fit(&poles, terms, &scale)?;
+        let noise = band.noise_of(&fit);
+        band.fit(&fit.at.poles, terms, &noise)
     }
 
     /// Noise of the columns in the sweep before, where all of them had one.
-    fn noise_before(&self, local: &Local, members: &[usize]) -> Option<Vec<f64>> {
+    fn noise_before(&self, band: &BandData, members: &[usize]) -> Option<Vec<f64>> {
         let known = &self.modes[*members.first()?].noise;
-        local
-            .used
+        band.used
             .iter()
             .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
             .collect()
     }
 
-    /// The band of these modes as their present poles have it.
-    pub fn local(&self, members: &[usize]) -> Result<Local<'a>, Unfit> {
-        let poles: Vec<Complex64> = members
+    /// Present poles of these modes (lines).
+    fn poles(&self, members: &[usize]) -> Vec<Complex64> {
+        members
             .iter()
             .map(|&index| self.modes[index].pole)
-            .collect();
-        let neighbours = self.neighbours(members);
-        Local::new(
-            self.data,
-            (&poles, &neighbours),
-            &self.steady,
-            self.most_lines,
-        )
-    }
-
-    fn neighbours(&self, members: &[usize]) -> Vec<Neighbour> {
-        self.modes
-            .iter()
-            .enumerate()
-            .filter(|(index, mode)| !members.contains(index) && mode.failed.is_none())
-            .map(|(_, mode)| Neighbour {
-                pole: mode.pole,
-                amplitudes: mode.amplitudes.clone(),
-            })
             .collect()
     }
 
-    /// From the starts, after a look about each.
-    fn first_fit(
-        &self,
-        local: &Local,
-        members: &[usize],
-        mut poles: Vec<Complex64>,
-    ) -> Result<GroupFit, Unfit> {
-        let terms = (0..=FIRST_TERMS)
-            .rev()
-            .find(|&terms| local.has_room(&poles, terms))
-            .unwrap_or(0);
-        let scale = local.scale();
-        for (place, &index) in members.iter().enumerate() {
-            let known = self.modes[index].damping_known;
-            local.look_about(&mut poles, place, (terms, &scale), known);
+    /// Band of these modes at their present poles.
+    pub fn band(&self, members: &[usize]) -> Result<BandData<'a>, Unfit> {
+        let mut neighbours = Vec::new();
+        for (index, mode) in self.modes.iter().enumerate() {
+            if !members.contains(&index) && mode.failed.is_none() {
+                neighbours.push(Neighbour {
+                    pole: mode.pole,
+                    amplitudes: mode.amplitudes.clone(),
+                });
+            }
         }
-        let fit = local.fit(&poles, terms, &scale)?;
-        let noise = local.noise_of(&fit);
-        local.fit(&fit.at.poles, terms, &noise)
-    }
-}
-
-fn mode(data: &ModalData, start: &PoleStart, added: f64) -> Mode {
-    let position = start.frequency / data.spacing();
-    let unknown = 0.3 * data.resolution() / data.spacing();
-    let decay = start
-        .damping_ratio
-        .filter(|ratio| *ratio > 0.0)
-        .map_or(unknown, |ratio| ratio * position);
-    let pole = Complex64::new(-decay - added / data.spacing(), position);
-    let within = position > 0.0 && start.frequency < data.highest() && pole.is_finite();
-    Mode {
-        start: pole,
-        damping_known: start.damping_ratio.is_some(),
-        pole,
-        amplitudes: None,
-        noise: Vec::new(),
-        failed: (!within).then_some(Unfit::OutsideBand),
-    }
-}
-
-/// Why a fitted pole is no mode near its start.
-fn refusal(data: &ModalData, mode: &Mode, (of_position, of_decay): (f64, f64)) -> Option<Unfit> {
-    let lines = |hertz: f64| hertz / data.spacing();
-    let line = lines(data.resolution());
-    let pole = mode.pole;
-    let allowed = 3.0 * line + 3.0 * mode.start.re.abs().max(pole.re.abs());
-    let first = data.frequencies().first().copied().unwrap_or(0.0);
-    let last = data.frequencies().last().copied().unwrap_or(0.0);
-    let away = (pole.im - mode.start.im).abs();
-    if pole.im < lines(first) || pole.im > lines(last) || away > allowed {
-        return Some(Unfit::LeftStart {
-            frequency: pole.im * data.spacing(),
-            distance: away * data.spacing(),
-        });
-    }
-    if pole.re >= 0.0 {
-        return Some(Unfit::NoDecay);
-    }
-    let wide = line.max(pole.re.abs());
-    let vague = of_position.is_nan() || of_position > wide || of_decay.is_nan() || of_decay > wide;
-    vague.then_some(Unfit::Undetermined {
-        std: of_position * data.spacing(),
-    })
-}
-
-impl Local<'_> {
-    /// Tries some dampings, some places and some dampings again for one pole, and keeps the best: a start
-    /// half a line off lies outside the valley of a resonance narrower than a line.
-    fn look_about(
-        &self,
-        poles: &mut [Complex64],
-        place: usize,
-        (terms, scale): (usize, &[f64]),
-        damping_known: bool,
-    ) {
-        let factors: &[f64] = if damping_known {
-            &[0.5, 1.0, 2.0]
-        } else {
-            &[0.1, 0.3, 1.0, 3.0, 10.0]
-        };
-        let line = self.data.resolution() / self.data.spacing();
-        let offsets = [-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75].map(|share| share * line);
-        let damped = |pole: Complex64| {
-            factors
-                .iter()
-                .map(move |f| Complex64::new(pole.re * f, pole.im))
-        };
-        for round in 0..3 {
-            let pole = poles[place];
-            let tries: Vec<Complex64> = if round == 1 {
-                offsets
-                    .iter()
-                    .map(|&o| pole + Complex64::new(0.0, o))
-                    .collect()
-            } else {
-                damped(pole).collect()
-            };
-            let found = self.best(poles, place, &tries, (terms, scale));
-            poles[place] = found.unwrap_or(pole);
-        }
-    }
-
-    fn best(
-        &self,
-        poles: &[Complex64],
-        place: usize,
-        tries: &[Complex64],
-        (terms, scale): (usize, &[f64]),
-    ) -> Option<Complex64> {
-        let sums = self.square_sums(poles, place, tries, (terms, scale));
-        tries
-            .iter()
-            .zip(sums)
-            .filter_map(|(&pole, sum)| sum.map(|sum| (pole, sum)))
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(pole, _)| pole)
+        let poles = self.poles(members);
+        BandData::new(
+            self.data,
+            &poles,
+            &neighbours,
+            &self.steady,
+            self.most_lines,
+        )
     }
 }

@@ -23,15 +23,12 @@
 //! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit,
 //! and the spread over the orders is a measure of stability, not an uncertainty.
 
-mod eigenvalues;
-mod matrix;
-mod normal_equations;
-mod residues;
 mod selection;
 mod stabilisation;
 mod sub_bands;
 
-pub use matrix::ResponseMatrix;
+use num_complex::Complex64;
+
 pub use selection::{PolyreferenceMode, SelectionSettings, select_modes};
 pub use stabilisation::{PoleStability, StabilisationPole, stabilise_poles};
 pub use sub_bands::{BandSearch, SubBand, SubBandSettings, all_modes, find_modes, sub_bands};
@@ -195,7 +192,139 @@ impl PolyreferenceSettings {
 /// Lines that an order needs: numerators and the denominator's share of each output, and a quarter
 /// more so that noise is averaged at all.
 fn least_lines(matrix: &ResponseMatrix, order: usize) -> usize {
-    let numerator = order + 1 + 2 * normal_equations::EXTRA_POWERS;
+    let numerator = order + 1 + 2 * stabilisation::EXTRA_POWERS;
     let denominator = (order * matrix.inputs()).div_ceil(matrix.outputs().max(1));
     (numerator + denominator) * 5 / 4
+}
+
+/// Responses on equally spaced lines: frequency response functions, or transforms of free decays
+/// (then each tap and sensor is an output of one input).
+#[derive(Debug, Clone)]
+pub struct ResponseMatrix<'a> {
+    first: f64,
+    spacing: f64,
+    outputs: usize,
+    inputs: usize,
+    /// Entry (output, input) stands at output * inputs + input.
+    entries: Vec<&'a [Complex64]>,
+}
+
+impl<'a> ResponseMatrix<'a> {
+    /// Takes `values[output][input][line]` on lines `first + line * spacing` (both Hz).
+    ///
+    /// # Errors
+    /// [`PolyreferenceError::Shape`] where an output lacks an input or an entry lacks lines,
+    /// [`PolyreferenceError::NotFinite`] where a value is no number.
+    pub fn new(
+        first: f64,
+        spacing: f64,
+        values: &[Vec<&'a [Complex64]>],
+    ) -> Result<Self, PolyreferenceError> {
+        let inputs = values.first().map_or(0, Vec::len);
+        let points = values
+            .first()
+            .and_then(|row| row.first())
+            .map_or(0, |entry| entry.len());
+        for (output, row) in values.iter().enumerate() {
+            let least = row.iter().map(|entry| entry.len()).min().unwrap_or(0);
+            let most = row.iter().map(|entry| entry.len()).max().unwrap_or(0);
+            if row.len() != inputs || least != points || most != points {
+                return Err(PolyreferenceError::Shape {
+                    output: output + 1,
+                    inputs: row.len(),
+                    expected_inputs: inputs,
+                    lines: if least == points { most } else { least },
+                    expected_lines: points,
+                });
+            }
+        }
+        let entries: Vec<&[Complex64]> = values.iter().flatten().copied().collect();
+        check_finite(&entries, inputs, first, spacing)?;
+        Ok(ResponseMatrix {
+            first,
+            spacing,
+            outputs: values.len(),
+            inputs,
+            entries,
+        })
+    }
+
+    /// The part between two frequencies (Hz), both ends included.
+    #[must_use]
+    pub fn band(&self, low: f64, high: f64) -> Self {
+        // A millionth of a line more, so that an end that lies on a line is not lost by rounding.
+        let index = |frequency: f64| (frequency - self.first) / self.spacing;
+        let start = (index(low) - 1e-6).ceil().max(0.0) as usize;
+        let end = ((index(high) + 1e-6).floor().max(-1.0) + 1.0) as usize;
+        let end = end.min(self.points());
+        let start = start.min(end);
+        ResponseMatrix {
+            first: self.frequency(start),
+            entries: self
+                .entries
+                .iter()
+                .map(|entry| &entry[start..end])
+                .collect(),
+            ..*self
+        }
+    }
+
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    /// Number of inputs.
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Number of lines.
+    pub fn points(&self) -> usize {
+        self.entries.first().map_or(0, |entry| entry.len())
+    }
+
+    /// Distance between lines (Hz).
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Frequency of line `index` (Hz).
+    pub fn frequency(&self, index: usize) -> f64 {
+        self.first + index as f64 * self.spacing
+    }
+
+    /// First and last frequency (Hz).
+    pub fn ends(&self) -> (f64, f64) {
+        (self.first, self.frequency(self.points().saturating_sub(1)))
+    }
+
+    /// Values of one entry on all lines.
+    pub fn entry(&self, output: usize, input: usize) -> &'a [Complex64] {
+        self.entries[output * self.inputs + input]
+    }
+
+    /// Power of each entry, line by line.
+    pub(super) fn powers(&self) -> Vec<Vec<f64>> {
+        let power = |entry: &&[Complex64]| entry.iter().map(Complex64::norm_sqr).collect();
+        self.entries.iter().map(power).collect()
+    }
+}
+
+fn check_finite(
+    entries: &[&[Complex64]],
+    inputs: usize,
+    first: f64,
+    spacing: f64,
+) -> Result<(), PolyreferenceError> {
+    for (index, entry) in entries.iter().enumerate() {
+        if let Some(line) = entry.iter().position(|value| !value.is_finite()) {
+            return Err(PolyreferenceError::NotFinite {
+                output: index / inputs + 1,
+                input: index % inputs + 1,
+                frequency: first + line as f64 * spacing,
+            });
+        }
+    }
+    Ok(())
 }

@@ -1,8 +1,16 @@
-//! Tests of measurement, with files that the tests write and with recordings by others.
+//! Tests of measurement: one module per stage, with files that the tests write and with recordings by others.
 
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
+mod modal;
+mod modal_fit;
+mod modal_matrix_pencil;
+mod modal_polyreference;
+mod quality;
 mod recording;
 mod recording_uff;
 mod shared;
+mod spectral;
+mod spectral_frf;
+mod taps;
 mod written;

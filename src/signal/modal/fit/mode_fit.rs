@@ -1,0 +1,495 @@
+//! Fitted modes and how well they are known.
+//!
+//! The standard deviation of a frequency or damping comes from the noise that the fit leaves, or from the
+//! scatter of the taps where that is larger.
+
+use super::super::from_one;
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, Matrix2};
+use num_complex::Complex64;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use tapjoint_numerics::stats::student;
+
+use super::data::{Basis, ModalData};
+use super::group::{GroupFit, complex_row};
+use super::sweep::{Group, Sweeper};
+use super::variable_projection::{Problem, StopReason};
+use super::{FitSettings, PoleStart, Unfit};
+
+/// A scatter of the taps less probable than this is more than noise.
+const SCATTER_LEVEL: f64 = 0.01;
+/// A residual correlation beyond so many standard deviations is a misfit. 3: by chance one fit in 700.
+const CORRELATED: f64 = 3.0;
+/// Steps of the fit of one tap; it starts from the joint poles.
+const TAP_STEPS: usize = 6;
+
+/// What a standard deviation rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum UncertaintySource {
+    /// The noise that the fit leaves on the lines.
+    Residual,
+    /// The scatter of the taps, which is more than that noise explains.
+    #[serde(rename = "taps")]
+    TapScatter,
+}
+
+/// A value with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FittedValue {
+    /// The value (Hz, or a ratio).
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+    /// Lower end of the 95 % interval.
+    pub low: f64,
+    /// Upper end of the 95 % interval.
+    pub high: f64,
+    /// What the standard deviation rests on.
+    pub source: UncertaintySource,
+    /// Its degrees of freedom.
+    pub freedom: f64,
+    /// Probability that noise alone makes the taps scatter as much as they do; `None` with fewer
+    /// than two taps that could be fitted alone.
+    pub scatter_probability: Option<f64>,
+}
+
+/// Frequency and damping of one tap alone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct TapFit {
+    /// Number of the tap, from 0; in outputs from 1.
+    #[serde(serialize_with = "from_one")]
+    pub tap: usize,
+    /// Natural frequency (Hz).
+    pub frequency: f64,
+    /// Its standard deviation from the noise (Hz).
+    pub frequency_std: f64,
+    /// Damping ratio.
+    #[serde(rename = "damping")]
+    pub damping_ratio: f64,
+    /// Its standard deviation from the noise.
+    pub damping_std: f64,
+}
+
+impl FittedValue {
+    /// Value and interval from the joint fit, or from the taps where they scatter beyond their own
+    /// standard deviations. `taps` are values with their standard deviations.
+    fn new(value: f64, std: f64, freedom: f64, taps: &[(f64, f64)]) -> Self {
+        let scatter_probability = scatter_probability(taps);
+        let scattered = scatter_probability.is_some_and(|p| p < SCATTER_LEVEL);
+        let (value, std, freedom, source) = if scattered {
+            let (mean, scatter) = weighted_mean(taps);
+            // Scatter cannot make a value better than the noise permits.
+            let freedom = taps.len() as f64 - 1.0;
+            (
+                mean,
+                scatter.max(std),
+                freedom,
+                UncertaintySource::TapScatter,
+            )
+        } else {
+            (value, std, freedom, UncertaintySource::Residual)
+        };
+        let quantile = student::quantile(0.05, freedom.max(1.0));
+        FittedValue {
+            value,
+            std,
+            low: value - quantile * std,
+            high: value + quantile * std,
+            source,
+            freedom,
+            scatter_probability,
+        }
+    }
+}
+
+/// Probability of the taps' scatter about their weighted mean by noise alone (chi-squared test).
+fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
+    if taps.len() < 2 {
+        return None;
+    }
+    let scatter = scatter_about_mean(taps);
+    let distribution = ChiSquared::new(taps.len() as f64 - 1.0).ok()?;
+    scatter.is_finite().then(|| distribution.sf(scatter))
+}
+
+/// Chi-squared of values with their standard deviations about their weighted mean.
+pub fn scatter_about_mean(taps: &[(f64, f64)]) -> f64 {
+    let weight = |std: f64| 1.0 / (std * std);
+    let total: f64 = taps.iter().map(|tap| weight(tap.1)).sum();
+    let mean = taps.iter().map(|tap| weight(tap.1) * tap.0).sum::<f64>() / total;
+    taps.iter()
+        .map(|tap| weight(tap.1) * (tap.0 - mean).powi(2))
+        .sum()
+}
+
+/// Mean of values that scatter between taps by tau beside their own std_i, and its standard deviation.
+///
+/// Weights v_i = 1/(std_i^2 + tau^2), tau^2 after DerSimonian & Laird 1986; standard deviation
+/// sqrt(sum v_i (x_i - mean)^2/((n - 1) sum v_i)), which goes with Student's t of n - 1 (Hartung & Knapp
+/// 2001).
+pub fn weighted_mean(taps: &[(f64, f64)]) -> (f64, f64) {
+    let sum = |of: &dyn Fn(&(f64, f64)) -> f64| taps.iter().map(of).sum::<f64>();
+    let degrees = taps.len() as f64 - 1.0;
+    let weight = |std: f64| 1.0 / (std * std);
+    let total = sum(&|tap| weight(tap.1));
+    let mean = sum(&|tap| weight(tap.1) * tap.0) / total;
+    let scatter = sum(&|tap| weight(tap.1) * (tap.0 - mean).powi(2));
+    let squares = sum(&|tap| weight(tap.1).powi(2));
+    let between = ((scatter - degrees) / (total - squares / total)).max(0.0);
+    let share = |std: f64| 1.0 / (std * std + between);
+    let total = sum(&|tap| share(tap.1));
+    let mean = sum(&|tap| share(tap.1) * tap.0) / total;
+    let scatter = sum(&|tap| share(tap.1) * (tap.0 - mean).powi(2));
+    (mean, (scatter / (degrees * total)).sqrt())
+}
+
+/// Complex amplitude of a mode in one column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnAmplitude {
+    /// Number of the tap.
+    pub tap: usize,
+    /// Number of the sensor.
+    pub sensor: usize,
+    /// Free decay: a in x(t) = Re(a e^{p t}), t from the decay's first sample (unit of the samples).
+    /// Frequency response function: its residue R (unit of the function times rad/s).
+    pub value: Complex64,
+    /// Standard deviation of its real and of its imaginary part from noise, the pole held fixed.
+    pub std: f64,
+    /// Change with the pole's angular frequency (unit of the amplitude times s).
+    pub by_omega: Complex64,
+    /// Change with the pole's decay (unit of the amplitude times s).
+    pub by_decay: Complex64,
+}
+
+/// A fitted mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeFit {
+    /// Natural frequency (Hz), undamped: modulus of the pole over 2 pi, a window's decay taken out.
+    pub frequency: FittedValue,
+    /// Damping ratio, a window's decay taken out.
+    pub damping_ratio: FittedValue,
+    /// Pole (rad/s), negative decay + j angular frequency, a window's decay still in it.
+    pub pole: Complex64,
+    /// Covariance of the pole's angular frequency and decay from the residual ((rad/s)^2).
+    pub pole_covariance: [[f64; 2]; 2],
+    /// Correlation of the errors of frequency and damping ratio.
+    pub correlation: f64,
+    /// Each tap alone; taps that could not be fitted are missing.
+    pub taps: Vec<TapFit>,
+    /// Correlation of the residual between neighbouring lines: near 0 for a good fit, near 1 where the
+    /// model misses something.
+    pub residual_correlation: f64,
+    /// Factor that correlation puts on the standard deviations (1: it may be chance).
+    pub inflation: f64,
+    /// Band of the fit (Hz).
+    pub band: (f64, f64),
+    /// Lines in it.
+    pub lines: usize,
+    /// Complex terms of the background polynomial that the data asked for.
+    pub background_terms: usize,
+    /// Indices of the starts that were fitted jointly, this one among them.
+    pub joint_with: Vec<usize>,
+    /// Why the search ended.
+    pub stop: StopReason,
+    /// Amplitude in every column of the data that holds anything.
+    pub amplitudes: Vec<ColumnAmplitude>,
+}
+
+/// Fits the modes that begin at `starts`. Returns for each start a mode, or the reason why there is none.
+///
+/// Modes nearer than three of their half widths together and a few lines are fitted jointly. The others
+/// are subtracted with their own amplitudes, or keep free ones where they lie in the band. A polynomial of
+/// the frequency stands for everything else outside, where the data ask for it. Where two starts turn out
+/// to be one resonance, the later one fails: put the surer ones first.
+pub fn fit_modes(
+    data: &ModalData,
+    starts: &[PoleStart],
+    settings: &FitSettings,
+) -> Vec<Result<ModeFit, Unfit>> {
+    let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
+    let groups = sweeper.run();
+    mode_fits(&mut sweeper, &groups, settings)
+}
+
+/// Reads the modes from the fits of their groups. Returns for each start its mode, or why there is none.
+pub(super) fn mode_fits(
+    sweeper: &mut Sweeper,
+    groups: &[Group],
+    settings: &FitSettings,
+) -> Vec<Result<ModeFit, Unfit>> {
+    let mut modes: Vec<Option<ModeFit>> = vec![None; sweeper.modes.len()];
+    for group in groups {
+        let reader = GroupReader::new(sweeper.data, settings, group);
+        for (place, &index) in group.members.iter().enumerate() {
+            match reader.mode(place) {
+                Ok(fit) => modes[index] = Some(fit),
+                Err(reason) => sweeper.modes[index].failed = Some(reason),
+            }
+        }
+    }
+    let mut results = Vec::with_capacity(modes.len());
+    for (mode, state) in modes.into_iter().zip(&sweeper.modes) {
+        let reason = state.failed.clone().unwrap_or(Unfit::NotIndependent);
+        results.push(mode.ok_or(reason));
+    }
+    results
+}
+
+/// Poles of one tap fitted alone, with their covariance (lines).
+struct TapPoles {
+    tap: usize,
+    poles: Vec<Complex64>,
+    covariance: DMatrix<f64>,
+}
+
+/// Reads the modes of one group's fit.
+struct GroupReader<'a> {
+    data: &'a ModalData,
+    group: &'a Group,
+    /// Added decay (lines).
+    added: f64,
+    /// Resolution over line spacing: denser lines repeat each other, and variances grow by that factor.
+    repetition: f64,
+    /// Correlation of the residual between neighbouring lines.
+    correlation: f64,
+    /// Factor that it puts on the standard deviations.
+    inflation: f64,
+    taps: Vec<TapPoles>,
+}
+
+impl<'a> GroupReader<'a> {
+    fn new(data: &'a ModalData, settings: &FitSettings, group: &'a Group) -> Self {
+        let (correlation, inflation) = residual_correlation(&group.fit);
+        GroupReader {
+            data,
+            group,
+            added: settings.added_decay / TAU / data.spacing(),
+            repetition: data.resolution() / data.spacing(),
+            correlation,
+            inflation,
+            taps: fit_taps(data, &group.fit),
+        }
+    }
+
+    /// Returns the mode at `place` in the group.
+    fn mode(&self, place: usize) -> Result<ModeFit, Unfit> {
+        let fit = &self.group.fit;
+        let spacing = self.data.spacing();
+        let all = fit
+            .slopes
+            .covariance(fit.variance)
+            .ok_or(Unfit::NotIndependent)?;
+        let in_lines = pole_block(&all, place) * self.repetition * self.inflation * self.inflation;
+        let joint = PoleReading::new(fit.at.poles[place], spacing, self.added);
+        let covariance = joint.slopes * in_lines * joint.slopes.transpose();
+        let stds = [covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt()];
+        let freedom = (fit.freedom / self.repetition).max(1.0);
+        let taps = self.taps_of(place);
+        let frequencies: Vec<(f64, f64)> = taps
+            .iter()
+            .map(|tap| (tap.frequency, tap.frequency_std))
+            .collect();
+        let dampings: Vec<(f64, f64)> = taps
+            .iter()
+            .map(|tap| (tap.damping_ratio, tap.damping_std))
+            .collect();
+        let damping_ratio = FittedValue::new(joint.damping_ratio, stds[1], freedom, &dampings);
+        // Less than two standard deviations beside the window's decay are no damping.
+        let hidden = damping_ratio.value <= 0.0 || damping_ratio.value < 2.0 * damping_ratio.std;
+        if self.added > 0.0 && hidden {
+            return Err(Unfit::WindowDominates {
+                remaining: damping_ratio.value,
+                std: damping_ratio.std,
+            });
+        }
+        let to_rad = TAU * spacing;
+        let positions = &fit.lines.positions;
+        Ok(ModeFit {
+            frequency: FittedValue::new(joint.frequency, stds[0], freedom, &frequencies),
+            damping_ratio,
+            pole: fit.at.poles[place] * to_rad,
+            pole_covariance: (in_lines * to_rad * to_rad).into(),
+            correlation: covariance[(0, 1)] / (stds[0] * stds[1]),
+            taps,
+            residual_correlation: self.correlation,
+            inflation: self.inflation,
+            band: (
+                positions[0] * spacing,
+                positions[positions.len() - 1] * spacing,
+            ),
+            lines: positions.len(),
+            background_terms: fit.terms,
+            joint_with: self.group.members.clone(),
+            stop: fit.stop,
+            amplitudes: self.amplitudes(place),
+        })
+    }
+
+    /// Frequency and damping of each tap alone, where its pole stays within a half width of the joint one.
+    fn taps_of(&self, place: usize) -> Vec<TapFit> {
+        let joint = self.group.fit.at.poles[place];
+        let mut taps = Vec::new();
+        for tap in &self.taps {
+            let near = (tap.poles[place] - joint).norm() <= 1.0 + joint.re.abs();
+            if !near {
+                continue;
+            }
+            let own = PoleReading::new(tap.poles[place], self.data.spacing(), self.added);
+            let in_lines = pole_block(&tap.covariance, place);
+            let spread = own.slopes * in_lines * self.repetition * own.slopes.transpose();
+            taps.push(TapFit {
+                tap: tap.tap,
+                frequency: own.frequency,
+                frequency_std: spread[(0, 0)].sqrt(),
+                damping_ratio: own.damping_ratio,
+                damping_std: spread[(1, 1)].sqrt(),
+            });
+        }
+        taps
+    }
+
+    /// Returns the amplitude of every used column, with its slopes.
+    ///
+    /// From b of the fit it is a = 2 b (2 pi df)/(1 - e^{pT}) of a decay, or the residue R = b (2 pi df).
+    fn amplitudes(&self, place: usize) -> Vec<ColumnAmplitude> {
+        let fit = &self.group.fit;
+        let unit = TAU * self.data.spacing();
+        // pT = 2 pi q of a decay; the factor's change with q relative to itself is
+        // 2 pi e^{pT}/(1 - e^{pT}).
+        let (factor, relative) = match self.data.basis() {
+            Basis::FreeDecay { .. } => {
+                let fallen = (TAU * fit.at.poles[place]).exp();
+                let rest = 1.0 - fallen;
+                (2.0 * unit / rest, TAU * fallen / rest)
+            }
+            Basis::FrequencyResponse { .. } => (Complex64::from(unit), Complex64::ZERO),
+        };
+        // Mean variance of the two parts of an amplitude for unit noise: (R'R)^-1.
+        let inverse = &fit.at.inverse;
+        let rows = [2 * place, 2 * place + 1].map(|row| inverse.row(row).norm_squared());
+        let spread = 0.5 * (rows[0] + rows[1]) * fit.variance * self.repetition;
+        let slopes = &fit.slopes.amplitude_slopes;
+        let mut amplitudes = Vec::with_capacity(fit.used.len());
+        for (index, (&column, &noise)) in fit.used.iter().zip(&fit.noise).enumerate() {
+            let b = fit.amplitude(place, index);
+            let by_position = complex_row(&slopes[2 * place], place, index);
+            let by_position = by_position + Complex64::i() * relative * b;
+            let by_decay = complex_row(&slopes[2 * place + 1], place, index) - relative * b;
+            amplitudes.push(ColumnAmplitude {
+                tap: self.data.columns()[column].tap,
+                sensor: self.data.columns()[column].sensor,
+                value: b * noise * factor,
+                std: spread.sqrt() * noise * factor.norm(),
+                by_omega: by_position * noise * factor / unit,
+                by_decay: by_decay * noise * factor / unit,
+            });
+        }
+        amplitudes
+    }
+}
+
+/// Frequency and damping of a pole, and their derivatives.
+struct PoleReading {
+    /// Natural frequency (Hz).
+    frequency: f64,
+    damping_ratio: f64,
+    /// Derivatives of frequency and damping ratio (rows) to position and decay (lines).
+    slopes: Matrix2<f64>,
+}
+
+impl PoleReading {
+    /// Reads a pole (lines): with w its position, s its decay less `added`, and r = hypot(w, s), the
+    /// frequency is r df and the damping ratio s/r.
+    fn new(pole: Complex64, spacing: f64, added: f64) -> Self {
+        let (position, decay) = (pole.im, -pole.re - added);
+        let modulus = position.hypot(decay);
+        let cube = modulus.powi(3);
+        PoleReading {
+            frequency: modulus * spacing,
+            damping_ratio: decay / modulus,
+            slopes: Matrix2::new(
+                position / modulus * spacing,
+                decay / modulus * spacing,
+                -decay * position / cube,
+                position * position / cube,
+            ),
+        }
+    }
+}
+
+/// Covariance of position and decay of the pole at `place`, from that of all poles.
+fn pole_block(covariance: &DMatrix<f64>, place: usize) -> Matrix2<f64> {
+    let block = covariance.fixed_view::<2, 2>(2 * place, 2 * place);
+    block.into_owned()
+}
+
+/// Correlation of the residual between neighbouring lines, and the factor on the standard deviations.
+///
+/// r = Re sum e(m) conj(e(m+1)) / sum |e|^2 over neighbouring lines is 1 for a misfit that varies slowly.
+/// By chance its standard deviation is 1/sqrt(2 N) for N independent complex pairs. A residual correlated
+/// like r^k over k lines needs the factor sqrt((1 + r)/(1 - r)).
+fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
+    let count = fit.lines.count();
+    let positions = &fit.lines.positions;
+    let neighbours: Vec<usize> = (0..count - 1)
+        .filter(|&line| positions[line + 1] - positions[line] < 1.5)
+        .collect();
+    let product: f64 = fit
+        .at
+        .residual
+        .column_iter()
+        .map(|e| {
+            let pairs = neighbours.iter();
+            pairs
+                .map(|&m| e[m] * e[m + 1] + e[m + count] * e[m + 1 + count])
+                .sum::<f64>()
+        })
+        .sum();
+    let pairs = (neighbours.len() * fit.used.len()).max(1) as f64;
+    let share = pairs / (count * fit.used.len()) as f64;
+    let correlation = product / (fit.at.square_sum * share).max(f64::MIN_POSITIVE);
+    if correlation > CORRELATED * (2.0 * pairs).sqrt().recip() {
+        let bounded = correlation.min(0.99);
+        (correlation, ((1.0 + bounded) / (1.0 - bounded)).sqrt())
+    } else {
+        (correlation, 1.0)
+    }
+}
+
+/// Fits the columns of each tap alone, from the joint poles. Taps that cannot be fitted are left out.
+fn fit_taps(data: &ModalData, fit: &GroupFit) -> Vec<TapPoles> {
+    let taps: Vec<usize> = fit
+        .used
+        .iter()
+        .map(|&column| data.columns()[column].tap)
+        .collect();
+    let mut numbers = taps.clone();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let mut fitted = Vec::new();
+    for tap in numbers {
+        let places: Vec<usize> = (0..taps.len())
+            .filter(|&place| taps[place] == tap)
+            .collect();
+        let problem = Problem {
+            lines: &fit.lines,
+            fixed: &fit.fixed,
+            columns: fit.columns.select_columns(&places),
+        };
+        let Some((at, _)) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS) else {
+            continue;
+        };
+        if let Some(covariance) = problem.slopes(&at).covariance(fit.variance) {
+            fitted.push(TapPoles {
+                tap,
+                poles: at.poles,
+                covariance,
+            });
+        }
+    }
+    fitted
+}

@@ -1,0 +1,481 @@
+//! Variable projection: a least-squares fit that is nonlinear in the poles alone.
+//!
+//! # Function of one pole
+//! Inside the fit a line stands at m (its frequency over the line spacing df), and a pole at
+//! q = p/(2 pi df) = -decay + j position. With kappa = 2 pi/M, the transform of a decay
+//! x(n) = Re(a z^n), z = e^{kappa q}, over its M samples (times 1/rate) is on the line m
+//!
+//! ```text
+//! X(m) = b phi(m; q) + conj(b) phi(m; conj q),     phi(m; q) = kappa/(1 - e^{kappa (q - j m)}),
+//! a = 2 b (2 pi df)/(1 - e^{2 pi q}),
+//! ```
+//!
+//! because e^{-j kappa m M} = 1 on every line: the truncation is a factor of the amplitude and causes no
+//! error. For a frequency response function phi = 1/(j m - q), and its residue is R = b (2 pi df).
+//!
+//! # Least squares
+//! The model of the columns Y is Y = Phi(q) B. Phi has two real columns for each pole, B is free for every
+//! column. With Phi = Q R the best B is R^-1 Q' Y. The residual Y - Q Q' Y depends on the poles alone
+//! (Golub & Pereyra 1973). Its derivative is taken as -(I - Q Q') (dPhi/dq) B (Kaufman 1975). That is also
+//! the Jacobian whose Gauss-Newton matrix is the information on the poles when all amplitudes are
+//! unknown. Columns of a fixed part (neighbours, background) are projected out beforehand.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+use num_complex::Complex64;
+
+use super::data::{Basis, ModalData};
+
+/// Least decay (lines) of a steady line: on its own line it is a million times its neighbours.
+pub(super) const STEADY: f64 = 1e-6;
+
+/// Lines of one band.
+#[derive(Debug, Clone)]
+pub(super) struct Lines {
+    /// Index of the band's first line in the data.
+    pub first: usize,
+    /// Step from one line to the next: 1 takes all, 2 every other one.
+    pub stride: usize,
+    /// Positions (lines).
+    pub positions: Vec<f64>,
+    /// 2 pi/M for free decays; `None` for frequency response functions.
+    kappa: Option<f64>,
+}
+
+impl Lines {
+    /// Takes the lines of an index range, evenly thinned to `most` at most.
+    pub fn new(data: &ModalData, range: Range<usize>, most: usize) -> Self {
+        let stride = range.len().div_ceil(most).max(1);
+        let frequencies = data.frequencies()[range.clone()].iter().step_by(stride);
+        Lines {
+            first: range.start,
+            stride,
+            positions: frequencies.map(|f| f / data.spacing()).collect(),
+            kappa: match data.basis() {
+                Basis::FreeDecay { samples, .. } => Some(TAU / samples as f64),
+                Basis::FrequencyResponse { .. } => None,
+            },
+        }
+    }
+
+    /// Number of lines.
+    pub fn count(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Returns phi and d phi/dq.
+    fn value(&self, pole: Complex64, line: f64) -> [Complex64; 2] {
+        let distance = pole - Complex64::new(0.0, line);
+        match self.kappa {
+            // phi = kappa/(1 - e^u), d phi/dq = e^u phi^2, u = kappa (q - j m).
+            Some(kappa) => {
+                let less_one = exp_less_one(kappa * distance);
+                let value = -kappa / less_one;
+                [value, (less_one + 1.0) * value * value]
+            }
+            // phi = 1/(j m - q), d phi/dq = phi^2.
+            None => {
+                let value = -distance.inv();
+                [value, value * value]
+            }
+        }
+    }
+
+    /// Returns the real columns of the model, two for each pole.
+    ///
+    /// With b = b1 + j b2 the model is b1 (phi + image) + b2 j (phi - image), where `image` is phi of the
+    /// conjugate pole. Rows are the real parts of all lines, then the imaginary parts.
+    pub fn model(&self, poles: &[Complex64]) -> DMatrix<f64> {
+        self.columns(poles, 0)
+    }
+
+    /// Returns the columns u = phi' + image' and v = j (phi' - image') of each pole, phi' = d phi/dq.
+    ///
+    /// ```text
+    /// d model/d position = b1 v - b2 u,     d model/d decay = -(b1 u + b2 v)
+    /// ```
+    pub fn slopes(&self, poles: &[Complex64]) -> DMatrix<f64> {
+        self.columns(poles, 1)
+    }
+
+    /// Returns sum and turned difference of each pole's function and its image; `derivative` is 0 or 1.
+    fn columns(&self, poles: &[Complex64], derivative: usize) -> DMatrix<f64> {
+        let count = self.count();
+        let mut columns = DMatrix::zeros(2 * count, 2 * poles.len());
+        for (place, &pole) in poles.iter().enumerate() {
+            for (line, &m) in self.positions.iter().enumerate() {
+                let own = self.value(pole, m)[derivative];
+                let image = self.value(pole.conj(), m)[derivative];
+                let sum = own + image;
+                let turned = Complex64::i() * (own - image);
+                columns[(line, 2 * place)] = sum.re;
+                columns[(line + count, 2 * place)] = sum.im;
+                columns[(line, 2 * place + 1)] = turned.re;
+                columns[(line + count, 2 * place + 1)] = turned.im;
+            }
+        }
+        columns
+    }
+
+    /// Returns the columns of a complex polynomial with `terms` terms over the band.
+    ///
+    /// It stands for everything that lies outside the band.
+    pub fn polynomial(&self, terms: usize) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(2 * self.count(), 2 * terms);
+        let low = self.positions.first().copied().unwrap_or(0.0);
+        let high = self.positions.last().copied().unwrap_or(1.0);
+        for (line, m) in self.positions.iter().enumerate() {
+            let place = (2.0 * m - low - high) / (high - low).max(f64::MIN_POSITIVE);
+            for term in 0..terms {
+                let value = place.powi(term as i32);
+                columns[(line, 2 * term)] = value;
+                columns[(line + self.count(), 2 * term + 1)] = value;
+            }
+        }
+        columns
+    }
+}
+
+/// Computes e^u - 1 without cancellation near zero.
+///
+/// With u = x + j y it is (e^x - 1) cos y - 2 sin^2(y/2) + j e^x sin y.
+fn exp_less_one(u: Complex64) -> Complex64 {
+    let (half_sin, half_cos) = (0.5 * u.im).sin_cos();
+    let grown = u.re.exp_m1();
+    let versine = 2.0 * half_sin * half_sin;
+    Complex64::new(
+        grown * (1.0 - versine) - versine,
+        (grown + 1.0) * 2.0 * half_sin * half_cos,
+    )
+}
+
+/// Reason why the search for the poles ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// The next step was a thousandth of a standard deviation or less.
+    Converged,
+    /// No step makes the residual smaller.
+    NoBetterStep,
+    /// The limit of steps was reached first.
+    StepLimit,
+}
+
+/// Orthonormal columns of the fixed part: neighbours and background.
+#[derive(Debug, Clone)]
+pub(super) struct Fixed {
+    columns: DMatrix<f64>,
+}
+
+/// Least remainder of a fixed column beside the columns before it, relative to its length. A column with
+/// less is left out: the others contain it already.
+const DISTINCT: f64 = 1e-5;
+
+impl Fixed {
+    /// Orthonormalises the columns (Gram and Schmidt, twice) and leaves dependent ones out.
+    pub fn new(raw: &DMatrix<f64>) -> Self {
+        let mut kept: Vec<DVector<f64>> = Vec::new();
+        for column in raw.column_iter() {
+            let length = column.norm();
+            if length.is_nan() || length <= 0.0 {
+                continue;
+            }
+            let mut rest = column / length;
+            for _ in 0..2 {
+                for other in &kept {
+                    let share = other.dot(&rest);
+                    rest.axpy(-share, other, 1.0);
+                }
+            }
+            let remains = rest.norm();
+            if remains > DISTINCT && kept.len() + 1 < raw.nrows() {
+                kept.push(rest / remains);
+            }
+        }
+        let columns = DMatrix::from_fn(raw.nrows(), kept.len(), |row, column| kept[column][row]);
+        Fixed { columns }
+    }
+
+    /// Number of independent columns.
+    pub fn rank(&self) -> usize {
+        self.columns.ncols()
+    }
+
+    /// Takes the fixed part out of every column of `matrix`.
+    pub fn project(&self, matrix: &mut DMatrix<f64>) {
+        if self.rank() > 0 {
+            let shares = self.columns.tr_mul(matrix);
+            matrix.gemm(-1.0, &self.columns, &shares, 1.0);
+        }
+    }
+}
+
+/// Lines, fixed part, and the columns of the data without the fixed part.
+pub(super) struct Problem<'a> {
+    pub lines: &'a Lines,
+    pub fixed: &'a Fixed,
+    pub columns: DMatrix<f64>,
+}
+
+/// Solution for the amplitudes at given poles.
+#[derive(Debug, Clone)]
+pub(super) struct Evaluation {
+    pub poles: Vec<Complex64>,
+    /// Sum of the squares of the residual.
+    pub square_sum: f64,
+    /// Residual, a column for each of the data.
+    pub residual: DMatrix<f64>,
+    /// Amplitudes: rows b1, b2 of each pole.
+    pub amplitudes: DMatrix<f64>,
+    /// Inverse of R.
+    pub inverse: DMatrix<f64>,
+    /// Q.
+    orthonormal: DMatrix<f64>,
+}
+
+/// Slopes of the residual, contracted to what the search and the covariance need.
+#[derive(Debug, Clone)]
+pub(super) struct Slopes {
+    /// Gauss-Newton matrix; the order is position, decay of each pole.
+    pub information: DMatrix<f64>,
+    /// J' r.
+    pub gradient: DVector<f64>,
+    /// Change of the amplitudes with each parameter (rows b1, b2 of each pole; columns of the data).
+    pub amplitude_slopes: Vec<DMatrix<f64>>,
+}
+
+impl Slopes {
+    /// Covariance of position and decay of all poles (lines squared) at this noise variance.
+    ///
+    /// `None` where two poles cannot be separated.
+    pub fn covariance(&self, variance: f64) -> Option<DMatrix<f64>> {
+        let factor = self.information.clone().cholesky()?;
+        Some(factor.inverse() * variance)
+    }
+}
+
+impl Problem<'_> {
+    /// Solves for the amplitudes; `None` where the poles' columns are not independent.
+    pub fn evaluate(&self, poles: &[Complex64]) -> Option<Evaluation> {
+        let mut model = self.lines.model(poles);
+        self.fixed.project(&mut model);
+        let lengths: Vec<f64> = model.column_iter().map(|column| column.norm()).collect();
+        let (orthonormal, upper) = model.qr().unpack();
+        let sound = lengths
+            .iter()
+            .enumerate()
+            .all(|(i, length)| length.is_finite() && upper[(i, i)].abs() > 1e-9 * length);
+        if !sound || upper.nrows() != upper.ncols() {
+            return None;
+        }
+        let inverse =
+            upper.solve_upper_triangular(&DMatrix::identity(upper.nrows(), upper.ncols()))?;
+        let shares = orthonormal.tr_mul(&self.columns);
+        let mut residual = self.columns.clone();
+        residual.gemm(-1.0, &orthonormal, &shares, 1.0);
+        let square_sum = residual.norm_squared();
+        square_sum.is_finite().then(|| Evaluation {
+            poles: poles.to_vec(),
+            square_sum,
+            amplitudes: &inverse * shares,
+            residual,
+            inverse,
+            orthonormal,
+        })
+    }
+
+    /// Returns the slopes of the residual at an evaluation.
+    pub fn slopes(&self, at: &Evaluation) -> Slopes {
+        let mut raw = self.lines.slopes(&at.poles);
+        self.fixed.project(&mut raw);
+        let along = at.orthonormal.tr_mul(&raw);
+        raw.gemm(-1.0, &at.orthonormal, &along, 1.0);
+        let products = raw.tr_mul(&raw);
+        let with_residual = raw.tr_mul(&at.residual);
+        let mixes = mixes(&at.amplitudes);
+        let parameters = mixes.len();
+        let mut information = DMatrix::zeros(parameters, parameters);
+        let mut gradient = DVector::zeros(parameters);
+        for (a, left) in mixes.iter().enumerate() {
+            let rows = with_residual.rows(2 * (a / 2), 2);
+            gradient[a] = rows.component_mul(left).sum();
+            for (b, right) in mixes.iter().enumerate().take(a + 1) {
+                let weights = left * right.transpose();
+                let block = products.view((2 * (a / 2), 2 * (b / 2)), (2, 2));
+                let value = block.component_mul(&weights).sum();
+                information[(a, b)] = value;
+                information[(b, a)] = value;
+            }
+        }
+        let back = &at.inverse * along;
+        let amplitude_slopes = mixes
+            .iter()
+            .enumerate()
+            .map(|(a, mix)| -(back.columns(2 * (a / 2), 2) * mix))
+            .collect();
+        Slopes {
+            information,
+            gradient,
+            amplitude_slopes,
+        }
+    }
+
+    /// Minimises the residual by Levenberg and Marquardt's method, from `start`, with `most` steps at most.
+    ///
+    /// `freedom` are the degrees of freedom of the residual. `None` where the poles' columns or their
+    /// slopes are not independent.
+    pub fn search(
+        &self,
+        start: &[Complex64],
+        freedom: f64,
+        most: usize,
+    ) -> Option<(Evaluation, StopReason)> {
+        let mut at = self.evaluate(start)?;
+        let mut damping = 1e-4;
+        for _ in 0..most {
+            let slopes = self.slopes(&at);
+            // Standard deviations are sqrt(s^2 (J'J)^-1): this is the squared step in their unit.
+            let variance = at.square_sum / freedom.max(1.0);
+            let floor = 1e-24 * self.columns.norm_squared();
+            let full = slopes.information.clone().cholesky()?;
+            let decrease = slopes.gradient.dot(&full.solve(&slopes.gradient));
+            let near = decrease <= 1e-6 * variance || decrease <= floor;
+            match self.step(&at, &slopes, &mut damping) {
+                Some(next) => at = next,
+                None if near => return Some((at, StopReason::Converged)),
+                None => return Some((at, StopReason::NoBetterStep)),
+            }
+            if near {
+                return Some((at, StopReason::Converged));
+            }
+        }
+        Some((at, StopReason::StepLimit))
+    }
+
+    /// Takes the first step that makes the residual smaller, with more and more damping.
+    fn step(&self, at: &Evaluation, slopes: &Slopes, damping: &mut f64) -> Option<Evaluation> {
+        const TRIALS: usize = 12;
+        for _ in 0..TRIALS {
+            let mut matrix = slopes.information.clone();
+            for i in 0..matrix.nrows() {
+                matrix[(i, i)] *= 1.0 + *damping;
+            }
+            let step = matrix
+                .cholesky()
+                .map(|factor| factor.solve(&slopes.gradient));
+            let next = step.and_then(|step| self.evaluate(&moved(&at.poles, &step)?));
+            if let Some(next) = next.filter(|next| next.square_sum <= at.square_sum) {
+                *damping = (*damping * 0.1).max(1e-12);
+                return Some(next);
+            }
+            *damping *= 10.0;
+        }
+        None
+    }
+}
+
+/// Returns the poles after a step; `None` where one would leave the upper half plane.
+fn moved(poles: &[Complex64], step: &DVector<f64>) -> Option<Vec<Complex64>> {
+    poles
+        .iter()
+        .enumerate()
+        .map(|(k, pole)| {
+            let next = pole + Complex64::new(-step[2 * k + 1], step[2 * k]);
+            (next.is_finite() && next.im > 0.0).then_some(next)
+        })
+        .collect()
+}
+
+/// Weights by which a pole's slope columns u and v form the change of the model, for each parameter.
+///
+/// Rows are u, v; columns those of the data. Position: -b2, b1. Decay: -b1, -b2.
+fn mixes(amplitudes: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
+    let columns = amplitudes.ncols();
+    (0..amplitudes.nrows())
+        .map(|parameter| {
+            let first = parameter - parameter % 2;
+            let (b1, b2) = (amplitudes.row(first), amplitudes.row(first + 1));
+            DMatrix::from_fn(2, columns, |row, column| match (parameter % 2, row) {
+                (0, 0) => -b2[column],
+                (0, _) => b1[column],
+                (_, 0) => -b1[column],
+                (_, _) => -b2[column],
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::modal::fit::Column;
+
+    fn lines(basis: Basis) -> Lines {
+        let frequencies: Vec<f64> = (20..40).map(f64::from).collect();
+        let values = vec![Complex64::ONE; frequencies.len()];
+        let column = Column {
+            tap: 0,
+            sensor: 0,
+            values,
+        };
+        let data = ModalData::new(basis, frequencies, vec![column]).unwrap();
+        Lines::new(&data, 0..20, usize::MAX)
+    }
+
+    const DECAY: Basis = Basis::FreeDecay {
+        sample_rate: 100.0,
+        samples: 100,
+    };
+    const RESPONSE: Basis = Basis::FrequencyResponse { resolution: 1.0 };
+
+    #[test]
+    fn limit_the_model_is_the_transform_of_a_sampled_decay() {
+        let (pole, amplitude) = (Complex64::new(-0.2, 30.3), Complex64::new(0.7, -1.1));
+        let lines = lines(DECAY);
+        // b = a (1 - e^{pT})/(2 2 pi df), all in lines; df = 1 Hz, T = 1 s.
+        let b = amplitude * (1.0 - (TAU * pole).exp()) / (2.0 * TAU);
+        let model = lines.model(&[pole]);
+        for (row, m) in lines.positions.iter().enumerate() {
+            let transform: Complex64 = (0..100)
+                .map(|n| {
+                    let time = f64::from(n) / 100.0;
+                    let x = (amplitude * (TAU * pole * time).exp()).re;
+                    x * Complex64::from_polar(0.01, -TAU * m * time)
+                })
+                .sum();
+            let imaginary = row + lines.count();
+            let fitted = Complex64::new(
+                b.re * model[(row, 0)] + b.im * model[(row, 1)],
+                b.re * model[(imaginary, 0)] + b.im * model[(imaginary, 1)],
+            );
+            // Rounding of a sum of a hundred terms.
+            assert!((fitted - transform).norm() < 1e-12, "line {m}");
+        }
+    }
+
+    #[test]
+    fn prop_the_slopes_are_differences_of_the_model() {
+        let pole = Complex64::new(-0.4, 29.6);
+        let step = 1e-6;
+        for basis in [DECAY, RESPONSE] {
+            let lines = lines(basis);
+            let slopes = lines.slopes(&[pole]);
+            let difference = |by: Complex64| {
+                (lines.model(&[pole + by]) - lines.model(&[pole - by])) / (2.0 * step)
+            };
+            let position = difference(Complex64::new(0.0, step));
+            let decay = difference(Complex64::new(-step, 0.0));
+            let (u, v) = (slopes.column(0), slopes.column(1));
+            // Second differences of order one over the step squared: 10^-9 at most.
+            for (found, expected) in [
+                (position.column(0), v.into_owned()),
+                (position.column(1), -u.into_owned()),
+                (decay.column(0), -u.into_owned()),
+                (decay.column(1), -v.into_owned()),
+            ] {
+                assert!((found - expected).norm() < 1e-7, "{basis:?}");
+            }
+        }
+    }
+}

@@ -305,3 +305,8 @@ pub fn capital(text: &str) -> String {
     let first = letters.next().map(|c| c.to_uppercase().to_string());
     first.unwrap_or_default() + letters.as_str()
 }
+
+/// What there is, or the sign of what is missing.
+pub fn or_missing(value: Option<impl ToString>) -> String {
+    value.map_or_else(|| MISSING.to_owned(), |value| value.to_string())
+}

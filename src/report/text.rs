@@ -105,11 +105,7 @@ pub fn frfs(document: &Document) -> String {
 pub fn estimate(document: &Document) -> String {
     match &document.estimate {
         None => String::new(),
-        Some(None) => {
-            let reason = document.estimate_reason.as_deref();
-            let reason = reason.unwrap_or("no reason was recorded");
-            wrapped(&format!("No estimate: {reason}."), 0)
-        }
+        Some(None) => wrapped(&format!("No estimate: {}.", document.no_estimate()), 0),
         Some(Some(found)) => {
             let mut text = table_or_nothing(tables::parameters(document));
             if let Some(methods) = tables::methods(document) {

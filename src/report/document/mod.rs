@@ -146,6 +146,12 @@ impl Document {
         kind != Some("free")
     }
 
+    /// Why there is no estimate.
+    pub fn no_estimate(&self) -> &str {
+        let reason = self.estimate_reason.as_deref();
+        reason.unwrap_or("no reason was recorded")
+    }
+
     /// The warnings that concern the result itself.
     pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
         of_the_result(&self.warnings).into_iter()

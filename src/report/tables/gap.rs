@@ -1,7 +1,7 @@
 //! Tables of the diagnosis: what may be missing in the model, and what to do next.
 
 use super::super::document::{Baseline, Document, GapSection};
-use super::super::format::{MISSING, probability, significant};
+use super::super::format::{MISSING, or_missing, probability, significant};
 use super::super::words::gap::{
     EQUALLY_LIKELY, LEAST_PROBABILITY, confirms, left, names, not_predicted, percent, sizes,
     together, unit_of,
@@ -119,7 +119,7 @@ fn told_apart(found: &HypothesisResult) -> String {
     let is_pair = matches!(&found.hypothesis, Hypothesis::Effects(effects) if effects.len() > 1);
     let mut parameters = found.parameters.iter().filter(|_| !is_pair);
     let least = parameters.find_map(least);
-    least.unwrap_or_else(|| MISSING.to_owned())
+    or_missing(least)
 }
 
 /// How many hypotheses that cannot be told from one are named; report.json has them all.

@@ -6,7 +6,8 @@ use super::super::document::{
 };
 use super::super::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
-    rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words, with_decimals_of,
+    or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
+    with_decimals_of,
 };
 use super::{Column, Table, bound_of, coherence, mode_name, mode_of, number, words};
 use tapjoint_signal::modal::fit::UncertaintySource;
@@ -243,7 +244,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
             UncertaintySource::TapScatter => "taps",
         })
         .to_owned(),
-        line.unwrap_or_else(|| MISSING.into()),
+        or_missing(line),
         damping(mode),
         optional(tap_deviation(mode), 2),
         optional(scatter, 2),
@@ -252,7 +253,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
         optional(mode.above_noise_db, 2),
         coherence(mode.coherence),
         optional(mode.random_error.map(|error| 100.0 * error), 2),
-        mode.recording.clone().unwrap_or_else(|| MISSING.into()),
+        or_missing(mode.recording.clone()),
     ]
 }
 
@@ -419,7 +420,7 @@ fn function_row(
         trimmed(found.frequency, 6),
         optional(found.magnitude, 4),
         unit,
-        found.phase.map_or(MISSING.to_owned(), phase),
+        or_missing(found.phase.map(phase)),
         coherence(found.coherence),
         optional(found.random_error.map(|error| 100.0 * error), 2),
     ]
@@ -497,6 +498,6 @@ fn compared_frequencies(document: &Document, row: &PredictionSection) -> [String
     [
         hertz(row.measured),
         hertz(row.predicted),
-        percent.map_or(MISSING.into(), bound_percent),
+        or_missing(percent.map(bound_percent)),
     ]
 }

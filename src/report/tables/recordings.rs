@@ -3,47 +3,52 @@
 use super::super::document::{
     ChannelSection, DatasetSection, Document, RecordingSection, TapSection,
 };
-use super::super::format::{MISSING, optional, significant, trimmed, unit_words};
+use super::super::format::{MISSING, optional, or_missing, significant, trimmed, unit_words};
 use super::{Table, number, words};
 
-/// Where taps and sensors were, and under what conditions: beside the spectra's columns these would
-/// need a page wider than a screen.
-const CONDITIONS: [&str; 6] = [
-    "Tap at (m)",
-    "Sensors at (m)",
-    "Fastened",
-    "Torque (N m)",
-    "Temperature (°C)",
-    "Date",
-];
-
-/// One row for each recording; `None` without recordings.
+/// One row for each recording, with its spectra; `None` without recordings.
 pub fn recordings(document: &Document) -> Option<Table> {
-    Some(all_columns(document)?.without_columns(|name| CONDITIONS.contains(&name)))
-}
-
-/// Where taps and sensors were in each recording, and under what conditions; `None` where nothing of it
-/// is stated.
-pub fn conditions(document: &Document) -> Option<Table> {
-    let kept = |name: &str| name == "Recording" || CONDITIONS.contains(&name);
-    let table = all_columns(document)?.without_columns(|name| !kept(name));
-    (table.columns.len() > 1).then(|| Table {
-        caption: "Where and how each was recorded".to_owned(),
-        note: String::new(),
-        ..table
-    })
-}
-
-fn all_columns(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
     let transformed = recordings.iter().any(|r| r.line_spacing.is_some());
+    let (caption, note) = match transformed {
+        true => (
+            "Recordings and their spectra",
+            "Spacing: distance of the spectral lines. 1/T: resolution, T the length of signal \
+             used. Block: samples at the rate of the zoomed band. Left at end: level at the \
+             record's end relative to its start.",
+        ),
+        false => ("Recordings", ""),
+    };
+    let row = |recording: &RecordingSection| {
+        let used = recording.taps.iter().filter(|tap| tap.accepted).count();
+        vec![
+            recording.file.clone(),
+            recording.format.clone(),
+            or_missing(recording.sample_rate.map(|rate| trimmed(rate, 8))),
+            exact(recording.seconds),
+            recording.channels.to_string(),
+            match (recording.sample_rate, recording.taps.len()) {
+                // Functions from a file: of their taps nothing is known.
+                (None, 0) => MISSING.to_owned(),
+                (_, all) => format!("{used} of {all}"),
+            },
+            or_missing(recording.block),
+            or_missing(recording.lines),
+            or_missing(
+                recording
+                    .band
+                    .map(|[low, high]| format!("{} to {}", trimmed(low, 6), trimmed(high, 6))),
+            ),
+            exact(recording.line_spacing),
+            exact(recording.resolution),
+            exact(recording.half_line),
+            or_missing(recording.window.clone()),
+            optional(recording.window_decay, 3),
+            optional(recording.remaining_at_end.map(|level| 100.0 * level), 2),
+        ]
+    };
     let table = Table {
-        caption: if transformed {
-            "Recordings and their spectra"
-        } else {
-            "Recordings"
-        }
-        .to_owned(),
+        caption: caption.to_owned(),
         columns: vec![
             words("Recording"),
             words("Format").on_page_if(transformed),
@@ -60,6 +65,39 @@ fn all_columns(document: &Document) -> Option<Table> {
             words("Window"),
             number("Window's decay (1/s)").on_page(),
             number("Left at end (%)").on_page(),
+        ],
+        rows: recordings.iter().map(row).collect(),
+        note: note.to_owned(),
+    };
+    Some(table.without_empty_columns())
+}
+
+/// Where taps and sensors were in each recording, and under what conditions: beside the spectra's columns these would
+/// need a page wider than a screen. `None` where nothing of it is stated.
+pub fn conditions(document: &Document) -> Option<Table> {
+    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+    let row = |recording: &RecordingSection| {
+        let sensors = recording.sensor_positions.iter();
+        let sensors = sensors.map(|(name, position)| format!("{name} {}", trimmed(*position, 4)));
+        let masses = recording.masses.iter();
+        let masses = masses.map(|one| {
+            let grams = significant(1e3 * one.mass, 4);
+            format!("{grams} g at {} m", trimmed(one.position, 4))
+        });
+        vec![
+            recording.file.clone(),
+            exact(recording.tap),
+            listed(sensors.collect()),
+            listed(masses.collect()),
+            exact(recording.torque),
+            exact(recording.temperature),
+            or_missing(recording.date.clone()),
+        ]
+    };
+    let table = Table {
+        caption: "Where and how each was recorded".to_owned(),
+        columns: vec![
+            words("Recording"),
             number("Tap at (m)").on_page(),
             words("Sensors at (m)").on_page(),
             words("Fastened").on_page(),
@@ -67,93 +105,20 @@ fn all_columns(document: &Document) -> Option<Table> {
             number("Temperature (°C)").on_page(),
             words("Date").on_page(),
         ],
-        rows: recordings.iter().map(recording_row).collect(),
-        note: if transformed {
-            "Spacing: distance of the spectral lines. 1/T: resolution, T the length of signal \
-             used. Block: samples at the rate of the zoomed band. Left at end: level at the \
-             record's end relative to its start."
-        } else {
-            ""
-        }
-        .to_owned(),
+        rows: recordings.iter().map(row).collect(),
+        note: String::new(),
     };
-    Some(table.without_empty_columns())
-}
-
-fn recording_row(recording: &RecordingSection) -> Vec<String> {
-    let used = recording.taps.iter().filter(|tap| tap.accepted).count();
-    let count = |value: Option<usize>| value.map_or(MISSING.to_owned(), |v| v.to_string());
-    vec![
-        recording.file.clone(),
-        recording.format.clone(),
-        recording
-            .sample_rate
-            .map_or(MISSING.into(), |rate| trimmed(rate, 8)),
-        recording
-            .seconds
-            .map_or(MISSING.into(), |seconds| trimmed(seconds, 4)),
-        recording.channels.to_string(),
-        match (recording.sample_rate, recording.taps.len()) {
-            // Functions from a file: of their taps nothing is known.
-            (None, 0) => MISSING.to_owned(),
-            (_, all) => format!("{used} of {all}"),
-        },
-        count(recording.block),
-        count(recording.lines),
-        band(recording.band),
-        exact(recording.line_spacing),
-        exact(recording.resolution),
-        exact(recording.half_line),
-        recording.window.clone().unwrap_or_else(|| MISSING.into()),
-        optional(recording.window_decay, 3),
-        optional(recording.remaining_at_end.map(|level| 100.0 * level), 2),
-        exact(recording.tap),
-        places(recording),
-        fastened(recording),
-        exact(recording.torque),
-        exact(recording.temperature),
-        recording.date.clone().unwrap_or_else(|| MISSING.into()),
-    ]
+    Some(table.without_empty_columns()).filter(|table| table.columns.len() > 1)
 }
 
 /// "A 0.338, B 0.205".
-fn places(recording: &RecordingSection) -> String {
-    let places: Vec<String> = recording
-        .sensor_positions
-        .iter()
-        .map(|(name, position)| format!("{name} {}", trimmed(*position, 4)))
-        .collect();
-    if places.is_empty() {
-        MISSING.to_owned()
-    } else {
-        places.join(", ")
-    }
-}
-
-/// "15 g at 0.423 m".
-fn fastened(recording: &RecordingSection) -> String {
-    let masses = recording.masses.iter();
-    let masses = masses.map(|one| {
-        let grams = significant(1e3 * one.mass, 4);
-        format!("{grams} g at {} m", trimmed(one.position, 4))
-    });
-    let masses: Vec<String> = masses.collect();
-    if masses.is_empty() {
-        MISSING.to_owned()
-    } else {
-        masses.join(", ")
-    }
+fn listed(parts: Vec<String>) -> String {
+    or_missing((!parts.is_empty()).then(|| parts.join(", ")))
 }
 
 /// A setting.
 fn exact(value: Option<f64>) -> String {
-    value.map_or(MISSING.to_owned(), |value| trimmed(value, 4))
-}
-
-fn band(band: Option<[f64; 2]>) -> String {
-    band.map_or(MISSING.to_owned(), |[low, high]| {
-        format!("{} to {}", trimmed(low, 6), trimmed(high, 6))
-    })
+    or_missing(value.map(|value| trimmed(value, 4)))
 }
 
 /// One row for each channel; `None` without recordings.
@@ -278,7 +243,7 @@ fn tap_row(recording: &RecordingSection, number: usize, tap: &TapSection) -> Vec
         recording.file.clone(),
         number.to_string(),
         format!("{:.3}", tap.time),
-        peak(tap).map_or(MISSING.to_owned(), |peak| significant(peak, 3)),
+        or_missing(peak(tap).map(|peak| significant(peak, 3))),
         peak_unit(recording),
         if tap.accepted { "yes" } else { "no" }.to_owned(),
         tap.reason.clone().unwrap_or_default(),
@@ -332,11 +297,9 @@ pub fn taps_used(document: &Document) -> Option<Table> {
 
 fn used_row(recording: &RecordingSection) -> Vec<String> {
     let used: Vec<&TapSection> = recording.taps.iter().filter(|tap| tap.accepted).collect();
-    let time = |tap: Option<&&TapSection>| {
-        tap.map_or(MISSING.to_owned(), |tap| format!("{:.3}", tap.time))
-    };
+    let time = |tap: Option<&&TapSection>| or_missing(tap.map(|tap| format!("{:.3}", tap.time)));
     let peaks = || used.iter().filter_map(|tap| peak(tap));
-    let written = |peak: Option<f64>| peak.map_or(MISSING.to_owned(), |peak| significant(peak, 3));
+    let written = |peak: Option<f64>| or_missing(peak.map(|peak| significant(peak, 3)));
     vec![
         recording.file.clone(),
         format!("{} of {}", used.len(), recording.taps.len()),
@@ -376,7 +339,6 @@ pub fn datasets(document: &Document) -> Option<Table> {
 }
 
 fn dataset_row(dataset: &DatasetSection, several: bool) -> Vec<String> {
-    let words = |text: &Option<String>| text.clone().unwrap_or_else(|| MISSING.to_owned());
     let step = match (dataset.spacing, &dataset.spacing_unit) {
         (Some(step), Some(unit)) => format!("{} {unit}", trimmed(step, 6)),
         (Some(step), None) => trimmed(step, 6),
@@ -385,7 +347,7 @@ fn dataset_row(dataset: &DatasetSection, several: bool) -> Vec<String> {
     };
     let unit = match (&dataset.unit, &dataset.denominator_unit) {
         (Some(above), Some(below)) => format!("({above})/({below})"),
-        (above, _) => words(above),
+        (above, _) => or_missing(above.clone()),
     };
     vec![
         if several {
@@ -395,15 +357,13 @@ fn dataset_row(dataset: &DatasetSection, several: bool) -> Vec<String> {
         },
         dataset.dataset.to_string(),
         dataset.kind.clone(),
-        dataset
-            .points
-            .map_or(MISSING.to_owned(), |points| points.to_string()),
+        or_missing(dataset.points),
         step,
-        words(&dataset.response),
-        words(&dataset.reference),
+        or_missing(dataset.response.clone()),
+        or_missing(dataset.reference.clone()),
         unit,
-        words(&dataset.values),
-        words(&dataset.coding),
-        words(&dataset.description),
+        or_missing(dataset.values.clone()),
+        or_missing(dataset.coding.clone()),
+        or_missing(dataset.description.clone()),
     ]
 }

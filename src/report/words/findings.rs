@@ -33,64 +33,88 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
 }
 
 fn taps_in_short(document: &Document) -> Option<String> {
-    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
-    let files = match recordings.len() {
-        1 => "1 recording".to_owned(),
-        count => format!("{count} recordings"),
-    };
-    // Functions from a file have no taps to judge.
-    if recordings
-        .iter()
-        .all(|recording| recording.sample_rate.is_none())
-    {
-        return Some(format!("none: {files} of frequency response functions"));
+    let found = TapCount::of(document)?;
+    if found.of_functions {
+        return Some(format!(
+            "none: {} of frequency response functions",
+            found.files
+        ));
     }
-    let all = recordings.iter().flat_map(|recording| &recording.taps);
-    let used = all.clone().filter(|tap| tap.accepted).count();
-    let could = if document.modes.is_some() {
-        "used"
-    } else {
-        "can be used"
+    let could = match document.modes {
+        Some(_) => "used",
+        None => "can be used",
     };
     // Without a hammer it matters on what taps were looked for.
     let channels = channels(document).map_or(String::new(), |words| format!(". {words}"));
     Some(format!(
-        "{used} of {} taps {could}, in {files}{channels}",
-        all.count()
+        "{} of {} taps {could}, in {}{channels}",
+        found.used, found.total, found.files
     ))
 }
 
+/// Taps of all recordings.
+struct TapCount {
+    /// "2 recordings".
+    files: String,
+    /// Whether the files hold nothing but frequency response functions, which have no taps to judge.
+    of_functions: bool,
+    total: usize,
+    used: usize,
+}
+
+impl TapCount {
+    fn of(document: &Document) -> Option<TapCount> {
+        let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+        let taps = recordings.iter().flat_map(|recording| &recording.taps);
+        Some(TapCount {
+            files: match recordings.len() {
+                1 => "1 recording".to_owned(),
+                count => format!("{count} recordings"),
+            },
+            of_functions: recordings.iter().all(|one| one.sample_rate.is_none()),
+            total: taps.clone().count(),
+            used: taps.filter(|tap| tap.accepted).count(),
+        })
+    }
+}
+
 fn modes_in_short(document: &Document) -> Option<String> {
-    let modes = document.modes.as_deref()?;
-    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
-    let frequencies: Vec<f64> = numbered.map(|mode| mode.frequency).collect();
-    let low = frequencies.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = frequencies.iter().copied().fold(0.0, f64::max);
-    Some(match frequencies.len() {
+    let (count, range) = numbered(document.modes.as_deref()?);
+    Some(match count {
         0 => "none".to_owned(),
-        1 => format!("1 mode at {} Hz", significant(low, 4)),
-        count => format!(
-            "{count} modes from {} to {} Hz",
-            significant(low, 4),
-            significant(high, 4)
-        ),
+        1 => format!("1 mode {range}"),
+        count => format!("{count} modes {range}"),
     })
+}
+
+/// The number of modes, and where they are: "from 17.00 to 994.2 Hz".
+fn numbered(modes: &[ModeSection]) -> (usize, String) {
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let frequencies = || numbered.clone().map(|mode| mode.frequency);
+    let low = significant(frequencies().fold(f64::INFINITY, f64::min), 4);
+    let range = match frequencies().count() {
+        1 => format!("at {low} Hz"),
+        _ => {
+            let high = significant(frequencies().fold(0.0, f64::max), 4);
+            format!("from {low} to {high} Hz")
+        }
+    };
+    (frequencies().count(), range)
 }
 
 fn joint(document: &Document) -> Option<String> {
     let Some(estimate) = document.estimate.as_ref()? else {
-        let reason = document.estimate_reason.as_deref();
-        return Some(format!(
-            "no estimate: {}",
-            reason.unwrap_or("no reason was recorded")
-        ));
+        return Some(format!("no estimate: {}", document.no_estimate()));
     };
-    let physical: Vec<String> = estimated(estimate)
-        .iter()
-        .filter(|parameter| parameter.unit != "1")
-        .map(with_bounds)
-        .collect();
+    let physical = physical(estimate, with_bounds);
     (!physical.is_empty()).then(|| physical.join(", "))
+}
+
+/// The parameters that have a unit, in words.
+fn physical(estimate: &EstimateSection, words: fn(&Parameter<'_>) -> String) -> Vec<String> {
+    let all = estimated(estimate);
+    let physical = all.iter().filter(|parameter| parameter.unit != "1");
+    physical.map(words).collect()
 }
 
 /// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
@@ -188,28 +212,23 @@ fn amplitudes(document: &Document) -> Vec<String> {
 }
 
 fn taps(document: &Document) -> Option<String> {
-    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
-    let all: Vec<_> = recordings.iter().flat_map(|r| &r.taps).collect();
-    let used = all.iter().filter(|tap| tap.accepted).count();
-    let files = counted(recordings.len(), "recording");
-    // Functions from a file have no samples in time.
-    let functions = recordings
-        .iter()
-        .all(|recording| recording.sample_rate.is_none());
-    let total = all.len();
+    let TapCount {
+        files,
+        of_functions,
+        total,
+        used,
+    } = TapCount::of(document)?;
     let found = match total {
         1 => format!("1 tap was found in {files}"),
         count => format!("{count} taps were found in {files}"),
     };
     // Of recordings that were only looked at, nothing was used yet.
-    let were_used = if document.modes.is_none() {
-        ["can be used"; 2]
-    } else {
-        ["was used", "were used"]
+    let [was_used, were_used] = match document.modes {
+        None => ["can be used"; 2],
+        Some(_) => ["was used", "were used"],
     };
-    let [was_used, were_used] = were_used;
     Some(match (total, used) {
-        (0, _) if functions => {
+        (0, _) if of_functions => {
             format!("{files} of frequency response functions: there are no taps to judge.")
         }
         (0, _) => format!("No taps were found in {files}."),
@@ -223,12 +242,6 @@ fn taps(document: &Document) -> Option<String> {
             format!("{used} of {total} taps in {files} {were_used}, {rejected} {were} rejected.")
         }
     })
-}
-
-/// "1 recording", "3 recordings".
-fn counted(count: usize, word: &str) -> String {
-    let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {word}{ending}")
 }
 
 /// On what taps were looked for where there is no hammer.
@@ -255,28 +268,18 @@ fn channels(document: &Document) -> Option<String> {
 
 fn modes(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref()?;
-    let numbered: Vec<f64> = modes
-        .iter()
-        .filter(|mode| mode.mode.is_some())
-        .map(|mode| mode.frequency)
-        .collect();
+    let (count, range) = numbered(modes);
     let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == ReadBy::Given);
     let found = if given { "given" } else { "found" };
     let described = document.test.iter().any(|test| test.kind.is_some());
     let word = if described { "mode" } else { "resonance" };
-    let low = numbered.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = numbered.iter().copied().fold(0.0, f64::max);
-    let mut sentence = match numbered.len() {
+    let mut sentence = match count {
         0 => format!("No {word}s were {found}"),
-        1 => format!("1 {word} was {found}, at {} Hz", significant(low, 4)),
-        count => format!(
-            "{count} {word}s were {found}, from {} to {} Hz",
-            significant(low, 4),
-            significant(high, 4)
-        ),
+        1 => format!("1 {word} was {found}, {range}"),
+        count => format!("{count} {word}s were {found}, {range}"),
     };
     let finest = finest(document.recordings.as_deref().unwrap_or_default());
-    if let Some(half_line) = finest.filter(|_| !numbered.is_empty()) {
+    if let Some(half_line) = finest.filter(|_| count > 0) {
         let half_line = trimmed(half_line, 3);
         sentence.push_str(&format!(
             "; a reading on a spectral line is good to \u{b1}{half_line} Hz at best"
@@ -322,15 +325,12 @@ fn finest(recordings: &[RecordingSection]) -> Option<f64> {
 
 fn estimate(document: &Document) -> Option<String> {
     let Some(estimate) = document.estimate.as_ref()? else {
-        let reason = document.estimate_reason.as_deref();
-        let reason = reason.unwrap_or("no reason was recorded");
-        return Some(format!("No stiffness was estimated: {reason}."));
+        return Some(format!(
+            "No stiffness was estimated: {}.",
+            document.no_estimate()
+        ));
     };
-    let physical: Vec<String> = estimated(estimate)
-        .iter()
-        .filter(|parameter| parameter.unit != "1")
-        .map(stiffness)
-        .collect();
+    let physical = physical(estimate, stiffness);
     if physical.is_empty() {
         return None;
     }

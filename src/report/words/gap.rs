@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::super::document::{Document, GapSection};
 use super::super::format::{
-    MISSING, RIGID, prefix, probability, rounded, signed_percent, significant, trimmed,
+    RIGID, or_missing, prefix, probability, rounded, signed_percent, significant, trimmed,
 };
 use tapjoint_beam::effects::{EffectId, Place};
 use tapjoint_diagnosis::{
@@ -682,7 +682,7 @@ pub(crate) fn left(error: Option<f64>, noise: Option<f64>) -> String {
 
 /// A value in percent with two digits.
 pub(crate) fn percent(value: Option<f64>) -> String {
-    value.map_or_else(|| MISSING.to_owned(), |value| significant(value, 2))
+    or_missing(value.map(|value| significant(value, 2)))
 }
 
 #[cfg(test)]

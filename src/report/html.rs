@@ -5,8 +5,8 @@ use askama::Template;
 use super::ReportError;
 use super::document::{Document, RecordingSection, TestSection, WarningSection};
 use super::format::{significant, trimmed};
-use super::summary::sentences;
 use super::tables::{self, Table};
+use super::words::findings::sentences;
 
 /// A picture inside the page.
 #[derive(Debug, Clone, PartialEq)]

@@ -100,10 +100,10 @@ fn crisp(position: f64) -> f64 {
     position.floor() + 0.5
 }
 
-/// Entries of the legend so far: nothing is explained twice.
+/// Names in the legend so far: nothing is explained twice.
 #[derive(Default)]
 struct Legend {
-    listed: Vec<(Mark, Color)>,
+    listed: Vec<String>,
 }
 
 impl Legend {
@@ -170,16 +170,15 @@ impl Legend {
             let words = format!("{} more without a label, see the table", layout.unnamed);
             entries.push((dashes, Color::Soft, words));
         }
+        let mut looks: Vec<(Mark, Color)> = Vec::new();
         entries.retain(|(mark, color, words)| {
-            let kind = std::mem::discriminant(mark);
-            let listed = self
-                .listed
-                .iter()
-                .any(|(other, listed)| std::mem::discriminant(other) == kind && listed == color);
-            if !words.is_empty() && !listed {
-                self.listed.push((*mark, *color));
+            let named = !words.is_empty() && !self.listed.contains(words);
+            let kept = named && !looks.contains(&(*mark, *color));
+            if kept {
+                self.listed.push(words.clone());
+                looks.push((*mark, *color));
             }
-            !words.is_empty() && !listed
+            kept
         });
         entries
     }

@@ -1,19 +1,8 @@
 //! How far the recordings of one test are apart, beyond what each frequency's own uncertainty explains.
 
-use super::analysis::ModeResult;
+use super::analysis::{BetweenRecordings, ModeResult};
 use tapjoint_numerics::stats::chi_square_quantile;
 use tapjoint_signal::modal::ModeReading;
-
-/// One mode in the recordings of one configuration.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BetweenRecordings {
-    /// Variance of its frequency between the recordings, sum (f - mean)^2/(n - 1), over the mean's square (1).
-    pub variance: f64,
-    /// What the readings' own standard uncertainties make of that, over the same (1).
-    pub own: f64,
-    /// Recordings less one.
-    pub freedom: usize,
-}
 
 /// From the readings of one mode that have an uncertainty; `None` below two.
 pub(super) fn between(readings: &[ModeReading]) -> Option<BetweenRecordings> {

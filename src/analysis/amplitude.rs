@@ -4,11 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::cmp::Ordering;
 use std::fmt;
-
-use super::Warning;
-use crate::analysis::RecordingResult;
 use tapjoint_numerics::stats::median;
-use tapjoint_signal::modal::ModeReading;
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
 
 /// A change of the frequency below this share is not worth a word: 0.01 %, a fifth of the smallest
@@ -41,20 +37,17 @@ pub struct AmplitudeChange {
 }
 
 impl AmplitudeChange {
-    /// The change of a fitted mode where it is beyond its uncertainty and large enough to matter.
-    pub fn of(reading: &ModeReading, recording: &RecordingResult) -> Option<AmplitudeChange> {
-        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+    /// The change of a mode's curve where it is beyond its uncertainty and large enough to matter, its amplitude
+    /// without a unit.
+    pub(super) fn of(curve: &AmplitudeCurve) -> Option<AmplitudeChange> {
         if curve.verdict != AmplitudeVerdict::Changes {
             return None;
         }
         let known = well_known(curve);
         let ends = [known.first()?, known.last()?];
-        let response = curve
-            .sensor
-            .and_then(|sensor| recording.responses.get(sensor));
         let change = AmplitudeChange {
             amplitude: ends.map(|end| end.amplitude),
-            unit: response.and_then(|response| response.unit.clone()),
+            unit: None,
             frequency: ends.map(|end| end.frequency),
             frequency_bound: ends.map(|end| end.frequency_bound),
             damping_ratio: ends.map(|end| end.damping_ratio),
@@ -144,7 +137,7 @@ fn damping_moves(values: [f64; 2], bounds: [f64; 2]) -> String {
 
 /// Which way a mode goes with the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+pub(super) enum Way {
     /// Softer, or more damped, the harder it is driven.
     Slips,
     /// Stiffer the harder it is driven.
@@ -157,7 +150,7 @@ enum Way {
 
 impl AmplitudeChange {
     /// Change of the frequency and of the damping ratio as shares of them, 0 within their bounds; compared in this order.
-    fn size(&self) -> (f64, f64) {
+    pub(super) fn size(&self) -> (f64, f64) {
         let share = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
             true => ((values[1] - values[0]) / values[0]).abs(),
             false => 0.0,
@@ -169,7 +162,7 @@ impl AmplitudeChange {
     }
 
     /// By the signs of what changes beyond its bounds.
-    fn way(&self) -> Way {
+    pub(super) fn way(&self) -> Way {
         let sign = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
             true => values[0].total_cmp(&values[1]),
             false => Ordering::Equal,
@@ -219,75 +212,6 @@ fn decimals(value: f64) -> usize {
     (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
 }
 
-/// One warning for each way in which modes change, with the recording in which they change most.
-pub(crate) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<Warning> {
-    let of_recording = |recording: &RecordingResult| {
-        let spectra = recording.measurement.spectra.as_ref()?;
-        let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
-        let changes: Changes = numbered
-            .filter_map(|(reading, &mode)| Some((mode?, AmplitudeChange::of(reading, recording)?)))
-            .collect();
-        (!changes.is_empty()).then(|| (recording.file.clone(), changes))
-    };
-    by_way(recordings.iter().filter_map(of_recording).collect())
-}
-
-/// Numbers of modes, and how each changes.
-type Changes = Vec<(usize, AmplitudeChange)>;
-
-fn by_way(all: Vec<(String, Changes)>) -> Vec<Warning> {
-    let mut groups: Vec<(Way, Vec<(String, Changes)>)> = Vec::new();
-    for (file, changes) in all {
-        for (mode, change) in changes {
-            let way = change.way();
-            let place = groups.iter().position(|group| group.0 == way);
-            let place = place.unwrap_or_else(|| {
-                groups.push((way, Vec::new()));
-                groups.len() - 1
-            });
-            let own = &mut groups[place].1;
-            match own.last_mut().filter(|one| one.0 == file) {
-                Some(one) => one.1.push((mode, change)),
-                None => own.push((file.clone(), vec![(mode, change)])),
-            }
-        }
-    }
-    let warnings = groups
-        .into_iter()
-        .filter_map(|(_, group)| one_warning(group));
-    warnings.collect()
-}
-
-/// The recordings whose modes change in one way.
-fn one_warning(mut group: Vec<(String, Changes)>) -> Option<Warning> {
-    let most = |one: &(String, Changes)| {
-        let sizes = one.1.iter().map(|(_, change)| change.size());
-        sizes.fold(
-            (0.0, 0.0),
-            |most: (f64, f64), size| {
-                if size > most { size } else { most }
-            },
-        )
-    };
-    let (mut worst, mut size) = (0, most(group.first()?));
-    for (place, one) in group.iter().enumerate().skip(1) {
-        let own = most(one);
-        if own > size {
-            (worst, size) = (place, own);
-        }
-    }
-    let (file, changes) = group.remove(worst);
-    let modes = |changes: Changes| changes.into_iter().map(|(mode, _)| mode).collect();
-    let others = group
-        .into_iter()
-        .map(|(file, changes)| (file, modes(changes)));
-    Some(Warning::AmplitudeDependent {
-        file,
-        changes,
-        others: others.collect(),
-    })
-}
-
 pub(super) fn write_dependence(
     f: &mut fmt::Formatter<'_>,
     (file, changes): (&str, &[(usize, AmplitudeChange)]),
@@ -330,140 +254,5 @@ fn write_cause(f: &mut fmt::Formatter<'_>, changes: &[(usize, AmplitudeChange)])
     match changes.first() {
         Some((_, first)) => write!(f, "; {}", first.way().cause()),
         None => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn regress_a_change_in_words() {
-        let change = AmplitudeChange {
-            amplitude: [33.2, 2.31],
-            unit: Some("m/s2".into()),
-            frequency: [80.281, 80.543],
-            frequency_bound: [0.01, 0.02],
-            damping_ratio: [0.00283, 0.00149],
-            damping_bound: [0.0001, 0.0001],
-        };
-        let plain = |change: &AmplitudeChange| change.to_string().replace('\u{a0}', " ");
-        assert_eq!(
-            plain(&change),
-            "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude \
-             falls from 33 to 2.3 m/s\u{b2}"
-        );
-        let steady = AmplitudeChange {
-            damping_bound: [0.001, 0.001],
-            ..change
-        };
-        assert!(plain(&steady).contains("its damping stays near 0.2 %"));
-        let undamped = AmplitudeChange {
-            damping_ratio: [-0.000_12, -0.000_05],
-            damping_bound: [0.0002, 0.0002],
-            ..steady
-        };
-        assert!(plain(&undamped).contains("its damping stays below 0.020 %"));
-    }
-
-    /// A change of frequency and damping as the amplitude falls.
-    fn change(frequency: [f64; 2], damping_ratio: [f64; 2]) -> AmplitudeChange {
-        AmplitudeChange {
-            amplitude: [10.0, 1.0],
-            unit: None,
-            frequency,
-            frequency_bound: [0.01, 0.01],
-            damping_ratio,
-            damping_bound: [0.0001, 0.0001],
-        }
-    }
-
-    #[test]
-    fn regress_the_cause_follows_the_sign_of_the_change() {
-        let steady = [0.002, 0.002];
-        let cases = [
-            ([80.0, 80.5], steady, "softens and damps more"),
-            ([80.0, 80.0], [0.004, 0.002], "softens and damps more"),
-            ([80.5, 80.0], steady, "stiffens the harder"),
-            ([80.0, 80.0], [0.002, 0.004], "damped less the harder"),
-            ([80.0, 80.5], [0.002, 0.004], "softens but is damped less"),
-        ];
-        for (frequency, damping, cause) in cases {
-            let warning = Warning::AmplitudeDependent {
-                file: "a.wav".into(),
-                changes: vec![(1, change(frequency, damping))],
-                others: Vec::new(),
-            };
-            let text = warning.to_string();
-            assert!(text.contains(cause), "{frequency:?} {damping:?}: {text}");
-        }
-    }
-
-    #[test]
-    fn regress_a_cause_is_said_of_the_modes_that_go_its_way_alone() {
-        let softer = change([80.0, 80.5], [0.002, 0.002]);
-        let stiffer = change([500.5, 500.0], [0.002, 0.002]);
-        let text = |changes: Vec<(usize, AmplitudeChange)>| {
-            by_way(vec![("a.wav".into(), changes)])[0].to_string()
-        };
-        let alike = text(vec![(1, softer.clone()), (2, softer.clone())]);
-        assert!(
-            alike.contains("1 more mode changes with it; a joint"),
-            "{alike}"
-        );
-        let mixed = by_way(vec![(
-            "a.wav".into(),
-            vec![(1, softer.clone()), (2, softer), (3, stiffer)],
-        )]);
-        let texts: Vec<String> = mixed.iter().map(ToString::to_string).collect();
-        assert_eq!(texts.len(), 2, "{texts:?}");
-        let told = "1 more mode changes with it; a joint";
-        assert!(texts[0].contains(told), "{texts:?}");
-        let other = texts[1].starts_with("a.wav: mode 3 falls");
-        assert!(
-            other && texts[1].contains("stiffens the harder"),
-            "{texts:?}"
-        );
-    }
-
-    #[test]
-    fn regress_recordings_that_change_alike_are_one_warning() {
-        let softer = change([80.0, 80.5], [0.002, 0.002]);
-        let softest = change([79.0, 80.5], [0.002, 0.002]);
-        let stiffer = change([500.5, 500.0], [0.002, 0.002]);
-        let one = |file: &str, changes: &[(usize, &AmplitudeChange)]| {
-            let own = changes.iter().map(|&(mode, one)| (mode, one.clone()));
-            (file.to_owned(), own.collect())
-        };
-        let found = by_way(vec![
-            one("a.wav", &[(1, &softer), (2, &softer)]),
-            one("b.wav", &[(3, &stiffer)]),
-            one("c.wav", &[(1, &softest)]),
-            one("d.wav", &[(2, &softer), (3, &stiffer)]),
-        ]);
-        let texts: Vec<String> = found.iter().map(ToString::to_string).collect();
-        assert_eq!(texts.len(), 2, "{texts:?}");
-        assert!(texts[0].starts_with("c.wav: mode 1 rises"), "{}", texts[0]);
-        let also = "; the same in a.wav: modes 1, 2; d.wav: mode 2";
-        assert!(texts[0].ends_with(also), "{}", texts[0]);
-        assert!(texts[1].starts_with("b.wav: mode 3 falls"), "{}", texts[1]);
-        assert!(
-            texts[1].ends_with("; the same in d.wav: mode 3"),
-            "{}",
-            texts[1]
-        );
-    }
-
-    /// Whose frequency stays within its bounds is ranked by its damping, and not by noise.
-    #[test]
-    fn regress_modes_that_rub_are_ranked_by_their_damping() {
-        let little = change([80.0, 80.015], [0.002, 0.003]);
-        let much = change([80.0, 80.001], [0.002, 0.006]);
-        let found = by_way(vec![
-            ("a.wav".to_owned(), vec![(1, little)]),
-            ("b.wav".to_owned(), vec![(1, much)]),
-        ]);
-        assert_eq!(found.len(), 1);
-        assert!(found[0].to_string().starts_with("b.wav"), "{found:?}");
     }
 }

@@ -1,8 +1,34 @@
-//! What an earlier run may have left in a report's folder, so that nothing old stays beside what is new.
+//! `report.json`: its text, its schema, and what it says of the files of an earlier run.
 
+use schemars::generate::SchemaSettings;
 use serde_json::Value;
 
+use super::ReportError;
+use super::document::Document;
 use super::run::stems;
+
+/// The document as indented JSON with a newline at its end.
+///
+/// Values that are not finite are written as `null`.
+///
+/// # Errors
+/// [`ReportError::Json`] if the document cannot be serialised.
+pub fn render_json(document: &Document) -> Result<String, ReportError> {
+    let mut text = serde_json::to_string_pretty(document).map_err(ReportError::Json)?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// The JSON Schema (draft 2020-12) of `report.json` and of every `--json` answer that is a document.
+pub fn render_schema() -> String {
+    let generator = SchemaSettings::draft2020_12()
+        .for_serialize()
+        .into_generator();
+    let schema = generator.into_root_schema_for::<Document>();
+    // Indented as report.json is; a value without infinities or maps of odd keys always serialises.
+    let text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
+    text + "\n"
+}
 
 /// The model that a diagnosis leads to, beside the report.
 pub const MODEL_FILE: &str = "updated-model.toml";

@@ -1,11 +1,168 @@
-//! What was found, in a few plain sentences.
+//! What was found: in five lines for a terminal, and in a few plain sentences for the page.
 
-use super::document::{
+use super::super::document::{
     Document, EstimateSection, ModeSection, PredictionSection, ReadBy, RecordingSection,
 };
-use super::format::{bound_percent, signed_or_below, significant, trimmed};
-use super::tables::{Parameter, estimated, gap_in_short, gap_story, quality_count, reading_bound};
+use super::super::format::{bound_percent, capital, signed_or_below, significant, trimmed};
+use super::super::tables::{Parameter, estimated, quality_count, reading_bound};
+use super::gap::{gap_in_short, gap_story, joint_with, missing, shows_gap};
+use tapjoint_diagnosis::Verdict;
 use tapjoint_identify::observation::UNPAIRED;
+
+/// At most five lines, each with what it is about; what was not computed has none.
+pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
+    let lines = [
+        ("Taps", taps_in_short(document)),
+        ("Modes", modes_in_short(document)),
+        (
+            if document.has_joint() {
+                "Joint"
+            } else {
+                "Beam"
+            },
+            joint(document),
+        ),
+        ("Model", model(document)),
+        ("Doubts", doubts(document)),
+        ("Next", described(document)),
+    ];
+    lines
+        .into_iter()
+        .filter_map(|(about, words)| Some((about, words?)))
+        .collect()
+}
+
+fn taps_in_short(document: &Document) -> Option<String> {
+    let found = TapCount::of(document)?;
+    if found.of_functions {
+        return Some(format!(
+            "none: {} of frequency response functions",
+            found.files
+        ));
+    }
+    let could = match document.modes {
+        Some(_) => "used",
+        None => "can be used",
+    };
+    // Without a hammer it matters on what taps were looked for.
+    let channels = channels(document).map_or(String::new(), |words| format!(". {words}"));
+    Some(format!(
+        "{} of {} taps {could}, in {}{channels}",
+        found.used, found.total, found.files
+    ))
+}
+
+/// Taps of all recordings.
+struct TapCount {
+    /// "2 recordings".
+    files: String,
+    /// Whether the files hold nothing but frequency response functions, which have no taps to judge.
+    of_functions: bool,
+    total: usize,
+    used: usize,
+}
+
+impl TapCount {
+    fn of(document: &Document) -> Option<TapCount> {
+        let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+        let taps = recordings.iter().flat_map(|recording| &recording.taps);
+        Some(TapCount {
+            files: match recordings.len() {
+                1 => "1 recording".to_owned(),
+                count => format!("{count} recordings"),
+            },
+            of_functions: recordings.iter().all(|one| one.sample_rate.is_none()),
+            total: taps.clone().count(),
+            used: taps.filter(|tap| tap.accepted).count(),
+        })
+    }
+}
+
+fn modes_in_short(document: &Document) -> Option<String> {
+    let (count, range) = numbered(document.modes.as_deref()?);
+    Some(match count {
+        0 => "none".to_owned(),
+        1 => format!("1 mode {range}"),
+        count => format!("{count} modes {range}"),
+    })
+}
+
+/// The number of modes, and where they are: "from 17.00 to 994.2 Hz".
+fn numbered(modes: &[ModeSection]) -> (usize, String) {
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let frequencies = || numbered.clone().map(|mode| mode.frequency);
+    let low = significant(frequencies().fold(f64::INFINITY, f64::min), 4);
+    let range = match frequencies().count() {
+        1 => format!("at {low} Hz"),
+        _ => {
+            let high = significant(frequencies().fold(0.0, f64::max), 4);
+            format!("from {low} to {high} Hz")
+        }
+    };
+    (frequencies().count(), range)
+}
+
+fn joint(document: &Document) -> Option<String> {
+    let Some(estimate) = document.estimate.as_ref()? else {
+        return Some(format!("no estimate: {}", document.no_estimate()));
+    };
+    let physical = physical(estimate, with_bounds);
+    (!physical.is_empty()).then(|| physical.join(", "))
+}
+
+/// The parameters that have a unit, in words.
+fn physical(estimate: &EstimateSection, words: fn(&Parameter<'_>) -> String) -> Vec<String> {
+    let all = estimated(estimate);
+    let physical = all.iter().filter(|parameter| parameter.unit != "1");
+    physical.map(words).collect()
+}
+
+/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
+/// gives limits these are said, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
+fn with_bounds(parameter: &Parameter<'_>) -> String {
+    let [value, _, _, _, unit] = parameter.written();
+    let rounded = parameter.written_together();
+    if let Some([low, high]) = parameter.written_scaled_limits() {
+        let own = format!("{} = {} {unit}", parameter.symbol, rounded.value);
+        let limits = format!("(95 %: {low} to {high})");
+        return [own, limits]
+            .map(|part| part.replace(' ', "\u{a0}"))
+            .join(" ");
+    }
+    let shown = if rounded.uncertainty.is_some() {
+        rounded.joined()
+    } else {
+        value
+    };
+    // A number stays on the line of its unit.
+    format!("{} = {shown} {unit}", parameter.symbol).replace(' ', "\u{a0}")
+}
+
+fn model(document: &Document) -> Option<String> {
+    let worst = most_missed(document)?;
+    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
+        let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
+        let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
+        format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
+    });
+    Some(format!(
+        "largest frequency error of the model {} % (mode {}){gap}",
+        signed_or_below(worst.error_percent?),
+        worst.mode
+    ))
+}
+
+fn doubts(document: &Document) -> Option<String> {
+    let warnings = match document.main_warnings().count() {
+        0 => "no warnings".to_owned(),
+        1 => "1 warning, see above".to_owned(),
+        count => format!("{count} warnings, see above"),
+    };
+    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
+    // Where nothing was computed there is nothing to doubt.
+    let computed = document.modes.is_some() || document.recordings.is_some();
+    computed.then_some(warnings + &checks)
+}
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
@@ -27,7 +184,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
 }
 
 /// What a description would add to a bare recording; `None` where there is one, and of what was not analysed.
-pub(super) fn described(document: &Document) -> Option<String> {
+fn described(document: &Document) -> Option<String> {
     let bare = document
         .test
         .as_ref()
@@ -55,28 +212,23 @@ fn amplitudes(document: &Document) -> Vec<String> {
 }
 
 fn taps(document: &Document) -> Option<String> {
-    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
-    let all: Vec<_> = recordings.iter().flat_map(|r| &r.taps).collect();
-    let used = all.iter().filter(|tap| tap.accepted).count();
-    let files = counted(recordings.len(), "recording");
-    // Functions from a file have no samples in time.
-    let functions = recordings
-        .iter()
-        .all(|recording| recording.sample_rate.is_none());
-    let total = all.len();
+    let TapCount {
+        files,
+        of_functions,
+        total,
+        used,
+    } = TapCount::of(document)?;
     let found = match total {
         1 => format!("1 tap was found in {files}"),
         count => format!("{count} taps were found in {files}"),
     };
     // Of recordings that were only looked at, nothing was used yet.
-    let were_used = if document.modes.is_none() {
-        ["can be used"; 2]
-    } else {
-        ["was used", "were used"]
+    let [was_used, were_used] = match document.modes {
+        None => ["can be used"; 2],
+        Some(_) => ["was used", "were used"],
     };
-    let [was_used, were_used] = were_used;
     Some(match (total, used) {
-        (0, _) if functions => {
+        (0, _) if of_functions => {
             format!("{files} of frequency response functions: there are no taps to judge.")
         }
         (0, _) => format!("No taps were found in {files}."),
@@ -92,14 +244,8 @@ fn taps(document: &Document) -> Option<String> {
     })
 }
 
-/// "1 recording", "3 recordings".
-fn counted(count: usize, word: &str) -> String {
-    let ending = if count == 1 { "" } else { "s" };
-    format!("{count} {word}{ending}")
-}
-
 /// On what taps were looked for where there is no hammer.
-pub(super) fn channels(document: &Document) -> Option<String> {
+fn channels(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref()?;
     let mut names: Vec<&str> = Vec::new();
     for recording in recordings.iter().filter(|recording| !recording.has_hammer) {
@@ -122,28 +268,18 @@ pub(super) fn channels(document: &Document) -> Option<String> {
 
 fn modes(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref()?;
-    let numbered: Vec<f64> = modes
-        .iter()
-        .filter(|mode| mode.mode.is_some())
-        .map(|mode| mode.frequency)
-        .collect();
+    let (count, range) = numbered(modes);
     let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == ReadBy::Given);
     let found = if given { "given" } else { "found" };
     let described = document.test.iter().any(|test| test.kind.is_some());
     let word = if described { "mode" } else { "resonance" };
-    let low = numbered.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = numbered.iter().copied().fold(0.0, f64::max);
-    let mut sentence = match numbered.len() {
+    let mut sentence = match count {
         0 => format!("No {word}s were {found}"),
-        1 => format!("1 {word} was {found}, at {} Hz", significant(low, 4)),
-        count => format!(
-            "{count} {word}s were {found}, from {} to {} Hz",
-            significant(low, 4),
-            significant(high, 4)
-        ),
+        1 => format!("1 {word} was {found}, {range}"),
+        count => format!("{count} {word}s were {found}, {range}"),
     };
     let finest = finest(document.recordings.as_deref().unwrap_or_default());
-    if let Some(half_line) = finest.filter(|_| !numbered.is_empty()) {
+    if let Some(half_line) = finest.filter(|_| count > 0) {
         let half_line = trimmed(half_line, 3);
         sentence.push_str(&format!(
             "; a reading on a spectral line is good to \u{b1}{half_line} Hz at best"
@@ -189,15 +325,12 @@ fn finest(recordings: &[RecordingSection]) -> Option<f64> {
 
 fn estimate(document: &Document) -> Option<String> {
     let Some(estimate) = document.estimate.as_ref()? else {
-        let reason = document.estimate_reason.as_deref();
-        let reason = reason.unwrap_or("no reason was recorded");
-        return Some(format!("No stiffness was estimated: {reason}."));
+        return Some(format!(
+            "No stiffness was estimated: {}.",
+            document.no_estimate()
+        ));
     };
-    let physical: Vec<String> = estimated(estimate)
-        .iter()
-        .filter(|parameter| parameter.unit != "1")
-        .map(stiffness)
-        .collect();
+    let physical = physical(estimate, stiffness);
     if physical.is_empty() {
         return None;
     }
@@ -252,14 +385,8 @@ fn stiffness(parameter: &Parameter<'_>) -> String {
     )
 }
 
-pub(super) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
-}
-
 /// The mode that the model misses most.
-pub(super) fn most_missed(document: &Document) -> Option<&PredictionSection> {
+fn most_missed(document: &Document) -> Option<&PredictionSection> {
     let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
     let rows = document.prediction.as_deref()?.iter();
     rows.filter(|row| row.error_percent.is_some_and(f64::is_finite))

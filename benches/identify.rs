@@ -9,7 +9,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use tapjoint::identify::MeasuredMode;
 use tapjoint::identify::consistent::{ConsistentEstimator, ConsistentSettings, JointedStructure};
 use tapjoint::identify::pairs::{ModeLambda, estimate_three_parameter, estimate_two_parameter};
-use tapjoint::structure::frequency_equation::RootedBeam;
+use tapjoint::structure::roots::RootedBeam;
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, Slenderness, natural_lambdas,
 };

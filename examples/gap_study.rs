@@ -468,7 +468,7 @@ fn report(cases: &[Case]) {
     println!(
         "where                                 {}",
         Rate::of(single(), |case| {
-            let places = case.answer.places;
+            let places = case.answer.locations;
             let Truth::Effects(effects) = &case.truth else {
                 return false;
             };

@@ -1,7 +1,7 @@
 //! The consistent estimate of a described test: what the description says, in the estimator's terms.
 
 use super::model::TestedStructure;
-use tapjoint_beam::finite_elements::PointAttachment;
+use tapjoint_beam::interface::PointAttachment;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, Beam, JointStiffness};
 use tapjoint_description::described::{fastened_masses, lap_layout};

@@ -4,7 +4,7 @@ use super::analysis::ModeResult;
 use super::between::differ;
 use super::model::TestedStructure;
 use super::warning::Warning;
-use tapjoint_identify::consistent::goodness::NOTABLE_MISFIT;
+use tapjoint_identify::consistent::NOTABLE_MISFIT;
 use tapjoint_identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
 };

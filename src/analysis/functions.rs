@@ -4,11 +4,11 @@ use num_complex::Complex64;
 
 use super::analysis::{Analysis, Conditions, RecordingResult, Response};
 use super::error::PipelineError;
-use super::fits::{Candidates, source_of, stabilisation};
+use super::fits::{Candidates, stabilisation};
 use super::measure::{MeasuredSpectra, Measurement};
 use super::warning::Warning;
 use super::wired::analysis_of;
-use tapjoint_description::{FrfForm, ReadingMethod, SensorKind};
+use tapjoint_description::{FrfForm, ReadBy, SensorKind};
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use tapjoint_signal::modal::{CompositeLevel, ModeReading, PeakSettings, find_peaks, read_peaks};
 use tapjoint_signal::recording::{Format, FrequencyResponses, ResponseForm};
@@ -27,7 +27,7 @@ pub struct FunctionSettings {
     /// Band to be analysed (Hz); `None` = all lines.
     pub band: Option<(f64, f64)>,
     /// How natural frequencies are read.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
 }
 
 /// Takes frequency response functions about which nothing is described as far as they go.
@@ -166,7 +166,7 @@ fn spectra(
         add_constants(&mut readings, (functions, settings));
     }
     for reading in &mut readings {
-        reading.prefer(source_of(settings.reading));
+        reading.prefer(settings.reading);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     MeasuredSpectra {

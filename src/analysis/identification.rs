@@ -9,7 +9,7 @@ use super::perturbation::perturbations;
 use super::shapes::predicted_specimen;
 use super::warning::Warning;
 use tapjoint_beam::specimen::Specimen;
-use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator, goodness};
+use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
 use tapjoint_identify::{
     Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, PredictedMode, estimate_joint,
     estimate_modulus, predict,
@@ -72,7 +72,7 @@ impl IdentifySettings {
 
 /// A misfit is worth a warning beyond this error (%): what a beam's stated dimensions usually leave
 /// open in its frequencies.
-const NOTABLE_MISFIT: f64 = 100.0 * goodness::NOTABLE_MISFIT;
+const NOTABLE_MISFIT: f64 = 100.0 * tapjoint_identify::consistent::NOTABLE_MISFIT;
 
 /// Estimates the joint from numbered modes, predicts with it and perturbs it.
 pub fn identify(

@@ -3,7 +3,7 @@
 use super::fits::Stabilisation;
 use super::stage::Stage;
 use super::warning::Warning;
-use tapjoint_description::{ReadingMethod, WindowKind};
+use tapjoint_description::{ReadBy, WindowKind};
 use tapjoint_signal::modal::{MainsSettings, ModeReading, PeakSettings};
 use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::recording::{Recording, RecordingError};
@@ -25,7 +25,7 @@ pub struct MeasureSettings {
     /// Window; `None` = by the decay in the record.
     pub window: Option<WindowKind>,
     /// How natural frequencies are read.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// What each response measures, for modal constants; `None` where nobody said, or it is no motion in
     /// SI units over a force in N.
     pub kinds: Vec<Option<ResponseForm>>,
@@ -45,7 +45,7 @@ impl MeasureSettings {
             band: None,
             block: None,
             window: None,
-            reading: ReadingMethod::default(),
+            reading: ReadBy::default(),
             kinds: Vec::new(),
             taps: TapSettings::default(),
             peaks: PeakSettings::default(),

@@ -3,6 +3,8 @@
 use super::analysis::Analysis;
 use super::consistent::{StructureDetails, jointed};
 use super::model::TestedStructure;
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint};
 use tapjoint_beam::{Assembly, Beam, JointStiffness};
@@ -11,7 +13,7 @@ use tapjoint_beam::{Assembly, Beam, JointStiffness};
 const POINTS: usize = 121;
 
 /// The shape of one mode.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SampledShape {
     /// The model's number.
     pub mode: usize,

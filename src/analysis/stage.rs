@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::decays::FreeDecays;
-use super::fits::{Candidates, Stabilisation, complete, source_of, stabilisation};
+use super::fits::{Candidates, Stabilisation, complete, stabilisation};
 use super::force::{PulseWindow, pulse_window, remove_offset};
 use super::measure::{MeasureSettings, MeasuredSpectra};
 use super::quiet::Quiet;
 use tapjoint_description::WindowKind;
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::modal::{
-    CompositeLevel, FrequencySource, ModeReading, PeakLabel, find_peaks, read_peaks,
+    CompositeLevel, ModeReading, PeakLabel, ReadBy, find_peaks, read_peaks,
 };
 use tapjoint_signal::recording::{Recording, RecordingError};
 use tapjoint_signal::spectral::{
@@ -105,7 +105,7 @@ impl<'a> Stage<'a> {
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = self.fit(&mut readings)?;
         for reading in &mut readings {
-            reading.prefer(source_of(self.settings.reading));
+            reading.prefer(self.settings.reading);
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
@@ -305,6 +305,6 @@ fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> Mod
         label: Some(label),
         ..reading.clone()
     };
-    reading.prefer(FrequencySource::Line);
+    reading.prefer(ReadBy::Line);
     reading
 }

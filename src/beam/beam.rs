@@ -1,6 +1,8 @@
 //! The beam: geometry, material, and the two stiffnesses and two inertias that follow from them.
 
 use super::StructureError;
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::f64::consts::PI;
 
 /// Shear coefficient of a rectangular cross-section, 5/6 (Timoshenko's beam with a parabolic
@@ -20,7 +22,7 @@ pub enum BeamTheory {
 }
 
 /// A uniform beam of rectangular cross-section, bending in the direction of its thickness.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Beam {
     /// Length (m); of a lap joint: both halves together.
     pub length: f64,
@@ -33,6 +35,7 @@ pub struct Beam {
     /// Density (kg/m3).
     pub density: f64,
     /// Poisson's ratio; [`DEFAULT_POISSON`] where unknown. Only the Timoshenko theory uses it.
+    #[serde(skip)]
     pub poisson: f64,
 }
 

@@ -19,19 +19,18 @@
 
 pub mod beam;
 pub mod effects;
-pub mod end_slopes;
+
 pub mod finite_elements;
-pub mod frequency_equation;
+
 pub mod interface;
 pub mod joint;
 pub mod mode_shape;
 pub mod receptance;
 pub mod roots;
 pub mod specimen;
-pub mod timoshenko;
 
 mod banded;
-mod element;
+mod eigen;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
 pub use joint::JointStiffness;

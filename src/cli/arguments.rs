@@ -16,6 +16,10 @@ pub(super) struct CommonArguments {
     /// printed
     #[arg(long, global = true, value_name = "FILE")]
     pub(super) json: Option<JsonDestination>,
+    /// Replace existing files that tapjoint did not make, too; without it only files that it made are
+    /// replaced, and inputs never are
+    #[arg(long, global = true)]
+    pub(super) force: bool,
     /// Print nothing but errors (and the seal of a blind check)
     #[arg(long, short, global = true)]
     pub(super) quiet: bool,

@@ -2,8 +2,10 @@
 
 use super::Outcome;
 use super::input::{TestFile, read_test};
-use super::output::{OutputError, OutputFolder};
+use super::output::{OutputError, OutputFolder, files_made_in};
+use super::overwrite::Expanded;
 use super::renamed::check_names_elsewhere;
+use super::signature::CHECKSUMS;
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -12,6 +14,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -73,8 +76,8 @@ pub(super) struct BlindCheckArguments {
     /// in braces, {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,
-    /// Keep the drawn tests in this new folder, each with its recordings and its description, and beside
-    /// them their truth.json: to look at, or for --folder
+    /// Keep the drawn tests in this folder, each with its recordings and its description, and beside them
+    /// their truth.json: to look at, or for --folder; a new folder, or that of earlier kept tests
     #[arg(long, value_name = "DIR", conflicts_with = "folder")]
     keep: Option<PathBuf>,
     /// Folder of the results
@@ -82,7 +85,28 @@ pub(super) struct BlindCheckArguments {
     out: PathBuf,
 }
 
+/// Names of the results.
+const RESULTS: [&str; 8] = [
+    "score.json",
+    "cases.csv",
+    "truth.json",
+    "confusion.png",
+    "confusion.svg",
+    "reliability.png",
+    "reliability.svg",
+    CHECKSUMS,
+];
+
 impl BlindCheckArguments {
+    /// Returns the results, and every file in an earlier folder of kept tests.
+    pub(super) fn expanded(&self) -> Vec<Expanded> {
+        let results = RESULTS.iter().map(|name| self.out.join(name)).collect();
+        let kept = self.keep.iter().flat_map(|folder| files_made_in(folder));
+        let kept = kept.chain(self.keep.iter().map(|folder| folder.join("truth.json")));
+        let kept = kept.collect::<BTreeSet<_>>().into_iter().collect();
+        vec![("out", results), ("keep", kept)]
+    }
+
     fn campaign(&self, seed: u64) -> anyhow::Result<Campaign> {
         if !(self.drift >= 0.0 && self.drift <= 0.2) {
             bail!(
@@ -145,7 +169,7 @@ pub(super) fn run(
     for file in render_blind_check(&cases, &scores, &conduct)? {
         output.add(&file.name, &file.bytes)?;
     }
-    let folder = output.publish()?;
+    let folder = output.publish(terminal.files())?;
     terminal.say(&format!("Results: {}", folder.display()))?;
     terminal.write_json(&score_json(&scores, &conduct))?;
     Ok(Outcome::Answered)
@@ -157,7 +181,9 @@ fn drawn(
     keep: Option<&Path>,
     terminal: &Terminal,
 ) -> anyhow::Result<(Vec<Case>, Conduct)> {
-    let kept = keep.map(new_folder).transpose()?;
+    let force = terminal.files().force;
+    let kept = keep.map(|name| OutputFolder::prepare_own(name, force));
+    let kept = kept.transpose()?;
     let tests = (0..campaign.len())
         .into_par_iter()
         .map(|index| campaign.draw(index))
@@ -209,18 +235,9 @@ fn drawn(
     };
     if let Some(kept) = kept {
         kept.add("truth.json", sealed.as_bytes())?;
-        kept.publish()?;
+        kept.publish(terminal.files())?;
     }
     Ok((diagnosed, conduct))
-}
-
-/// A new folder of tests that appears whole or not at all.
-fn new_folder(name: &Path) -> anyhow::Result<OutputFolder> {
-    if name.exists() {
-        let shown = name.display();
-        bail!("{shown}: is there already; give the name of a new folder");
-    }
-    Ok(OutputFolder::prepare(name)?)
 }
 
 /// How many tests are diagnosed again under other names.

@@ -6,12 +6,13 @@ use super::bare::{BareSettings, analyse, holds_functions, refuse_given};
 use super::choices::{EstimatorArgument, FormArgument, SensorArgument, WindowArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFile;
+use super::overwrite::Expanded;
 use super::terminal::Terminal;
 use super::wiring::wire;
 use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tapjoint::description::{ChannelRef, WindowKind};
+use tapjoint::description::{ChannelRef, TestDescription, WindowKind};
 use tapjoint::pipeline::{Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_wired};
 use tapjoint::recording::UffFormat;
 use tapjoint::report::{
@@ -103,8 +104,7 @@ struct Request {
 fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Request> {
     let (subject, stems) = if is_description(&arguments.file) {
         let file = described(arguments, terminal)?;
-        let recordings = file.test.recordings.iter();
-        let stems = recordings.map(|recording| stem(&recording.file)).collect();
+        let stems = stems(&file.test);
         (Subject::Test(Box::new(file)), stems)
     } else {
         check_file(&arguments.file)?;
@@ -186,6 +186,22 @@ fn described(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Te
     }
     file.check_recordings()?;
     Ok(file)
+}
+
+impl FrfArguments {
+    /// Returns the pictures of a test's recordings.
+    pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
+        let pictures = self.png.as_deref().zip(test);
+        pictures
+            .map(|(png, test)| ("png", picture_files(png, &stems(test))))
+            .into_iter()
+            .collect()
+    }
+}
+
+fn stems(test: &TestDescription) -> Vec<String> {
+    let recordings = test.recordings.iter();
+    recordings.map(|recording| stem(&recording.file)).collect()
 }
 
 fn stem(file: &Path) -> String {

@@ -2,6 +2,7 @@
 
 use super::Outcome;
 use super::output::OutputFolder;
+use super::overwrite::Expanded;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::{Args, Command};
@@ -20,6 +21,18 @@ pub(super) struct ManArguments {
     out: Option<PathBuf>,
 }
 
+impl ManArguments {
+    /// Returns the pages of `--out`.
+    pub(super) fn expanded(&self, command: &mut Command) -> Vec<Expanded> {
+        command.build();
+        let pages = |folder: &PathBuf| {
+            let names = with_pages(command).map(file_name);
+            ("out", names.map(|name| folder.join(name)).collect())
+        };
+        self.out.iter().map(pages).collect()
+    }
+}
+
 pub(super) fn run(
     arguments: &ManArguments,
     mut command: Command,
@@ -33,7 +46,7 @@ pub(super) fn run(
             for (name, page) in &pages {
                 output.add(name, page)?;
             }
-            let folder = output.publish()?;
+            let folder = output.publish(terminal.files())?;
             terminal.say(&format!("{} pages in {}", pages.len(), folder.display()))?;
             serde_json::json!({ "pages": pages.iter().map(|(name, _)| name).collect::<Vec<_>>() })
         }
@@ -49,13 +62,16 @@ pub(super) fn run(
 
 /// The page of every command, with its file name; the program's own first.
 fn pages(command: &Command) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
-    let own = std::iter::once(command);
+    with_pages(command)
+        .map(|found| Ok((file_name(found), page(found)?)))
+        .collect()
+}
+
+fn with_pages(command: &Command) -> impl Iterator<Item = &Command> {
     let commands = command
         .get_subcommands()
         .filter(|found| found.get_name() != "help");
-    own.chain(commands)
-        .map(|found| Ok((format!("{}.1", page_name(found)), page(found)?)))
-        .collect()
+    std::iter::once(command).chain(commands)
 }
 
 fn page(command: &Command) -> anyhow::Result<Vec<u8>> {
@@ -64,9 +80,10 @@ fn page(command: &Command) -> anyhow::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// "tapjoint-run" for the command `run`.
-fn page_name(command: &Command) -> &str {
-    command.get_display_name().unwrap_or(command.get_name())
+/// "tapjoint-run.1" for the command `run`.
+fn file_name(command: &Command) -> String {
+    let name = command.get_display_name().unwrap_or(command.get_name());
+    format!("{name}.1")
 }
 
 fn chosen<'a>(command: &'a Command, name: Option<&str>) -> anyhow::Result<&'a Command> {

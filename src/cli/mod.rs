@@ -9,8 +9,10 @@ mod choices;
 mod help;
 mod input;
 mod output;
+mod overwrite;
 mod progress;
 mod renamed;
+mod signature;
 mod stiffness;
 mod terminal;
 mod updated_model;
@@ -35,10 +37,14 @@ mod simulate;
 mod spectrum;
 
 use arguments::CommonArguments;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use input::is_description;
+use overwrite::{Expanded, Files, described};
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
+use tapjoint::description::TestDescription;
 use terminal::Terminal;
 
 /// From hammer taps to joint stiffness.
@@ -94,9 +100,9 @@ enum Outcome {
 pub(super) fn main() -> ExitCode {
     let parsed = help::grouped::<CommandLine>()
         .try_get_matches()
-        .and_then(|matches| CommandLine::from_arg_matches(&matches));
-    let line = match parsed {
-        Ok(line) => line,
+        .and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)));
+    let (line, matches) = match parsed {
+        Ok(parsed) => parsed,
         Err(usage) => {
             let usage = help::with_suggestion(usage, &CommandLine::command());
             // Help that nobody reads to its end (`tapjoint --help | head`) is no error.
@@ -105,7 +111,7 @@ pub(super) fn main() -> ExitCode {
         }
     };
     let start = Instant::now();
-    let outcome = run_command(&line);
+    let outcome = run_command(&line, &matches);
     if line.common.tells_more() {
         let seconds = start.elapsed().as_secs_f64();
         let threads = rayon::current_num_threads();
@@ -126,9 +132,11 @@ pub(super) fn main() -> ExitCode {
     }
 }
 
-fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
+fn run_command(line: &CommandLine, matches: &ArgMatches) -> anyhow::Result<Outcome> {
+    let files = files_of(line, matches);
+    files.check()?;
     line.common.set_threads()?;
-    let terminal = Terminal::new(&line.common)?;
+    let terminal = Terminal::new(&line.common, files)?;
     match &line.command {
         Command::Run(arguments) => run::run(arguments, line.common.seed, terminal),
         Command::Init(arguments) => init::run(arguments, terminal),
@@ -152,6 +160,35 @@ fn run_command(line: &CommandLine) -> anyhow::Result<Outcome> {
     }
 }
 
+/// Collects the files that a command reads and writes, from its arguments and its test description.
+fn files_of(line: &CommandLine, matches: &ArgMatches) -> Files {
+    let Some((_, own)) = matches.subcommand() else {
+        return Files::default();
+    };
+    let path_of = |id| own.try_get_one::<PathBuf>(id).ok().flatten();
+    let description = path_of("test").or(path_of("file").filter(|path| is_description(path)));
+    let test = description.and_then(|path| described(path));
+    let expanded = line.command.expanded(test.as_ref());
+    // The recordings of a virtual test are made, not read.
+    let read = description.map(PathBuf::as_path).zip(test.as_ref());
+    let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
+    Files::of(own, read, expanded)
+}
+
+impl Command {
+    /// Returns the files of those options that write several files.
+    fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
+        match self {
+            Self::Run(arguments) => arguments.expanded(test),
+            Self::Frf(arguments) => arguments.expanded(test),
+            Self::BlindCheck(arguments) => arguments.expanded(),
+            Self::Man(arguments) => arguments.expanded(&mut CommandLine::command()),
+            Self::Simulate(arguments) => arguments.expanded(test),
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// Whether somebody stopped reading what we print, as `head` does.
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
@@ -164,6 +201,27 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn regress_every_path_among_the_arguments_is_shown_as_one() {
+        use clap::builder::ValueParser;
+        let (path, json) = (
+            ValueParser::path_buf().type_id(),
+            ValueParser::from(clap::value_parser!(arguments::JsonDestination)).type_id(),
+        );
+        let mut line = CommandLine::command();
+        line.build();
+        let commands = line.get_subcommands();
+        for (command, argument) in commands.flat_map(|c| c.get_arguments().map(move |a| (c, a))) {
+            let found = argument.get_value_parser().type_id();
+            let names = argument.get_value_names().unwrap_or_default();
+            let is_path = names
+                .iter()
+                .any(|name| ["FILE", "DIR", "TEST"].contains(&name.as_str()));
+            let place = (command.get_name(), argument.get_id());
+            assert_eq!(is_path, found == path || found == json, "{place:?}");
+        }
+    }
 
     #[test]
     fn regress_clap_finds_no_contradiction_in_the_arguments() {

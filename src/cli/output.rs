@@ -2,15 +2,17 @@
 //!
 //! A file is written under a temporary name in its own folder and renamed at the end. A report
 //! folder is filled in a temporary folder: if the report folder is new, that folder is renamed to
-//! it in one step; if it exists, the temporary one lies inside it and its files are renamed one by
-//! one, each replacing its predecessor whole; files of other names stay, except leftovers that the
+//! it in one step; if it exists, the temporary one lies inside it and its files (also those in folders
+//! below it) are renamed one by one, each replacing its predecessor whole; files of other names stay, except leftovers that the
 //! caller names. The temporary file or folder is made before any work, which shows that writing will be
 //! possible; when the work fails, it is removed.
 
+use super::overwrite::{Files, OverwriteError};
+use super::signature::{CHECKSUMS, carries_mark, checksum_list, signed};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use tapjoint::report::plot::PictureFormat;
+use tapjoint::report::chart::PictureFormat;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Beginning of the names of everything temporary.
@@ -56,6 +58,15 @@ pub(super) enum OutputError {
         /// What the system says of the first.
         cause: io::Error,
     },
+    /// A folder that the program did not fill.
+    #[error("{}: is there already and was not made by tapjoint; give the name of a new folder, or write into it with --force", path.display())]
+    NotNew {
+        /// That folder.
+        path: PathBuf,
+    },
+    /// A file must not be replaced.
+    #[error(transparent)]
+    NotReplaced(#[from] OverwriteError),
     /// Writing failed on the way; nothing half-written is left.
     #[error("{}: could not be written: {cause}; nothing was changed there", path.display())]
     Failed {
@@ -129,6 +140,7 @@ impl OutputFile {
     /// [`OutputError::Failed`]; what was there before is then still there.
     pub(super) fn write(self, bytes: &[u8]) -> Result<(), OutputError> {
         let path = self.path;
+        let bytes: &[u8] = &signed(bytes);
         let written = match self.target {
             Target::Direct(mut file) => file.write_all(bytes).and_then(|()| file.flush()),
             Target::Aside(mut file) => file
@@ -180,12 +192,27 @@ impl OutputFolder {
         })
     }
 
+    /// Prepares a folder that is new, empty, or has a list of what the program made in it; with `force` any.
+    ///
+    /// # Errors
+    /// [`OutputError`] when it cannot.
+    pub(super) fn prepare_own(path: &Path, force: bool) -> Result<Self, OutputError> {
+        let is_empty = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        if path.exists() && !is_empty && !force && !path.join(CHECKSUMS).is_file() {
+            return Err(OutputError::NotNew {
+                path: path.to_owned(),
+            });
+        }
+        Self::prepare(path)
+    }
+
     /// Adds a file to what will appear in the folder.
     ///
     /// # Errors
     /// [`OutputError::Failed`] when it cannot be written.
     pub(super) fn add(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
-        fs::write(self.staging.path().join(name), bytes).map_err(|cause| OutputError::Failed {
+        let written = fs::write(self.staging.path().join(name), signed(bytes));
+        written.map_err(|cause| OutputError::Failed {
             path: self.path.join(name),
             cause,
         })
@@ -196,11 +223,20 @@ impl OutputFolder {
         self.staging.path().join(name)
     }
 
-    /// Moves everything into its place, and says where that is.
+    /// Moves everything into its place, and says where that is. Files in the folder are replaced only
+    /// where `files` allows it.
     ///
     /// # Errors
-    /// [`OutputError::Failed`]; every file is then either the old or the new one, whole.
-    pub(super) fn publish(self) -> Result<PathBuf, OutputError> {
+    /// [`OutputError::NotReplaced`], and nothing was changed; [`OutputError::Failed`], and every file is
+    /// either the old or the new one, whole.
+    pub(super) fn publish(self, files: &Files) -> Result<PathBuf, OutputError> {
+        let names = self.add_checksums().map_err(|cause| OutputError::Failed {
+            path: self.path.clone(),
+            cause,
+        })?;
+        for name in names {
+            files.check_again(&self.path.join(name))?;
+        }
         let moved = if self.path.exists() {
             self.move_files()
         } else {
@@ -229,17 +265,18 @@ impl OutputFolder {
     pub(super) fn publish_without(
         self,
         stale: &[String],
+        files: &Files,
     ) -> Result<(PathBuf, Option<OutputError>), OutputError> {
         let stale: Vec<&String> = stale
             .iter()
             .filter(|name| !self.staging.path().join(name).exists())
             .collect();
-        let folder = self.publish()?;
+        let folder = self.publish(files)?;
         let is_file =
             |path: &PathBuf| fs::symlink_metadata(path).is_ok_and(|found| !found.is_dir());
         let stale = stale.into_iter().map(|name| folder.join(name));
         let (paths, causes): (Vec<PathBuf>, Vec<io::Error>) = stale
-            .filter(is_file)
+            .filter(|path| is_file(path) && files.may_remove(path))
             .filter_map(|path| fs::remove_file(&path).err().map(|cause| (path, cause)))
             .unzip();
         let cause = causes.into_iter().next();
@@ -253,12 +290,60 @@ impl OutputFolder {
     }
 
     fn move_files(&self) -> io::Result<()> {
-        let mut files = fs::read_dir(self.staging.path())?.collect::<io::Result<Vec<_>>>()?;
-        files.sort_by_key(fs::DirEntry::file_name);
-        files
-            .iter()
-            .try_for_each(|file| fs::rename(file.path(), self.path.join(file.file_name())))
+        for name in files_below(self.staging.path())? {
+            let path = self.path.join(&name);
+            fs::create_dir_all(folder_of(&path))?;
+            fs::rename(self.staging.path().join(&name), path)?;
+        }
+        Ok(())
     }
+
+    /// Adds a list of checksums if one of the files cannot show by itself that the program made it. Returns
+    /// the names of all files.
+    fn add_checksums(&self) -> io::Result<Vec<PathBuf>> {
+        let staging = self.staging.path();
+        let mut names = files_below(staging)?;
+        let marked = names.iter().map(|name| carries_mark(&staging.join(name)));
+        if marked.collect::<io::Result<Vec<_>>>()?.contains(&false) {
+            let new: Vec<_> = names
+                .iter()
+                .map(|name| (name.clone(), staging.join(name)))
+                .collect();
+            let list = checksum_list(&self.earlier(CHECKSUMS).unwrap_or_default(), &new)?;
+            fs::write(staging.join(CHECKSUMS), list)?;
+            names.push(CHECKSUMS.into());
+        }
+        Ok(names)
+    }
+}
+
+/// All files in a folder that has a list of what the program made in it; empty for any other folder.
+pub(super) fn files_made_in(folder: &Path) -> Vec<PathBuf> {
+    let names = match folder.join(CHECKSUMS).is_file() {
+        true => files_below(folder).unwrap_or_default(),
+        false => Vec::new(),
+    };
+    names.iter().map(|name| folder.join(name)).collect()
+}
+
+/// Names of all files in a folder and in the folders below it, as seen from the folder, in order.
+///
+/// # Errors
+/// A folder cannot be read.
+fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    let mut files = Vec::new();
+    for entry in entries {
+        let name = PathBuf::from(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            let below = files_below(&entry.path())?;
+            files.extend(below.iter().map(|file| name.join(file)));
+        } else {
+            files.push(name);
+        }
+    }
+    Ok(files)
 }
 
 /// Modes before the user's umask; temporary files are private by default, results are not.
@@ -307,6 +392,10 @@ fn or_here(path: &Path) -> &Path {
 mod tests {
     use super::*;
 
+    /// Documents as the program writes them.
+    const OLD: &str = r#"{"version": 1, "warnings": []}"#;
+    const NEW: &str = r#"{"version": 2, "warnings": []}"#;
+
     fn names(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).expect("the folder exists");
         let mut names: Vec<_> = entries
@@ -353,9 +442,9 @@ mod tests {
             "preparing left something behind"
         );
         let output = OutputFolder::prepare(&path).unwrap();
-        output.add("report.html", "x".as_bytes()).unwrap();
-        output.publish().unwrap();
-        assert_eq!(names(&path), ["report.html"]);
+        output.add("report.json", NEW.as_bytes()).unwrap();
+        output.publish(&Files::default()).unwrap();
+        assert_eq!(names(&path), ["report.json"]);
         assert_eq!(names(folder.path()), ["deep"]);
     }
 
@@ -363,14 +452,14 @@ mod tests {
     fn regress_an_existing_folder_keeps_strangers_and_replaces_ours() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("notes.txt"), "mine").unwrap();
-        fs::write(folder.path().join("report.json"), "old").unwrap();
+        fs::write(folder.path().join("report.json"), OLD).unwrap();
         let output = OutputFolder::prepare(folder.path()).unwrap();
-        output.add("report.json", "new".as_bytes()).unwrap();
-        output.publish().unwrap();
+        output.add("report.json", NEW.as_bytes()).unwrap();
+        output.publish(&Files::default()).unwrap();
         assert_eq!(names(folder.path()), ["notes.txt", "report.json"]);
         assert_eq!(
             fs::read_to_string(folder.path().join("report.json")).unwrap(),
-            "new"
+            NEW
         );
     }
 
@@ -378,14 +467,14 @@ mod tests {
     fn regress_leftovers_go_and_strangers_stay() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["notes.txt", "old.png", "report.json"] {
-            fs::write(folder.path().join(name), "old").unwrap();
+            fs::write(folder.path().join(name), OLD).unwrap();
         }
         fs::create_dir(folder.path().join("folder")).unwrap();
         let output = OutputFolder::prepare(folder.path()).unwrap();
-        assert_eq!(output.earlier("report.json").as_deref(), Some("old"));
-        output.add("report.json", b"new").unwrap();
+        assert_eq!(output.earlier("report.json").as_deref(), Some(OLD));
+        output.add("report.json", NEW.as_bytes()).unwrap();
         let stale = ["old.png", "report.json", "gone.png", "folder"].map(str::to_owned);
-        let (_, left) = output.publish_without(&stale).unwrap();
+        let (_, left) = output.publish_without(&stale, &Files::default()).unwrap();
         assert!(left.is_none(), "{left:?}");
         assert_eq!(
             names(folder.path()),
@@ -393,7 +482,7 @@ mod tests {
             "leftovers"
         );
         let kept = fs::read_to_string(folder.path().join("report.json")).unwrap();
-        assert_eq!(kept, "new");
+        assert_eq!(kept, NEW);
     }
 
     #[test]
@@ -401,15 +490,15 @@ mod tests {
     fn regress_what_cannot_be_removed_is_told_at_the_end() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["old.png", "older.png"] {
-            fs::write(folder.path().join(name), "old").unwrap();
+            fs::write(folder.path().join(name), OLD).unwrap();
         }
         let output = OutputFolder::prepare(folder.path()).unwrap();
-        output.add("report.json", b"new").unwrap();
+        output.add("report.json", NEW.as_bytes()).unwrap();
         // Nobody, not even the system's owner, removes a file of the kernel's.
         std::os::unix::fs::symlink("/proc", folder.path().join("kernel")).unwrap();
         let stale = ["old.png", "kernel/version", "kernel/uptime", "older.png"];
         let stale = stale.map(str::to_owned);
-        let (_, left) = output.publish_without(&stale).unwrap();
+        let (_, left) = output.publish_without(&stale, &Files::default()).unwrap();
         assert_eq!(names(folder.path()), ["kernel", "report.json"], "leftovers");
         let told = left.expect("two files stay").to_string();
         for part in ["kernel/version, ", "kernel/uptime: left by an earlier run"] {

@@ -6,11 +6,13 @@ use super::bare::{BareSettings, analyse};
 use super::choices::{MethodsArgument, ReadingArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFolder;
+use super::overwrite::Expanded;
 use super::terminal::Terminal;
 use super::updated_model::add_model;
 use anyhow::bail;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use tapjoint::description::TestDescription;
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
 use tapjoint::report::{
@@ -42,6 +44,45 @@ pub(super) struct RunArguments {
     method: MethodsArgument,
     #[command(flatten)]
     recording: RecordingArguments,
+}
+
+impl RunArguments {
+    /// The report's folder, for a test of this name.
+    fn folder(&self, name: &str) -> PathBuf {
+        let beside = || self.file.with_file_name(report_folder(name));
+        self.out.clone().unwrap_or_else(beside)
+    }
+
+    /// Returns the files that a report may consist of.
+    pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
+        let name = test.map_or_else(|| stem(&self.file), |test| test.name.clone());
+        let recordings: Vec<&Path> = match test {
+            Some(test) => test
+                .recordings
+                .iter()
+                .map(|recording| recording.file.as_path())
+                .collect(),
+            None => vec![&self.file],
+        };
+        let recordings = recordings.iter().filter_map(|file| file.file_name());
+        let recordings: Vec<_> = recordings
+            .map(|file| serde_json::json!({ "file": file.to_string_lossy() }))
+            .collect();
+        let report = serde_json::json!({
+            "version": 1,
+            "recordings": recordings,
+            "gap": { "updated_model": { "file": MODEL_FILE } },
+            "warnings": [],
+        });
+        let folder = self.folder(&name);
+        let files = earlier_files(&report.to_string());
+        vec![("out", files.iter().map(|file| folder.join(file)).collect())]
+    }
+}
+
+fn stem(file: &Path) -> String {
+    let stem = file.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
 }
 
 /// Monte Carlo samples of the report, as many as its picture shows; `perturb` draws more.
@@ -83,14 +124,12 @@ fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Requ
         (Subject::Test(Box::new(file)), name)
     } else {
         check_file(&arguments.file)?;
-        let stem = arguments.file.file_stem().unwrap_or_default();
         (
             Subject::Recording(arguments.file.clone()),
-            stem.to_string_lossy().into_owned(),
+            stem(&arguments.file),
         )
     };
-    let beside = || arguments.file.with_file_name(report_folder(&name));
-    let output = OutputFolder::prepare(&arguments.out.clone().unwrap_or_else(beside))?;
+    let output = OutputFolder::prepare(&arguments.folder(&name))?;
     Ok(Request { subject, output })
 }
 
@@ -158,7 +197,7 @@ pub(super) fn run(
     let page = request.output.earlier("report.html");
     let earlier = page.and(request.output.earlier("report.json"));
     let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
-    let (folder, left) = request.output.publish_without(&stale)?;
+    let (folder, left) = request.output.publish_without(&stale, terminal.files())?;
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;
@@ -184,7 +223,6 @@ pub(super) fn outcome(analysis: &Analysis) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
 
     #[test]
     fn regress_report_folders_have_names_that_can_be_made() {

@@ -2,6 +2,7 @@
 
 use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
+use super::overwrite::Files;
 use super::progress::Progress;
 use serde_json::json;
 use std::io::{self, IsTerminal, Write};
@@ -11,6 +12,7 @@ use tapjoint::report::{document::Document, render_json, render_readings, render_
 /// Where a command's words go.
 #[derive(Debug)]
 pub(super) struct Terminal {
+    files: Files,
     json: Option<Json>,
     quiet: bool,
     verbose: u8,
@@ -26,17 +28,23 @@ enum Json {
 impl Terminal {
     /// Opens what `--json` names, so that a folder without write permission is found out before
     /// any work.
-    pub(super) fn new(common: &CommonArguments) -> anyhow::Result<Self> {
+    pub(super) fn new(common: &CommonArguments, files: Files) -> anyhow::Result<Self> {
         let json = match &common.json {
             None => None,
             Some(JsonDestination::StandardOutput) => Some(Json::StandardOutput),
             Some(JsonDestination::File(path)) => Some(Json::File(OutputFile::prepare(path)?)),
         };
         Ok(Self {
+            files,
             json,
             quiet: common.quiet,
             verbose: common.verbose,
         })
+    }
+
+    /// The files that the command reads and writes.
+    pub(super) fn files(&self) -> &Files {
+        &self.files
     }
 
     /// Prints an answer, unless it was asked to be quiet or standard output belongs to JSON.

@@ -1,162 +1,199 @@
-//! How probable the data are under a hypothesis: Laplace's method for all that is well determined, and
+//! Evidence of a hypothesis: Laplace's method for all that is well determined, and
 //! quadrature for an effect's size, whose prior has a peak at zero and an end there.
 
-use super::catalogue::Size;
-use super::forward::{Forward, Layout};
-use super::frame::Frame;
-use super::knowledge::with_drift;
-use super::least_squares::{
-    Knowledge, Model, Optimum, factor_of, log_determinant, maximise, maximise_linear, objective_at,
-    optimum_at,
+use crate::dataset::{Dataset, Datum};
+use crate::forward::Forward;
+use crate::least_squares::{
+    LinearModel, Model, Optimum, covariance, factor_of, free_parameters, log_determinant, maximise,
+    objective_at, optimum_at,
 };
-use super::noise::{self, Reading};
-use super::small_unknowns::Small;
+use crate::parameters::{CandidateEffect, Layout, Prior, Size};
+use crate::thresholds::POORLY_KNOWN_SIZE;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// A hypothesis fitted from one start.
+/// Local optimum of a hypothesis, fitted from one start.
 #[derive(Debug, Clone)]
-pub(super) struct Branch {
-    /// The best parameters, at the most probable drift.
-    pub(super) optimum: Optimum,
-    /// What was known of each parameter there.
-    pub(super) knowledge: Vec<Knowledge>,
+pub struct LocalOptimum {
+    /// Best parameters, at the most probable drift.
+    pub optimum: Optimum,
+    /// Priors of the parameters there.
+    pub priors: Vec<Prior>,
     /// Logarithm of the evidence.
-    pub(super) log_evidence: f64,
-    /// The spreads of the drift that it was averaged over, each with the logarithm of its own evidence.
-    pub(super) drifts: Vec<(f64, f64)>,
+    pub log_evidence: f64,
+    /// Spreads of the drift over which it was averaged, each with the logarithm of its own evidence.
+    pub drifts: Vec<(f64, f64)>,
 }
 
-/// Fits a hypothesis from a start and integrates over everything, the drift's spread included.
-pub(super) fn evaluate(
-    forward: &Forward<'_>,
-    known: &[Knowledge],
-    start: &[f64],
-    drifts: &[f64],
-) -> Option<Branch> {
-    let frame = forward.frame;
-    let middle = drifts[drifts.len() / 2];
-    let known = with_drift(frame, &forward.layout, known, middle);
-    let readings = &frame.readings;
-    let mut optimum = maximise(readings, &known, start, forward)?;
-    let mut branch = over_drifts(frame, &forward.layout, &known, optimum.clone(), drifts);
-    // Another drift moves the optimum by the linearised model; where the true one does not follow, it
-    // is sought again with that drift.
-    for _ in 0..RETURNS {
-        let own = branch.knowledge.clone();
-        let there = &branch.optimum.parameters;
-        let (predicted, _) = forward.predict(there)?;
-        let truly = objective_at(readings, &own, (there, &predicted));
-        if (truly - branch.optimum.objective).abs() < FOLLOWED {
-            return Some(branch);
-        }
-        optimum = maximise(readings, &own, there, forward)?;
-        branch = over_drifts(frame, &forward.layout, &own, optimum.clone(), drifts);
+impl LocalOptimum {
+    /// Returns the covariance of the parameters.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        covariance(&self.priors, &self.optimum)
     }
-    // What does not settle is worth what the true model says of it, without other drifts.
-    let own = with_drift(frame, &forward.layout, &branch.knowledge, middle);
+}
+
+/// Hypothesis with its best fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Effects that it adds; none for the nominal model and for what is unknown.
+    pub effects: Vec<CandidateEffect>,
+    /// Best of its local optima.
+    pub best: LocalOptimum,
+    /// Logarithm of the evidence of all local optima together.
+    pub log_evidence: f64,
+}
+
+impl Fit {
+    /// Best parameters.
+    pub fn parameters(&self) -> &[f64] {
+        &self.best.optimum.parameters
+    }
+}
+
+/// Searches with the drift that suits the optimum.
+const RETURNS: usize = 2;
+/// Difference of log probability up to which the linearised model counts as true.
+const LINEAR_ENOUGH: f64 = 0.3;
+
+/// Fits a hypothesis from a start and integrates over all parameters, the drift's spread included.
+pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Option<LocalOptimum> {
+    let (dataset, layout) = (forward.dataset, &forward.layout);
+    let drifts = &dataset.settings.drift_stds;
+    let middle = drifts[drifts.len() / 2];
+    let priors = dataset.with_drift(layout, priors, middle);
+    let mut optimum = maximise(&dataset.data, &priors, start, forward)?;
+    let mut found = over_drifts(dataset, layout, &priors, &optimum, drifts);
+    // Another drift moves the optimum by the linearised model; where the true one does not follow, it
+    // is searched again with that drift.
+    for _ in 0..RETURNS {
+        let own = found.priors.clone();
+        let there = &found.optimum.parameters;
+        let (predicted, _) = forward.predict(there)?;
+        let truly = objective_at(&dataset.data, &own, there, &predicted);
+        if (truly - found.optimum.objective).abs() < LINEAR_ENOUGH {
+            return Some(found);
+        }
+        optimum = maximise(&dataset.data, &own, there, forward)?;
+        found = over_drifts(dataset, layout, &own, &optimum, drifts);
+    }
+    // A search that does not settle counts with the true model, without other drifts.
+    let own = dataset.with_drift(layout, &found.priors, middle);
     let there = forward.linearise(&optimum.parameters, &own)?;
-    let optimum = optimum_at(readings, &own, optimum.parameters, there);
-    let log_evidence = log_evidence(readings, &forward.layout, &own, &optimum);
-    Some(Branch {
+    let optimum = optimum_at(&dataset.data, &own, optimum.parameters, there);
+    let log_evidence = log_evidence(&dataset.data, layout, &own, &optimum);
+    Some(LocalOptimum {
         optimum,
-        knowledge: own,
+        priors: own,
         log_evidence,
         drifts: vec![(middle, log_evidence)],
     })
 }
 
-/// How often the optimum is sought again with the drift that suits it.
-const RETURNS: usize = 2;
-/// Difference of log probability up to which the linearised model counts as true.
-const FOLLOWED: f64 = 0.3;
-
-/// Evidence at an optimum, averaged over the drift's spreads by the model linearised there.
-pub(super) fn over_drifts(
-    frame: &Frame,
+/// Averages the evidence at an optimum over the drift's spreads, by the model linearised there.
+pub fn over_drifts(
+    dataset: &Dataset,
     layout: &Layout,
-    known: &[Knowledge],
-    optimum: Optimum,
+    priors: &[Prior],
+    optimum: &Optimum,
     drifts: &[f64],
-) -> Branch {
-    let has_drift = frame
-        .smalls
-        .iter()
-        .any(|small| matches!(small, Small::Drift { .. }));
-    let drifts = if has_drift { drifts } else { &drifts[..1] };
-    let mut best: Option<Branch> = None;
-    let mut all = Vec::new();
-    for &drift in drifts {
-        let own = with_drift(frame, layout, known, drift);
-        let moved = moved_optimum(&frame.readings, layout, (&own, &optimum));
-        let log_evidence = log_evidence(&frame.readings, layout, &own, &moved);
-        all.push((drift, log_evidence));
-        if best
-            .as_ref()
-            .is_none_or(|best| log_evidence > best.log_evidence)
-        {
-            best = Some(Branch {
-                optimum: moved,
-                knowledge: own,
-                log_evidence,
-                drifts: Vec::new(),
-            });
-        }
-    }
-    let mut best = best.unwrap_or(Branch {
-        optimum,
-        knowledge: known.to_vec(),
+) -> LocalOptimum {
+    let drifts = match dataset.first_drift() {
+        Some(_) => drifts,
+        None => &drifts[..1],
+    };
+    let mut best = LocalOptimum {
+        optimum: optimum.clone(),
+        priors: priors.to_vec(),
         log_evidence: f64::NEG_INFINITY,
         drifts: Vec::new(),
-    });
+    };
+    let mut all = Vec::new();
+    for (k, &drift) in drifts.iter().enumerate() {
+        let own = dataset.with_drift(layout, priors, drift);
+        let moved = moved_optimum(&dataset.data, layout, &own, optimum);
+        let log_evidence = log_evidence(&dataset.data, layout, &own, &moved);
+        all.push((drift, log_evidence));
+        if k == 0 || log_evidence > best.log_evidence {
+            best.optimum = moved;
+            best.priors = own;
+            best.log_evidence = log_evidence;
+        }
+    }
     let logs: Vec<f64> = all.iter().map(|one| one.1).collect();
     best.log_evidence = log_mean(&logs);
     best.drifts = all;
     best
 }
 
-/// The optimum of the model as it was linearised at another one.
-pub(super) fn linear_optimum(
-    readings: &[Reading],
-    known: &[Knowledge],
-    at: &Optimum,
-) -> Option<Optimum> {
-    maximise_linear(
-        readings,
-        known,
-        (&at.parameters, &at.model.predicted),
-        &at.model.slopes,
-    )
+/// Returns the optimum of the model as it was linearised at another one.
+pub fn linear_optimum(data: &[Datum], priors: &[Prior], at: &Optimum) -> Option<Optimum> {
+    let model = LinearModel {
+        origin: &at.parameters,
+        there: &at.model.predicted,
+        slopes: &at.model.slopes,
+    };
+    maximise(data, priors, &at.parameters, &model)
 }
 
-/// The same with the effects kept as they are: the other parameters are so nearly linear that another
-/// spread of the drift moves them as the linearised model says, sizes and places are not.
-fn moved_optimum(
-    readings: &[Reading],
-    layout: &Layout,
-    (known, at): (&[Knowledge], &Optimum),
-) -> Optimum {
-    let mut held = known.to_vec();
-    let effects = layout.joint.len()..layout.smalls();
-    for (known, value) in held[effects.clone()]
-        .iter_mut()
-        .zip(&at.parameters[effects])
-    {
-        *known = Knowledge::held(*value);
+/// Returns the linearised optimum with the effects kept as they are. The other parameters are so nearly linear that
+/// another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
+fn moved_optimum(data: &[Datum], layout: &Layout, priors: &[Prior], at: &Optimum) -> Optimum {
+    let mut held = priors.to_vec();
+    for k in layout.joint.len()..layout.first_nuisance() {
+        held[k] = Prior::held(at.parameters[k]);
     }
-    match linear_optimum(readings, &held, at) {
-        Some(moved) => optimum_at(readings, known, moved.parameters, moved.model),
+    match linear_optimum(data, &held, at) {
+        Some(moved) => optimum_at(data, priors, moved.parameters, moved.model),
         None => at.clone(),
     }
 }
 
-/// Logarithm of the mean of exponentials.
-pub(super) fn log_mean(logs: &[f64]) -> f64 {
+/// Returns the parameters without the last effect, and that effect with a size and a location.
+fn start_with(without: &Fit, layout: &Layout, size: f64, location: Option<f64>) -> Vec<f64> {
+    let at = layout.last_size();
+    let mut start = without.parameters().to_vec();
+    start.insert(at, size);
+    if let Some(location) = location {
+        start.insert(at + 1, location);
+    }
+    start
+}
+
+/// Fits a hypothesis with its last effect at a size, from the optimum without it.
+pub fn evaluate_at_size(
+    forward: &Forward<'_>,
+    without: &Fit,
+    priors: &[Prior],
+    size: f64,
+) -> Option<LocalOptimum> {
+    let start = start_with(without, &forward.layout, size, None);
+    evaluate(forward, priors, &start)
+}
+
+/// Returns the optimum of the model linearised where the last effect is next to nothing, beside a fit without it.
+pub fn linear_fit(
+    forward: &Forward<'_>,
+    without: &Fit,
+    priors: &[Prior],
+    location: Option<f64>,
+) -> Option<Optimum> {
+    let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
+    // Slopes that vanish at zero size (with respect to a location, a frequency) are taken a little inside.
+    let inside = size.neutral + 0.05 * size.scale;
+    let start = start_with(without, &forward.layout, inside, location);
+    let there = forward.linearise(&start, priors)?;
+    let data = &forward.dataset.data;
+    let here = optimum_at(data, priors, start, there);
+    linear_optimum(data, priors, &here)
+}
+
+/// Returns the logarithm of the mean of exponentials.
+pub fn log_mean(logs: &[f64]) -> f64 {
     log_sum(logs) - (logs.len() as f64).ln()
 }
 
-/// Logarithm of the sum of exponentials.
-pub(super) fn log_sum(logs: &[f64]) -> f64 {
+/// Returns the logarithm of the sum of exponentials.
+pub fn log_sum(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most == f64::NEG_INFINITY {
         return most;
@@ -164,94 +201,75 @@ pub(super) fn log_sum(logs: &[f64]) -> f64 {
     most + logs.iter().map(|x| (x - most).exp()).sum::<f64>().ln()
 }
 
-/// Parameters that are not held.
-fn free(known: &[Knowledge]) -> Vec<usize> {
-    (0..known.len())
-        .filter(|&k| known[k].low < known[k].high)
-        .collect()
-}
-
-/// Logarithm of the integral of likelihood times prior about an optimum.
+/// Returns the logarithm of the integral of likelihood times prior about an optimum.
 ///
-/// Laplace: ln Z = -objective + d/2 ln 2 pi - ln det(A)/2 + ln of the priors' constants, A being the
-/// objective's curvature. The size of a single effect is integrated apart ([`over_size`]); of two
-/// effects, kept only when both stand out, the sizes are Gaussian too.
-fn log_evidence(
-    readings: &[Reading],
-    layout: &Layout,
-    known: &[Knowledge],
-    optimum: &Optimum,
-) -> f64 {
-    let free = free(known);
-    let places = free_places(layout, known);
-    // Next to nothing of an effect may lie anywhere, but not outside the range: as broad a Gaussian at most.
+/// Laplace, with the curvature A of the objective:
+///
+/// ```text
+///                    d              1
+/// ln Z = -objective + - ln(2 pi)  -  - ln det A  +  ln of the priors' constants
+///                    2              2
+/// ```
+///
+/// The size of a single effect is integrated apart ([`over_size`]); the sizes of two
+/// effects, accepted only if both stand out, are Gaussian too.
+fn log_evidence(data: &[Datum], layout: &Layout, priors: &[Prior], optimum: &Optimum) -> f64 {
+    let free = free_parameters(priors);
+    let locations = free_locations(layout, priors);
+    // A tiny effect may lie anywhere, but not outside the range: as broad a Gaussian at most.
     let mut curvature = optimum.curvature.clone();
-    for &(place, range) in &places {
-        curvature[(place, place)] += 2.0 * PI / (range * range);
+    for &(location, range) in &locations {
+        curvature[(location, location)] += 2.0 * PI / (range * range);
     }
     let Some(factor) = factor_of(&curvature, &free) else {
         return f64::NEG_INFINITY;
     };
-    let log_det = log_determinant(&factor);
     let mut log = -optimum.objective;
-    log += readings
-        .iter()
-        .map(|reading| noise::log_density_peak(reading.std, reading.freedom))
-        .sum::<f64>();
-    log += 0.5 * free.len() as f64 * (2.0 * PI).ln() - 0.5 * log_det;
+    log += data.iter().map(Datum::log_density_peak).sum::<f64>();
+    log += 0.5 * free.len() as f64 * (2.0 * PI).ln() - 0.5 * log_determinant(&factor);
     let sizes: Vec<usize> = (0..layout.effects.len())
         .map(|effect| layout.size(effect))
         .collect();
     for &k in free.iter().filter(|k| !sizes.contains(k)) {
-        if known[k].std.is_finite() {
-            log -= 0.5 * (2.0 * PI).ln() + known[k].std.ln();
+        if priors[k].std.is_finite() {
+            log -= 0.5 * (2.0 * PI).ln() + priors[k].std.ln();
         }
     }
-    log -= places.iter().map(|(_, range)| range.ln()).sum::<f64>();
-    for effect in 0..layout.effects.len() {
-        let size = layout.size(effect);
+    log -= locations.iter().map(|(_, range)| range.ln()).sum::<f64>();
+    for (effect, &size) in layout.effects.iter().zip(&sizes) {
         let Some(position) = free.iter().position(|&k| k == size) else {
             continue;
         };
         let mut unit = DVector::zeros(free.len());
         unit[position] = 1.0;
         let variance = factor.solve(&unit)[position];
-        // What Laplace's method has put there for this parameter is taken out again.
+        // Laplace's factor for this parameter is taken out again.
         log -= 0.5 * (2.0 * PI * variance).ln();
-        log += over_size(
-            &layout.effects[effect].size,
-            &known[size],
-            (
-                optimum.parameters[size],
-                optimum.gradient[size],
-                1.0 / variance,
-            ),
-        );
+        log += over_size(&effect.size, &priors[size], optimum, size, 1.0 / variance);
     }
-    log.min(log_likelihood(readings, optimum))
+    log.min(log_likelihood(data, optimum))
 }
 
-/// The parameters that are places and free, each with the length of its range.
-fn free_places(layout: &Layout, known: &[Knowledge]) -> Vec<(usize, f64)> {
-    let place = |effect: usize| {
-        let at = layout
-            .place(effect)
-            .filter(|&at| known[at].low < known[at].high)?;
-        let range = layout.effects[effect].place.as_ref()?;
-        Some((at, range.inward(range.high) - range.inward(range.low)))
-    };
-    (0..layout.effects.len()).filter_map(place).collect()
+/// Returns the free locations among the parameters, each with the length of its range.
+fn free_locations(layout: &Layout, priors: &[Prior]) -> Vec<(usize, f64)> {
+    let mut all = Vec::new();
+    for (effect, candidate) in layout.effects.iter().enumerate() {
+        if let (Some(at), Some(range)) = (layout.location(effect), candidate.location)
+            && !priors[at].is_held()
+        {
+            let (low, high) = range.searched_bounds();
+            all.push((at, high - low));
+        }
+    }
+    all
 }
 
-/// Logarithm of the likelihood alone. No average of a likelihood over a prior exceeds its largest value.
-pub(super) fn log_likelihood(readings: &[Reading], optimum: &Optimum) -> f64 {
-    readings
-        .iter()
-        .zip(&optimum.model.predicted)
-        .map(|(reading, predicted)| {
-            let residual = (reading.value - predicted) / reading.std;
-            noise::log_density_peak(reading.std, reading.freedom)
-                + noise::log_density_drop(residual, reading.freedom)
+/// Returns the logarithm of the likelihood alone. No average of a likelihood over a prior exceeds its largest value.
+pub fn log_likelihood(data: &[Datum], optimum: &Optimum) -> f64 {
+    let pairs = data.iter().zip(&optimum.model.predicted);
+    pairs
+        .map(|(datum, predicted)| {
+            datum.log_density_peak() + datum.log_density_drop(datum.residual(*predicted))
         })
         .sum()
 }
@@ -259,32 +277,37 @@ pub(super) fn log_likelihood(readings: &[Reading], optimum: &Optimum) -> f64 {
 /// Points of the quadrature over a size.
 const POINTS: usize = 160;
 
-/// ln of the integral of prior(t) exp(-g (t - t0) - h (t - t0)^2/2 + regularisation(t)) dt, where the
-/// objective with its normal regularisation has slope g and curvature h at t0.
-fn over_size(size: &Size, known: &Knowledge, (at, slope, curvature): (f64, f64, f64)) -> f64 {
-    // Only at an end of the range may the optimum have a slope, and only outwards; elsewhere a slope
-    // says that the search got stuck, and promises what no structure has.
-    let slope = match slope {
-        slope if at <= size.low => slope.max(0.0),
-        slope if at >= size.high => slope.min(0.0),
-        _ => 0.0,
-    };
-    let log_likelihood = |t: f64| {
-        let away = t - at;
-        let regular = (t - known.centre) / known.std;
-        -slope * away - 0.5 * curvature * away * away + 0.5 * regular * regular
-    };
-    let std = curvature.powf(-0.5);
-    let peak = (at - slope / curvature).clamp(size.low, size.high);
-    log_integral(size, (peak - 9.0 * std, peak + 9.0 * std), &log_likelihood)
+/// Returns the negative logarithm of a normal prior without its constant.
+fn regularisation(prior: &Prior, value: f64) -> f64 {
+    0.5 * ((value - prior.centre) / prior.std).powi(2)
 }
 
-/// ln of the integral of prior times likelihood over a range within the size's bounds, by Simpson's
+/// Returns ln of the integral of prior(t) exp(-g (t - t0) - h (t - t0)^2/2 + regularisation(t)) dt, where the
+/// objective with its normal regularisation has slope g and curvature h at t0, the parameter `size` of the optimum.
+fn over_size(prior: &Size, normal: &Prior, optimum: &Optimum, size: usize, curvature: f64) -> f64 {
+    let at = optimum.parameters[size];
+    // Only at an end of the range may the optimum have a slope, and only outwards; elsewhere a slope
+    // shows that the search got stuck, and promises a likelihood that no structure has.
+    let slope = match optimum.gradient[size] {
+        slope if at <= prior.low => slope.max(0.0),
+        slope if at >= prior.high => slope.min(0.0),
+        _ => 0.0,
+    };
+    let std = curvature.powf(-0.5);
+    let peak = (at - slope / curvature).clamp(prior.low, prior.high);
+    log_integral(prior, peak - 9.0 * std, peak + 9.0 * std, |t| {
+        let away = t - at;
+        -slope * away - 0.5 * curvature * away * away + regularisation(normal, t)
+    })
+}
+
+/// Returns ln of the integral of prior times likelihood over a range within the size's bounds, by Simpson's
 /// rule on points that crowd at the prior's own peak as well as at the likelihood's.
-pub(super) fn log_integral(
+fn log_integral(
     size: &Size,
-    (from, to): (f64, f64),
-    log_likelihood: &dyn Fn(f64) -> f64,
+    from: f64,
+    to: f64,
+    log_likelihood: impl Fn(f64) -> f64 + Copy,
 ) -> f64 {
     let (from, to) = (from.max(size.low), to.min(size.high));
     if from >= to {
@@ -293,7 +316,7 @@ pub(super) fn log_integral(
     // The prior bends within two fifths of its scale; cut inside, the pieces are smooth.
     let near = 0.2 * size.scale;
     let mut cuts = vec![from];
-    for cut in [size.nothing - near, size.nothing, size.nothing + near] {
+    for cut in [size.neutral - near, size.neutral, size.neutral + near] {
         if cut > from && cut < to {
             cuts.push(cut);
         }
@@ -301,12 +324,12 @@ pub(super) fn log_integral(
     cuts.push(to);
     let pieces: Vec<f64> = cuts
         .windows(2)
-        .map(|piece| simpson(size, (piece[0], piece[1]), log_likelihood))
+        .map(|piece| simpson(size, piece[0], piece[1], log_likelihood))
         .collect();
     log_sum(&pieces)
 }
 
-fn simpson(size: &Size, (from, to): (f64, f64), log_likelihood: &dyn Fn(f64) -> f64) -> f64 {
+fn simpson(size: &Size, from: f64, to: f64, log_likelihood: impl Fn(f64) -> f64) -> f64 {
     let step = (to - from) / POINTS as f64;
     let logs: Vec<f64> = (0..=POINTS)
         .map(|k| {
@@ -322,34 +345,99 @@ fn simpson(size: &Size, (from, to): (f64, f64), log_likelihood: &dyn Fn(f64) -> 
     log_sum(&logs) + (step / 3.0).ln()
 }
 
-/// Covariance of the parameters at an optimum; held ones have none.
-pub(super) fn covariance(known: &[Knowledge], optimum: &Optimum) -> Option<DMatrix<f64>> {
-    let free = free(known);
-    let inverse = factor_of(&optimum.curvature, &free)?.inverse();
-    let mut full = DMatrix::zeros(known.len(), known.len());
-    for (i, &a) in free.iter().enumerate() {
-        for (j, &b) in free.iter().enumerate() {
-            full[(a, b)] = inverse[(i, j)];
-        }
+/// Returns what the profile of the likelihood over the size of a single effect adds to the evidence of its parabola.
+/// Only a size that is so badly known that the parabola need not hold has one; beside another effect, or at a
+/// fitted location, the parabola is taken.
+pub fn profile_correction(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
+    let [effect] = &forward.layout.effects[..] else {
+        return 0.0;
+    };
+    let Some(covariance) = found.covariance().filter(|_| effect.location.is_none()) else {
+        return 0.0;
+    };
+    let at = forward.layout.last_size();
+    let variance = covariance[(at, at)];
+    if variance.sqrt() < POORLY_KNOWN_SIZE * effect.size.scale {
+        return 0.0;
     }
-    Some(full)
+    profile_gain(forward, found, &effect.size, variance).unwrap_or(0.0)
+}
+
+/// Returns the logarithm of the integral over the profile of the likelihood over that over its parabola.
+fn profile_gain(
+    forward: &Forward<'_>,
+    found: &LocalOptimum,
+    size: &Size,
+    variance: f64,
+) -> Option<f64> {
+    const NODES: usize = 9;
+    let at = forward.layout.last_size();
+    let (here, prior) = (found.optimum.parameters[at], &found.priors[at]);
+    let reach = 4.0 * variance.sqrt();
+    let from = (here - reach)
+        .max(size.low)
+        .max(size.neutral - 4.0 * size.scale);
+    let to = (here + reach)
+        .min(size.high)
+        .min(size.neutral + 4.0 * size.scale);
+    let mut logs = Vec::new();
+    // The regularisation of the size is no part of its likelihood; where it is held it has none.
+    let base = marginal_log(&found.priors, &found.optimum, at)? + regularisation(prior, here);
+    for node in 0..NODES {
+        let t = from + (to - from) * node as f64 / (NODES - 1) as f64;
+        let mut held = found.priors.clone();
+        held[at] = Prior::held(t);
+        let mut start = found.optimum.parameters.clone();
+        start[at] = t;
+        let optimum = maximise(&forward.dataset.data, &held, &start, forward);
+        let log = optimum.and_then(|optimum| marginal_log(&found.priors, &optimum, at));
+        logs.push((t, log.map_or(f64::NEG_INFINITY, |log| log - base)));
+    }
+    let slope = found.optimum.gradient[at];
+    let profile = log_integral(size, from, to, |t| interpolate(&logs, t));
+    let parabola = log_integral(size, from, to, |t| {
+        let away = t - here;
+        -slope * away - 0.5 * away * away / variance + regularisation(prior, t)
+            - regularisation(prior, here)
+    });
+    (profile.is_finite() && parabola.is_finite()).then_some(profile - parabola)
+}
+
+/// Returns -objective - ln det/2 over all free parameters but the size.
+fn marginal_log(priors: &[Prior], optimum: &Optimum, size: usize) -> Option<f64> {
+    let mut free = free_parameters(priors);
+    free.retain(|&k| k != size);
+    let factor = factor_of(&optimum.curvature, &free)?;
+    Some(-optimum.objective - 0.5 * log_determinant(&factor))
+}
+
+/// Returns the value on straight lines between points.
+fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
+    let above = points
+        .partition_point(|point| point.0 < t)
+        .clamp(1, points.len() - 1);
+    let ((t0, y0), (t1, y1)) = (points[above - 1], points[above]);
+    if y0 == f64::NEG_INFINITY || y1 == f64::NEG_INFINITY {
+        return f64::NEG_INFINITY;
+    }
+    y0 + (y1 - y0) * (t - t0) / (t1 - t0)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::catalogue::{Candidate, PlaceKind, PlaceRange};
-    use super::super::least_squares::Linearised;
     use super::*;
+    use crate::least_squares::Linearised;
+    use crate::parameters::{LocationKind, LocationRange};
     use tapjoint_beam::effects::EffectId;
 
-    /// One stiffness and one size, with readings that need not be linear in either.
-    struct Small {
-        readings: Vec<Reading>,
+    /// One stiffness and one size, with data that need not be linear in either.
+    struct TwoParameters {
+        data: Vec<Datum>,
         size: Size,
         model: fn(f64, f64) -> Vec<f64>,
     }
 
-    impl Model for Small {
+    impl Model for TwoParameters {
         type Rest = ();
 
         fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
@@ -359,8 +447,9 @@ mod tests {
         fn complete(
             &self,
             parameters: &[f64],
-            _: &[Knowledge],
-            (predicted, ()): (Vec<f64>, ()),
+            _: &[Prior],
+            predicted: Vec<f64>,
+            (): (),
         ) -> Option<Linearised> {
             const STEP: f64 = 1e-6;
             let [a, t] = [parameters[0], parameters[1]];
@@ -372,25 +461,25 @@ mod tests {
         }
     }
 
-    impl Small {
+    impl TwoParameters {
         fn by_laplace(&self) -> f64 {
             let layout = Layout {
                 joint: vec![0],
-                effects: vec![Candidate {
+                effects: vec![CandidateEffect {
                     effect: EffectId::SensorMass,
                     size: self.size,
-                    place: None,
+                    location: None,
                 }],
             };
-            let size = Knowledge {
+            let size = Prior {
                 low: self.size.low,
                 high: self.size.high,
-                ..Knowledge::normal(0.0, 3.0 * self.size.scale)
+                ..Prior::normal(0.0, 3.0 * self.size.scale)
             };
-            let known = [Knowledge::normal(0.0, 1.5), size];
+            let known = [Prior::normal(0.0, 1.5), size];
             let start = [0.0, 0.1 * self.size.scale];
-            let optimum = maximise(&self.readings, &known, &start, self).unwrap();
-            log_evidence(&self.readings, &layout, &known, &optimum)
+            let optimum = maximise(&self.data, &known, &start, self).unwrap();
+            log_evidence(&self.data, &layout, &known, &optimum)
         }
 
         /// The integral as a sum over a fine grid.
@@ -408,13 +497,10 @@ mod tests {
                     let t = low + width[1] * (j as f64 + 0.5);
                     let likelihood: f64 = (self.model)(a, t)
                         .iter()
-                        .zip(&self.readings)
-                        .map(|(predicted, reading)| {
-                            noise::log_density_peak(reading.std, reading.freedom)
-                                + noise::log_density_drop(
-                                    (reading.value - predicted) / reading.std,
-                                    reading.freedom,
-                                )
+                        .zip(&self.data)
+                        .map(|(predicted, datum)| {
+                            datum.log_density_peak()
+                                + datum.log_density_drop(datum.residual(*predicted))
                         })
                         .sum();
                     let prior = -0.5 * (a / 1.5).powi(2) - (1.5 * (2.0 * PI).sqrt()).ln();
@@ -425,20 +511,20 @@ mod tests {
         }
     }
 
-    fn readings(values: &[f64], std: f64, freedom: f64) -> Vec<Reading> {
-        let reading = |value: &f64| Reading {
+    fn data(values: &[f64], std: f64, freedom: f64) -> Vec<Datum> {
+        let datum = |value: &f64| Datum {
             value: *value,
             std,
             freedom,
         };
-        values.iter().map(reading).collect()
+        values.iter().map(datum).collect()
     }
 
     fn size(low: f64) -> Size {
         Size {
             name: "mass",
             scale: 1.0,
-            nothing: 0.0,
+            neutral: 0.0,
             low,
             high: 8.0,
         }
@@ -450,8 +536,8 @@ mod tests {
 
     #[test]
     fn val_evidence_of_a_size_that_stands_out_is_the_integral() {
-        let case = Small {
-            readings: readings(&[1.25, -0.55, 1.75, 0.3], 0.2, f64::INFINITY),
+        let case = TwoParameters {
+            data: data(&[1.25, -0.55, 1.75, 0.3], 0.2, f64::INFINITY),
             size: size(0.0),
             model: linear,
         };
@@ -462,9 +548,9 @@ mod tests {
 
     #[test]
     fn val_evidence_at_the_end_of_the_range_is_the_integral() {
-        // The readings ask for a negative size, which there is not.
-        let case = Small {
-            readings: readings(&[0.3, 0.5, 0.1, -0.1], 0.2, f64::INFINITY),
+        // The data ask for a negative size, which there is not.
+        let case = TwoParameters {
+            data: data(&[0.3, 0.5, 0.1, -0.1], 0.2, f64::INFINITY),
             size: size(0.0),
             model: linear,
         };
@@ -474,8 +560,8 @@ mod tests {
 
     #[test]
     fn val_evidence_of_bent_models_with_few_taps_is_nearly_the_integral() {
-        let case = Small {
-            readings: readings(&[0.9, -0.4, 1.2, 0.35, 0.6], 0.15, 8.0),
+        let case = TwoParameters {
+            data: data(&[0.9, -0.4, 1.2, 0.35, 0.6], 0.15, 8.0),
             size: size(-8.0),
             model: |a, t| {
                 let root = (1.0 + 0.3 * t + 0.2 * a).max(1e-3).ln();
@@ -493,8 +579,8 @@ mod tests {
         let (laplace, force) = (case.by_laplace(), case.by_force());
         assert!((laplace - force).abs() < 0.2, "{laplace} {force}");
     }
-    /// The same beside a place that changes next to nothing.
-    struct Placed(Small);
+    /// Two parameters beside a location that changes next to nothing.
+    struct Placed(TwoParameters);
 
     impl Model for Placed {
         type Rest = ();
@@ -506,10 +592,11 @@ mod tests {
         fn complete(
             &self,
             parameters: &[f64],
-            known: &[Knowledge],
-            rest: (Vec<f64>, ()),
+            known: &[Prior],
+            predicted: Vec<f64>,
+            (): (),
         ) -> Option<Linearised> {
-            let own = self.0.complete(parameters, known, rest)?;
+            let own = self.0.complete(parameters, known, predicted, ())?;
             let slopes = own.slopes.insert_column(2, 1e-5);
             Some(Linearised { slopes, ..own })
         }
@@ -517,8 +604,8 @@ mod tests {
 
     #[test]
     fn limit_a_place_that_changes_nothing_tells_nothing() {
-        let case = Small {
-            readings: readings(&[0.3, 0.5, 0.1, -0.1], 0.2, f64::INFINITY),
+        let case = TwoParameters {
+            data: data(&[0.3, 0.5, 0.1, -0.1], 0.2, f64::INFINITY),
             size: size(0.0),
             model: linear,
         };
@@ -526,32 +613,32 @@ mod tests {
         let placed = Placed(case);
         let layout = Layout {
             joint: vec![0],
-            effects: vec![Candidate {
+            effects: vec![CandidateEffect {
                 effect: EffectId::AddedMass,
                 size: size(0.0),
-                place: Some(PlaceRange {
-                    kind: PlaceKind::Position,
+                location: Some(LocationRange {
+                    kind: LocationKind::Position,
                     low: 0.0,
                     high: 0.4,
                     nodes: 5,
                 }),
             }],
         };
-        let size = Knowledge {
+        let size = Prior {
             low: 0.0,
             high: 8.0,
-            ..Knowledge::normal(0.0, 3.0)
+            ..Prior::normal(0.0, 3.0)
         };
-        let place = Knowledge {
+        let place = Prior {
             centre: 0.2,
             std: f64::INFINITY,
             low: 0.0,
             high: 0.4,
         };
-        let known = [Knowledge::normal(0.0, 1.5), size, place];
-        let readings = &placed.0.readings;
-        let optimum = maximise(readings, &known, &[0.0, 0.1, 0.2], &placed).unwrap();
-        let with = log_evidence(readings, &layout, &known, &optimum);
+        let known = [Prior::normal(0.0, 1.5), size, place];
+        let data = &placed.0.data;
+        let optimum = maximise(data, &known, &[0.0, 0.1, 0.2], &placed).unwrap();
+        let with = log_evidence(data, &layout, &known, &optimum);
         // The same integral over size and stiffness; where the effect lies is the prior's affair alone.
         assert!((with - without).abs() < 1e-6, "{with} {without}");
     }

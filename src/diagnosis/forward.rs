@@ -1,115 +1,48 @@
-//! What a hypothesis predicts: all readings, with their slopes.
+//! Predictions of all observables under a hypothesis, with their slopes.
 
-use super::catalogue::{Candidate, PlaceKind};
-use super::frame::{Frame, Row};
-use super::joint_energy::joint_slopes;
-use super::least_squares::{Knowledge, Linearised, Model};
-use super::nominal::COUPLING;
-use super::solved::Solved;
+use crate::dataset::{Dataset, Observable, ObservableKind};
+use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
+use crate::least_squares::{Linearised, Model};
+use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
+use crate::structure::{Arrangement, ModalModel, with_joint};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-use tapjoint_beam::effects::Effect;
-use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
+use tapjoint_beam::effects::{Circumstances, EffectId, JointLaw, SensorPlace, apply};
+use tapjoint_beam::specimen::{BeamModes, Mesh, Specimen};
+use tapjoint_identify::observation::effective_share;
 
-/// Parameters of a hypothesis in their order: joint, effects (size and place of each), small unknowns.
-#[derive(Debug, Clone)]
-pub(super) struct Layout {
-    /// What is sought of the joint: 0 translation, 1 rotation, 2 coupling.
-    pub(super) joint: Vec<usize>,
-    /// The effects.
-    pub(super) effects: Vec<Candidate>,
+/// Model of a dataset under one hypothesis.
+pub struct Forward<'a> {
+    /// The data.
+    pub dataset: &'a Dataset,
+    /// Order of the parameters.
+    pub layout: Layout,
+    /// Observables that are predicted: those of the fit, or held-out or planned ones.
+    pub observables: &'a [Observable],
 }
 
-impl Layout {
-    pub(super) fn new(frame: &Frame, effects: &[Candidate]) -> Self {
-        let sought = frame.nominal.sought();
-        Layout {
-            joint: sought.iter().map(|(direction, _)| *direction).collect(),
-            effects: effects.to_vec(),
-        }
-    }
-
-    /// Index of the size of an effect.
-    pub(super) fn size(&self, effect: usize) -> usize {
-        let before = self.effects[..effect].iter();
-        self.joint.len()
-            + before
-                .map(|one| 1 + usize::from(one.place.is_some()))
-                .sum::<usize>()
-    }
-
-    /// Index of the place of an effect, if it has one.
-    pub(super) fn place(&self, effect: usize) -> Option<usize> {
-        self.effects[effect].place.map(|_| self.size(effect) + 1)
-    }
-
-    /// Index of the first small unknown.
-    pub(super) fn smalls(&self) -> usize {
-        self.size(self.effects.len())
-    }
-
-    /// The effects with the values that the parameters give them.
-    pub(super) fn effects_at(&self, parameters: &[f64]) -> Option<Vec<Effect>> {
-        (0..self.effects.len())
-            .map(|index| {
-                let candidate = &self.effects[index];
-                let size = parameters[self.size(index)];
-                let place = self.place(index).map(|place| parameters[place]);
-                effect_of(candidate, size, place)
-            })
-            .collect()
-    }
-
-    /// The nominal structure with the joint that the parameters give it.
-    pub(super) fn with_joint(&self, specimen: &Specimen, parameters: &[f64]) -> Specimen {
-        let mut specimen = specimen.clone();
-        if let SpecimenJoint::Springs { kt, kr, coupling } = &mut specimen.joint {
-            for (direction, value) in self.joint.iter().zip(parameters) {
-                match *direction {
-                    0 => *kt = value.exp(),
-                    COUPLING => *coupling = *value,
-                    _ => *kr = value.exp(),
-                }
-            }
-        }
-        specimen
-    }
-}
-
-/// The effect with its size and its place as it is searched for.
-pub(super) fn effect_of(candidate: &Candidate, size: f64, place: Option<f64>) -> Option<Effect> {
-    let mut pairs = vec![(candidate.size.name, size)];
-    if let (Some(range), Some(searched)) = (&candidate.place, place) {
-        let value = range.outward(searched);
-        pairs.push(match range.kind {
-            PlaceKind::Position => ("position", value),
-            PlaceKind::FixtureFrequency => ("frequency", value),
-            PlaceKind::Exponent => ("exponent", value),
-            PlaceKind::Gyration => ("inertia", size * value * value),
-        });
-    }
-    Effect::from_pairs(candidate.effect, &pairs).ok()
-}
-
-/// What a prediction leaves behind for its slopes.
-pub(super) struct Solution {
-    solved: Vec<Solved>,
-    /// All rows without the small unknowns.
+/// Intermediate results of a prediction, for its slopes.
+pub struct Solution {
+    models: Vec<ModalModel>,
+    /// Predictions without the nuisance parameters.
     base: Vec<f64>,
-    /// Those with respect to the small unknowns.
+    /// Slopes with respect to the nuisance parameters.
     slopes: DMatrix<f64>,
 }
+
+/// Modes of a structure, and its frequencies (Hz) if the modes are those of a structure next to it.
+type SolvedModes = (Arc<BeamModes>, Option<Vec<f64>>);
 
 impl Model for Forward<'_> {
     type Rest = Solution;
 
     fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Solution)> {
-        let solved = self.solve(parameters)?;
-        let base = self.rows_of(&solved, parameters)?;
-        let mut slopes = DMatrix::zeros(self.rows.len(), parameters.len());
-        let predicted = self.add_smalls(&solved, base.clone(), (parameters, &mut slopes));
+        let models = self.solve(parameters)?;
+        let base = self.predictions_of(&models, parameters)?;
+        let slopes = self.nuisance_slopes(&models, &base, parameters);
+        let predicted = self.with_nuisances(&base, &slopes, parameters);
         let solution = Solution {
-            solved,
+            models,
             base,
             slopes,
         };
@@ -119,184 +52,597 @@ impl Model for Forward<'_> {
     fn complete(
         &self,
         parameters: &[f64],
-        known: &[Knowledge],
-        (predicted, solution): (Vec<f64>, Solution),
+        priors: &[Prior],
+        predicted: Vec<f64>,
+        solution: Solution,
     ) -> Option<Linearised> {
         let Solution {
-            solved,
+            models,
             base,
             mut slopes,
         } = solution;
-        self.joint_slopes(&solved, &mut slopes);
+        self.set_joint_slopes(&models, &mut slopes);
         for index in 0..self.layout.effects.len() {
-            let steps = self.steps(index, parameters);
-            for (column, step) in steps.into_iter().filter(|(k, _)| !known[*k].is_held()) {
-                let mut moved = parameters.to_vec();
-                moved[column] += step;
-                let other = self.rows_of(&self.solve_near(&moved, &solved)?, &moved)?;
-                for (row, (new, old)) in other.iter().zip(&base).enumerate() {
-                    slopes[(row, column)] = (new - old) / step;
+            for (column, step) in self.steps(index, parameters) {
+                if !priors[column].is_held() {
+                    let near = Some(&models[..]);
+                    let change = self.difference(parameters, column, step, near, &base)?;
+                    slopes.set_column(column, &change.into());
                 }
             }
         }
-        if self.softening(parameters).is_some() {
-            self.amplitude_slopes(parameters, (&solved, &base), &mut slopes);
+        let nuisance = self.dataset.nuisance_index(NuisanceParameter::Amplitude);
+        if let Some(k) = nuisance.filter(|_| self.amplitude_effect(parameters).is_some()) {
+            let column = self.layout.first_nuisance() + k;
+            let near = Some(&models[..]);
+            if let Some(change) = self.difference(parameters, column, WIDE_STEP, near, &base) {
+                slopes.set_column(column, &change.into());
+            }
         }
         Some(Linearised { predicted, slopes })
     }
 }
 
-/// Predicts all rows of a frame under one hypothesis.
-pub(super) struct Forward<'a> {
-    pub(super) frame: &'a Frame,
-    pub(super) layout: Layout,
-    /// Rows beyond those of the fit (withheld or planned), if wanted in their place.
-    pub(super) rows: &'a [Row],
-}
+/// Step of the differences with respect to logarithms of stiffnesses and amplitudes.
+const WIDE_STEP: f64 = 1e-2;
 
 impl<'a> Forward<'a> {
-    pub(super) fn new(frame: &'a Frame, effects: &[Candidate]) -> Self {
+    /// Returns the model of the fitted observables with these effects.
+    pub fn new(dataset: &'a Dataset, effects: &[CandidateEffect]) -> Self {
         Forward {
-            frame,
-            layout: Layout::new(frame, effects),
-            rows: &frame.rows,
+            dataset,
+            layout: dataset.layout(effects),
+            observables: &dataset.observables,
         }
     }
 
-    /// Steps of the finite differences of one effect, away from its bounds: small against what readings to
-    /// 0.005 % leave open of a large effect (0.1 % of its size, 0.03 % of the length).
+    /// Priors of all parameters, with the middle spread of the drift.
+    pub fn priors(&self) -> Vec<Prior> {
+        self.dataset.priors(&self.layout)
+    }
+
+    /// Returns the columns of one effect and the steps of their finite differences, away from the bounds. They are
+    /// small against what data of 0.005 % leave open of a large effect (0.1 % of its size, 0.03 % of the length).
     fn steps(&self, index: usize, parameters: &[f64]) -> Vec<(usize, f64)> {
         let candidate = &self.layout.effects[index];
-        let column = self.layout.size(index);
-        let size = 1e-4 * candidate.size.scale.max(parameters[column].abs());
-        let inward =
-            |value: f64, step: f64, high: f64| if value + step > high { -step } else { step };
-        let mut steps = vec![(
-            column,
-            inward(parameters[column], size, candidate.size.high),
-        )];
-        if let (Some(range), Some(place)) = (&candidate.place, self.layout.place(index)) {
-            let step = 5e-5 * (range.inward(range.high) - range.inward(range.low));
-            steps.push((
-                place,
-                inward(parameters[place], step, range.inward(range.high)),
-            ));
+        let size = self.layout.size(index);
+        let step = 1e-4 * candidate.size.scale.max(parameters[size].abs());
+        let mut steps = vec![(size, step, candidate.size.high)];
+        if let (Some(range), Some(location)) = (candidate.location, self.layout.location(index)) {
+            let (low, high) = range.searched_bounds();
+            steps.push((location, 5e-5 * (high - low), high));
         }
-        steps
+        let inward = steps.into_iter().map(|(column, step, high)| {
+            let is_outside = parameters[column] + step > high;
+            (column, if is_outside { -step } else { step })
+        });
+        inward.collect()
     }
 
-    /// Slopes of all rows with respect to the joint's stiffnesses by finite differences.
-    pub(super) fn joint_differences(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
-        const STEP: f64 = 1e-2;
-        let base = self.rows_of(&self.solve(parameters)?, parameters)?;
-        let mut slopes = DMatrix::zeros(self.rows.len(), self.layout.joint.len());
+    /// Returns the slopes of all predictions with respect to one parameter by a finite difference. Next to solved
+    /// modal models the solution is that of a changed structure.
+    fn difference(
+        &self,
+        parameters: &[f64],
+        column: usize,
+        step: f64,
+        near: Option<&[ModalModel]>,
+        base: &[f64],
+    ) -> Option<Vec<f64>> {
+        let mut moved = parameters.to_vec();
+        moved[column] += step;
+        let models = match near {
+            Some(there) => self.solve_near(&moved, there)?,
+            None => self.solve(&moved)?,
+        };
+        let new = self.predictions_of(&models, &moved)?;
+        let pairs = new.iter().zip(base);
+        Some(pairs.map(|(new, old)| (new - old) / step).collect())
+    }
+
+    /// Returns the slopes of all predictions with respect to the joint's parameters by finite differences.
+    pub fn joint_differences(&self, parameters: &[f64]) -> Option<DMatrix<f64>> {
+        let base = self.predictions_of(&self.solve(parameters)?, parameters)?;
+        let mut slopes = DMatrix::zeros(self.observables.len(), self.layout.joint.len());
         for column in 0..self.layout.joint.len() {
-            let mut moved = parameters.to_vec();
-            moved[column] += STEP;
-            let other = self.rows_of(&self.solve(&moved)?, &moved)?;
-            for (row, (new, old)) in other.iter().zip(&base).enumerate() {
-                slopes[(row, column)] = (new - old) / STEP;
-            }
+            let change = self.difference(parameters, column, WIDE_STEP, None, &base)?;
+            slopes.set_column(column, &change.into());
         }
         Some(slopes)
     }
 
-    /// All rows without the small unknowns.
-    pub(super) fn rows_of(&self, solved: &[Solved], parameters: &[f64]) -> Option<Vec<f64>> {
-        self.rows
-            .iter()
-            .map(|row| self.row_of(row, solved, parameters))
+    /// Returns the modal model of each configuration; equal structures are solved once.
+    pub fn solve(&self, parameters: &[f64]) -> Option<Vec<ModalModel>> {
+        self.solve_by(parameters, |_, specimen| {
+            Some((self.modes_of(specimen)?, None))
+        })
+    }
+
+    /// Returns the modal models next to a point that is solved. If only frequencies are predicted, Rayleigh's
+    /// quotient gives their change.
+    fn solve_near(&self, parameters: &[f64], there: &[ModalModel]) -> Option<Vec<ModalModel>> {
+        let frequencies_alone = self.observables.iter().all(Observable::is_frequency);
+        self.solve_by(parameters, |configuration, specimen| {
+            let known = &there[configuration];
+            if known.seen.specimen == *specimen {
+                return Some((known.own.clone(), None));
+            }
+            // A kink that moves takes the shape with it.
+            let kinks = specimen.hinges.iter().map(|hinge| hinge.position);
+            let before = known.seen.specimen.hinges.iter();
+            let shape_holds = kinks.eq(before.map(|hinge| hinge.position));
+            if frequencies_alone
+                && shape_holds
+                && let Ok(all) = known.modes().rayleigh_frequencies(specimen)
+            {
+                return Some((known.own.clone(), Some(all)));
+            }
+            let near = known.own.near(specimen).ok()?.map(Arc::new);
+            Some((near.or_else(|| self.modes_of(specimen))?, None))
+        })
+    }
+
+    fn solve_by(
+        &self,
+        parameters: &[f64],
+        modes_of: impl Fn(usize, &Specimen) -> Option<SolvedModes>,
+    ) -> Option<Vec<ModalModel>> {
+        let effects = self.layout.effects_at(parameters)?;
+        let law = self.law(parameters);
+        let mut all: Vec<ModalModel> = Vec::with_capacity(self.dataset.arrangements.len());
+        for (configuration, arrangement) in self.dataset.arrangements.iter().enumerate() {
+            let nominal = with_joint(&arrangement.specimen, &self.layout.joint, parameters);
+            let motion = arrangement.joint_motion.as_ref().zip(law.as_ref());
+            let stiffness_changes = motion.map(|(motion, law)| motion.stiffness_changes(law));
+            let circumstances = Circumstances {
+                sensors: &arrangement.carried,
+                level: self.level(arrangement, stiffness_changes.as_ref(), parameters),
+                ..Circumstances::default()
+            };
+            let seen = apply(&effects, &nominal, &circumstances);
+            let mut solved = all.iter();
+            let (own, frequencies) = match solved.find(|one| one.seen.specimen == seen.specimen) {
+                Some(other) => (other.own.clone(), other.frequencies.clone()),
+                None => modes_of(configuration, &seen.specimen)?,
+            };
+            all.push(ModalModel {
+                seen,
+                own,
+                frequencies,
+                stiffness_changes,
+            });
+        }
+        Some(all)
+    }
+
+    fn modes_of(&self, specimen: &Specimen) -> Option<Arc<BeamModes>> {
+        let elements = self.dataset.elements;
+        let found = specimen.beam_modes(self.dataset.modes, Mesh { elements });
+        Some(Arc::new(found.ok()?))
+    }
+
+    /// Returns all predictions without the nuisance parameters.
+    fn predictions_of(&self, models: &[ModalModel], parameters: &[f64]) -> Option<Vec<f64>> {
+        let observables = self.observables.iter();
+        observables
+            .map(|one| self.prediction_of(one, models, parameters))
             .collect()
     }
 
-    fn row_of(&self, row: &Row, solved: &[Solved], parameters: &[f64]) -> Option<f64> {
-        match *row {
-            Row::Frequency {
-                configuration,
-                mode,
-            } => {
-                let one = &solved[configuration];
-                let frequency = one.frequency(mode)?;
-                let own = Self::own_change(mode, one);
+    fn prediction_of(
+        &self,
+        observable: &Observable,
+        models: &[ModalModel],
+        parameters: &[f64],
+    ) -> Option<f64> {
+        let one = &models[observable.configuration];
+        if observable.is_damping() {
+            let damping = self.damping(observable.mode, models, parameters)?;
+            return Some(damping.total.ln());
+        }
+        let place = ModeInPlace::new(self, observable, models)?;
+        match observable.kind {
+            ObservableKind::Frequency => {
+                let frequency = one.frequency(observable.mode)?;
+                let own = one.own_change(observable.mode);
                 (frequency > 0.0).then(|| frequency.ln() + own)
             }
-            Row::Constant {
-                configuration,
-                mode,
-                sensor,
-            } => {
-                let one = &solved[configuration];
-                let index = one.index(mode)?;
-                let setup = &self.frame.setups[configuration];
-                let at = |x: f64| one.modes().displacement(index, x);
-                Some(at(setup.sensors[sensor].position) * at(setup.tap?))
+            ObservableKind::Constant { sensor } => {
+                Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
             }
-            Row::Ratio {
-                configuration,
-                mode,
-                sensor,
-                reference,
-            } => {
-                let one = &solved[configuration];
-                let index = one.index(mode)?;
-                let setup = &self.frame.setups[configuration];
-                let at = |sensor: usize| {
-                    one.modes()
-                        .displacement(index, setup.sensors[sensor].position)
-                };
-                Some(at(sensor) / at(reference))
+            ObservableKind::Ratio { sensor, reference } => {
+                Some(place.at_sensor(sensor) / place.at_sensor(reference))
             }
-            Row::Damping { mode } => Some(self.damping(mode, solved, parameters)?.0.ln()),
-            Row::Slope {
-                configuration,
-                mode,
-            } => Some(self.slope_along_decay(
-                (configuration, mode),
-                &solved[configuration],
-                parameters,
-            )),
+            ObservableKind::Slope | ObservableKind::Damping => {
+                let law = self.law(parameters);
+                Some(law.map_or(0.0, |law| {
+                    slope_along_decay(place.arrangement, observable.mode, one, &law)
+                }))
+            }
         }
     }
 
-    /// What the joint's stiffnesses do to every row: see [`joint_slopes`]; to shapes, what they do at the nominal
-    /// optimum.
-    fn joint_slopes(&self, solved: &[Solved], slopes: &mut DMatrix<f64>) {
-        let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(solved.len());
-        for one in solved {
-            let mut before = solved[..all.len()].iter();
+    /// Sets the slopes with respect to the joint: see [`ModalModel::joint_slopes`]; those of shapes are taken
+    /// at the nominal optimum.
+    fn set_joint_slopes(&self, models: &[ModalModel], slopes: &mut DMatrix<f64>) {
+        let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(models.len());
+        for one in models {
+            let mut before = models[..all.len()].iter();
             let known = before.position(|other| Arc::ptr_eq(&other.own, &one.own));
             let directions = self.layout.joint.iter();
             all.push(match known {
                 Some(other) => all[other].clone(),
-                None => directions.map(|k| joint_slopes(one, *k)).collect(),
+                None => directions.map(|k| one.joint_slopes(*k)).collect(),
             });
         }
-        for (row, kind) in self.rows.iter().enumerate() {
-            let Row::Frequency {
-                configuration,
-                mode,
-            } = *kind
-            else {
-                if let Some(known) = &self.frame.shape_slopes {
-                    for column in 0..self.layout.joint.len() {
-                        slopes[(row, column)] = known[(row, column)];
+        for (row, observable) in self.observables.iter().enumerate() {
+            if observable.is_frequency() {
+                let one = &models[observable.configuration];
+                if let Some(index) = one.index(observable.mode) {
+                    for (column, own) in all[observable.configuration].iter().enumerate() {
+                        slopes[(row, column)] = own[index] * one.offset_factor(index);
                     }
                 }
-                continue;
-            };
-            let one = &solved[configuration];
-            let Some(index) = one.index(mode) else {
-                continue;
-            };
-            for (column, own) in all[configuration].iter().enumerate() {
-                slopes[(row, column)] = own[index] * offset_factor(one, index);
+            } else if let Some(known) = &self.dataset.shape_slopes {
+                for column in 0..self.layout.joint.len() {
+                    slopes[(row, column)] = known[(row, column)];
+                }
             }
         }
     }
+
+    /// Returns the slopes with respect to the nuisance parameters; the columns of all others are 0.
+    fn nuisance_slopes(
+        &self,
+        models: &[ModalModel],
+        base: &[f64],
+        parameters: &[f64],
+    ) -> DMatrix<f64> {
+        let first = self.layout.first_nuisance();
+        let mut slopes = DMatrix::zeros(base.len(), parameters.len());
+        for (row, observable) in self.observables.iter().enumerate() {
+            for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
+                let nuisance = nuisance.parameter;
+                slopes[(row, first + k)] =
+                    self.nuisance_slope(observable, nuisance, models, base[row], parameters);
+            }
+        }
+        slopes
+    }
+
+    /// Returns the predictions with the nuisance parameters.
+    fn with_nuisances(&self, base: &[f64], slopes: &DMatrix<f64>, parameters: &[f64]) -> Vec<f64> {
+        use NuisanceParameter::{Amplitude, Damping, DampingTilt};
+        let first = self.layout.first_nuisance();
+        let mut predicted = base.to_vec();
+        for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
+            // These enter the solution itself.
+            if !matches!(nuisance.parameter, Damping | DampingTilt | Amplitude) {
+                for (row, predicted) in predicted.iter_mut().enumerate() {
+                    *predicted += parameters[first + k] * slopes[(row, first + k)];
+                }
+            }
+        }
+        predicted
+    }
+
+    /// Returns the derivative of a prediction with respect to a nuisance parameter.
+    fn nuisance_slope(
+        &self,
+        observable: &Observable,
+        nuisance: NuisanceParameter,
+        models: &[ModalModel],
+        predicted: f64,
+        parameters: &[f64],
+    ) -> f64 {
+        if observable.is_damping() {
+            let tilt = match nuisance {
+                NuisanceParameter::Damping => 1.0,
+                NuisanceParameter::DampingTilt => self.dataset.tilt(observable.mode),
+                _ => return 0.0,
+            };
+            let damping = self.damping(observable.mode, models, parameters);
+            return damping.map_or(1.0, |damping| damping.nominal / damping.total) * tilt;
+        }
+        let Some(place) = ModeInPlace::new(self, observable, models) else {
+            return 0.0;
+        };
+        match observable.kind {
+            ObservableKind::Frequency => place.frequency_slope(nuisance, parameters),
+            ObservableKind::Constant { sensor } => {
+                place.constant_slope(sensor, nuisance, predicted)
+            }
+            ObservableKind::Ratio { sensor, reference } => {
+                let towards = place.relative_slope(sensor, nuisance);
+                predicted * (towards - place.relative_slope(reference, nuisance))
+            }
+            ObservableKind::Slope | ObservableKind::Damping => 0.0,
+        }
+    }
+
+    /// Returns the sum of the sizes of all effects of a kind; 0 without any.
+    fn size_of(&self, wanted: EffectId, parameters: &[f64]) -> f64 {
+        let effects = self.layout.effects.iter().enumerate();
+        let own = effects.filter(|(_, one)| one.effect == wanted);
+        own.map(|(k, _)| parameters[self.layout.size(k)]).sum()
+    }
+
+    /// Returns the mass of a sensor (kg): the stated one, or that of the hypothesis if none is stated.
+    fn mass_at(&self, sensor: &SensorPlace, parameters: &[f64]) -> f64 {
+        match sensor.mass {
+            0.0 => self.size_of(EffectId::SensorMass, parameters),
+            stated => stated,
+        }
+    }
+
+    /// Returns the masses that the hypothesis adds (kg), and their positions (m).
+    fn added_masses(&self, parameters: &[f64]) -> Vec<(f64, f64)> {
+        let mut all = Vec::new();
+        for (k, one) in self.layout.effects.iter().enumerate() {
+            if let (EffectId::AddedMass, Some(range), Some(location)) =
+                (one.effect, one.location, self.layout.location(k))
+            {
+                let position = range.from_searched(parameters[location]);
+                all.push((parameters[self.layout.size(k)], position));
+            }
+        }
+        all
+    }
+
+    /// Returns the damping ratio of a mode: the nominal one, a level times a power of the frequency, and eta/2 times the
+    /// joint's share of the strain energy.
+    fn damping(&self, mode: usize, all: &[ModalModel], parameters: &[f64]) -> Option<DampingRatio> {
+        let first = self.layout.first_nuisance();
+        let level = self.dataset.nuisance_index(NuisanceParameter::Damping)?;
+        let tilt = self
+            .dataset
+            .nuisance_index(NuisanceParameter::DampingTilt)?;
+        let rise = parameters[first + tilt] * self.dataset.tilt(mode);
+        let nominal = (parameters[first + level] + rise).exp();
+        let one = all.first()?;
+        let shares = one.joint_shares(one.index(mode)?);
+        let slip = self.slip_loss(mode, all, parameters) * shares[1];
+        let lost = one.seen.joint_loss_factor * (shares[0] + shares[1]) + slip;
+        Some(DampingRatio {
+            total: nominal + 0.5 * lost.max(0.0),
+            nominal,
+        })
+    }
+
+    /// Returns the loss factor of a joint that slips, as one mode feels it on average over the configurations: in the
+    /// share of the strain energy of the spring that has softened, 1 + change.
+    fn slip_loss(&self, mode: usize, all: &[ModalModel], parameters: &[f64]) -> f64 {
+        let law = self.law(parameters);
+        let share = law.map_or(0.0, |law| law.loss_over_change());
+        let changes = all.iter().map(|one| one.stiffness_changes.as_ref());
+        let changes = changes.filter_map(|changes| changes?.of(mode));
+        let (sum, count) = changes.fold((0.0, 0), |(sum, n), one| (sum + one, n + 1));
+        let change = sum / f64::from(count.max(1));
+        -share * change / (1.0 + change).max(LEAST_STIFFNESS)
+    }
+
+    /// Returns the joint's law at the amplitudes that the parameters give it, where that is a hypothesis.
+    fn law(&self, parameters: &[f64]) -> Option<JointLaw> {
+        let JointLaw { ratio, exponent } = self.amplitude_effect(parameters)?;
+        // The amplitude is known but for a factor, which all recordings share.
+        let ratio = ratio * self.amplitude_factor(parameters).powf(exponent);
+        Some(JointLaw { ratio, exponent })
+    }
+
+    /// Returns the relative amplitude at which the structure of a configuration is solved: the joint then has the mean
+    /// stiffness that its modes feel.
+    fn level(
+        &self,
+        arrangement: &Arrangement,
+        changes: Option<&StiffnessChanges>,
+        parameters: &[f64],
+    ) -> f64 {
+        let Some(JointLaw { ratio, exponent }) = self.amplitude_effect(parameters) else {
+            return 1.0;
+        };
+        match changes {
+            // ratio level^p = mean change, of the same sign.
+            Some(changes) if ratio != 0.0 => (changes.mean / ratio).powf(exponent.recip()),
+            Some(_) => 0.0,
+            None => {
+                let factor = self.amplitude_factor(parameters);
+                factor * arrangement.level * effective_share(exponent)
+            }
+        }
+    }
+
+    fn amplitude_factor(&self, parameters: &[f64]) -> f64 {
+        let index = self.dataset.nuisance_index(NuisanceParameter::Amplitude);
+        index.map_or(1.0, |k| parameters[self.layout.first_nuisance() + k].exp())
+    }
+
+    /// Returns the joint's law by the size and exponent of the effect, where that is a hypothesis.
+    fn amplitude_effect(&self, parameters: &[f64]) -> Option<JointLaw> {
+        let location = self.layout.location_of_kind(LocationKind::Exponent)?;
+        Some(JointLaw {
+            ratio: parameters[location - 1],
+            exponent: parameters[location],
+        })
+    }
 }
 
-/// A constant bias does not move with the structure: d ln(s f + b)/d ln f = s f/(s f + b).
-fn offset_factor(one: &Solved, index: usize) -> f64 {
-    let own = one.modes().frequencies()[index] * one.seen.frequency_scale;
-    own / (own + one.seen.frequency_offset)
+/// Damping ratio of a mode.
+struct DampingRatio {
+    /// With the losses in the joint.
+    total: f64,
+    /// Without the losses in the joint.
+    nominal: f64,
+}
+
+/// Mode of an observable, with the sensors and masses that it moves.
+struct ModeInPlace<'a> {
+    forward: &'a Forward<'a>,
+    observable: Observable,
+    arrangement: &'a Arrangement,
+    model: &'a ModalModel,
+    index: usize,
+}
+
+impl<'a> ModeInPlace<'a> {
+    /// Returns the mode; `None` where the structure does not have it.
+    fn new(
+        forward: &'a Forward<'a>,
+        observable: &Observable,
+        models: &'a [ModalModel],
+    ) -> Option<Self> {
+        let model = &models[observable.configuration];
+        Some(ModeInPlace {
+            forward,
+            observable: *observable,
+            arrangement: &forward.dataset.arrangements[observable.configuration],
+            model,
+            index: model.index(observable.mode)?,
+        })
+    }
+
+    fn at_sensor(&self, sensor: usize) -> f64 {
+        self.displacement(self.arrangement.sensors[sensor].position)
+    }
+
+    fn displacement(&self, position: f64) -> f64 {
+        self.model.modes().displacement(self.index, position)
+    }
+
+    fn slope(&self, position: f64) -> f64 {
+        self.model.modes().slope(self.index, position)
+    }
+
+    /// Sensors with this index among the indices `keys`.
+    fn sensors(&self, keys: &'a [usize], wanted: usize) -> impl Iterator<Item = &'a SensorPlace> {
+        let own = keys.iter().zip(&self.arrangement.sensors);
+        own.filter(move |(key, _)| **key == wanted)
+            .map(|(_, sensor)| sensor)
+    }
+
+    /// Returns d ln f with respect to a nuisance parameter.
+    fn frequency_slope(&self, nuisance: NuisanceParameter, parameters: &[f64]) -> f64 {
+        let (forward, arrangement) = (self.forward, self.arrangement);
+        let (dataset, mode) = (forward.dataset, self.observable.mode);
+        match nuisance {
+            NuisanceParameter::Scale => 1.0,
+            NuisanceParameter::Shear => dataset.shear_slope(mode),
+            NuisanceParameter::Temperature { setup } if setup == arrangement.setup => 1.0,
+            NuisanceParameter::Discrepancy { mode: own } if own == mode => 1.0,
+            NuisanceParameter::Scatter { configuration }
+                if configuration == self.observable.configuration =>
+            {
+                dataset.scatter_of(configuration, mode)
+            }
+            NuisanceParameter::Drift { setup, direction } if setup == arrangement.setup => {
+                0.5 * self.model.joint_shares(self.index)[direction]
+            }
+            // d ln f/d m = -phi^2/2 for a mass-normalised shape.
+            NuisanceParameter::SensorMass { name } => self
+                .sensors(&arrangement.names, name)
+                .map(|sensor| -0.5 * sensor.mass * self.displacement(sensor.position).powi(2))
+                .sum(),
+            // d ln f/d J = -(phi')^2/2.
+            NuisanceParameter::SensorInertia { name } => self
+                .sensors(&arrangement.names, name)
+                .map(|sensor| {
+                    let mass = forward.mass_at(sensor, parameters);
+                    self.inertia_slope(mass, sensor.position)
+                })
+                .sum(),
+            NuisanceParameter::AddedInertia => forward
+                .added_masses(parameters)
+                .into_iter()
+                .map(|(mass, position)| self.inertia_slope(mass, position))
+                .sum(),
+            // d ln f = (k/omega^2 - m) phi phi' dx, of the mass there and of the spring that holds it.
+            NuisanceParameter::SensorPosition { position } => self
+                .sensors(&arrangement.positions, position)
+                .map(|sensor| {
+                    let omega = self.model.omega(self.index);
+                    let spring = forward.size_of(EffectId::SensorCable, parameters);
+                    let held = spring / (omega * omega);
+                    let moved = self.displacement(sensor.position) * self.slope(sensor.position);
+                    (held - forward.mass_at(sensor, parameters)) * moved
+                })
+                .sum(),
+            // d ln f/d m = -phi^2/2, and d ln f/d x = -m phi phi'.
+            NuisanceParameter::FastenedMass { fastened } => self
+                .fastened(fastened)
+                .map(|(mass, position)| -0.5 * mass * self.displacement(position).powi(2))
+                .sum(),
+            NuisanceParameter::FastenedPosition { fastened } => self
+                .fastened(fastened)
+                .map(|(mass, x)| -mass * self.displacement(x) * self.slope(x))
+                .sum(),
+            _ => 0.0,
+        }
+    }
+
+    /// Returns d ln f with respect to the rotary inertia of a mass (kg) over its usual one.
+    fn inertia_slope(&self, mass: f64, position: f64) -> f64 {
+        let inertia = mass * self.forward.dataset.settings.sensor_radius.powi(2);
+        -0.5 * inertia * self.slope(position).powi(2)
+    }
+
+    /// Added masses (kg) with this index, and their positions (m).
+    fn fastened(&self, wanted: usize) -> impl Iterator<Item = (f64, f64)> + 'a {
+        let own = self.arrangement.fastened.iter();
+        let own = own.filter(move |(own, _)| *own == wanted);
+        own.map(|(_, mass)| (mass.mass, mass.position))
+    }
+
+    /// Returns the derivative of the modal constant at a sensor with respect to a nuisance parameter.
+    fn constant_slope(&self, sensor: usize, nuisance: NuisanceParameter, predicted: f64) -> f64 {
+        let arrangement = self.arrangement;
+        let Some(tap) = arrangement.tap else {
+            return 0.0;
+        };
+        let x = arrangement.sensors[sensor].position;
+        match nuisance {
+            NuisanceParameter::Gain { setup, name } if self.is_gain(sensor, setup, name) => {
+                predicted
+            }
+            NuisanceParameter::SensorPosition { position }
+                if arrangement.positions[sensor] == position =>
+            {
+                self.slope(x) * self.displacement(tap)
+            }
+            NuisanceParameter::TapPosition { setup } if arrangement.setup == setup => {
+                self.displacement(x) * self.slope(tap)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Returns the relative derivative of the displacement at a sensor with respect to a nuisance parameter.
+    fn relative_slope(&self, sensor: usize, nuisance: NuisanceParameter) -> f64 {
+        match nuisance {
+            NuisanceParameter::Gain { setup, name } if self.is_gain(sensor, setup, name) => 1.0,
+            NuisanceParameter::SensorPosition { position }
+                if self.arrangement.positions[sensor] == position =>
+            {
+                let x = self.arrangement.sensors[sensor].position;
+                self.slope(x) / self.displacement(x)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Returns whether a sensor of this configuration has this gain.
+    fn is_gain(&self, sensor: usize, setup: usize, name: usize) -> bool {
+        self.arrangement.setup == setup && self.arrangement.names[sensor] == name
+    }
+}
+
+/// Returns d ln f/d ln a = S_i d ln kr/d ln a, with the mode's sensitivity S_i = d ln f_i/d ln kr, averaged over the
+/// followed part of the decay.
+pub fn slope_along_decay(
+    arrangement: &Arrangement,
+    mode: usize,
+    model: &ModalModel,
+    law: &JointLaw,
+) -> f64 {
+    model.index(mode).map_or(0.0, |index| {
+        model.rotation_sensitivity(index) * arrangement.stiffness_slope(mode, law)
+    })
 }

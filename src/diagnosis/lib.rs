@@ -1,96 +1,75 @@
-//! The gap between model and measurement: where it lies, which effect causes it, how far it closes.
+//! Diagnosis of the gap between model and measurement: where it lies, which effect causes it, how far the effect
+//! closes it.
 //!
 //! ```text
-//! Observations, Nominal -> frame       readings and small unknowns in order
-//!                          forward     what a hypothesis predicts (structure, effects)
-//!                          evidence    how probable the readings are under it
-//!                          fixture_peak  peaks of no mode, and the fixture whose mode they may be
-//!                          posterior   probabilities, places, what cannot be told apart
-//!                          quality     misfit overall, by block, with each mode left out
-//!                          withheld    what it predicts of readings that took no part
-//!                          left_out    what it predicts of each recording from the others
-//!                          trial       what all of this says of one explanation
-//!                          verdict     an answer, or the reason why there is none
-//!                          unplaced    the model without sensors that sat nobody knows where
-//!                          decay_law   the joint's law that explains changes along the decays
-//!                          decay_finding  what the decays say by themselves
-//!                          advisor     which test would tell more
+//! Observations, Nominal -> observations   common modes, unpaired peaks, checks
+//!                          dataset        data with their uncertainties, nuisance parameters
+//!                          structure      the described structure and its modal models
+//!                          parameters     effects, priors, order of the parameters
+//!                          forward        predictions of a hypothesis and their slopes
+//!                          evidence       evidence of a hypothesis (with least_squares)
+//!                          amplitude      joints whose stiffness depends on the amplitude (with joint_motion)
+//!                          fixture        the fixture's own resonance
+//!                          fit            local optima of one hypothesis (with multi_start)
+//!                          validate       residuals, hold-out data, leave-one-recording-out
+//!                          goodness_of_fit  tests of one explanation
+//!                          posterior      probabilities and inseparable hypotheses
+//!                          effect_pairs   two effects at once
+//!                          compare        all hypotheses
+//!                          verdict        an answer, or the reason why there is none
+//!                          location_map   changes along the beam
+//!                          next_test      the most informative next test
+//!                          summary        the result
 //! ```
 //!
-//! Every hypothesis is the nominal model, one effect of the catalogue added to it, or "something else";
-//! under each, the joint's stiffnesses and all small unknowns (geometry's common scale, the joint's
-//! drift and the warmth between visits, masses, inertias and places of sensors, calibration) are fitted and integrated over. The
-//! uncertainty of the readings comes from the measurement, never from a residual. This module cannot
-//! reach the simulator, so that its answers to virtual tests are answers.
+//! Every hypothesis is the nominal model, one or two effects of the catalogue added to it, or something unknown.
+//! Under each, the joint's stiffnesses and all nuisance parameters (the geometry's common scale, drift of the
+//! joint and temperature between set-ups, masses, inertias and positions of sensors, calibration) are fitted and
+//! integrated over. The uncertainty of the data comes from the measurement, never from a residual. This crate cannot
+//! reach the simulator, so that its answers to virtual tests are independent of it.
 
-mod advisor;
-mod afar;
-mod along_decay;
-mod assemble;
-mod branches;
-mod catalogue;
-mod catch_all;
-mod checks;
-mod common_modes;
-mod decay_finding;
-mod decay_law;
-mod decay_readings;
-mod doubt;
-mod error;
+mod amplitude;
+mod compare;
+mod dataset;
+mod effect_pairs;
 mod evidence;
-#[cfg(test)]
-mod example;
-mod fastened;
-mod fixture_peak;
+mod fit;
+mod fixture;
 mod forward;
-mod frame;
-mod hypothesis;
-mod joint_energy;
-mod joint_path;
-mod knowledge;
+mod goodness_of_fit;
+mod joint_motion;
 mod least_squares;
-mod left_out;
-mod lone_peaks;
-mod noise;
-mod nominal;
-mod pairs;
-mod place_map;
+mod location_map;
+mod multi_start;
+mod next_test;
+mod observations;
+mod parameters;
 mod posterior;
-mod profile;
-mod quality;
 mod result;
-mod search;
 mod settings;
-mod setup;
-mod shear;
-mod small_slopes;
-mod small_unknowns;
-mod solved;
+mod structure;
+mod summary;
 mod synthetic;
-mod trial;
-mod unplaced;
+#[cfg(test)]
+mod tests;
+mod thresholds;
+mod validate;
 mod verdict;
-mod withheld;
 
-pub use advisor::{NextTest, Step};
-pub use decay_finding::{DecayChange, DecayFinding};
-pub use error::GapError;
-pub use nominal::{Nominal, NominalSensor};
 pub use result::{
-    Block, Closure, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
-    LeftOutRecording, LeftOutRecordings, Misfit, ParameterValue, PlaceMap, PlaceProbabilities,
-    Pull, Verdict,
+    AmplitudeDependence, Block, Closure, CrossValidation, DecidedBy, Diagnosis, FrequencyChange,
+    Hypothesis, HypothesisResult, JointShift, LeftOutRecording, LocationMap, LocationProbabilities,
+    Misfit, NextTest, ParameterValue, Proposal, Residual, UnlocatedSensors, Verdict,
 };
-pub use settings::GapSettings;
+pub use settings::{GapError, GapSettings};
+pub use structure::{Nominal, NominalSensor};
 pub use synthetic::{PlannedConfiguration, TestPlan, observe};
-pub use trial::MISFIT;
-pub use unplaced::Unplaced;
-pub use verdict::SEEN;
+pub use thresholds::{DETECTED, MISFIT};
 
 use tapjoint_identify::observation::Observations;
 
-/// By how much chi square (priors included) the nominal model with its joint refitted misses what a test
-/// observed: what any effect could gain at most.
+/// Returns the chi square (priors included) that the nominal model with its joint refitted leaves of a test:
+/// the most that any effect could gain.
 ///
 /// # Errors
 /// As [`diagnose`].
@@ -100,24 +79,24 @@ pub fn nominal_chi_square(
     settings: &GapSettings,
 ) -> Result<f64, GapError> {
     settings.check()?;
-    checks::check(observations, nominal)?;
-    search::nominal_chi_square(observations, nominal, settings).ok_or(GapError::NoFit)
+    observations::check(observations, nominal)?;
+    compare::least_nominal_chi_square(observations, nominal, settings).ok_or(GapError::NoFit)
 }
 
-/// Diagnoses what a test observed against what it was described to be.
+/// Diagnoses the observations of a test against the described structure.
 ///
 /// # Errors
-/// [`GapError`] where there is nothing to diagnose: too few modes, no uncertainties, recordings of
-/// different structures, sensors that see nothing.
+/// [`GapError`] where no diagnosis is possible: too few modes, no uncertainties, recordings of
+/// different structures, sensors at nodes.
 pub fn diagnose(
     observations: &Observations,
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
     settings.check()?;
-    checks::check(observations, nominal)?;
-    let mut competition = search::compete(observations, nominal, settings)?;
-    doubt::doubt(&mut competition);
-    let unplaced = unplaced::unplaced(observations, nominal, settings);
-    Ok(assemble::diagnosis(&competition, unplaced, settings))
+    observations::check(observations, nominal)?;
+    let mut comparison = compare::compare(observations, nominal, settings)?;
+    posterior::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
+    let unlocated = compare::without_unlocated(observations, nominal, settings);
+    Ok(summary::diagnosis(&comparison, unlocated))
 }

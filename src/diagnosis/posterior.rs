@@ -1,27 +1,32 @@
-//! Probabilities of the hypotheses, and which of them the readings cannot tell apart.
+//! Probabilities of the hypotheses, and which of them the data cannot separate.
 
-use super::evidence::{covariance, log_sum};
-use super::frame::Frame;
-use super::hypothesis::Fit;
-use super::result::{Hypothesis, PlaceProbabilities};
+use crate::dataset::Dataset;
+use crate::evidence::{Fit, log_sum};
+use crate::goodness_of_fit::GoodnessOfFit;
+use crate::result::{Hypothesis, LocationProbabilities};
+use crate::thresholds::{NO_GAP_PRIOR, SECOND_EFFECT, SEPARATE, SMALLEST_P_VALUE};
+use std::f64::consts::E;
 use tapjoint_beam::effects::{EffectId, Group, Place};
 
-/// A fitted hypothesis in the competition.
+/// Hypothesis that takes part in the comparison, with its fit.
 #[derive(Debug, Clone)]
-pub(super) struct Entry {
-    pub(super) hypothesis: Hypothesis,
-    pub(super) fit: Fit,
-    /// Its probability (1).
-    pub(super) probability: f64,
-    /// What it had beforehand, in units of one group of effects (1).
-    pub(super) prior: f64,
+pub struct Candidate {
+    /// The hypothesis.
+    pub hypothesis: Hypothesis,
+    /// Its fit.
+    pub fit: Fit,
+    /// Probability (1).
+    pub probability: f64,
+    /// Prior probability, in units of one group of effects (1).
+    pub prior: f64,
     /// Standard deviation of the joint's drift, where that is the hypothesis.
-    pub(super) drift: Option<f64>,
+    pub drift: Option<f64>,
 }
 
-impl Entry {
-    pub(super) fn new(hypothesis: Hypothesis, fit: Fit) -> Self {
-        Entry {
+impl Candidate {
+    /// Returns a candidate that has no probability yet.
+    pub fn new(hypothesis: Hypothesis, fit: Fit) -> Self {
+        Candidate {
             hypothesis,
             fit,
             probability: 0.0,
@@ -31,91 +36,169 @@ impl Entry {
     }
 
     /// Logarithm of evidence times prior.
-    pub(super) fn log_weight(&self) -> f64 {
+    pub fn log_weight(&self) -> f64 {
         self.fit.log_evidence + self.prior.ln()
     }
 
-    /// Its effects; none of `none` and `unknown`.
-    pub(super) fn effects(&self) -> &[EffectId] {
+    /// Its effects; none for `none` and `unknown`.
+    pub fn effects(&self) -> &[EffectId] {
         match &self.hypothesis {
             Hypothesis::Effects(effects) => effects,
             _ => &[],
         }
     }
 
-    /// The groups of its effects, in order.
-    pub(super) fn groups(&self) -> Vec<Group> {
+    /// Groups of its effects, in order.
+    pub fn groups(&self) -> Vec<Group> {
         self.effects().iter().map(|effect| effect.group()).collect()
     }
-}
 
-/// Probability beforehand that there is no gap, over that of one group of effects. The priors of all
-/// sizes reach zero, and an effect too small to be noticed is as good as none; and of a dozen things that
-/// may be wrong with a test mostly none is.
-const NONE_SHARE: f64 = 4.0;
+    /// Returns whether it is something outside the catalogue.
+    pub fn is_unknown(&self) -> bool {
+        self.hypothesis == Hypothesis::Unknown
+    }
 
-/// Gives every group the same probability beforehand, split evenly inside; `unknown` is a group, `none`
-/// has [`NONE_SHARE`] of them. The pairs that were `tried` share one unit among themselves, the accepted
-/// and the others. Sorts the most probable first.
-pub(super) fn set_probabilities(entries: &mut [Entry], tried: usize) {
-    let prior = |entry: &Entry| -> f64 {
-        if entry.effects().len() > 1 {
-            return 1.0 / tried.max(1) as f64;
-        }
-        let same = |other: &&Entry| match (&entry.hypothesis, &other.hypothesis) {
-            (Hypothesis::Effects(_), Hypothesis::Effects(others)) => {
-                others.len() == 1 && other.groups() == entry.groups()
+    /// Standard deviations of all parameters.
+    pub fn stds(&self) -> Vec<f64> {
+        match self.fit.best.covariance() {
+            Some(covariance) => {
+                let variances = covariance.diagonal();
+                variances.iter().map(|v| v.max(0.0).sqrt()).collect()
             }
-            (own, other) => own == other,
-        };
-        let weight = match entry.hypothesis {
-            Hypothesis::None => NONE_SHARE,
-            _ => 1.0,
-        };
-        weight / entries.iter().filter(same).count() as f64
-    };
-    let priors: Vec<f64> = entries.iter().map(prior).collect();
-    for (entry, prior) in entries.iter_mut().zip(priors) {
-        entry.prior = prior;
+            None => vec![f64::INFINITY; self.fit.best.priors.len()],
+        }
     }
-    let logs: Vec<f64> = entries.iter().map(Entry::log_weight).collect();
+}
+
+/// Returns the candidate of the nominal model.
+pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
+    let mut all = candidates.iter();
+    all.find(|one| one.hypothesis == Hypothesis::None)
+}
+
+/// Gives every group the same prior probability, split evenly inside; `unknown` is a group, `none`
+/// has [`NO_GAP_PRIOR`] of them. The pairs that were `tried` share one unit among themselves, the accepted
+/// and the others. Sorts the most probable first.
+pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
+    let priors: Vec<f64> = (candidates.iter())
+        .map(|one| prior_of(one, candidates, tried))
+        .collect();
+    for (candidate, prior) in candidates.iter_mut().zip(priors) {
+        candidate.prior = prior;
+    }
+    let logs: Vec<f64> = candidates.iter().map(Candidate::log_weight).collect();
     let total = log_sum(&logs);
-    for (entry, log) in entries.iter_mut().zip(&logs) {
-        entry.probability = (log - total).exp();
+    for (candidate, log) in candidates.iter_mut().zip(&logs) {
+        candidate.probability = (log - total).exp();
     }
-    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    sort(candidates);
 }
 
-/// Gives what is unknown odds of at least `bayes_factor` times those beforehand against the hypothesis
-/// `refuted`; all others keep theirs among each other.
-pub(super) fn raise_unknown(entries: &mut [Entry], refuted: usize, bayes_factor: f64) {
-    let is_unknown = |entry: &Entry| entry.hypothesis == Hypothesis::Unknown;
-    let Some(unknown) = entries.iter().position(is_unknown) else {
+fn prior_of(one: &Candidate, all: &[Candidate], tried: usize) -> f64 {
+    if one.effects().len() > 1 {
+        return 1.0 / tried.max(1) as f64;
+    }
+    let same = all.iter().filter(|other| {
+        let is_single = one.effects().len() == 1 && other.effects().len() == 1;
+        is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
+    });
+    let weight = match one.hypothesis {
+        Hypothesis::None => NO_GAP_PRIOR,
+        _ => 1.0,
+    };
+    weight / same.count() as f64
+}
+
+fn sort(candidates: &mut [Candidate]) {
+    candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+}
+
+/// Returns the best explanation that can be shown: `unknown` has no residual.
+pub fn best_known(candidates: &[Candidate]) -> Option<usize> {
+    candidates.iter().position(|one| !one.is_unknown())
+}
+
+/// Lowers the probability of the best explanation by what its own misfit says against it.
+///
+/// A misfit of probability p speaks against an explanation with odds of 1 to -e p ln p at most (Sellke, Bayarri &
+/// Berger 2001). Such odds count against every explanation that is about as probable as the best. Evidence compares
+/// how well explanations fit under the assumed noise; one that this noise refutes is no explanation
+/// while another stands. If none stands, the noise is in doubt, and with it the evidence. The odds that remain against
+/// the one that is left are evidence for something unknown, which
+/// has no misfit of its own. A best explanation that stands is left alone: what refutes its rivals makes it no
+/// better.
+pub fn calibrate_by_p_value(dataset: &Dataset, candidates: &mut [Candidate]) {
+    let Some(best) = best_known(candidates) else {
         return;
     };
-    let odds = bayes_factor * entries[unknown].prior / entries[refuted].prior;
-    let weight = odds * entries[refuted].probability;
-    if weight <= entries[unknown].probability {
+    let odds = odds_against(dataset, &candidates[best]);
+    if odds <= 1.0 {
         return;
     }
-    let total = 1.0 - entries[unknown].probability + weight;
-    entries[unknown].probability = weight;
-    for entry in entries.iter_mut() {
-        entry.probability /= total;
+    let mut all: Vec<Option<f64>> = vec![None; candidates.len()];
+    all[best] = Some(odds);
+    // Down to explanations as good as the best, and then as good as the best that is not refuted.
+    let mut least = candidates[best].probability * (-SECOND_EFFECT).exp();
+    let mut stands = false;
+    for (k, candidate) in candidates.iter().enumerate().skip(best + 1) {
+        if candidate.is_unknown() || candidate.probability < least {
+            continue;
+        }
+        all[k] = Some(odds_against(dataset, candidate));
+        if !stands && all[k] == Some(1.0) {
+            stands = true;
+            least = candidate.probability * (-SECOND_EFFECT).exp();
+        }
     }
-    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let probabilities: Vec<f64> = candidates.iter().map(|one| one.probability).collect();
+    let Some((left, relative)) = relative_odds(&probabilities, &all) else {
+        return;
+    };
+    let name = candidates[left].hypothesis.clone();
+    let lowered = divided(&probabilities, &relative);
+    for (candidate, probability) in candidates.iter_mut().zip(lowered) {
+        candidate.probability = probability;
+    }
+    sort(candidates);
+    let left_now = candidates.iter().position(|one| one.hypothesis == name);
+    if let Some((left_now, odds)) = left_now.zip(all[left].filter(|odds| *odds > 1.0)) {
+        raise_unknown(candidates, left_now, odds);
+    }
 }
 
-/// Divides the probability of every entry against which there are odds by these.
-pub(super) fn lower(entries: &mut [Entry], odds: &[Option<f64>]) {
-    let before: Vec<f64> = entries.iter().map(|entry| entry.probability).collect();
-    for (entry, probability) in entries.iter_mut().zip(divided(&before, odds)) {
-        entry.probability = probability;
-    }
-    entries.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+/// Returns the odds against one explanation; infinite where its fit has no covariance to be tested with.
+fn odds_against(dataset: &Dataset, candidate: &Candidate) -> f64 {
+    let Some(goodness) = GoodnessOfFit::new(dataset, &candidate.fit) else {
+        return f64::INFINITY;
+    };
+    goodness.refuting_p_value().map_or(1.0, odds_by_p_value)
 }
 
-/// Probabilities divided by odds, with the sum 1.
+/// Returns the highest odds against an explanation whose misfit has the probability `p`.
+pub fn odds_by_p_value(p: f64) -> f64 {
+    let p = p.clamp(SMALLEST_P_VALUE, 1.0 / E);
+    -1.0 / (E * p * p.ln())
+}
+
+/// Returns which of the tested explanations is left, the first of equal ones, and the odds against every
+/// other of them over those against it; `None` where none was tested or all have infinite odds against them.
+fn relative_odds(probabilities: &[f64], odds: &[Option<f64>]) -> Option<(usize, Vec<Option<f64>>)> {
+    let mut left: Option<(usize, f64)> = None;
+    for (k, odds) in odds.iter().enumerate() {
+        if let Some(odds) = odds.filter(|odds| odds.is_finite()) {
+            let weight = probabilities[k] / odds;
+            if left.is_none_or(|(_, most)| weight > most) {
+                left = Some((k, weight));
+            }
+        }
+    }
+    let (left, _) = left?;
+    let own = odds[left]?;
+    let relative = odds.iter().map(|odds| Some((*odds)? / own));
+    Some((left, relative.collect()))
+}
+
+/// Returns probabilities divided by odds, with the sum 1.
 fn divided(probabilities: &[f64], odds: &[Option<f64>]) -> Vec<f64> {
     let each = probabilities.iter().zip(odds);
     let each: Vec<f64> = each.map(|(p, odds)| p / odds.unwrap_or(1.0)).collect();
@@ -123,120 +206,134 @@ fn divided(probabilities: &[f64], odds: &[Option<f64>]) -> Vec<f64> {
     each.into_iter().map(|p| p / total).collect()
 }
 
-/// Probability of each group, pairs apart, `none` and `unknown` among them; the most probable first.
-pub(super) fn by_group(entries: &[Entry]) -> Vec<(Vec<usize>, f64)> {
-    let mut groups: Vec<(Vec<usize>, f64)> = Vec::new();
-    for (index, entry) in entries.iter().enumerate() {
-        let same = |other: &Entry| {
-            other.effects().len() == entry.effects().len()
-                && match entry.effects().len() {
-                    0 => other.hypothesis == entry.hypothesis,
-                    _ => other.groups() == entry.groups(),
+/// Gives `unknown` odds of at least `bayes_factor` times the prior ones against the hypothesis
+/// `refuted`; all others keep theirs among each other.
+fn raise_unknown(candidates: &mut [Candidate], refuted: usize, bayes_factor: f64) {
+    let Some(unknown) = candidates.iter().position(Candidate::is_unknown) else {
+        return;
+    };
+    let odds = bayes_factor * candidates[unknown].prior / candidates[refuted].prior;
+    let weight = odds * candidates[refuted].probability;
+    if weight <= candidates[unknown].probability {
+        return;
+    }
+    let total = 1.0 - candidates[unknown].probability + weight;
+    candidates[unknown].probability = weight;
+    for candidate in candidates.iter_mut() {
+        candidate.probability /= total;
+    }
+    sort(candidates);
+}
+
+/// Candidates of one group of effects; pairs, `none` and `unknown` are groups of their own.
+pub struct CandidateGroup {
+    /// Indices of the candidates, the most probable first.
+    pub members: Vec<usize>,
+    /// Probability of the group (1).
+    pub probability: f64,
+}
+
+/// Returns all groups, the most probable first.
+pub fn by_group(candidates: &[Candidate]) -> Vec<CandidateGroup> {
+    let mut groups: Vec<CandidateGroup> = Vec::new();
+    for (index, candidate) in candidates.iter().enumerate() {
+        let same = groups.iter_mut().find(|group| {
+            let other = &candidates[group.members[0]];
+            other.effects().len() == candidate.effects().len()
+                && match candidate.effects().len() {
+                    0 => other.hypothesis == candidate.hypothesis,
+                    _ => other.groups() == candidate.groups(),
                 }
-        };
-        match groups.iter_mut().find(|group| same(&entries[group.0[0]])) {
+        });
+        match same {
             Some(group) => {
-                group.0.push(index);
-                group.1 += entry.probability;
+                group.members.push(index);
+                group.probability += candidate.probability;
             }
-            None => groups.push((vec![index], entry.probability)),
+            None => groups.push(CandidateGroup {
+                members: vec![index],
+                probability: candidate.probability,
+            }),
         }
     }
-    groups.sort_by(|a, b| b.1.total_cmp(&a.1));
+    groups.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     groups
 }
 
-/// Probability of each place, given that there is a gap.
-pub(super) fn places(entries: &[Entry]) -> PlaceProbabilities {
-    let mut places = PlaceProbabilities::default();
-    for entry in entries {
-        let share = entry.probability / entry.effects().len().max(1) as f64;
-        if entry.hypothesis == Hypothesis::Unknown {
-            places.unknown += entry.probability;
+/// Returns the probability of each location, given that there is a gap.
+pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities {
+    let mut all = LocationProbabilities::default();
+    for candidate in candidates {
+        let share = candidate.probability / candidate.effects().len().max(1) as f64;
+        if candidate.is_unknown() {
+            all.unknown += candidate.probability;
         }
-        for effect in entry.effects() {
+        for effect in candidate.effects() {
             *match effect.place() {
-                Place::Joint => &mut places.joint,
-                Place::Fixture => &mut places.fixture,
-                Place::Sensor => &mut places.sensor,
-                Place::Body => &mut places.body,
-                Place::Acquisition => &mut places.acquisition,
+                Place::Joint => &mut all.joint,
+                Place::Fixture => &mut all.fixture,
+                Place::Sensor => &mut all.sensor,
+                Place::Body => &mut all.body,
+                Place::Acquisition => &mut all.acquisition,
             } += share;
         }
     }
-    let all = [
-        &mut places.joint,
-        &mut places.fixture,
-        &mut places.sensor,
-        &mut places.body,
-        &mut places.acquisition,
-        &mut places.unknown,
+    let each = [
+        &mut all.joint,
+        &mut all.fixture,
+        &mut all.sensor,
+        &mut all.body,
+        &mut all.acquisition,
+        &mut all.unknown,
     ];
-    let total: f64 = all.iter().map(|place| **place).sum();
+    let total: f64 = each.iter().map(|one| **one).sum();
     if total > 0.0 {
-        for place in all {
-            *place /= total;
+        for one in each {
+            *one /= total;
         }
     }
-    places
+    all
 }
 
-/// Squared distance of what two fits predict, in standard deviations of the readings.
-pub(super) fn distance(frame: &Frame, a: &Fit, b: &Fit) -> f64 {
-    frame
-        .readings
-        .iter()
-        .zip(&a.branch.optimum.model.predicted)
-        .zip(&b.branch.optimum.model.predicted)
-        .map(|((reading, a), b)| ((a - b) / reading.std).powi(2))
+/// Returns the squared distance of the predictions of two fits, in standard deviations of the data.
+fn separation(dataset: &Dataset, a: &Fit, b: &Fit) -> f64 {
+    let a = &a.best.optimum.model.predicted;
+    let b = &b.best.optimum.model.predicted;
+    let data = dataset.data.iter().enumerate();
+    data.map(|(row, datum)| ((a[row] - b[row]) / datum.std).powi(2))
         .sum()
 }
 
-/// Chi square by which a rival fits worse, priors included.
-pub(super) fn lead(best: &Fit, rival: &Fit) -> f64 {
-    2.0 * (rival.branch.optimum.objective - best.branch.optimum.objective)
+/// Returns the chi square by which a rival fits worse, priors included.
+pub fn delta_chi_square(best: &Fit, rival: &Fit) -> f64 {
+    2.0 * (rival.best.optimum.objective - best.best.optimum.objective)
 }
 
-/// Chi square below which two hypotheses count as one on these readings: three standard deviations.
-pub(super) const APART: f64 = 9.0;
-
-/// Effects whose best fit predicts the same as this entry's.
-pub(super) fn confounded(frame: &Frame, entries: &[Entry], index: usize) -> Vec<EffectId> {
-    let own = &entries[index];
-    if own.hypothesis == Hypothesis::Unknown {
+/// Returns the effects whose best fit predicts the same as that of a candidate.
+pub fn confounded(dataset: &Dataset, candidates: &[Candidate], index: usize) -> Vec<EffectId> {
+    let own = &candidates[index];
+    if own.is_unknown() {
         return Vec::new();
     }
-    entries
-        .iter()
-        .enumerate()
-        .filter(|(other, entry)| *other != index && entry.effects().len() == 1)
-        .filter(|(_, entry)| {
-            distance(frame, &own.fit, &entry.fit) < APART
-                && lead(&own.fit, &entry.fit).abs() < APART
-        })
-        .flat_map(|(_, entry)| entry.effects().to_vec())
-        .filter(|effect| !own.effects().contains(effect))
-        .collect()
-}
-
-/// Value and standard uncertainty of every parameter of an entry's effects.
-pub(super) fn spreads(entry: &Entry) -> Vec<f64> {
-    let branch = &entry.fit.branch;
-    match covariance(&branch.knowledge, &branch.optimum) {
-        Some(covariance) => covariance
-            .diagonal()
-            .iter()
-            .map(|v| v.max(0.0).sqrt())
-            .collect(),
-        None => vec![f64::INFINITY; branch.knowledge.len()],
+    let mut all = Vec::new();
+    for (k, other) in candidates.iter().enumerate() {
+        if let [effect] = other.effects()
+            && k != index
+            && separation(dataset, &own.fit, &other.fit) < SEPARATE
+            && delta_chi_square(&own.fit, &other.fit).abs() < SEPARATE
+            && !own.effects().contains(effect)
+        {
+            all.push(*effect);
+        }
     }
+    all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What is refuted, even beyond all odds, leaves the others as they were among each other.
+    /// A refuted hypothesis, even against all odds, leaves the others as they were among each other.
     #[test]
     fn limit_lowered_probabilities_keep_the_odds_of_all_others() {
         for odds in [8.0, 1e10, f64::INFINITY] {
@@ -246,5 +343,49 @@ mod tests {
             assert!((after[1] / after[2] - 3.0).abs() < 1e-14);
             assert!((after[0] / after[1] - 2.0 / odds).abs() < 1e-15);
         }
+    }
+
+    /// At p = 1/e and above a misfit does not count; below, the odds grow and stay finite down to zero.
+    #[test]
+    fn limit_odds_from_a_misfit_are_even_at_best_and_finite_at_worst() {
+        assert!((odds_by_p_value(1.0) - 1.0).abs() < 1e-15);
+        assert!((odds_by_p_value((-1.0_f64).exp()) - 1.0).abs() < 1e-15);
+        assert!(odds_by_p_value(0.0).is_finite());
+        assert!(odds_by_p_value(0.0) > odds_by_p_value(1e-6));
+    }
+
+    /// Sellke, Bayarri & Berger (2001), table 1: at least 0.407 at p = 0.05 and 0.125 at p = 0.01, to the
+    /// digits printed there.
+    #[test]
+    fn val_odds_from_a_misfit_are_those_of_sellke() {
+        for (p, bound) in [(0.05, 0.407), (0.01, 0.125)] {
+            assert!((1.0 / odds_by_p_value(p) - bound).abs() < 5e-4, "{p}");
+        }
+    }
+
+    /// Equal odds against two change nothing between them, and of equal weights the first is left.
+    #[test]
+    fn limit_equal_odds_keep_the_order() {
+        let (first, relative) =
+            relative_odds(&[0.4, 0.4, 0.2], &[Some(9.0), Some(9.0), None]).unwrap();
+        assert_eq!(first, 0);
+        assert_eq!(relative, [Some(1.0), Some(1.0), None]);
+    }
+
+    /// A rival against which less speaks takes the place; untested ones keep their odds to it.
+    #[test]
+    fn regress_an_explanation_that_stands_takes_the_place_of_a_refuted_one() {
+        let (first, relative) =
+            relative_odds(&[0.8, 0.15, 0.05], &[Some(40.0), Some(4.0), None]).unwrap();
+        assert_eq!(first, 1);
+        assert_eq!(relative, [Some(10.0), Some(1.0), None]);
+    }
+
+    #[test]
+    fn limit_infinite_odds_against_all_leave_nothing_to_choose() {
+        let infinite = Some(f64::INFINITY);
+        assert_eq!(relative_odds(&[0.5, 0.5], &[infinite, infinite]), None);
+        let (first, relative) = relative_odds(&[0.9, 0.1], &[infinite, Some(2.0)]).unwrap();
+        assert_eq!((first, relative), (1, vec![infinite, Some(1.0)]));
     }
 }

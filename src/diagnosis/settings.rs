@@ -1,22 +1,104 @@
-//! What the diagnosis takes for granted where nobody says otherwise.
+//! Settings of the diagnosis, and its errors.
 
-use super::error::GapError;
 use tapjoint_identify::FREQUENCY_FLOOR;
+
+/// Reasons why a diagnosis has no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GapError {
+    /// Fewer modes than could show a gap.
+    #[error(
+        "{modes} natural {} observed; a gap shows only beyond the {needed} that the \
+         joint's stiffnesses can follow: observe at least {least} modes", if *.modes == 1 { "frequency was" } else { "frequencies were" }
+    )]
+    TooFewModes {
+        /// Modes observed.
+        modes: usize,
+        /// Stiffnesses of the joint.
+        needed: usize,
+        /// Least number of modes.
+        least: usize,
+    },
+    /// No frequency has an uncertainty, so that every misfit may be noise.
+    #[error(
+        "no frequency has an uncertainty, so that a misfit cannot be told from noise: tap at least \
+         three times per recording, or state `half_line`, `std` or `scatter`"
+    )]
+    NoUncertainty,
+    /// The same mode differs by more between configurations than sensors, joint or level explain.
+    #[error(
+        "{first} and {second} do not show the same structure: mode {mode} is at {low} Hz and {high} Hz; \
+         diagnose recordings of one structure only"
+    )]
+    Contradictory {
+        /// One configuration.
+        first: String,
+        /// The other.
+        second: String,
+        /// The mode.
+        mode: usize,
+        /// Its frequency in one (Hz).
+        low: f64,
+        /// In the other (Hz).
+        high: f64,
+    },
+    /// Most peaks of one configuration are missing in another.
+    #[error(
+        "{first} and {second} do not show the same structure: {strangers} of the {peaks} peaks of {second} lie more \
+         than {percent} % from every peak of {first}; diagnose recordings of one structure only"
+    )]
+    AnotherStructure {
+        /// One configuration.
+        first: String,
+        /// The other.
+        second: String,
+        /// Peaks of the second that the first has not.
+        strangers: usize,
+        /// All peaks of the second.
+        peaks: usize,
+        /// Largest distance of two equal peaks (%).
+        percent: f64,
+    },
+    /// Every sensor sits at a node of every mode.
+    #[error(
+        "every sensor sits within {percent} % of the largest displacement of zero in all observed modes: \
+         move one at least {distance:.3} m away"
+    )]
+    SensorsAtNodes {
+        /// Largest displacement at a sensor over that of the mode (%).
+        percent: f64,
+        /// A distance that would do (m).
+        distance: f64,
+    },
+    /// The nominal model has no solution.
+    #[error("the nominal model cannot be solved: {0}")]
+    Structure(#[from] tapjoint_beam::StructureError),
+    /// A setting out of its range.
+    #[error("{setting}")]
+    Setting {
+        /// The setting and its allowed values.
+        setting: &'static str,
+    },
+    /// No start led to a fit of the nominal model.
+    #[error(
+        "the nominal model could not be fitted to the frequencies; check the beam's description"
+    )]
+    NoFit,
+}
 
 /// Settings of the diagnosis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GapSettings {
-    /// Standard deviations that the joint's stiffnesses may have between visits (1), equally
+    /// Standard deviations that the joint's stiffnesses may have between set-ups (1), equally
     /// probable: 0.2 %, untouched; 1 %, usual; 2 %, a joint that was re-tightened.
     pub drift_stds: Vec<f64>,
     /// Standard uncertainty of a common factor on all frequencies where no tolerance is stated (1):
-    /// 0.2 %, a modulus known to 0.3 % and a length to 0.1 %. What is larger than this counts as a gap
-    /// that has a name (`modulus`, `length`, `timebase`); whoever knows the geometry less well states it.
+    /// 0.2 %, a modulus known to 0.3 % and a length to 0.1 %. A larger error counts as a gap
+    /// that has a name (`modulus`, `length`, `timebase`); state a tolerance if the geometry is known less well.
     pub scale_std: f64,
     /// Standard uncertainty of a Timoshenko beam's shear flexibility and rotary inertia together (1): 2 %, by which
     /// the shear coefficient used here, 5/6, and Cowper's (1966) 10 (1 + nu)/(12 + 11 nu) differ for metals.
     pub shear_std: f64,
-    /// Standard deviation of a common factor on the frequencies of one visit (1): 0.02 %, about what a kelvin does
+    /// Standard deviation of a common factor on the frequencies of one set-up (1): 0.02 %, about what a kelvin does
     /// (0.015 % of steel, 0.025 % of aluminium).
     pub temperature_std: f64,
     /// Relative uncertainty of any frequency that repetition cannot show (1): [`FREQUENCY_FLOOR`].
@@ -25,12 +107,12 @@ pub struct GapSettings {
     pub sensor_mass_std: f64,
     /// Radius of gyration of a sensor about the beam's axis (m): 8 mm, of one some 12 mm high on a beam 5 mm thick.
     pub sensor_radius: f64,
-    /// Relative standard uncertainty of a mass that is fastened to be known: 1 %, a kitchen scale's 0.1 g
+    /// Relative standard uncertainty of a known added mass: 1 %, a kitchen scale's 0.1 g
     /// of 10 g, and the wax under it.
     pub fastened_mass_std: f64,
     /// Standard uncertainty of the places of sensors, fastened masses and taps (m): 1 mm.
     pub position_std: f64,
-    /// Standard uncertainty of the calibration of hammer and sensor together (1), anew in every visit: 3 %,
+    /// Standard uncertainty of the calibration of hammer and sensor together (1), anew in every set-up: 3 %,
     /// since a sensor that is mounted again is not aligned as before.
     pub gain_std: f64,
     /// Scatter of the nominal damping ratios about a power of the frequency (natural logarithm): 0.4.
@@ -44,47 +126,48 @@ pub struct GapSettings {
     /// The highest mode that is compared: 10. Waves of higher ones are short beside the width of a joint, the height of a
     /// sensor and the thickness of the beam, of which the model takes the first order only.
     pub highest_mode: usize,
-    /// Number of modes from which on the highest is withheld: 6.
+    /// Number of modes from which on the highest is held out: 6.
     pub withhold_from: usize,
-    /// How many of the highest modes are withheld: 1.
+    /// Number of the highest modes that are held out: 1.
     pub withheld_modes: usize,
-    /// Places tried for a sensor whose position nobody said: 12.
+    /// Locations tried for a sensor of unknown position: 12.
     pub unknown_positions: usize,
-    /// Seed of what is sampled.
+    /// Seed of random draws.
     pub seed: u64,
 }
 
 impl GapSettings {
-    /// Refuses settings with which nothing can be compared.
-    pub(super) fn check(&self) -> Result<(), GapError> {
-        let refused = |setting| Err(GapError::Setting { setting });
-        let positive = |std: &f64| *std > 0.0 && std.is_finite();
-        match self {
-            s if s.drift_stds.is_empty() || !s.drift_stds.iter().all(positive) => {
-                refused("drift_stds must hold at least one standard deviation above 0")
-            }
-            s if s.withheld_modes >= s.withhold_from => {
-                refused("withheld_modes must be less than withhold_from")
-            }
-            s if ![s.scale_std, s.shear_std, s.temperature_std, s.damping_tilt]
-                .iter()
-                .all(positive) =>
-            {
-                refused(
-                    "scale_std, shear_std, temperature_std and damping_tilt must be finite and above 0",
-                )
-            }
-            s if !(s.frequency_floor.is_finite() && s.frequency_floor >= 0.0) => {
-                refused("frequency_floor must be finite and not below 0")
-            }
-            s if !(s.sensor_radius.is_finite() && s.sensor_radius >= 0.0) => {
-                refused("sensor_radius must be finite and not below 0")
-            }
-            s if s.highest_mode == 0 => refused("highest_mode must be at least 1"),
-            s if s.unknown_positions == 0 => refused("unknown_positions must be at least 1"),
-            _ => Ok(()),
-        }
+    /// Refuses settings out of their range.
+    pub(crate) fn check(&self) -> Result<(), GapError> {
+        let stds = [
+            self.scale_std,
+            self.shear_std,
+            self.temperature_std,
+            self.damping_tilt,
+        ];
+        let setting = if self.drift_stds.is_empty() || !are_positive(&self.drift_stds) {
+            "drift_stds must hold at least one standard deviation above 0"
+        } else if self.withheld_modes >= self.withhold_from {
+            "withheld_modes must be less than withhold_from"
+        } else if !are_positive(&stds) {
+            "scale_std, shear_std, temperature_std and damping_tilt must be finite and above 0"
+        } else if !(self.frequency_floor.is_finite() && self.frequency_floor >= 0.0) {
+            "frequency_floor must be finite and not below 0"
+        } else if !(self.sensor_radius.is_finite() && self.sensor_radius >= 0.0) {
+            "sensor_radius must be finite and not below 0"
+        } else if self.highest_mode == 0 {
+            "highest_mode must be at least 1"
+        } else if self.unknown_positions == 0 {
+            "unknown_positions must be at least 1"
+        } else {
+            return Ok(());
+        };
+        Err(GapError::Setting { setting })
     }
+}
+
+fn are_positive(stds: &[f64]) -> bool {
+    stds.iter().all(|std| *std > 0.0 && std.is_finite())
 }
 
 impl Default for GapSettings {

@@ -1,12 +1,12 @@
-//! Observations that a planned test would make of a given structure: drawn from the structure's modes
-//! on the finer mesh, not from the diagnosis's own predictions. Only whether a fixture's peak is read follows
-//! the diagnosis's own rule: what that is worth is for the simulator, which makes signals, to say.
+//! Observations that a planned test would make of a given structure.
+//!
+//! They are drawn from the structure's modes on the finer mesh, not from the diagnosis's own predictions. Only whether
+//! a fixture's peak is read follows the diagnosis's own rule: the simulator, which makes signals, tests that rule.
 
-use super::error::GapError;
-use super::fixture_peak::{SEEN, strength};
-use super::joint_path::joint_amplitude;
-use super::lone_peaks::DECIBEL;
-use super::nominal::Nominal;
+use crate::observations::DECIBEL;
+use crate::settings::GapError;
+use crate::structure::{Nominal, fixture_strength, joint_amplitude};
+use crate::thresholds::FIXTURE_LEVEL;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -17,7 +17,7 @@ use tapjoint_identify::observation::{
     ObservedMode, ObservedSensor, ShapeValue, UNPAIRED, effective_share,
 };
 
-/// What a test will look at, and how well.
+/// Plan of a test, with the uncertainties of its data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestPlan {
     /// The recordings.
@@ -37,27 +37,27 @@ pub struct TestPlan {
     pub slope_std: Option<f64>,
     /// Standard deviation of the joint's stiffnesses between recordings (1).
     pub drift: f64,
-    /// Damping ratio of the beam by itself (1).
+    /// Damping ratio of the beam alone (1).
     pub damping: f64,
-    /// How far what is drawn scatters, in standard deviations (1): 1, or 0 for what the mean of endless
-    /// repetition would show, drift and errors of the readings being none.
+    /// Factor on the scatter of the drawn data (1): 1, or 0 for the mean of endless
+    /// repetition, without drift and errors.
     pub scatter: f64,
 }
 
 /// One planned recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedConfiguration {
-    /// Name and place (m) of each sensor.
+    /// Name and position (m) of each sensor.
     pub sensors: Vec<(String, f64)>,
-    /// Known masses that are fastened.
+    /// Known added masses.
     pub masses: Vec<PointMass>,
-    /// Where the hammer strikes (m).
+    /// Position of the taps (m).
     pub tap: f64,
     /// Force over that of the hardest taps (1).
     pub level: f64,
 }
 
-/// Draws what the plan would observe of a structure with these effects.
+/// Draws the observations that the plan would make of a structure with these effects.
 ///
 /// # Errors
 /// [`GapError::Structure`] where the structure has no such modes.
@@ -67,53 +67,57 @@ pub fn observe(
     effects: &[Effect],
     seed: u64,
 ) -> Result<Observations, GapError> {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let solved = amplitudes(plan, truth)?;
-    let mut scene = Scene {
+    let modes = truth.specimen.modes(plan.modes, Mesh::SIMULATION)?;
+    let planned = plan.configurations.iter();
+    let amplitudes: Vec<f64> = planned
+        .map(|one| joint_amplitude(&modes, one.tap, one.level, 0..plan.modes))
+        .collect();
+    let largest = amplitudes.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let mut test = VirtualTest {
         plan,
         truth,
         effects,
-        random: &mut random,
+        random: ChaCha8Rng::seed_from_u64(seed),
     };
-    let configurations = (0..plan.configurations.len())
-        .map(|index| scene.configuration(index, solved[index]))
-        .collect::<Result<Vec<Configuration>, GapError>>()?;
+    let mut configurations = Vec::new();
+    for (index, amplitude) in amplitudes.iter().enumerate() {
+        configurations.push(test.configuration(index, amplitude / largest)?);
+    }
     Ok(Observations { configurations })
 }
 
-/// Amplitude of the joint's rotation in each recording over that of the largest.
-fn amplitudes(plan: &TestPlan, truth: &Nominal) -> Result<Vec<f64>, GapError> {
-    let modes = truth.specimen.modes(plan.modes, Mesh::SIMULATION)?;
-    let all: Vec<f64> = plan
-        .configurations
-        .iter()
-        .map(|one| joint_amplitude(&modes, (one.tap, one.level), 0..plan.modes))
-        .collect();
-    let most = all.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    Ok(all.into_iter().map(|amplitude| amplitude / most).collect())
+/// Amplitudes between which a decay is followed, over the first one.
+const DECAY_ENDS: [f64; 2] = [0.9, 0.22];
+
+/// Structure and modes of one configuration.
+struct VirtualModes {
+    seen: Seen,
+    own: BeamModes,
+    /// Modes at both ends of the followed decay.
+    ends: [BeamModes; 2],
 }
 
-struct Scene<'a> {
+/// Test of a structure by a plan.
+struct VirtualTest<'a> {
     plan: &'a TestPlan,
     truth: &'a Nominal,
     effects: &'a [Effect],
-    random: &'a mut ChaCha8Rng,
+    random: ChaCha8Rng,
 }
 
-impl Scene<'_> {
+impl VirtualTest<'_> {
     fn normal(&mut self) -> f64 {
         self.plan.scatter * self.random.sample::<f64, _>(StandardNormal)
     }
 
-    /// The mean of the taps and the standard deviation that their scatter suggests.
+    /// Draws the mean of the taps and the standard deviation by their scatter.
     fn measured(&mut self, value: f64, std: f64) -> Observed {
         let value = value + std * self.normal();
         if self.plan.taps < 2 || self.plan.scatter == 0.0 {
-            let freedom = None;
             return Observed {
                 value,
                 std,
-                freedom,
+                freedom: None,
             };
         }
         let freedom = self.plan.taps as f64 - 1.0;
@@ -127,6 +131,42 @@ impl Scene<'_> {
 
     fn configuration(&mut self, index: usize, amplitude: f64) -> Result<Configuration, GapError> {
         let planned = &self.plan.configurations[index];
+        let modes = self.solve(planned, amplitude)?;
+        let observed = (0..self.plan.modes)
+            .map(|number| self.mode(planned, number, &modes))
+            .collect();
+        let sensors = planned
+            .sensors
+            .iter()
+            .map(|(name, position)| ObservedSensor {
+                name: name.clone(),
+                position: Some(*position),
+            });
+        Ok(Configuration {
+            file: Some(format!("recording {}", index + 1)),
+            recording: Some(index),
+            sensors: sensors.collect(),
+            masses: planned.masses.clone(),
+            tap: Some(planned.tap),
+            peak_force: Some(planned.level),
+            level: Some(planned.level),
+            taps: self.plan.taps,
+            decay_seconds: None,
+            band: None,
+            modes: observed,
+            covariance: None,
+            common: 0.0,
+            extra_peaks: self.fixture_peak(planned, &modes).into_iter().collect(),
+        })
+    }
+
+    /// Solves the structure of a recording: with its own joint, at the effective amplitude and at both ends of
+    /// the followed decay.
+    fn solve(
+        &mut self,
+        planned: &PlannedConfiguration,
+        amplitude: f64,
+    ) -> Result<VirtualModes, GapError> {
         let sensors: Vec<SensorPlace> = planned
             .sensors
             .iter()
@@ -135,92 +175,37 @@ impl Scene<'_> {
                 mass: self.truth.mass_of(name),
             })
             .collect();
-        let masses: Vec<(f64, f64)> = sensors.iter().map(|s| (s.position, s.mass)).collect();
-        let mut nominal = self.truth.with_masses(&masses);
-        nominal.masses.extend_from_slice(&planned.masses);
+        let mut nominal = self.truth.loaded(&sensors, &planned.masses);
         self.drift(&mut nominal);
-        let power = self.power();
-        let circumstances = |level: f64| Circumstances {
-            sensors: &sensors,
-            level,
-            ..Circumstances::default()
-        };
-        let seen = apply(
-            self.effects,
-            &nominal,
-            &circumstances(amplitude * effective_share(power)),
-        );
-        let modes = self.solve(&seen.specimen)?;
-        // Along the decay: the frequency at the two amplitudes between which it is followed.
-        let ends = ENDS
-            .map(|share| apply(self.effects, &nominal, &circumstances(amplitude * share)).specimen);
-        let ends = [self.solve(&ends[0])?, self.solve(&ends[1])?];
-        let scale = (
-            seen.frequency_scale,
-            seen.frequency_offset,
-            seen.joint_loss_factor,
-        );
-        let seen_modes = (0..self.plan.modes)
-            .map(|mode| self.mode((index, mode), &modes, (scale, &ends)))
-            .collect();
-        let planned = &self.plan.configurations[index];
-        Ok(Configuration {
-            file: Some(format!("recording {}", index + 1)),
-            recording: Some(index),
-            sensors: planned
-                .sensors
-                .iter()
-                .map(|(name, position)| ObservedSensor {
-                    name: name.clone(),
-                    position: Some(*position),
-                })
-                .collect(),
-            masses: planned.masses.clone(),
-            tap: Some(planned.tap),
-            peak_force: Some(planned.level),
-            level: Some(planned.level),
-            taps: self.plan.taps,
-            decay_seconds: None,
-            band: None,
-            modes: seen_modes,
-            covariance: None,
-            common: 0.0,
-            extra_peaks: self.fixture_peak(index, (&modes, &seen)),
+        let mut effects = self.effects.iter();
+        let power = effects
+            .find(|effect| effect.id == EffectId::JointNonlinearity)
+            .and_then(|effect| effect.value("exponent"));
+        let shares = [
+            effective_share(power.unwrap_or(1.0)),
+            DECAY_ENDS[0],
+            DECAY_ENDS[1],
+        ];
+        let [seen, early, late] = shares.map(|share| {
+            let circumstances = Circumstances {
+                sensors: &sensors,
+                level: amplitude * share,
+                ..Circumstances::default()
+            };
+            apply(self.effects, &nominal, &circumstances)
+        });
+        let modes = self.plan.modes;
+        Ok(VirtualModes {
+            own: seen.specimen.beam_modes(modes, Mesh::SIMULATION)?,
+            ends: [
+                early.specimen.beam_modes(modes, Mesh::SIMULATION)?,
+                late.specimen.beam_modes(modes, Mesh::SIMULATION)?,
+            ],
+            seen,
         })
     }
 
-    /// The fixture's own mode, where it is strong enough to be read.
-    fn fixture_peak(&mut self, index: usize, (own, seen): (&BeamModes, &Seen)) -> Vec<ExtraPeak> {
-        let planned = &self.plan.configurations[index];
-        let sensors: Vec<f64> = planned.sensors.iter().map(|sensor| sensor.1).collect();
-        let read = own.fixture.and_then(|base| {
-            let place = (&sensors[..], Some(planned.tap));
-            let strength = strength(&own.modes, (base, &own.numbers), place)?;
-            (strength.0 > strength.1 + SEEN / DECIBEL).then_some((base, strength.0.exp()))
-        });
-        let Some((base, constant)) = read else {
-            return Vec::new();
-        };
-        let frequency = seen.read(own.modes.frequencies()[base]);
-        let read = self.measured(frequency, frequency * self.plan.frequency_std);
-        vec![ExtraPeak {
-            frequency: read.value,
-            std: Some(read.std),
-            level_db: None,
-            constant: self.plan.shape_std.map(|_| constant),
-            label: UNPAIRED.to_owned(),
-        }]
-    }
-
-    fn power(&self) -> f64 {
-        self.effects
-            .iter()
-            .find(|effect| effect.id == EffectId::JointNonlinearity)
-            .and_then(|effect| effect.value("exponent"))
-            .unwrap_or(1.0)
-    }
-
-    /// The joint as this visit finds it.
+    /// Draws the joint of one set-up.
     fn drift(&mut self, specimen: &mut Specimen) {
         let std = self.plan.drift;
         let factors = [(std * self.normal()).exp(), (std * self.normal()).exp()];
@@ -230,52 +215,73 @@ impl Scene<'_> {
         }
     }
 
-    fn solve(&self, specimen: &Specimen) -> Result<BeamModes, GapError> {
-        Ok(specimen.beam_modes(self.plan.modes, Mesh::SIMULATION)?)
+    /// Draws the fixture's own mode, where it is strong enough to be read.
+    fn fixture_peak(
+        &mut self,
+        planned: &PlannedConfiguration,
+        modes: &VirtualModes,
+    ) -> Option<ExtraPeak> {
+        let own = &modes.own;
+        let fixture = own.fixture?;
+        let sensors: Vec<f64> = planned.sensors.iter().map(|sensor| sensor.1).collect();
+        let tap = Some(planned.tap);
+        let strength = fixture_strength(&own.modes, fixture, &own.numbers, &sensors, tap)?;
+        if strength.own <= strength.median + FIXTURE_LEVEL / DECIBEL {
+            return None;
+        }
+        let frequency = modes.seen.read(own.modes.frequencies()[fixture]);
+        let read = self.measured(frequency, frequency * self.plan.frequency_std);
+        Some(ExtraPeak {
+            frequency: read.value,
+            std: Some(read.std),
+            level_db: None,
+            constant: self.plan.shape_std.map(|_| strength.own.exp()),
+            label: UNPAIRED.to_owned(),
+        })
     }
 
     fn mode(
         &mut self,
-        (index, number): (usize, usize),
-        BeamModes { modes, numbers, .. }: &BeamModes,
-        ((scale, offset, loss), ends): ((f64, f64, f64), &[BeamModes; 2]),
+        planned: &PlannedConfiguration,
+        number: usize,
+        modes: &VirtualModes,
     ) -> ObservedMode {
-        let mode = numbers[number];
-        let true_frequency = modes.frequencies()[mode] * scale + offset;
+        let (own, seen) = (&modes.own.modes, &modes.seen);
+        let mode = modes.own.numbers[number];
+        let true_frequency = own.frequencies()[mode] * seen.frequency_scale + seen.frequency_offset;
         let frequency = self.measured(true_frequency, true_frequency * self.plan.frequency_std);
-        let planned = self.plan.configurations[index].clone();
-        let at = |x: f64| modes.displacement(mode, x);
-        let strongest = (0..planned.sensors.len()).max_by(|&a, &b| {
-            let size = |sensor: usize| at(planned.sensors[sensor].1).abs();
-            size(a).total_cmp(&size(b))
-        });
-        let shape_std = self.plan.shape_std;
-        let reference = strongest.filter(|_| shape_std.is_some());
+        let at_sensors: Vec<f64> = planned
+            .sensors
+            .iter()
+            .map(|(_, position)| own.displacement(mode, *position))
+            .collect();
+        let strongest = (0..at_sensors.len())
+            .max_by(|&a, &b| at_sensors[a].abs().total_cmp(&at_sensors[b].abs()));
+        let reference = strongest.zip(self.plan.shape_std);
         // Shapes of unit modal mass are about 2/sqrt(mass) large.
-        let beams = self.truth.specimen.body.beams();
-        let size = 2.0 / beams.iter().map(tapjoint_beam::Beam::mass).sum::<f64>();
-        let constant = reference.zip(shape_std).map(|(sensor, std)| {
-            let value = at(planned.sensors[sensor].1) * at(planned.tap);
+        let size = 2.0 / self.truth.beam_mass();
+        let constant = reference.map(|(sensor, std)| {
+            let value = at_sensors[sensor] * own.displacement(mode, planned.tap);
             self.measured(value, size * std)
         });
         let mut shape = Vec::new();
-        for sensor in 0..planned.sensors.len() {
-            let (Some(reference), Some(std)) = (reference, shape_std) else {
-                continue;
-            };
-            let std = if sensor == reference { 0.0 } else { std };
-            let value = at(planned.sensors[sensor].1) / at(planned.sensors[reference].1);
-            shape.push(ShapeValue {
-                sensor,
-                value: value + std * self.normal(),
-                std,
-            });
+        if let Some((reference, std)) = reference {
+            for (sensor, displacement) in at_sensors.iter().enumerate() {
+                let std = if sensor == reference { 0.0 } else { std };
+                shape.push(ShapeValue {
+                    sensor,
+                    value: displacement / at_sensors[reference] + std * self.normal(),
+                    std,
+                });
+            }
         }
-        let damping = self.plan.damping + 0.5 * loss * modes.joint_energy_share(mode);
+        let lost = 0.5 * seen.joint_loss_factor * own.joint_energy_share(mode);
+        let damping = self.plan.damping + lost;
         let damping_std = self.plan.damping_std;
         let damping = damping_std.map(|std| self.measured(damping, damping * std));
-        let end = |k: usize| ends[k].modes.frequencies()[ends[k].numbers[number]];
-        let slope = (end(0) / end(1)).ln() / (ENDS[0] / ENDS[1]).ln() * true_frequency;
+        let [early, late] = &modes.ends;
+        let [early, late] = [early, late].map(|end| end.modes.frequencies()[end.numbers[number]]);
+        let slope = (early / late).ln() / (DECAY_ENDS[0] / DECAY_ENDS[1]).ln() * true_frequency;
         let slope_std = self.plan.slope_std;
         let slope = slope_std.map(|std| self.measured(slope, std * true_frequency));
         ObservedMode {
@@ -286,20 +292,17 @@ impl Scene<'_> {
             repeats: self.plan.taps,
             damping,
             shape,
-            reference,
+            reference: reference.map(|(sensor, _)| sensor),
             constant,
             amplitude: None,
-            decay: slope.map(|slope| along(slope, frequency)),
+            decay: slope.map(|slope| along_decay(slope, frequency)),
         }
     }
 }
 
-/// Amplitudes between which a decay is followed, over the first one.
-const ENDS: [f64; 2] = [0.9, 0.22];
-
-/// The change along the decay; its ends are not observed apart.
-fn along(slope: Observed, frequency: Observed) -> AlongDecay {
-    let nothing = Observed {
+/// Returns the change along the decay; its ends are not observed apart.
+fn along_decay(slope: Observed, frequency: Observed) -> AlongDecay {
+    let unobserved = Observed {
         value: 0.0,
         std: f64::INFINITY,
         freedom: None,
@@ -307,12 +310,12 @@ fn along(slope: Observed, frequency: Observed) -> AlongDecay {
     let end = DecayEnd {
         amplitude: None,
         frequency,
-        damping: nothing,
+        damping: unobserved,
     };
     AlongDecay {
         frequency_slope: slope,
         frequency_change: None,
-        damping_slope: nothing,
+        damping_slope: unobserved,
         early: end,
         late: end,
         verdict: DecayVerdict::Steady,

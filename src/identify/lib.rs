@@ -16,29 +16,23 @@
 //! a [`Doubt`], not an error; an error means that no number exists.
 
 pub mod consistent;
-pub mod doubt;
-pub mod estimate;
-pub mod free_beam;
-pub mod monte_carlo;
 pub mod observation;
 pub mod pairing;
 pub mod pairs;
 pub mod perturbation;
 pub mod predict;
 
-pub use doubt::Doubt;
-pub use estimate::{
-    FREQUENCY_FLOOR, JointEstimate, MeasuredMode, Uncertain, estimate_joint, pairs_estimator,
-};
-pub use free_beam::{FreeBeamEstimate, estimate_modulus};
-pub use monte_carlo::{MonteCarlo, Spread, monte_carlo};
-pub use pairing::{WeightedPeak, pair_by_frequency, pair_by_ratio, pair_modes};
+pub use pairing::pair_modes;
 pub use pairs::{
-    ModeLambda, PairsEstimate, PairsModel, SingleModeStiffness, estimate_lap, estimate_pairs,
-    estimate_three_parameter, estimate_two_parameter, single_mode_stiffness,
+    Doubt, FREQUENCY_FLOOR, JointEstimate, MeasuredMode, ModeLambda, PairsEstimate, PairsModel,
+    SingleModeStiffness, Uncertain, estimate_joint, estimate_lap, estimate_pairs,
+    estimate_three_parameter, estimate_two_parameter, pairs_estimator, single_mode_stiffness,
 };
-pub use perturbation::Stiffnesses;
-pub use predict::{PredictedMode, compare, predict, predict_lambdas};
+pub use perturbation::{MonteCarlo, Spread, Stiffnesses, monte_carlo};
+pub use predict::{
+    FreeBeamEstimate, PredictedMode, WeightedPeak, compare, estimate_modulus, pair_by_frequency,
+    pair_by_ratio, predict, predict_lambdas,
+};
 
 use tapjoint_beam::StructureError;
 

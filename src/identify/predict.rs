@@ -1,6 +1,6 @@
 //! Natural frequencies of a known or estimated joint beside the measured ones.
 
-use super::{IdentifyError, MeasuredMode};
+use super::{IdentifyError, MeasuredMode, Uncertain};
 use tapjoint_beam::{
     Assembly, Beam, BeamTheory, JointStiffness, NaturalMode, Slenderness, natural_modes,
 };
@@ -78,4 +78,160 @@ pub fn predict_lambdas(
     count: usize,
 ) -> Result<Vec<NaturalMode>, IdentifyError> {
     Ok(natural_modes(assembly, joint, &Slenderness::EULER, count)?)
+}
+
+// A free beam has no joint: its natural frequencies check modulus and density.
+
+/// What the natural frequencies of a free beam say about its material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeBeamEstimate {
+    /// Numbers of the modes used.
+    pub modes_used: Vec<usize>,
+    /// Modulus (Pa) from each mode alone, with the mode's number, at the stated density.
+    pub per_mode: Vec<(usize, f64)>,
+    /// Modulus (Pa) by least squares of the relative frequency errors, at the stated density.
+    pub modulus: Uncertain,
+    /// Density (kg/m3) that explains the same frequencies at the stated modulus instead: only
+    /// the ratio of both can be told from frequencies.
+    pub density: Uncertain,
+}
+
+/// Modulus of a free beam. Each frequency is proportional to the root of the modulus, with shear
+/// too, for the ratio of shear modulus to modulus is Poisson's; hence no iteration.
+///
+/// # Errors
+/// [`IdentifyError::TooFewModes`] without any mode, [`IdentifyError::Frequency`], and
+/// [`IdentifyError::Structure`] where the beam cannot exist.
+pub fn estimate_modulus(
+    theory: BeamTheory,
+    beam: &Beam,
+    modes: &[MeasuredMode],
+) -> Result<FreeBeamEstimate, IdentifyError> {
+    beam.check()?;
+    let highest = modes.iter().map(|mode| mode.mode).max();
+    let Some(highest) = highest else {
+        return Err(IdentifyError::TooFewModes {
+            model: "free beam",
+            unknowns: 1,
+            needed: 1,
+            found: 0,
+            simpler: "",
+        });
+    };
+    let theory = beam.slenderness(theory);
+    let exact = natural_modes(Assembly::Free, &JointStiffness::FREE, &theory, highest)?;
+    // Measured over nominal frequency, for each mode.
+    let mut ratios = Vec::with_capacity(modes.len());
+    for mode in modes {
+        let usable = mode.frequency > 0.0 && mode.frequency.is_finite();
+        let nominal = exact
+            .get(mode.mode.wrapping_sub(1))
+            .filter(|_| usable)
+            .ok_or(IdentifyError::Frequency {
+                mode: mode.mode,
+                value: mode.frequency,
+            })?;
+        ratios.push(mode.frequency / beam.frequency_of(nominal.lambda));
+    }
+    // min sum (1 - x/r)^2 over x = sqrt(E/E0): x = sum(1/r) / sum(1/r^2).
+    let first: f64 = ratios.iter().map(|ratio| 1.0 / ratio).sum();
+    let second: f64 = ratios.iter().map(|ratio| ratio.powi(-2)).sum();
+    let root = first / second;
+    let relative = relative_std(modes, &ratios, root);
+    let modulus = beam.modulus * root * root;
+    let density = beam.density / (root * root);
+    Ok(FreeBeamEstimate {
+        modes_used: modes.iter().map(|mode| mode.mode).collect(),
+        per_mode: modes
+            .iter()
+            .zip(&ratios)
+            .map(|(mode, ratio)| (mode.mode, beam.modulus * ratio * ratio))
+            .collect(),
+        modulus: Uncertain::symmetric(modulus, relative.map(|relative| 2.0 * relative * modulus)),
+        density: Uncertain::symmetric(density, relative.map(|relative| 2.0 * relative * density)),
+    })
+}
+
+/// Relative standard uncertainty of x = sum(1/r)/sum(1/r^2) from those of the frequencies:
+/// dx/dr = (2 x/r - 1)/(r^2 sum(1/r^2)).
+fn relative_std(modes: &[MeasuredMode], ratios: &[f64], root: f64) -> Option<f64> {
+    let second: f64 = ratios.iter().map(|ratio| ratio.powi(-2)).sum();
+    let mut variance = 0.0;
+    for (mode, ratio) in modes.iter().zip(ratios) {
+        let spread = ratio * mode.std? / mode.frequency;
+        let slope = (2.0 * root / ratio - 1.0) / (ratio * ratio * second);
+        variance += (slope * spread).powi(2);
+    }
+    Some(variance.sqrt() / root)
+}
+
+// Which measured frequency is which mode.
+
+/// Numbers the measured frequencies (Hz, ascending) of a structure whose natural frequencies are
+/// predicted (Hz, ascending): each mode gets the measured frequency nearest to it, within `tolerance`
+/// (relative to the predicted one) and nearer to it than to any other mode; frequencies left over
+/// have no number.
+pub fn pair_by_frequency(
+    measured: &[f64],
+    predicted: &[f64],
+    tolerance: f64,
+) -> Vec<Option<usize>> {
+    let distance = |f: f64, mode: usize| ((f - predicted[mode]) / predicted[mode]).abs();
+    let nearest_mode =
+        |f: f64| (0..predicted.len()).min_by(|&a, &b| distance(f, a).total_cmp(&distance(f, b)));
+    let mut numbers = vec![None; measured.len()];
+    for mode in 0..predicted.len() {
+        let best = (0..measured.len())
+            .filter(|&i| nearest_mode(measured[i]) == Some(mode))
+            .filter(|&i| distance(measured[i], mode) <= tolerance)
+            .min_by(|&a, &b| distance(measured[a], mode).total_cmp(&distance(measured[b], mode)));
+        if let Some(best) = best {
+            numbers[best] = Some(mode + 1);
+        }
+    }
+    numbers
+}
+
+/// A measured peak: where it is and how much it stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedPeak {
+    /// Frequency (Hz).
+    pub frequency: f64,
+    /// Weight, such as its height over the noise (dB).
+    pub weight: f64,
+}
+
+/// Numbers the peaks of a structure whose natural frequencies are known but for one common factor
+/// near 1 (a free beam of uncertain modulus): the factor is the one under which the peaks that match
+/// within `tolerance` weigh most, among factors that differ from 1 by at most `range`; of equals the
+/// one nearest 1.
+pub fn pair_by_ratio(
+    peaks: &[WeightedPeak],
+    predicted: &[f64],
+    (range, tolerance): (f64, f64),
+) -> Vec<Option<usize>> {
+    let measured: Vec<f64> = peaks.iter().map(|peak| peak.frequency).collect();
+    let pairing = |factor: f64| {
+        let scaled: Vec<f64> = predicted.iter().map(|f| factor * f).collect();
+        pair_by_frequency(&measured, &scaled, tolerance)
+    };
+    let weight = |numbers: &[Option<usize>]| -> f64 {
+        peaks
+            .iter()
+            .zip(numbers)
+            .filter(|(_, n)| n.is_some())
+            .map(|(peak, _)| peak.weight)
+            .sum()
+    };
+    let factors = measured
+        .iter()
+        .flat_map(|f| predicted.iter().map(move |p| f / p));
+    factors
+        .filter(|factor| (factor - 1.0).abs() <= range)
+        .map(|factor| (factor, pairing(factor)))
+        .max_by(|a, b| {
+            let nearer = (b.0 - 1.0).abs().total_cmp(&(a.0 - 1.0).abs());
+            weight(&a.1).total_cmp(&weight(&b.1)).then(nearer)
+        })
+        .map_or(vec![None; peaks.len()], |(_, numbers)| numbers)
 }

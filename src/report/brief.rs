@@ -1,11 +1,13 @@
 //! What was found, in five lines for a terminal.
 
-use super::document::{Document, GapVerdictSection};
+use super::document::Document;
 use super::format::{signed_or_below, significant};
 use super::summary::{channels, described, most_missed};
 use super::tables::{
     Parameter, estimated, has_joint, joint_with, quality_count, shows_gap, together,
 };
+use tapjoint_beam::effects::EffectId;
+use tapjoint_diagnosis::{Hypothesis, Verdict};
 
 /// At most five lines, each with what it is about; what was not computed has none.
 pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
@@ -111,7 +113,7 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 fn model(document: &Document) -> Option<String> {
     let worst = most_missed(document)?;
     let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
-        let with = joint_with(gap).filter(|_| gap.verdict.kind == "named");
+        let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
         let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
         format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
     });
@@ -123,13 +125,21 @@ fn model(document: &Document) -> Option<String> {
 }
 
 /// What the diagnosis answers, in a few words; `there` where the readings show a gap, be its cause known or not.
-fn missing(verdict: &GapVerdictSection, there: bool) -> String {
+fn missing(verdict: &Verdict, there: bool) -> String {
+    let single = |effects: &[EffectId]| {
+        let one = |effect: &EffectId| Hypothesis::Effects(vec![*effect]);
+        effects.iter().map(one).collect()
+    };
+    let hypotheses = match verdict {
+        Verdict::Named(effects) => single(effects),
+        other => other.hypotheses(),
+    };
     let mut names: Vec<String> = Vec::new();
-    for effect in &verdict.effects {
-        let name = match effect.as_str() {
-            "none" => "nothing".to_owned(),
-            "unknown" => "something unknown".to_owned(),
-            effect => together(effect),
+    for hypothesis in hypotheses {
+        let name = match hypothesis {
+            Hypothesis::None => "nothing".to_owned(),
+            Hypothesis::Unknown => "something unknown".to_owned(),
+            effects => together(&effects),
         };
         if !names.contains(&name) {
             names.push(name);
@@ -141,13 +151,13 @@ fn missing(verdict: &GapVerdictSection, there: bool) -> String {
         }
         _ => names.join(""),
     };
-    match verdict.kind.as_str() {
-        "no-gap" => "no gap is established".to_owned(),
-        "named" => format!("missing in it: {}", listed("and")),
-        "group" => format!("missing in it: one of {}", listed("or")),
-        "set" if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
-        "set" => format!("not decided is what is missing in it: {}", listed("or")),
-        "unknown" => "missing in it: something unknown".to_owned(),
+    match verdict {
+        Verdict::NoGap => "no gap is established".to_owned(),
+        Verdict::Named(_) => format!("missing in it: {}", listed("and")),
+        Verdict::Group(_) => format!("missing in it: one of {}", listed("or")),
+        Verdict::Set(_) if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
+        Verdict::Set(_) => format!("not decided is what is missing in it: {}", listed("or")),
+        Verdict::Unknown => "missing in it: something unknown".to_owned(),
         _ if there => "something is missing in it, and these data cannot say what".to_owned(),
         _ => "not enough data to tell whether something is missing in it".to_owned(),
     }
@@ -171,26 +181,25 @@ mod tests {
 
     #[test]
     fn regress_every_verdict_has_its_words() {
-        let words = |kind: &str, effects: &[&str]| {
-            let verdict = GapVerdictSection {
-                kind: kind.to_owned(),
-                effects: effects.iter().map(|name| (*name).to_owned()).collect(),
-                reason: None,
-            };
-            [false, true].map(|there| missing(&verdict, there))
-        };
-        let [pair, _] = words("named", &["local-crack", "sensor-mass"]);
+        use EffectId::{Length, LocalCrack, Modulus, SensorMass};
+        let words = |verdict: Verdict| [false, true].map(|there| missing(&verdict, there));
+        let [pair, _] = words(Verdict::Named(vec![LocalCrack, SensorMass]));
         assert_eq!(pair, "missing in it: local-crack and sensor-mass");
         // A group of pairs repeats what they share.
-        let [group, _] = words("group", &["modulus", "length", "modulus"]);
+        let [group, _] = words(Verdict::Group(vec![Modulus, Length, Modulus]));
         assert_eq!(group, "missing in it: one of modulus or length");
-        let [set, _] = words("set", &["modulus", "none", "unknown"]);
+        let modulus = Hypothesis::Effects(vec![Modulus]);
+        let [set, _] = words(Verdict::Set(vec![
+            modulus.clone(),
+            Hypothesis::None,
+            Hypothesis::Unknown,
+        ]));
         let said = "not decided is what is missing in it: modulus, nothing or something unknown";
         assert_eq!(set, said);
-        let [alone, _] = words("set", &["modulus"]);
+        let [alone, _] = words(Verdict::Set(vec![modulus]));
         assert_eq!(alone, "perhaps missing in it: modulus");
         // That there is a gap and what causes it are two questions.
-        let [open, there] = words("not-enough-data", &[]);
+        let [open, there] = words(Verdict::NotEnoughData(String::new()));
         assert!(
             open.starts_with("not enough data to tell whether"),
             "{open}"

@@ -1,9 +1,13 @@
-//! Parameters and modes as comma separated values, one row each, numbers in full precision.
+//! Parameters, modes, changed frequencies and frequency response functions as comma separated values: one row each,
+//! numbers in full precision.
 
 use super::ReportError;
 use super::document::{
-    Document, EstimateSection, FreeBeamSection, ModeSection, PairsSection, ValueSection,
+    Document, EstimateSection, FreeBeamSection, Method, ModeSection, MonteCarloSection,
+    PairsSection, ResolutionSpanSection, ValueSection,
 };
+use num_complex::Complex64;
+use tapjoint_analysis::Frf;
 
 /// Columns of `parameters.csv`.
 const PARAMETER_COLUMNS: [&str; 10] = [
@@ -72,21 +76,21 @@ fn parameter_rows(estimate: &EstimateSection) -> Vec<Vec<String>> {
     ];
     let own = values.into_iter().filter_map(|(name, unit, value)| {
         let value = value.as_ref()?;
-        Some(parameter_row(name, &estimate.method, unit, value))
+        Some(parameter_row(name, estimate.method, unit, value))
     });
     let pairs = estimate
         .pairs
         .iter()
-        .flat_map(|pairs| pairs_rows(pairs, &estimate.method));
+        .flat_map(|pairs| pairs_rows(pairs, estimate.method));
     let free = estimate
         .free_beam
         .iter()
-        .flat_map(|free| free_beam_rows(free, &estimate.method));
+        .flat_map(|free| free_beam_rows(free, estimate.method));
     own.chain(pairs).chain(free).collect()
 }
 
-fn pairs_rows(pairs: &PairsSection, method: &str) -> Vec<Vec<String>> {
-    let repeated = method == "pairs";
+fn pairs_rows(pairs: &PairsSection, method: Method) -> Vec<Vec<String>> {
+    let repeated = method == Method::Pairs;
     [
         ("kx", "1", pairs.kx),
         ("ky", "1", pairs.ky),
@@ -98,22 +102,22 @@ fn pairs_rows(pairs: &PairsSection, method: &str) -> Vec<Vec<String>> {
     ]
     .into_iter()
     .filter(|(name, _, _)| !repeated || *name == "closure")
-    .filter_map(|(name, unit, value)| Some(closed_row(name, "pairs", unit, value?)))
+    .filter_map(|(name, unit, value)| Some(closed_row(name, Method::Pairs, unit, value?)))
     .collect()
 }
 
-fn free_beam_rows(free: &FreeBeamSection, method: &str) -> Vec<Vec<String>> {
-    if method == "free-beam" {
+fn free_beam_rows(free: &FreeBeamSection, method: Method) -> Vec<Vec<String>> {
+    if method == Method::FreeBeam {
         return Vec::new();
     }
     vec![
-        closed_row("modulus", "free-beam", "Pa", free.modulus),
-        closed_row("density", "free-beam", "kg/m3", free.density),
+        closed_row("modulus", Method::FreeBeam, "Pa", free.modulus),
+        closed_row("density", Method::FreeBeam, "kg/m3", free.density),
     ]
 }
 
 /// A value in closed form beside the main estimate, without its uncertainty.
-fn closed_row(name: &str, method: &str, unit: &str, value: f64) -> Vec<String> {
+fn closed_row(name: &str, method: Method, unit: &str, value: f64) -> Vec<String> {
     let value = ValueSection {
         value,
         ..ValueSection::default()
@@ -121,10 +125,10 @@ fn closed_row(name: &str, method: &str, unit: &str, value: f64) -> Vec<String> {
     parameter_row(name, method, unit, &value)
 }
 
-fn parameter_row(name: &str, method: &str, unit: &str, value: &ValueSection) -> Vec<String> {
+fn parameter_row(name: &str, method: Method, unit: &str, value: &ValueSection) -> Vec<String> {
     vec![
         name.to_owned(),
-        method.to_owned(),
+        method.name().to_owned(),
         unit.to_owned(),
         number(Some(value.value)),
         number(value.std),
@@ -141,7 +145,7 @@ fn mode_row(mode: &ModeSection) -> Vec<String> {
         mode.mode.map(|n| n.to_string()).unwrap_or_default(),
         mode.label.clone().unwrap_or_default(),
         mode.recording.clone().unwrap_or_default(),
-        mode.method.clone(),
+        mode.method.name().to_owned(),
         number(Some(mode.frequency)),
         number(mode.std),
         number(mode.line_frequency),
@@ -156,8 +160,174 @@ fn mode_row(mode: &ModeSection) -> Vec<String> {
     ]
 }
 
+/// Columns of `perturbation.csv`: `kind` is what was done to the frequencies, `percent` by how much
+/// where all were changed alike, `mode` which one where one was changed alone, `statistic` what of the
+/// estimates the three numbers are.
+const PERTURBATION_COLUMNS: [&str; 8] = [
+    "method",
+    "kind",
+    "percent",
+    "mode",
+    "statistic",
+    "kx",
+    "ky",
+    "kz",
+];
+
+/// `perturbation.csv`; only its header where nothing was perturbed.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportError> {
+    let spans = document.resolution_span.iter().flatten();
+    let random = document.monte_carlo.iter().flatten();
+    let rows = uniform(document)
+        .into_iter()
+        .chain(averages(document))
+        .chain(spans.flat_map(bounds))
+        .chain(random.flat_map(monte_carlo));
+    write(&PERTURBATION_COLUMNS, rows.collect())
+}
+
+/// What a row is about: method, kind, percent, mode, statistic.
+type About<'a> = (Method, &'a str, Option<f64>, Option<usize>, &'a str);
+
+fn changed_row(
+    (method, kind, percent, mode, statistic): About<'_>,
+    values: [Option<f64>; 3],
+) -> Vec<String> {
+    let mut cells = vec![
+        method.name().to_owned(),
+        kind.to_owned(),
+        number(percent),
+        mode.map(|mode| mode.to_string()).unwrap_or_default(),
+        statistic.to_owned(),
+    ];
+    cells.extend(values.map(number));
+    cells
+}
+
+fn uniform(document: &Document) -> Vec<Vec<String>> {
+    let rows = document.perturbation.iter().flatten();
+    rows.map(|found| {
+        let about = (found.method, "uniform", Some(found.percent), None, "value");
+        changed_row(about, [found.kx, found.ky, found.kz])
+    })
+    .collect()
+}
+
+fn averages(document: &Document) -> Vec<Vec<String>> {
+    let list = document.perturbation_averages.iter().flatten();
+    list.flat_map(|found| {
+        let about = |statistic| {
+            (
+                found.method,
+                "uniform",
+                Some(found.percent),
+                None,
+                statistic,
+            )
+        };
+        let errors = [found.kx_percent, found.ky_percent, found.kz_percent];
+        let of_mean = [
+            found.kx_of_mean_percent,
+            found.ky_of_mean_percent,
+            found.kz_of_mean_percent,
+        ];
+        [
+            changed_row(about("mean error (%)"), errors),
+            changed_row(about("error of mean (%)"), of_mean),
+        ]
+    })
+    .collect()
+}
+
+fn bounds(found: &ResolutionSpanSection) -> Vec<Vec<String>> {
+    let ranges = [found.kx, found.ky, found.kz];
+    let end = |statistic, index: usize| {
+        let values = ranges.map(|range| range.and_then(|range| range.get(index).copied()));
+        changed_row(
+            (found.method, "sign patterns", None, None, statistic),
+            values,
+        )
+    };
+    let mut rows = vec![end("smallest", 0), end("largest", 1)];
+    for mode in &found.sensitivity {
+        let about = |statistic| (found.method, "one mode", None, Some(mode.mode), statistic);
+        let change = [mode.kx_percent, mode.ky_percent, mode.kz_percent];
+        let slope = [
+            mode.kx_percent_per_percent,
+            mode.ky_percent_per_percent,
+            mode.kz_percent_per_percent,
+        ];
+        rows.push(changed_row(about("change by its bound (%)"), change));
+        rows.push(changed_row(about("change per percent (%)"), slope));
+    }
+    rows
+}
+
+fn monte_carlo(found: &MonteCarloSection) -> Vec<Vec<String>> {
+    let values = [found.kx, found.ky, found.kz];
+    let of = |statistic, pick: fn(ValueSection) -> Option<f64>| {
+        let about = (found.method, "monte carlo", None, None, statistic);
+        changed_row(about, values.map(|value| value.and_then(pick)))
+    };
+    vec![
+        of("median", |value| Some(value.value)),
+        of("low", |value| value.low),
+        of("high", |value| value.high),
+    ]
+}
+
+/// Columns of the table of frequency response functions.
+const FRF_COLUMNS: [&str; 13] = [
+    "recording",
+    "response",
+    "form",
+    "unit",
+    "frequency_Hz",
+    "h1_real",
+    "h1_imaginary",
+    "h2_real",
+    "h2_imaginary",
+    "hv_real",
+    "hv_imaginary",
+    "coherence",
+    "random_error",
+];
+
+/// One row for each line of each function: all estimators, coherence and random error, in full
+/// precision; a cell is empty where a value does not exist.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
+    write(&FRF_COLUMNS, frfs.iter().flat_map(frf_rows).collect())
+}
+
+fn frf_rows(frf: &Frf) -> impl Iterator<Item = Vec<String>> {
+    (0..frf.lines.points()).map(move |line| {
+        let on_line = |values: &Option<Vec<Option<f64>>>| {
+            number(values.as_ref().and_then(|values| *values.get(line)?))
+        };
+        let mut row = vec![
+            frf.recording.clone(),
+            frf.response.clone(),
+            frf.form_words.to_string(),
+            frf.unit.clone(),
+            frf.lines.frequency(line).to_string(),
+        ];
+        for values in [&frf.h1, &frf.h2, &frf.hv] {
+            let value: Option<Complex64> = values.get(line).copied().flatten();
+            row.extend([number(value.map(|v| v.re)), number(value.map(|v| v.im))]);
+        }
+        row.extend([on_line(&frf.coherence), on_line(&frf.random_error)]);
+        row
+    })
+}
+
 /// The shortest digits that give the same number back; empty where there is none.
-pub(super) fn number(value: Option<f64>) -> String {
+fn number(value: Option<f64>) -> String {
     value
         .filter(|value| value.is_finite())
         .map(|value| value.to_string())

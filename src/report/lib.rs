@@ -4,44 +4,20 @@
 
 pub mod blind_check;
 pub mod brief;
-mod convert;
-mod convert_datasets;
-mod convert_estimate;
-mod convert_figures;
-mod convert_fit;
-mod convert_gap;
-mod convert_perturbation;
-mod convert_quality;
+pub mod chart;
+pub mod charts;
 pub mod deck;
 pub mod document;
-mod document_contents;
-mod document_estimate;
-mod document_fit;
-mod document_frf;
-mod document_gap;
-mod document_perturbation;
-mod document_quality;
-mod document_shapes;
 mod earlier;
 pub mod figures;
 pub mod format;
 mod gap_text;
 pub mod html;
-pub mod live;
-pub mod live_amplitude;
-pub mod live_close_up;
-mod live_lines;
-pub mod live_model;
-pub mod live_points;
-pub mod plot;
 pub mod summary;
 pub mod tables;
 pub mod text;
 
-mod convert_consistent;
-mod convert_frf;
 mod csv;
-mod csv_perturbation;
 mod frf_uff;
 mod json;
 mod resolution;
@@ -51,17 +27,12 @@ mod short_names;
 mod stages;
 mod text_table;
 
-pub use convert::{
-    document as document_of, inspection as inspection_of, lambdas as lambdas_of,
-    prediction as prediction_of,
+pub use csv::{render_frf_csv, render_modes_csv, render_parameters_csv, render_perturbation_csv};
+pub use document::{
+    datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
 };
-pub use convert_datasets::datasets as datasets_of;
-pub use convert_figures::{figures as figures_of, frf_figure};
-pub use convert_frf::{frf_document, render_frf_csv};
-pub use convert_gap::gap_section;
-pub use csv::{render_modes_csv, render_parameters_csv};
-pub use csv_perturbation::render_perturbation_csv;
 pub use earlier::{MODEL_FILE, earlier_files};
+pub use figures::{figures as figures_of, frf_figure};
 pub use frf_uff::render_frf_uff;
 pub use gap_text::render_gap_text;
 pub use html::render_html;

@@ -61,7 +61,11 @@ fn estimate(found: &EstimateSection) -> Vec<String> {
     let modes: Vec<String> = found.modes_used.iter().map(usize::to_string).collect();
     let misfit = found.misfit.as_ref();
     let verdict = misfit.map_or(String::new(), |misfit| format!("; {}", misfit.verdict));
-    let head = format!("{} from modes {}{verdict}", found.method, modes.join(", "));
+    let head = format!(
+        "{} from modes {}{verdict}",
+        found.method.name(),
+        modes.join(", ")
+    );
     let more = found.identifiability.iter().flat_map(|can| &can.statements);
     std::iter::once(&head)
         .chain(more)
@@ -85,5 +89,5 @@ fn peak(mode: &ModeSection) -> String {
         (None, None) => "no number".to_owned(),
     };
     let frequency = significant(mode.frequency, 7);
-    format!("peak at {frequency} Hz ({}), {what}", mode.method)
+    format!("peak at {frequency} Hz ({}), {what}", mode.method.name())
 }

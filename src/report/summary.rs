@@ -1,11 +1,10 @@
 //! What was found, in a few plain sentences.
 
 use super::document::{
-    Document, EstimateSection, ModeSection, PredictionSection, RecordingSection,
+    Document, EstimateSection, ModeSection, PredictionSection, ReadBy, RecordingSection,
 };
 use super::format::{bound_percent, signed_or_below, significant, trimmed};
 use super::tables::{Parameter, estimated, gap_in_short, gap_story, quality_count, reading_bound};
-use tapjoint_analysis::AmplitudeChange;
 use tapjoint_identify::observation::UNPAIRED;
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
@@ -46,15 +45,7 @@ pub(super) fn described(document: &Document) -> Option<String> {
 fn amplitudes(document: &Document) -> Vec<String> {
     let modes = document.modes.as_deref().unwrap_or_default();
     let sentence = |mode: &ModeSection| {
-        let ends = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
-        let change = AmplitudeChange {
-            amplitude: ends.amplitude,
-            unit: ends.unit.clone(),
-            frequency: ends.frequency,
-            frequency_bound: ends.frequency_bound,
-            damping_ratio: ends.damping,
-            damping_bound: ends.damping_bound,
-        };
+        let change = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
         let change = change.to_string();
         // A number stays on the line of its unit.
         let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
@@ -136,7 +127,7 @@ fn modes(document: &Document) -> Option<String> {
         .filter(|mode| mode.mode.is_some())
         .map(|mode| mode.frequency)
         .collect();
-    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == "given");
+    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == ReadBy::Given);
     let found = if given { "given" } else { "found" };
     let described = document.test.iter().any(|test| test.kind.is_some());
     let word = if described { "mode" } else { "resonance" };
@@ -306,10 +297,10 @@ fn resolution(document: &Document) -> Option<String> {
     if estimate.is_some_and(misses) {
         return None;
     }
-    let main = estimate.map_or("", |estimate| estimate.method.as_str());
+    let main = estimate.map(|estimate| estimate.method);
     let spans = document.resolution_span.as_deref()?;
     // Of the method that the estimate is by; else of the one that there is.
-    let span = spans.iter().find(|span| span.method == main);
+    let span = spans.iter().find(|span| Some(span.method) == main);
     let span = span.or(spans.first())?;
     let ranges: Vec<String> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
         .into_iter()
@@ -342,7 +333,7 @@ fn bound_name(document: &Document) -> &'static str {
     let modes = document.modes.as_deref().unwrap_or_default();
     let between = modes
         .iter()
-        .any(|mode| matches!(mode.method.as_str(), "fit" | "interpolated"));
+        .any(|mode| matches!(mode.method, ReadBy::Fit | ReadBy::Interpolated));
     if between {
         "half line (as if it had been read on a line only)"
     } else {

@@ -1,7 +1,7 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
 use super::brief::brief;
-use super::document::{Document, ModeSection};
+use super::document::{Document, ModeSection, ReadBy};
 use super::format::signed_percent;
 use super::tables::{self, Table};
 use super::text_table::cut;
@@ -66,7 +66,7 @@ pub fn modes(document: &Document) -> String {
         return String::new();
     };
     let modes = document.modes.as_deref().unwrap_or_default();
-    let fitted = modes.iter().any(|mode| mode.method == "fit");
+    let fitted = modes.iter().any(|mode| mode.method == ReadBy::Fit);
     let note = if fitted {
         let note = format!(
             "Frequency: fit of {}, \u{b1} half the 95 % interval{}; line: the highest spectral line \
@@ -86,8 +86,8 @@ pub fn modes(document: &Document) -> String {
 fn not_fitted(modes: &[ModeSection]) -> String {
     let others: Vec<String> = modes
         .iter()
-        .filter(|mode| mode.method != "fit")
-        .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, mode.method)))
+        .filter(|mode| mode.method != ReadBy::Fit)
+        .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, mode.method.name())))
         .collect();
     match others.is_empty() {
         true => String::new(),

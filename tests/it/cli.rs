@@ -681,7 +681,6 @@ fn regress_a_second_run_replaces_the_first() {
     let report = folder.path().join("Lap joint-report");
     fs::create_dir(&report).unwrap();
     fs::write(report.join("notes.txt"), "mine").unwrap();
-    fs::write(report.join("report.json"), "old").unwrap();
     for _ in 0..2 {
         tapjoint(folder.path())
             .args(["run", "test.toml"])

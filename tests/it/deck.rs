@@ -8,7 +8,7 @@ use tapjoint::pipeline::{
     tested_structure,
 };
 use tapjoint::report::deck::{Deck, deck_of, render_nastran, source_of};
-use tapjoint::structure::finite_elements::PointAttachment;
+use tapjoint::structure::interface::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness};
 

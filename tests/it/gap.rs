@@ -49,7 +49,11 @@ fn recover_a_sensor_mass_that_the_model_left_out() {
         diagnosis.verdict,
         Verdict::Named(vec![EffectId::SensorMass])
     );
-    assert!(diagnosis.places.sensor > 0.9, "{:?}", diagnosis.places);
+    assert!(
+        diagnosis.locations.sensor > 0.9,
+        "{:?}",
+        diagnosis.locations
+    );
     let found = result(&diagnosis, "sensor-mass");
     let mass = &found.parameters[0];
     // Four standard uncertainties: one case in 16 000 misses.
@@ -57,10 +61,10 @@ fn recover_a_sensor_mass_that_the_model_left_out() {
         (mass.value - 0.0113).abs() < 4.0 * mass.std.unwrap(),
         "{mass:?}"
     );
-    assert!(mass.smallest_isolable.unwrap() < 0.0113);
+    assert!(mass.smallest_separable.unwrap() < 0.0113);
     assert!(found.closure.unwrap().value > 0.9, "{:?}", found.closure);
     // How high a sensor stands of which nothing is known moves the highest mode.
-    assert!(found.withheld_after.unwrap() < 0.5 * found.withheld_before.unwrap());
+    assert!(found.holdout_after.unwrap() < 0.5 * found.holdout_before.unwrap());
     assert!(found.gap_after.unwrap() < 0.2 * found.gap_before);
 }
 
@@ -248,7 +252,7 @@ fn prop_a_named_cause_comes_with_how_to_see_it() {
     let crack = [("compliance", 0.02), ("position", 0.137)];
     let diagnosis = diagnosed(Some(0.004), &[effect(EffectId::LocalCrack, &crack)], 32);
     let last = diagnosis.next_tests.last().unwrap();
-    assert_eq!(last.step.id(), "confirm");
+    assert_eq!(last.proposal.id(), "confirm");
     assert!(last.action.contains("look at the place"), "{}", last.action);
 }
 
@@ -385,7 +389,7 @@ fn prop_probabilities_sum_to_one_and_repeat_themselves() {
     let first = diagnosed(Some(0.004), std::slice::from_ref(&crack), 31);
     let sum: f64 = first.hypotheses.iter().map(|one| one.probability).sum();
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");
-    let p = first.places;
+    let p = first.locations;
     let places = p.joint + p.fixture + p.sensor + p.body + p.acquisition + p.unknown;
     assert!((places - 1.0).abs() < 1e-9, "{places}");
     // The same bits on any number of threads.
@@ -417,11 +421,11 @@ fn recover_the_place_of_a_crack_and_say_it_on_the_map() {
         (place.value - 0.137).abs() < 4.0 * place.std.unwrap(),
         "{place:?}"
     );
-    let map = diagnosis.map.unwrap();
+    let map = diagnosis.location_map.unwrap();
     // From frequencies alone a mirror place does nearly as well; the true one is among the best.
-    let most = map.stiffness_alone.iter().copied().fold(0.0, f64::max);
+    let most = map.stiffness_explains.iter().copied().fold(0.0, f64::max);
     let piece = (12.0 * 0.137 / LENGTH) as usize;
-    assert!(map.stiffness_alone[piece] > 0.9 * most, "{map:?}");
+    assert!(map.stiffness_explains[piece] > 0.9 * most, "{map:?}");
 }
 
 #[test]

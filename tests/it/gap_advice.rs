@@ -3,7 +3,7 @@
 use crate::shared::{five_recordings, strip_on_springs};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
-    Diagnosis, GapSettings, NextTest, Nominal, PlannedConfiguration, Step, TestPlan, Verdict,
+    Diagnosis, GapSettings, NextTest, Nominal, PlannedConfiguration, Proposal, TestPlan, Verdict,
     diagnose, observe,
 };
 use tapjoint::structure::specimen::PointMass;
@@ -45,20 +45,22 @@ fn effect(id: EffectId, pairs: &[(&str, f64)]) -> Effect {
 }
 
 /// The plan with the test added; `None` of tests that are no recordings.
-fn with_test(step: &Step) -> Option<TestPlan> {
+fn with_test(step: &Proposal) -> Option<TestPlan> {
     let mut plan = poor_plan();
     let first = recording(0.8 * LENGTH, 1.0);
     match step {
-        Step::HigherModes { last, .. } => plan.modes = *last,
-        Step::MoreTaps { factor } => plan.configurations.extend(vec![first; *factor]),
-        Step::Retighten => plan.configurations.push(first),
-        Step::TapLevel { level } => {
+        Proposal::HigherModes { last, .. } => plan.modes = *last,
+        Proposal::MoreTaps { factor } => plan.configurations.extend(vec![first; *factor]),
+        Proposal::Retighten => plan.configurations.push(first),
+        Proposal::TapLevel { level } => {
             plan.configurations[0].level = 1.0 / level.max(1.0);
             plan.configurations
                 .push(recording(0.8 * LENGTH, level.min(1.0)));
         }
-        Step::MoveSensor { position, .. } => plan.configurations.push(recording(*position, 1.0)),
-        Step::KnownMass { mass, position } => {
+        Proposal::MoveSensor { position, .. } => {
+            plan.configurations.push(recording(*position, 1.0))
+        }
+        Proposal::KnownMass { mass, position } => {
             let mut heavier = first;
             heavier.masses.push(PointMass {
                 position: *position,
@@ -107,20 +109,24 @@ fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
         let makeable: Vec<&NextTest> = before
             .next_tests
             .iter()
-            .filter(|test| with_test(&test.step).is_some())
+            .filter(|test| with_test(&test.proposal).is_some())
             .collect();
         let (Some(first), Some(least)) = (
-            makeable.iter().max_by(|a, b| a.bits.total_cmp(&b.bits)),
-            makeable.iter().min_by(|a, b| a.bits.total_cmp(&b.bits)),
+            makeable
+                .iter()
+                .max_by(|a, b| a.expected_information.total_cmp(&b.expected_information)),
+            makeable
+                .iter()
+                .min_by(|a, b| a.expected_information.total_cmp(&b.expected_information)),
         ) else {
             continue;
         };
-        if first.step == least.step {
+        if first.proposal == least.proposal {
             continue;
         }
         let own = of_truth(&before, truth);
         let gain = |test: &NextTest| {
-            let plan = with_test(&test.step).unwrap();
+            let plan = with_test(&test.proposal).unwrap();
             of_truth(&diagnosed(&plan, truth, seed), truth) - own
         };
         let gains = (gain(first), gain(least));
@@ -128,11 +134,11 @@ fn recover_the_truth_by_the_most_telling_test_more_than_by_the_least() {
             "{:?}: {:.3}; {} ({:.2} bit) {:+.3}; {} ({:.2} bit) {:+.3}",
             truth.id,
             own,
-            first.step.id(),
-            first.bits,
+            first.proposal.id(),
+            first.expected_information,
             gains.0,
-            least.step.id(),
-            least.bits,
+            least.proposal.id(),
+            least.expected_information,
             gains.1
         );
         best += gains.0;
@@ -162,12 +168,12 @@ fn prop_advice_is_ranked_and_bounded_by_what_is_not_known() {
     for test in tests {
         // Hypotheses below 0.3 % are left out and the others scaled up: 2 % more at most.
         assert!(
-            test.bits > 0.0 && test.bits < 1.02 * entropy + 0.01,
+            test.expected_information > 0.0 && test.expected_information < 1.02 * entropy + 0.01,
             "{test:?} {entropy}"
         );
         assert!(test.separates.len() > 1, "{test:?}");
     }
-    let mut ids: Vec<&str> = tests.iter().map(|test| test.step.id()).collect();
+    let mut ids: Vec<&str> = tests.iter().map(|test| test.proposal.id()).collect();
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), tests.len());
@@ -192,7 +198,7 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     let of = |name: &str| {
         let mut all = diagnosis.hypotheses.iter();
         let found = all.find(|one| one.hypothesis.name() == name).unwrap();
-        found.left_out_recordings.clone().unwrap()
+        found.cross_validation.clone().unwrap()
     };
     let found = of("sensor-mass");
     assert_eq!(found.recordings.len(), 5);
@@ -205,7 +211,12 @@ fn recover_each_recording_from_the_others_under_the_true_cause_alone() {
     let none = of("none");
     assert!(none.after > 0.5 * none.before, "{none:?}");
     // What is left to confirm is little: the answer is all but certain.
-    assert!(diagnosis.next_tests.iter().all(|test| test.bits < 0.2));
+    assert!(
+        diagnosis
+            .next_tests
+            .iter()
+            .all(|test| test.expected_information < 0.2)
+    );
 }
 
 #[test]
@@ -214,7 +225,7 @@ fn regress_large_errors_of_left_out_recordings_are_told_whole() {
     let diagnosis = diagnosed(&steady_joint(), &truth, 13);
     let mut all = diagnosis.hypotheses.iter();
     let none = all.find(|one| one.hypothesis.name() == "none").unwrap();
-    let found = none.left_out_recordings.clone().unwrap();
+    let found = none.cross_validation.clone().unwrap();
     // Who has not seen a recording misses it by hardly less than who has, though here the joint may drift
     // between them; both fit the nominal model, whose errors are a hundred noise floors here.
     assert!(none.gap_before > 30.0 * found.floor, "{}", none.gap_before);
@@ -232,5 +243,5 @@ fn limit_two_recordings_leave_none_out() {
     plan.configurations.truncate(2);
     let diagnosis = diagnosed(&plan, &truth, 12);
     let mut all = diagnosis.hypotheses.iter();
-    assert!(all.all(|one| one.left_out_recordings.is_none()));
+    assert!(all.all(|one| one.cross_validation.is_none()));
 }

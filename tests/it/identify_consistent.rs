@@ -13,7 +13,8 @@ use tapjoint::identify::consistent::{
     Point, Quantity, Route, Verdict, estimate_consistently, exceedance,
 };
 use tapjoint::identify::{IdentifyError, MeasuredMode};
-use tapjoint::structure::finite_elements::{FiniteElementModel, PointAttachment};
+use tapjoint::structure::finite_elements::FiniteElementModel;
+use tapjoint::structure::interface::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
 

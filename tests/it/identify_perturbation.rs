@@ -12,7 +12,7 @@ use tapjoint::identify::perturbation::{
     PAPER_PERCENTS, average_errors, mode_sensitivities, perturb_uniformly,
 };
 use tapjoint::identify::{MeasuredMode, Stiffnesses};
-use tapjoint::structure::finite_elements::PointAttachment;
+use tapjoint::structure::interface::PointAttachment;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, BeamTheory};
 

@@ -28,7 +28,6 @@ mod pipeline_fits;
 mod plan;
 mod predicted_shapes;
 mod real_data;
-mod recording;
 mod recording_uff;
 mod report;
 mod resolution;

@@ -251,7 +251,7 @@ fn regress_bad_orders_are_refused_and_nothing_is_written() {
         .args(["simulate", "test.toml", "--out", "."])
         .assert()
         .code(2)
-        .stderr(predicate::str::contains("would be overwritten"));
+        .stderr(predicate::str::contains("is an input of this command"));
     assert_eq!(
         fs::read_to_string(folder.path().join("test.toml")).unwrap(),
         TEST

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 use crate::shared::steel_strip;
-use tapjoint::structure::frequency_equation::RootedBeam;
 use tapjoint::structure::receptance::EndFunctions;
+use tapjoint::structure::roots::RootedBeam;
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, ModeShape, Slenderness, StructureError, Symmetry,
     mode_shapes, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint, natural_modes,

@@ -7,7 +7,9 @@ mod diagnose;
 mod documents;
 mod export;
 mod first_steps;
+mod frozen;
 mod leftovers;
+mod outputs;
 mod schema;
 mod updated_model;
 

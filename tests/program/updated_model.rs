@@ -209,10 +209,12 @@ fn regress_what_the_diagnosis_refuses_is_no_model() {
     assert!(!error.contains("as it was"), "{error}");
     let model = folder.path().join("model.toml");
     assert!(!model.exists());
-    fs::write(&model, "of another diagnosis").unwrap();
+    let earlier =
+        "# The model with what the diagnosis found (verdict: named; hypothesis: length, 99.6 %).\n";
+    fs::write(&model, earlier).unwrap();
     let (_, error) = told(folder.path(), &arguments, 0);
     assert!(error.contains("; model.toml is left as it was"), "{error}");
-    assert_eq!(fs::read_to_string(&model).unwrap(), "of another diagnosis");
+    assert_eq!(fs::read_to_string(&model).unwrap(), earlier);
     let gap = &json(folder.path(), &["diagnose", "test.toml"])["gap"];
     assert_eq!(gap["verdict"]["kind"], "unknown");
     assert!(gap["updated_model"].is_null());

@@ -1,5 +1,7 @@
 //! Modes whose frequency or damping changes with the amplitude.
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::cmp::Ordering;
 use std::fmt;
 
@@ -21,7 +23,7 @@ const MOST_NAMED: usize = 1;
 
 /// What a mode does along its decays: values at the largest and at the smallest amplitude at which its
 /// curve is well known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudeChange {
     /// Peak amplitude of the strongest sensor (`unit`).
     pub amplitude: [f64; 2],
@@ -32,6 +34,7 @@ pub struct AmplitudeChange {
     /// Its 95 % bounds (Hz).
     pub frequency_bound: [f64; 2],
     /// Damping ratio.
+    #[serde(rename = "damping")]
     pub damping_ratio: [f64; 2],
     /// Its 95 % bounds.
     pub damping_bound: [f64; 2],

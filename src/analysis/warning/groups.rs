@@ -199,6 +199,8 @@ mod tests {
             unit: check.unit(),
             outcome: Outcome::Doubtful,
             happened: format!("Value {value}."),
+            cause: Some(check.cause()),
+            remedy: Some(check.remedy()),
         }
     }
 

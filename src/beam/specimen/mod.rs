@@ -9,23 +9,14 @@
 //! shape, and what the static shapes miss is added to second order (`section.rs`). So frequencies
 //! are smooth in every position and good on a coarse mesh.
 
-mod band;
-mod beam_modes;
-mod checks;
-mod hung;
-mod lanczos;
-mod layout;
+pub(crate) mod element;
 mod model;
 mod modes;
-mod near;
-mod numbering;
-mod section;
-mod tridiagonal;
 
-use super::{Beam, StructureError};
-pub use beam_modes::BeamModes;
-pub use layout::LapLayout;
-pub use modes::SpecimenModes;
+use crate::{Assembly, Beam, BeamTheory, StructureError};
+pub use modes::{BeamModes, SpecimenModes};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// The beam, or the two beams that a joint joins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,13 +112,14 @@ pub struct Base {
 }
 
 /// A mass on the beam.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct PointMass {
     /// Distance from the left end (m).
     pub position: f64,
     /// Mass (kg).
     pub mass: f64,
     /// Moment of inertia about the neutral axis (kg m2).
+    #[serde(skip)]
     pub inertia: f64,
 }
 
@@ -216,5 +208,182 @@ impl Specimen {
     /// buckles the beam, or the mesh is too coarse for so many modes.
     pub fn modes(&self, count: usize, mesh: Mesh) -> Result<SpecimenModes, StructureError> {
         SpecimenModes::new(self, count, mesh)
+    }
+}
+
+// From a beam and how it is held to the specimen: the one place where halves of a lap joint are cut.
+
+/// Where a lap joint's halves differ from two equal pieces of one beam.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LapLayout {
+    /// The joint's place (m) from the left end; `None` = the middle.
+    pub position: Option<f64>,
+    /// The right half, where it differs; its `length` is not used.
+    pub right: Option<Beam>,
+    /// Length (m) of the overlap and the mass (kg) it adds.
+    pub overlap: Option<(f64, f64)>,
+}
+
+impl Specimen {
+    /// A beam (of a lap joint the left half's properties and the total length) on its joint, with nothing
+    /// on it but a lap joint's overlap; `lap` is of no meaning for one beam.
+    pub fn jointed(
+        theory: BeamTheory,
+        (beam, assembly): (&Beam, Assembly),
+        lap: &LapLayout,
+        joint: SpecimenJoint,
+    ) -> Self {
+        let mut specimen = Self::new(body(beam, assembly, lap), joint);
+        specimen.shear_rotary = match theory {
+            BeamTheory::Euler => 0.0,
+            BeamTheory::Timoshenko => 1.0,
+        };
+        let overlap = lap.overlap.filter(|_| assembly == Assembly::Lap);
+        specimen.overlap = overlap.map(|(length, mass)| LapOverlap { length, mass });
+        specimen
+    }
+}
+
+fn body(beam: &Beam, assembly: Assembly, lap: &LapLayout) -> Body {
+    if assembly != Assembly::Lap {
+        return Body::One(*beam);
+    }
+    let position = lap.position.unwrap_or(0.5 * beam.length);
+    let piece = |beam: Beam, length: f64| Beam { length, ..beam };
+    Body::Joined([
+        piece(*beam, position),
+        piece(lap.right.unwrap_or(*beam), beam.length - position),
+    ])
+}
+
+// Whether a specimen can exist.
+
+impl Specimen {
+    /// Checks that every part can exist and lies on the beam.
+    ///
+    /// # Errors
+    /// [`StructureError`], naming what is wrong.
+    pub fn check(&self) -> Result<(), StructureError> {
+        for beam in self.body.beams() {
+            beam.check()?;
+        }
+        not_negative("shear and rotary inertia", self.shear_rotary)?;
+        not_negative("joint mass", self.joint_mass.mass)?;
+        not_negative("joint inertia", self.joint_mass.inertia)?;
+        if !self.axial_force.is_finite() {
+            return Err(unphysical(
+                "axial force",
+                self.axial_force,
+                "give a finite force in N",
+            ));
+        }
+        self.check_attachments()?;
+        self.check_joint()?;
+        self.check_base()
+    }
+
+    fn check_attachments(&self) -> Result<(), StructureError> {
+        for mass in &self.masses {
+            self.on_beam(mass.position)?;
+            not_negative("point mass", mass.mass)?;
+            not_negative("inertia of a point mass", mass.inertia)?;
+        }
+        for spring in &self.springs {
+            self.on_beam(spring.position)?;
+            not_negative("spring to the ground", spring.stiffness)?;
+        }
+        for hinge in &self.hinges {
+            self.on_beam(hinge.position)?;
+            not_negative("compliance of a hinge", hinge.compliance)?;
+        }
+        if let Some(overlap) = &self.overlap {
+            not_negative("length of the overlap", overlap.length)?;
+            not_negative("mass of the overlap", overlap.mass)?;
+            let shorter = self.body.beams().iter().map(|beam| beam.length);
+            if 0.5 * overlap.length > shorter.fold(f64::INFINITY, f64::min) {
+                let remedy = "half of it must fit on either side of the joint";
+                return Err(unphysical("length of the overlap", overlap.length, remedy));
+            }
+        }
+        Ok(())
+    }
+
+    fn on_beam(&self, position: f64) -> Result<(), StructureError> {
+        let length = self.body.length();
+        // A sensor at the very end may have been rounded beyond it.
+        if (0.0..=length * (1.0 + 1e-9)).contains(&position) {
+            Ok(())
+        } else {
+            Err(StructureError::OffBeam { position, length })
+        }
+    }
+
+    fn check_joint(&self) -> Result<(), StructureError> {
+        let SpecimenJoint::Springs { kt, kr, coupling } = self.joint else {
+            return Ok(());
+        };
+        for (quantity, value) in [("kt", kt), ("kr", kr)] {
+            if value.is_nan() || value < 0.0 {
+                return Err(StructureError::Stiffness { quantity, value });
+            }
+        }
+        if coupling == 0.0 {
+            return Ok(());
+        }
+        if coupling.is_nan() || coupling.abs() >= 1.0 {
+            let remedy = "it must lie between -1 and 1, or the joint releases energy";
+            return Err(unphysical("coupling of the joint", coupling, remedy));
+        }
+        if matches!(self.body, Body::Joined(_)) {
+            return Err(StructureError::NoCoupling {
+                assembly: "lap joint",
+                cross_compliance: coupling,
+            });
+        }
+        Ok(())
+    }
+
+    fn check_base(&self) -> Result<(), StructureError> {
+        let Some(base) = &self.base else {
+            return Ok(());
+        };
+        if !(base.frequency > 0.0 && base.frequency.is_finite()) {
+            let remedy = "it must be positive and finite";
+            return Err(unphysical("frequency of the base", base.frequency, remedy));
+        }
+        not_negative("stiffness ratio of the base", base.ratio)?;
+        let [_, kr] = self.joint.stiffnesses();
+        if base.ratio == 0.0 {
+            return Ok(());
+        }
+        if matches!(self.body, Body::Joined(_)) || !(kr > 0.0 && kr.is_finite()) {
+            let remedy = "a flexible base needs a cantilever whose joint has a finite kr above 0";
+            return Err(unphysical(
+                "stiffness ratio of the base",
+                base.ratio,
+                remedy,
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn unphysical(quantity: &'static str, value: f64, remedy: &'static str) -> StructureError {
+    StructureError::Unphysical {
+        quantity,
+        value,
+        remedy,
+    }
+}
+
+fn not_negative(quantity: &'static str, value: f64) -> Result<(), StructureError> {
+    if value >= 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(unphysical(
+            quantity,
+            value,
+            "it must be finite and at least 0",
+        ))
     }
 }

@@ -7,21 +7,25 @@ mod summary;
 use super::Outcome;
 use super::input::{TestFile, read_model};
 use super::output::OutputFolder;
+use super::overwrite::Expanded;
+use super::signature::CHECKSUMS;
 use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use super::updated_model::effect_at;
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow};
 use clap::Args;
 use laboratory::LaboratoryArguments;
 use planted::PlantedArgument;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use tapjoint::description::TestDescription;
 use tapjoint::effects::Effect;
 use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::simulate::{
     GivenJoint, Laboratory, TestPlan, VirtualRecording, VirtualTest, believed_description,
-    plan_test, truth_of,
+    plan_test, truth_of, wav_name,
 };
 use tapjoint::study::updated_model::described_effects;
 
@@ -29,7 +33,8 @@ use tapjoint::study::updated_model::described_effects;
 ///
 /// TEST describes beam, joint (with kt and kr, or --kx and --ky), sensors and recordings. DIR gets the
 /// recordings, a test.toml that describes them as a user would believe them (what --with plants is
-/// left out, the joint is to be fitted), and truth.json.
+/// left out, the joint is to be fitted), truth.json, and a list of checksums by which the next
+/// `simulate` knows what it may replace.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint simulate test.toml --out virtual --with sensor-mass:mass=24g\n  tapjoint simulate test.toml --out virtual --kx 1400 --ky 4.8 --with joint-nonlinearity:ratio=-0.1,exponent=1 --seed 7\n  tapjoint run virtual/test.toml"
@@ -69,13 +74,6 @@ fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result
     let file = read_model(&arguments.test, terminal)?;
     let text = fs::read_to_string(&arguments.test)
         .with_context(|| format!("{}: cannot be read", file.name))?;
-    let written = arguments.out.join(DESCRIPTION);
-    if same_file(&arguments.test, &written) {
-        bail!(
-            "{}: the description itself would be overwritten; give another folder with --out",
-            written.display()
-        );
-    }
     let given = arguments.stiffness.given(file.test.joint.kind)?;
     let laboratory = arguments.laboratory.resolve()?;
     Ok(Request {
@@ -103,9 +101,24 @@ fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result
 
 /// Name of the description beside the recordings.
 const DESCRIPTION: &str = "test.toml";
+/// Name of the file with what was planted.
+const TRUTH: &str = "truth.json";
 
-fn same_file(one: &Path, other: &Path) -> bool {
-    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(a), Ok(b)) if a == b)
+impl SimulateArguments {
+    /// Returns the files of the virtual test.
+    pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
+        let recordings = test.into_iter().flat_map(|test| &test.recordings);
+        // A recording that is described twice, in two bands perhaps, is one file.
+        let mut names: BTreeSet<String> = recordings.map(wav_name).collect();
+        names.extend([DESCRIPTION, CHECKSUMS].map(str::to_owned));
+        if !self.no_truth {
+            names.insert(TRUTH.to_owned());
+        }
+        vec![(
+            "out",
+            names.iter().map(|name| self.out.join(name)).collect(),
+        )]
+    }
 }
 
 pub(super) fn run(
@@ -129,7 +142,7 @@ pub(super) fn run(
     if !arguments.no_truth {
         let mut text = serde_json::to_string_pretty(&truth)?;
         text.push('\n');
-        request.output.add("truth.json", text.as_bytes())?;
+        request.output.add(TRUTH, text.as_bytes())?;
     }
     for (recording, clipped) in test.recordings.iter().zip(&clipped) {
         if *clipped > 0 {
@@ -139,7 +152,7 @@ pub(super) fn run(
             ));
         }
     }
-    let folder = request.output.publish()?;
+    let folder = request.output.publish(terminal.files())?;
     terminal.say(&summary::summary(&truth, &test, &folder))?;
     terminal.write_json(&serde_json::json!({ "truth": truth }))?;
     Ok(Outcome::Answered)

@@ -1,10 +1,9 @@
 //! What an estimate says, as plain data.
 
-use super::goodness::Goodness;
-use super::identifiability::Identifiability;
-use super::least_squares::StopReason;
-use super::model::Parameter;
-use super::quantities::Quantity;
+use super::least_squares::{LOG_STIFFNESS, StopReason};
+use super::model::{PARAMETERS, Parameter, Point, log_nondimensional};
+use schemars::JsonSchema;
+use serde::Serialize;
 use tapjoint_beam::{Beam, JointStiffness};
 
 /// A parameter at the end of its range.
@@ -47,7 +46,7 @@ pub struct EstimatedQuantity {
 }
 
 /// Correlation of two estimated parameters (their logarithms; of the coupling its atanh).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Correlation {
     /// One.
     pub first: Parameter,
@@ -135,4 +134,389 @@ impl ConsistentEstimate {
         });
         found.map(|correlation| correlation.value)
     }
+}
+
+// What a point means: stiffnesses in both units, the coupling, the beam.
+
+/// A number that an estimate reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Kx (1).
+    Kx,
+    /// Ky (1).
+    Ky,
+    /// Kz (1).
+    Kz,
+    /// sqrt(Kx Ky)/Kz (1).
+    Coupling,
+    /// Kt (N/m).
+    Kt,
+    /// Kr (N m/rad).
+    Kr,
+    /// Ktr (N/rad).
+    Ktr,
+    /// Modulus (Pa).
+    Modulus,
+    /// Density (kg/m3).
+    Density,
+    /// Length (m).
+    Length,
+    /// Width (m).
+    Width,
+    /// Thickness (m).
+    Thickness,
+}
+
+impl Quantity {
+    /// Name as in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kx => "kx",
+            Self::Ky => "ky",
+            Self::Kz => "kz",
+            Self::Coupling => "coupling",
+            Self::Kt => "kt",
+            Self::Kr => "kr",
+            Self::Ktr => "ktr",
+            Self::Modulus => "modulus",
+            Self::Density => "density",
+            Self::Length => "length",
+            Self::Width => "width",
+            Self::Thickness => "thickness",
+        }
+    }
+
+    /// What follows from one estimated parameter.
+    pub(super) fn of(parameter: Parameter) -> &'static [Self] {
+        match parameter {
+            Parameter::Kt => &[Self::Kx, Self::Kt],
+            Parameter::Kr => &[Self::Ky, Self::Kr],
+            Parameter::Coupling => &[Self::Coupling, Self::Kz, Self::Ktr],
+            Parameter::Modulus => &[Self::Modulus],
+            Parameter::Density => &[Self::Density],
+            Parameter::Length => &[Self::Length],
+            Parameter::Width => &[Self::Width],
+            Parameter::Thickness => &[Self::Thickness],
+        }
+    }
+
+    /// The coordinate of a point that it is first of all about.
+    pub(super) fn lead(self) -> Parameter {
+        match self {
+            Self::Kx | Self::Kt => Parameter::Kt,
+            Self::Ky | Self::Kr => Parameter::Kr,
+            Self::Coupling | Self::Kz | Self::Ktr => Parameter::Coupling,
+            Self::Modulus => Parameter::Modulus,
+            Self::Density => Parameter::Density,
+            Self::Length => Parameter::Length,
+            Self::Width => Parameter::Width,
+            Self::Thickness => Parameter::Thickness,
+        }
+    }
+
+    /// Gradient of its logarithm (of the coupling: of its atanh), which is constant; of Kz and Ktr
+    /// without the part of the coupling.
+    pub(super) fn gradient(self) -> Point {
+        let mut gradient = [0.0; PARAMETERS];
+        let mut set = |parameter: Parameter, value: f64| gradient[parameter.index()] = value;
+        match self {
+            // Kx = 12 Kt L^3/(E b h^3) and Ky = 12 Kr L/(E b h^3); Kz of half of either.
+            Self::Kx | Self::Ky | Self::Kz => {
+                set(Parameter::Modulus, -1.0);
+                set(Parameter::Width, -1.0);
+                set(Parameter::Thickness, -3.0);
+                let (kt, kr) = match self {
+                    Self::Kx => (1.0, 0.0),
+                    Self::Ky => (0.0, 1.0),
+                    _ => (0.5, 0.5),
+                };
+                set(Parameter::Kt, kt);
+                set(Parameter::Kr, kr);
+                set(Parameter::Length, 3.0 * kt + kr);
+            }
+            Self::Ktr => {
+                set(Parameter::Kt, 0.5);
+                set(Parameter::Kr, 0.5);
+            }
+            other => set(other.lead(), 1.0),
+        }
+        gradient
+    }
+
+    /// Its value at a point; `None` where it is infinite.
+    pub(super) fn value(self, point: &Point) -> Option<f64> {
+        let at = |parameter: Parameter| point[parameter.index()];
+        let [log_kx, log_ky] = log_nondimensional(point);
+        let coupling = at(Parameter::Coupling).tanh();
+        let value = match self {
+            Self::Kx => log_kx.exp(),
+            Self::Ky => log_ky.exp(),
+            Self::Kz => (0.5 * (log_kx + log_ky)).exp() / coupling,
+            Self::Ktr => (0.5 * (at(Parameter::Kt) + at(Parameter::Kr))).exp() / coupling,
+            Self::Coupling => coupling,
+            other => at(other.lead()).exp(),
+        };
+        value.is_finite().then_some(value)
+    }
+}
+
+/// The non-dimensional joint at a point.
+pub(super) fn joint_at(point: &Point) -> JointStiffness {
+    let [kx, ky] = log_nondimensional(point).map(f64::exp);
+    let coupling = point[Parameter::Coupling.index()].tanh();
+    let cross = coupling / (kx.sqrt() * ky.sqrt());
+    JointStiffness {
+        kx,
+        ky,
+        cross_compliance: if cross.is_finite() { cross } else { 0.0 },
+    }
+}
+
+// Whether the model can explain the frequencies at all.
+
+/// Below this probability the stated uncertainties and the model do not go together.
+pub const DOUBTFUL: f64 = 0.01;
+
+/// Chi-squared from which only its power of ten is of interest.
+const MOST_IN_FULL: f64 = 1e4;
+
+/// A smaller probability is told as "below" this: so far out a distribution's tail is no measurement, and the
+/// smallest of all are written as 0.
+const LEAST_PROBABILITY: f64 = 1e-12;
+
+/// Below this one no usual slip in the uncertainties saves the model: with three degrees of
+/// freedom it asks for misfits of more than three standard deviations in every direction.
+pub const HOPELESS: f64 = 1e-6;
+/// Root-mean-square misfit (1, relative, per degree of freedom) beyond which a model is in doubt
+/// where no uncertainty is stated: a beam's dimensions usually leave 1 % open.
+pub const NOTABLE_MISFIT: f64 = 0.01;
+/// The same beyond which it explains nothing: twice that, and ten times what tap tests repeat to.
+pub const LARGE_MISFIT: f64 = 0.02;
+
+/// What the misfit says of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The misfit is no larger than the uncertainties allow.
+    Explains,
+    /// The misfit is larger than the uncertainties allow: they are too small, or the model lacks
+    /// something.
+    Doubtful,
+    /// This model cannot explain these frequencies.
+    CannotExplain,
+    /// As many unknowns as frequencies: nothing is left to test with.
+    Untestable,
+}
+
+/// The test of the model by its misfit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goodness {
+    /// Sum of squared residuals over their standard deviations (1); without stated uncertainties
+    /// `None`.
+    pub chi_squared: Option<f64>,
+    /// Frequencies and priors less parameters.
+    pub degrees_of_freedom: usize,
+    /// Probability of a larger chi-squared if the model is right.
+    pub probability: Option<f64>,
+    /// Root-mean-square relative misfit of the frequencies (1).
+    pub relative_misfit: f64,
+    /// The same per degree of freedom instead of per frequency; `None` without any.
+    pub misfit_per_freedom: Option<f64>,
+    /// What follows.
+    pub verdict: Verdict,
+}
+
+impl Goodness {
+    /// From the relative misfits of the frequencies (1), chi-squared where uncertainties are
+    /// stated, and the degrees of freedom.
+    pub(super) fn new(misfits: &[f64], chi_squared: Option<f64>, freedom: usize) -> Self {
+        let squares: f64 = misfits.iter().map(|misfit| misfit * misfit).sum();
+        let misfit_per_freedom = (freedom > 0).then(|| (squares / freedom as f64).sqrt());
+        let probability = chi_squared
+            .filter(|_| freedom > 0)
+            .map(|chi_squared| exceedance(chi_squared, freedom));
+        let verdict = match (probability, misfit_per_freedom) {
+            (_, None) => Verdict::Untestable,
+            (Some(p), _) if p < HOPELESS => Verdict::CannotExplain,
+            (Some(p), _) if p < DOUBTFUL => Verdict::Doubtful,
+            (None, Some(misfit)) if misfit > LARGE_MISFIT => Verdict::CannotExplain,
+            (None, Some(misfit)) if misfit > NOTABLE_MISFIT => Verdict::Doubtful,
+            _ => Verdict::Explains,
+        };
+        Self {
+            chi_squared,
+            degrees_of_freedom: freedom,
+            probability,
+            relative_misfit: (squares / misfits.len().max(1) as f64).sqrt(),
+            misfit_per_freedom,
+            verdict,
+        }
+    }
+
+    /// Factor on every standard uncertainty under which the misfit would be as expected:
+    /// sqrt(chi^2/degrees of freedom); `None` where there is no reason for one.
+    pub fn uncertainty_factor(&self) -> Option<f64> {
+        let too_large = self.probability.is_some_and(|p| p < DOUBTFUL);
+        let chi_squared = self.chi_squared.filter(|_| too_large)?;
+        Some((chi_squared / self.degrees_of_freedom as f64).sqrt())
+    }
+
+    /// The verdict in a sentence.
+    pub fn words(&self) -> String {
+        let misfit = 100.0 * self.relative_misfit;
+        let test = match (self.chi_squared, self.probability) {
+            (Some(chi_squared), Some(p)) => format!(
+                "chi-squared {} with {} of freedom, probability {}, rms misfit {misfit:.2} %",
+                if chi_squared < MOST_IN_FULL {
+                    format!("{chi_squared:.1}")
+                } else {
+                    format!("{chi_squared:.1e}")
+                },
+                match self.degrees_of_freedom {
+                    1 => "1 degree".to_owned(),
+                    more => format!("{more} degrees"),
+                },
+                if p < LEAST_PROBABILITY {
+                    format!("below {LEAST_PROBABILITY:e}")
+                } else {
+                    format!("{p:.1e}")
+                }
+            ),
+            _ => format!("rms misfit {misfit:.2} %"),
+        };
+        match self.verdict {
+            Verdict::Explains => format!("this model explains the frequencies ({test})"),
+            Verdict::Doubtful if self.chi_squared.is_none() => {
+                format!("the misfit is larger than a beam's dimensions usually leave open ({test})")
+            }
+            Verdict::Doubtful => format!(
+                "the misfit is larger than the stated uncertainties allow: they are too small, or \
+                 the model lacks something ({test})"
+            ),
+            Verdict::CannotExplain => {
+                format!("this model cannot explain the frequencies ({test})")
+            }
+            Verdict::Untestable => format!(
+                "as many unknowns as frequencies: the model cannot be tested ({test}); \
+                 measure one more mode"
+            ),
+        }
+    }
+}
+
+/// Probability that chi-squared with so many degrees of freedom exceeds a value: with x half of
+/// it, e^-x sum x^k/k! over k < freedom/2 for even ones; for odd ones the half-integer powers and
+/// erfc(sqrt x) in the place of the rest of the sum.
+pub fn exceedance(chi_squared: f64, freedom: usize) -> f64 {
+    let x = 0.5 * chi_squared.max(0.0);
+    let (mut sum, mut term, mut order) = if freedom.is_multiple_of(2) {
+        (0.0, (-x).exp(), 1.0)
+    } else {
+        // x^(1/2) e^-x / Gamma(3/2) begins the half-integer powers.
+        let first = 2.0 * (x / std::f64::consts::PI).sqrt() * (-x).exp();
+        (complementary_error_function(x.sqrt()), first, 1.5)
+    };
+    for _ in 0..freedom / 2 {
+        sum += term;
+        term *= x / order;
+        order += 1.0;
+    }
+    sum.min(1.0)
+}
+
+/// erfc(x) for x >= 0: the series of erf below 2, the continued fraction above.
+fn complementary_error_function(x: f64) -> f64 {
+    let root_pi = std::f64::consts::PI.sqrt();
+    if x < 2.0 {
+        // erf x = 2/sqrt(pi) sum (-1)^n x^(2n+1)/(n! (2n+1)); e^-x^2 taken out keeps every term
+        // positive: erf x = 2/sqrt(pi) e^-x^2 sum 2^n x^(2n+1)/(2n+1)!!.
+        let (mut term, mut sum) = (x, x);
+        for n in 1..60 {
+            term *= 2.0 * x * x / f64::from(2 * n + 1);
+            sum += term;
+        }
+        return 1.0 - 2.0 / root_pi * (-x * x).exp() * sum;
+    }
+    // erfc x = e^-x^2/sqrt(pi) / (x + (1/2)/(x + 1/(x + (3/2)/(x + ...)))).
+    let fraction = (1..=60)
+        .rev()
+        .fold(x, |tail, k| x + 0.5 * f64::from(k) / tail);
+    (-x * x).exp() / (root_pi * fraction)
+}
+
+/// Where a coordinate is at the end of its range but for rounding.
+pub(super) fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
+    // Within a factor e^3 of the end no frequency differs from that at the end.
+    const NEAR: f64 = 3.0;
+    let [log_kx, log_ky] = log_nondimensional(point);
+    let log = match quantity.lead() {
+        Parameter::Kt => log_kx,
+        Parameter::Kr => log_ky,
+        Parameter::Coupling => {
+            let full = 1.0 - point[2].tanh().abs() < 1e-6;
+            return full.then_some(Limit::FullCoupling);
+        }
+        _ => return None,
+    };
+    let (low, high) = LOG_STIFFNESS;
+    if log > high - NEAR {
+        Some(Limit::Rigid)
+    } else if log < low + NEAR {
+        Some(Limit::Absent)
+    } else {
+        None
+    }
+}
+
+/// A combination of parameters that the frequencies hardly feel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlatDirection {
+    /// The combination: a change of each parameter's logarithm (of the coupling: of its atanh).
+    pub direction: Vec<(Parameter, f64)>,
+    /// Standard uncertainty along it (1); `None` where nothing is known.
+    pub std: Option<f64>,
+    /// In a sentence.
+    pub words: String,
+}
+
+/// What one more mode would bring.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtraMode {
+    /// Its number.
+    pub mode: usize,
+    /// Where it is predicted (Hz).
+    pub frequency: f64,
+    /// Relative standard uncertainty (1) assumed for it: the median of the measured ones.
+    pub relative_std: f64,
+    /// Standard uncertainty of each estimated parameter with it (1, of the logarithm; of the
+    /// coupling: of its atanh), `None` where nothing is known.
+    pub stds: Vec<Option<f64>>,
+}
+
+/// From what accuracy of all frequencies on a parameter is measurable to 10 %.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NeededAccuracy {
+    /// Which parameter; the coupling is measurable when its standard uncertainty is 0.1.
+    pub parameter: Parameter,
+    /// Relative standard uncertainty (1) of every frequency that does; `None` where none does.
+    pub relative_std: Option<f64>,
+}
+
+/// The report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identifiability {
+    /// Singular values of the Jacobian (residuals in standard deviations, parameters as
+    /// logarithms), descending: the inverse of each is the uncertainty of one combination.
+    pub singular_values: Vec<f64>,
+    /// Largest over smallest.
+    pub condition: Option<f64>,
+    /// Parameters that no frequency feels, whatever the others are.
+    pub dead: Vec<Parameter>,
+    /// Combinations that they hardly feel.
+    pub flat: Vec<FlatDirection>,
+    /// Parameters at the end of their range.
+    pub at_limit: Vec<(Parameter, Limit)>,
+    /// What the missing modes below the highest and the next above it would bring.
+    pub extra_modes: Vec<ExtraMode>,
+    /// What accuracy each parameter asks for.
+    pub needed: Vec<NeededAccuracy>,
 }

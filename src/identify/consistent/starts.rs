@@ -4,8 +4,8 @@
 //! far each predicted frequency would be from its measured one, for the price of a few products.
 //! A grid over all joints is cheaper that way than one exact prediction.
 
+use super::least_squares::Problem;
 use super::model::{Parameter, Point, log_nondimensional};
-use super::problem::Problem;
 use std::f64::consts::{LN_10, PI};
 use tapjoint_beam::interface::{InterfaceFunctions, JointCompliance};
 

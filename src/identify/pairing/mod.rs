@@ -15,19 +15,15 @@
 //! 5. *Verdict*: the best assignment, and every other that is not beaten by [`PairingSettings::odds`].
 //!    Where the plain one (peaks numbered in ascending order) is among them it stays.
 
-mod by_frequency;
 mod candidates;
 mod joint;
 mod shape;
-mod strength;
 
-pub use by_frequency::{WeightedPeak, pair_by_frequency, pair_by_ratio};
-pub use strength::PeakStrength;
+pub use candidates::PeakStrength;
 
 use super::consistent::{FrequencyModel, JointedStructure, Parameter};
-use candidates::Assignment;
+use candidates::{Assignment, Neighbours, comparable};
 use joint::JointSearch;
-use strength::Neighbours;
 use tapjoint_beam::StructureError;
 
 /// A measured peak that may be a mode.
@@ -186,7 +182,7 @@ fn score(
     let extra = (assignment.len() - pairs.len()) as f64;
     let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
     let weak = neighbours.cost(assignment);
-    let shaped = strength::comparable(&pairs, assignment, (search.peaks, neighbours));
+    let shaped = comparable(&pairs, assignment, (search.peaks, neighbours));
     let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
     Scored {
         cost: by_data + unseen,

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::super::document::{
-    ClosureSection, Document, GapSection, HypothesisSection, PullSection,
-};
+use super::super::document::{Document, GapSection};
 use super::super::format::{
     RIGID, prefix, probability, rounded, signed_percent, significant, trimmed,
 };
 use super::has_joint;
 use super::hypotheses::{left, percent, together};
 use super::next_tests::next_test;
-use super::verdict::{named, shows_gap, verdict};
+use super::verdict::{shows_gap, verdict};
+use tapjoint_beam::effects::{EffectId, Place};
+use tapjoint_diagnosis::{Closure, Hypothesis, HypothesisResult, Residual, Verdict};
 use tapjoint_numerics::stats::times;
 
 /// The diagnosis as a story of three parts: where, which, how far. Empty without one.
@@ -30,22 +30,19 @@ pub fn gap_story(document: &Document) -> Vec<String> {
 
 /// Where, unless there is no gap; the probabilities take for granted that something is missing.
 fn place(document: &Document, gap: &GapSection) -> Option<String> {
-    if matches!(gap.verdict.kind.as_str(), "no-gap" | "not-enough-data") {
+    if matches!(gap.verdict, Verdict::NoGap | Verdict::NotEnoughData(_)) {
         return None;
     }
     let place = gap.place.as_ref()?;
-    let mut places: Vec<(&String, &f64)> = place.probability.iter().collect();
-    places.sort_by(|a, b| b.1.total_cmp(a.1));
+    let places = place.probability.ranked().into_iter().take(3);
     let listed: Vec<String> = places
-        .iter()
-        .take(3)
-        .filter(|(_, p)| **p >= 0.01)
-        .map(|(name, p)| {
-            format!(
-                "{name}{} {}",
-                sensors_at(document, gap, name),
-                probability(**p)
-            )
+        .filter(|(_, p)| *p >= 0.01)
+        .map(|(place, p)| match place {
+            Some(Place::Sensor) => {
+                format!("sensor{} {}", sensors_at(document, gap), probability(p))
+            }
+            Some(place) => format!("{} {}", place.name(), probability(p)),
+            None => format!("unknown {}", probability(p)),
         })
         .collect();
     let worst = place
@@ -62,23 +59,30 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
     ))
 }
 
-/// " (A at 338 mm)" behind the place "sensor", without the position of one that moves; nothing behind other
-/// places, and where too many sensors may be meant. An unknown mass is that of sensors whose mass is not stated.
-fn sensors_at(document: &Document, gap: &GapSection, place: &str) -> String {
+/// " (A at 338 mm)" behind the place "sensor", without the position of one that moves; nothing where too many sensors
+/// may be meant. An unknown mass is that of sensors whose mass is not stated.
+fn sensors_at(document: &Document, gap: &GapSection) -> String {
     const MOST: usize = 3;
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let mut at_sensors = gap.hypotheses.iter().map(|found| found.effect.as_str());
-    let by_mass = at_sensors.find(|effect| effect.starts_with("sensor")) == Some("sensor-mass");
+    let by_mass = gap
+        .hypotheses
+        .iter()
+        .find_map(|found| match &found.hypothesis {
+            Hypothesis::Effects(effects) if is_at_sensor(effects) => {
+                Some(effects.as_slice() == [EffectId::SensorMass])
+            }
+            _ => None,
+        });
     let mut sensors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for one in recordings {
         for (name, position) in &one.sensor_positions {
             let weighed = one.sensor_masses.get(name).is_some_and(|mass| *mass > 0.0);
-            if !(by_mass && weighed) {
+            if !(by_mass == Some(true) && weighed) {
                 sensors.entry(name).or_default().push(*position);
             }
         }
     }
-    if place != "sensor" || sensors.is_empty() || sensors.len() > MOST {
+    if sensors.is_empty() || sensors.len() > MOST {
         return String::new();
     }
     let named = sensors.iter().map(|(name, places)| {
@@ -91,8 +95,14 @@ fn sensors_at(document: &Document, gap: &GapSection, place: &str) -> String {
     format!(" ({})", named.collect::<Vec<_>>().join("; "))
 }
 
+/// Whether the first effect sits at a sensor.
+fn is_at_sensor(effects: &[EffectId]) -> bool {
+    let first = effects.first();
+    first.is_some_and(|effect| effect.place() == Place::Sensor)
+}
+
 /// "high.wav", or "high.wav (level 0.73)" where its taps were softer than the hardest.
-pub fn place_of(pull: &PullSection) -> String {
+pub fn place_of(pull: &Residual) -> String {
     match pull.level {
         Some(level) if level < 0.999 => format!("{} (level {level:.2})", pull.recording),
         _ => pull.recording.clone(),
@@ -106,27 +116,27 @@ fn change(value: f64, decimals: usize) -> String {
 
 /// How far the errors shrink, where an effect is held for the cause.
 fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
-    let kind = gap.verdict.kind.as_str();
-    if matches!(kind, "no-gap" | "unknown" | "not-enough-data") {
+    if !matches!(
+        gap.verdict,
+        Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_)
+    ) {
         return None;
     }
-    let found = named(gap).or_else(|| {
-        gap.hypotheses
-            .iter()
-            .find(|found| !matches!(found.effect.as_str(), "none" | "unknown"))
-    })?;
-    let shrink = match found.gap_before.zip(found.gap_after) {
-        Some((before, after)) if after >= before => "go",
+    let mut all = gap.hypotheses.iter();
+    let first = all.find(|found| matches!(found.hypothesis, Hypothesis::Effects(_)));
+    let found = gap.named().or(first)?;
+    let shrink = match found.gap_after {
+        Some(after) if after >= found.gap_before => "go",
         _ => "shrink",
     };
     let mut text = format!(
         "How far: with {} the errors {shrink} from {} to {} % (rms over fitted frequencies)",
-        together(&found.effect),
-        percent(found.gap_before),
+        together(&found.hypothesis),
+        percent(Some(found.gap_before)),
         left(found.gap_after, gap.noise_floor),
     );
     text.push_str(&by_drift(gap, found, has_joint));
-    if let Some((before, after)) = found.withheld_before.zip(found.withheld_after) {
+    if let Some((before, after)) = found.holdout_before.zip(found.holdout_after) {
         text.push_str(&format!(
             "; on frequencies that took no part from {} to {} %",
             percent(Some(before)),
@@ -136,7 +146,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     if let Some(closure) = &found.closure {
         text.push_str(&share(closure));
     }
-    if let Some(left_out) = &found.left_out_recordings {
+    if let Some(left_out) = &found.cross_validation {
         text.push_str(&format!(
             "; on recordings predicted from the others from {} to {} %",
             percent(Some(left_out.before)),
@@ -147,8 +157,8 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         }
     }
     let floor = percent(gap.noise_floor);
-    let outside = found.gap_before.zip(gap.noise_floor);
-    Some(match outside.filter(|(before, floor)| before < floor) {
+    let outside = gap.noise_floor.filter(|floor| found.gap_before < *floor);
+    Some(match outside {
         Some(_) => format!(
             "{text}. Their uncertainty is {floor} %: the cause shows elsewhere, not in the mean frequencies."
         ),
@@ -158,11 +168,10 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
 
 /// What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of the
 /// errors.
-fn by_drift(gap: &GapSection, found: &HypothesisSection, has_joint: bool) -> String {
-    let none = gap.hypotheses.iter().find(|one| one.effect == "none");
-    let remains = none.and_then(|none| none.gap_after);
-    match remains.zip(found.gap_before) {
-        Some((remains, before)) if remains < 0.5 * before => format!(
+fn by_drift(gap: &GapSection, found: &HypothesisResult, has_joint: bool) -> String {
+    let none = gap.result(&Hypothesis::None);
+    match none.and_then(|none| none.gap_after) {
+        Some(remains) if remains < 0.5 * found.gap_before => format!(
             ", where {}the tolerances leave {} %",
             if has_joint {
                 "a joint that drifts and "
@@ -176,7 +185,7 @@ fn by_drift(gap: &GapSection, found: &HypothesisSection, has_joint: bool) -> Str
 }
 
 /// ", 97 % of the gap (95 %: 93 to 99)".
-fn share(closure: &ClosureSection) -> String {
+fn share(closure: &Closure) -> String {
     format!(
         ", {:.0} % of the gap (95 %: {:.0} to {:.0})",
         100.0 * closure.value,
@@ -199,7 +208,7 @@ fn along_decays(gap: &GapSection) -> Option<String> {
         largest.recording,
         change(largest.percent_per_fold, 3)
     );
-    let Some(effect) = &found.effect else {
+    let Some(effect) = found.effect else {
         return Some(match found.enough {
             true => format!(
                 "{seen}, but not as a joint whose stiffness depends on the amplitude would make them."
@@ -209,14 +218,14 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             ),
         });
     };
-    if gap.verdict.effects.contains(effect) {
+    let own = Hypothesis::Effects(vec![effect]);
+    let said = match &gap.verdict {
+        Verdict::Named(effects) => effects.contains(&effect),
+        other => other.hypotheses().contains(&own),
+    };
+    if said {
         return None;
     }
-    let direction = if found.ratio < 0.0 {
-        "softens"
-    } else {
-        "stiffens"
-    };
     let size = if found.lawful && found.at_bound {
         format!(
             "its rotational stiffness changes by {:.0} % or more at the largest amplitude",
@@ -233,14 +242,16 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             .to_owned()
     };
     Some(format!(
-        "{seen}: the joint {direction} ({effect}); {size}. That is said by the decays alone and explains \
-         no misfit of the frequencies."
+        "{seen}: the joint {} ({}); {size}. That is said by the decays alone and explains \
+         no misfit of the frequencies.",
+        found.direction(),
+        effect.name()
     ))
 }
 
 /// What ignoring the effect costs; `None` where none is named.
 fn price(gap: &GapSection) -> Option<String> {
-    let found = named(gap).filter(|found| found.effect != "none")?;
+    let found = cause(gap)?;
     let part = |name: &str, shift: Option<f64>| {
         Some(format!("{name} by {} %", signed_percent(Some(shift?))))
     };
@@ -266,38 +277,41 @@ fn price(gap: &GapSection) -> Option<String> {
 /// "Kt = 168.2 kN/m, Kr = 205.4 N m/rad": the joint that is found together with what the verdict names; `None` where it
 /// names nothing.
 pub(crate) fn joint_with(gap: &GapSection) -> Option<String> {
-    joint(named(gap).filter(|found| found.effect != "none")?, false)
+    joint(cause(gap)?, false)
+}
+
+/// The effects that the verdict names.
+fn cause(gap: &GapSection) -> Option<&HypothesisResult> {
+    gap.named()
+        .filter(|found| found.hypothesis != Hypothesis::None)
 }
 
 /// What a named effect does, in one sentence, and the test to make next; empty where nothing is missing.
 pub fn gap_in_short(document: &Document) -> Vec<String> {
-    let is_there = |gap: &&GapSection| match gap.verdict.kind.as_str() {
-        "no-gap" => false,
-        "not-enough-data" => shows_gap(gap),
+    let is_there = |gap: &&GapSection| match gap.verdict {
+        Verdict::NoGap => false,
+        Verdict::NotEnoughData(_) => shows_gap(gap),
         _ => true,
     };
     let Some(gap) = document.gap.as_ref().filter(is_there) else {
         return Vec::new();
     };
-    let found = named(gap).filter(|found| found.effect != "none");
-    let shrink = found.and_then(|found| {
-        let before = found
-            .gap_before
-            .filter(|before| found.gap_after < Some(*before))?;
+    let found = cause(gap).filter(|found| found.gap_after < Some(found.gap_before));
+    let shrink = found.map(|found| {
         let joint =
             joint(found, true).map_or(String::new(), |joint| format!(", and the joint is {joint}"));
-        Some(format!(
+        format!(
             "With {} the errors of the frequencies shrink from {} to {} % (rms){joint}.",
-            together(&found.effect),
-            percent(Some(before)),
+            together(&found.hypothesis),
+            percent(Some(found.gap_before)),
             left(found.gap_after, gap.noise_floor)
-        ))
+        )
     });
     shrink.into_iter().chain(next_test(gap)).collect()
 }
 
 /// With 95 % intervals if these are wanted.
-fn joint(found: &HypothesisSection, intervals: bool) -> Option<String> {
+fn joint(found: &HypothesisResult, intervals: bool) -> Option<String> {
     let [kt, kr] = found.joint?;
     let [of_kt, of_kr] = found
         .joint_intervals

@@ -1,8 +1,10 @@
 //! What may be missing in the model, as a table.
 
-use super::super::document::{Document, GapSection, HypothesisSection, ParameterSection};
+use super::super::document::{Baseline, Document, GapSection};
 use super::super::format::{MISSING, probability, rounded, significant};
 use super::{Table, has_joint, number, words};
+use tapjoint_beam::effects::EffectId;
+use tapjoint_diagnosis::{Hypothesis, HypothesisResult, ParameterValue};
 
 /// Hypotheses less probable than this are not listed.
 pub(super) const LEAST_PROBABILITY: f64 = 0.005;
@@ -24,7 +26,7 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
         .filter(|(index, found)| {
             *index < LEAST_LISTED
                 || found.probability >= LEAST_PROBABILITY
-                || matches!(found.effect.as_str(), "none" | "unknown")
+                || !matches!(found.hypothesis, Hypothesis::Effects(_))
         })
         .map(|(_, found)| row(found, gap.noise_floor));
     Some(Table {
@@ -46,8 +48,8 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
 /// What the columns are, why even the hypothesis that nothing is missing mostly leaves less than the described model,
 /// and why the errors are not those of the estimate.
 fn note(document: &Document, gap: &GapSection) -> String {
-    let described = percent(gap.hypotheses[0].gap_before);
-    let withheld = gap.hypotheses[0].withheld_before;
+    let described = percent(Some(gap.hypotheses[0].gap_before));
+    let withheld = gap.hypotheses[0].holdout_before;
     let withheld = withheld.map_or_else(String::new, |before| {
         format!(" and {} %", significant(before, 2))
     });
@@ -74,10 +76,10 @@ fn note(document: &Document, gap: &GapSection) -> String {
 
 /// What the baseline leaves that needs no cause, only a factor.
 fn one_factor(gap: &GapSection) -> String {
-    let scale = gap.baselines.iter().find(|one| one.name == "scale");
+    let scale = gap.baselines.iter().find(|one| one.name == Baseline::Scale);
     let floor = gap.noise_floor;
     scale.map_or_else(String::new, |scale| {
-        let withheld = scale.withheld_after.map_or_else(String::new, |after| {
+        let withheld = scale.holdout_after.map_or_else(String::new, |after| {
             format!(", of the withheld ones {} %", left(Some(after), floor))
         });
         format!(
@@ -95,12 +97,12 @@ fn recordings(gap: &GapSection) -> usize {
     files.len()
 }
 
-fn row(found: &HypothesisSection, floor: Option<f64>) -> Vec<String> {
+fn row(found: &HypothesisResult, floor: Option<f64>) -> Vec<String> {
     vec![
-        together(&found.effect),
+        together(&found.hypothesis),
         probability(found.probability),
         left(found.gap_after, floor),
-        left(found.withheld_after, floor),
+        left(found.holdout_after, floor),
         sizes(found),
         told_apart(found),
         looks_like(&found.confounded_with),
@@ -108,60 +110,61 @@ fn row(found: &HypothesisSection, floor: Option<f64>) -> Vec<String> {
 }
 
 /// The size of a single effect from which these readings would tell it from every other.
-fn told_apart(found: &HypothesisSection) -> String {
-    let mut parameters = found.parameters.iter();
-    let least = |(name, parameter): (&String, &ParameterSection)| {
-        let (unit, factor) = unit_of(name);
-        let least = factor * parameter.smallest_isolable?;
+fn told_apart(found: &HypothesisResult) -> String {
+    let least = |parameter: &ParameterValue| {
+        let (unit, factor) = unit_of(parameter.name);
+        let least = factor * parameter.smallest_separable?;
         Some(format!("{}{unit}", significant(least, 2)))
     };
-    let single = !found.effect.contains('+');
-    let found = single.then(|| parameters.find_map(least)).flatten();
-    found.unwrap_or_else(|| MISSING.to_owned())
+    let is_pair = matches!(&found.hypothesis, Hypothesis::Effects(effects) if effects.len() > 1);
+    let mut parameters = found.parameters.iter().filter(|_| !is_pair);
+    let least = parameters.find_map(least);
+    least.unwrap_or_else(|| MISSING.to_owned())
 }
 
 /// How many hypotheses that cannot be told from one are named; report.json has them all.
 const NAMED: usize = 4;
 
 /// "timebase, modulus", "timebase, modulus, length, fixture and 9 more".
-fn looks_like(names: &[String]) -> String {
-    let named = names[..names.len().min(NAMED)].join(", ");
-    match names.len().saturating_sub(NAMED) {
+fn looks_like(effects: &[EffectId]) -> String {
+    let named = names(&effects[..effects.len().min(NAMED)]);
+    match effects.len().saturating_sub(NAMED) {
         0 => named,
-        1 => names.join(", "),
+        1 => names(effects),
         more => format!("{named} and {more} more"),
     }
 }
 
+/// "timebase, modulus".
+pub(super) fn names(effects: &[EffectId]) -> String {
+    let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+    names.join(", ")
+}
+
 /// "local-crack + joint-nonlinearity": both names of two effects, which a line may be broken between.
-pub(crate) fn together(effect: &str) -> String {
-    effect.replace('+', " + ")
+pub(crate) fn together(hypothesis: &Hypothesis) -> String {
+    hypothesis.name().replace('+', " + ")
 }
 
 /// "mass 24.10 ± 0.30 g"; of two effects "local-crack: compliance ..., position ...; sensor-mass: mass ...".
-pub(super) fn sizes(found: &HypothesisSection) -> String {
-    let mut of_effects: Vec<(&str, Vec<String>)> = Vec::new();
-    for (name, parameter) in &found.parameters {
-        let (effect, own) = name.split_once('.').unwrap_or(("", name));
-        // Of what may be anywhere, and of an inertia of no mass, no digit says anything.
-        let unknown = match parameter.std {
-            None => is_place(own),
-            Some(std) => own == "inertia" && std == 0.0,
-        };
-        if unknown {
-            continue;
-        }
-        let part = size(own, parameter);
-        match of_effects.last_mut().filter(|last| last.0 == effect) {
-            Some(last) => last.1.push(part),
-            None => of_effects.push((effect, vec![part])),
-        }
-    }
+pub(super) fn sizes(found: &HypothesisResult) -> String {
+    // Of what may be anywhere, and of an inertia of no mass, no digit says anything.
+    let is_known = |parameter: &&ParameterValue| match parameter.std {
+        None => !is_place(parameter.name),
+        Some(std) => parameter.name != "inertia" || std != 0.0,
+    };
+    let mut sorted: Vec<&ParameterValue> = found.parameters.iter().collect();
+    sorted.sort_by_key(|one| (one.effect.name(), one.name));
+    let alone = sorted.iter().all(|one| one.effect == sorted[0].effect);
+    sorted.retain(is_known);
+    let of_effects = sorted.chunk_by(|one, next| one.effect == next.effect);
     let parts: Vec<String> = of_effects
-        .iter()
-        .map(|(effect, parts)| match *effect {
-            "" => parts.join(", "),
-            effect => format!("{effect}: {}", parts.join(", ")),
+        .map(|own| {
+            let sizes: Vec<String> = own.iter().map(|one| size(one)).collect();
+            match alone {
+                true => sizes.join(", "),
+                false => format!("{}: {}", own[0].effect.name(), sizes.join(", ")),
+            }
         })
         .collect();
     parts.join("; ")
@@ -172,8 +175,8 @@ fn is_place(name: &str) -> bool {
     matches!(name, "position" | "frequency" | "exponent" | "inertia")
 }
 
-fn size(name: &str, parameter: &ParameterSection) -> String {
-    let (unit, factor) = unit_of(name);
+fn size(parameter: &ParameterValue) -> String {
+    let (unit, factor) = unit_of(parameter.name);
     let value = factor * parameter.value;
     let known = parameter.std.map(|std| factor * std);
     let size = match known.filter(|std| std.is_finite() && *std > 0.0) {
@@ -181,7 +184,7 @@ fn size(name: &str, parameter: &ParameterSection) -> String {
         None if value.abs() < NOTHING => "0".to_owned(),
         None => significant(value, 3),
     };
-    format!("{} {size}{unit}", name.replace('_', " "))
+    format!("{} {size}{unit}", parameter.name.replace('_', " "))
 }
 
 /// The unit a parameter is read in, and how many of it one SI unit is.
@@ -229,28 +232,37 @@ mod tests {
 
     #[test]
     fn limit_a_few_of_many_likenesses_are_named() {
-        let names: Vec<String> = ('a'..='g').map(String::from).collect();
-        assert_eq!(looks_like(&names[..0]), "");
-        assert_eq!(looks_like(&names[..5]), "a, b, c, d, e");
-        assert_eq!(looks_like(&names), "a, b, c, d and 3 more");
+        let all = &EffectId::ALL[7..14];
+        assert_eq!(looks_like(&all[..0]), "");
+        let five = "fixture, modulus, length, timebase, added-mass";
+        assert_eq!(looks_like(&all[..5]), five);
+        let seven = "fixture, modulus, length, timebase and 3 more";
+        assert_eq!(looks_like(all), seven);
     }
 
     #[test]
     fn limit_sizes_of_two_effects_stand_under_their_names() {
-        let known = |value: f64, std: Option<f64>| {
-            let parameters = [("mass", Some(1e-3), 0.0), ("position", std, value)];
-            let section = |(name, std, value): (&str, Option<f64>, f64)| {
-                let parameter = ParameterSection {
-                    value,
-                    std,
-                    ..ParameterSection::default()
-                };
-                (name.to_owned(), parameter)
+        let parameter =
+            |effect: EffectId, name: &'static str, value: f64, std: Option<f64>| ParameterValue {
+                effect,
+                name,
+                value,
+                std,
+                smallest_detectable: None,
+                smallest_separable: None,
             };
-            sizes(&HypothesisSection {
-                parameters: parameters.map(section).into(),
-                ..HypothesisSection::default()
+        let of = |parameters: Vec<ParameterValue>| {
+            sizes(&HypothesisResult {
+                parameters,
+                ..HypothesisResult::default()
             })
+        };
+        let known = |value: f64, std: Option<f64>| {
+            let mass = parameter(EffectId::AddedMass, "mass", 0.0, Some(1e-3));
+            of(vec![
+                mass,
+                parameter(EffectId::AddedMass, "position", value, std),
+            ])
         };
         // Next to nothing of it may be anywhere.
         assert_eq!(known(0.004, None), "mass 0.0 \u{b1} 1.0 g");
@@ -259,25 +271,10 @@ mod tests {
             somewhere,
             "mass 0.0 \u{b1} 1.0 g, position 4.0 \u{b1} 1.0 mm"
         );
-        let of = |names: &[(&str, f64)]| {
-            let parameters = names.iter().map(|(name, value)| {
-                let parameter = ParameterSection {
-                    value: *value,
-                    ..ParameterSection::default()
-                };
-                ((*name).to_owned(), parameter)
-            });
-            sizes(&HypothesisSection {
-                parameters: parameters.collect(),
-                ..HypothesisSection::default()
-            })
-        };
-        assert_eq!(of(&[("mass", 0.024)]), "mass 24.0 g");
-        let two = [
-            ("local-crack.compliance", 0.01),
-            ("sensor-mass.mass", 0.024),
-        ];
+        let mass = parameter(EffectId::SensorMass, "mass", 0.024, None);
+        assert_eq!(of(vec![mass.clone()]), "mass 24.0 g");
+        let crack = parameter(EffectId::LocalCrack, "compliance", 0.01, None);
         let words = "local-crack: compliance 0.0100 L/EI; sensor-mass: mass 24.0 g";
-        assert_eq!(of(&two), words);
+        assert_eq!(of(vec![mass, crack]), words);
     }
 }

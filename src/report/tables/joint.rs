@@ -1,6 +1,6 @@
 //! Tables of the joint: parameters, the pair regression.
 
-use super::super::document::{Document, EstimateSection, ValueSection};
+use super::super::document::{Document, EstimateSection, Method, ValueSection};
 use super::super::format::{
     MISSING, RIGID, Rounded, last_place, optional, prefix, rounded_to, signed_percent, significant,
 };
@@ -153,7 +153,7 @@ pub fn parameters(document: &Document) -> Option<Table> {
         .collect();
     let modes: Vec<String> = estimate.modes_used.iter().map(usize::to_string).collect();
     let table = Table {
-        caption: format!("Estimated parameters, method: {}", estimate.method),
+        caption: format!("Estimated parameters, method: {}", estimate.method.name()),
         columns: vec![
             words("Parameter"),
             words("Meaning").on_page_if(misses),
@@ -206,7 +206,7 @@ pub fn correlations(document: &Document) -> Option<Table> {
         .correlations
         .iter()
         .map(|found| {
-            let pair = format!("{} and {}", symbol(&found.first), symbol(&found.second));
+            let pair = format!("{} and {}", symbol(found.first), symbol(found.second));
             // Near 1 the distance from 1 is what counts: two digits of it.
             let digits = if found.value.abs() > 0.99 { 4 } else { 2 };
             vec![pair, significant(found.value, digits)]
@@ -222,14 +222,15 @@ pub fn correlations(document: &Document) -> Option<Table> {
     })
 }
 
-/// The symbol of a parameter by its name in descriptions.
-fn symbol(name: &str) -> &str {
-    match name {
-        "kt" => "Kt",
-        "kr" => "Kr",
-        "modulus" => "E",
-        "density" => "\u{3c1}",
-        other => other,
+/// The symbol of a parameter.
+fn symbol(parameter: tapjoint_identify::consistent::Parameter) -> &'static str {
+    use tapjoint_identify::consistent::Parameter as Fitted;
+    match parameter {
+        Fitted::Kt => "Kt",
+        Fitted::Kr => "Kr",
+        Fitted::Modulus => "E",
+        Fitted::Density => "\u{3c1}",
+        other => other.name(),
     }
 }
 
@@ -239,7 +240,7 @@ pub fn methods(document: &Document) -> Option<Table> {
     let pairs = estimate
         .pairs
         .as_ref()
-        .filter(|_| estimate.method != "pairs")?;
+        .filter(|_| estimate.method != Method::Pairs)?;
     let value = |value: &Option<ValueSection>| value.as_ref().map(|value| value.value);
     let rows = [
         ("Kx", value(&estimate.kx), pairs.kx),

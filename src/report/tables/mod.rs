@@ -32,7 +32,7 @@ pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 pub(super) use verdict::shows_gap;
 
-use super::document::{Document, ModeSection};
+use super::document::{Document, ModeSection, ReadBy};
 use super::format::MISSING;
 use tapjoint_identify::observation::UNPAIRED;
 
@@ -198,13 +198,13 @@ fn mode_of(document: &Document, mode: usize) -> Option<&ModeSection> {
 
 /// Bound of a resonance's best frequency (Hz).
 pub fn bound_of(mode: &ModeSection) -> Option<f64> {
-    let own = match mode.method.as_str() {
-        "interpolated" => mode.interpolated_bound,
-        "fit" => mode
+    let own = match mode.method {
+        ReadBy::Interpolated => mode.interpolated_bound,
+        ReadBy::Fit => mode
             .low
             .zip(mode.high)
             .map(|(low, high)| 0.5 * (high - low)),
-        _ => None,
+        ReadBy::Line | ReadBy::Given => None,
     };
     own.or(mode.half_line)
         .or(mode.std.map(|std| 2.0 * std))

@@ -1,11 +1,12 @@
 //! Tables of resonances.
 
-use super::super::document::{Document, ModeSection, RecordingSection};
+use super::super::document::{Document, ModeSection, ReadBy, RecordingSection};
 use super::super::format::{
     MISSING, Rounded, frequency_reading, last_place, line_reading, optional, rounded_digits,
     rounded_to, significant,
 };
 use super::{Column, Table, bound_of, coherence, mode_name, number, words};
+use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
 const LAMBDA_DIGITS: i32 = 6;
@@ -15,7 +16,7 @@ const DAMPING_DIGITS: i32 = 4;
 /// One row for each resonance of the merged list; `None` without any.
 pub fn modes(document: &Document) -> Option<Table> {
     let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
-    let given = modes.iter().all(|mode| mode.method == "given");
+    let given = modes.iter().all(|mode| mode.method == ReadBy::Given);
     let described = document.test.iter().any(|test| test.kind.is_some());
     let caption = match (given, described) {
         (true, _) => "Modes, frequencies given",
@@ -105,7 +106,7 @@ fn details(table: Table) -> Option<Table> {
 
 fn details_note(modes: &[ModeSection]) -> String {
     let mut parts = Vec::new();
-    if modes.iter().any(|mode| mode.method == "fit") {
+    if modes.iter().any(|mode| mode.method == ReadBy::Fit) {
         parts.push(INTERVAL_NOTE);
     }
     if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
@@ -134,16 +135,16 @@ pub fn fitted_to(document: &Document) -> &'static str {
 
 /// What the columns mean, of the methods that occur.
 fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
-    let by = |method: &str| modes.iter().any(|mode| mode.method == method);
+    let by = |method: ReadBy| modes.iter().any(|mode| mode.method == method);
     let fit = format!(
         "Fit: maximum likelihood of {}; its bound is half the 95 % interval.",
         fitted_to(document)
     );
     let mut parts = vec!["Frequency: the best reading with its bound (about 95 %)."];
-    if by("fit") {
+    if by(ReadBy::Fit) {
         parts.push(&fit);
     }
-    if by("interpolated") {
+    if by(ReadBy::Interpolated) {
         parts.push("Interpolated: from the shape of the peak between the lines.");
     }
     parts.push(LINE_NOTE);
@@ -233,8 +234,12 @@ fn row(mode: &ModeSection) -> Vec<String> {
     vec![
         mode_name(mode.mode, mode.label.as_deref()),
         reading(mode).joined(),
-        mode.method.clone(),
-        fit.map_or_else(|| MISSING.into(), |fit| fit.uncertainty_from.clone()),
+        mode.method.name().to_owned(),
+        fit.map_or(MISSING, |fit| match fit.uncertainty_from {
+            UncertaintySource::Residual => "residual",
+            UncertaintySource::TapScatter => "taps",
+        })
+        .to_owned(),
         line.unwrap_or_else(|| MISSING.into()),
         damping(mode),
         optional(tap_deviation(mode), 2),
@@ -253,7 +258,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
 fn is_of(mode: &ModeSection, line: f64) -> bool {
     let bounds = mode.half_line.zip(bound_of(mode));
     let far = |(half, bound): (f64, f64)| (line - mode.frequency).abs() > half + 3.0 * bound;
-    mode.method != "fit" || !bounds.is_some_and(far)
+    mode.method != ReadBy::Fit || !bounds.is_some_and(far)
 }
 
 /// Distance (Hz) of the tap farthest from the mean of all taps; `None` with fewer than two.
@@ -278,8 +283,10 @@ fn damping(mode: &ModeSection) -> String {
 
 /// The best frequency with its bound.
 pub fn reading(mode: &ModeSection) -> Rounded {
-    match (mode.method.as_str(), mode.half_line, bound_of(mode)) {
-        ("line" | "given", Some(half_line), _) => line_reading(mode.frequency, half_line),
+    match (mode.method, mode.half_line, bound_of(mode)) {
+        (ReadBy::Line | ReadBy::Given, Some(half_line), _) => {
+            line_reading(mode.frequency, half_line)
+        }
         (_, half_line, Some(bound)) => frequency_reading(mode.frequency, bound, half_line),
         (_, _, None) => Rounded {
             value: significant(mode.frequency, 6),

@@ -1,34 +1,37 @@
 //! Which test to make next, in a sentence and as a table.
 
-use super::super::document::{Document, GapSection, NextTestSection};
+use super::super::document::{Document, GapSection};
 use super::super::format::MISSING;
 use super::{Table, number, words};
+use tapjoint_diagnosis::{NextTest, Proposal, Verdict};
 
 /// The test that tells most for its effort; what it is for depends on the answer.
 pub(super) fn next_test(gap: &GapSection) -> Option<String> {
     let test = gap.next_test.first()?;
-    let (purpose, premise) = match gap.verdict.kind.as_str() {
-        "no-gap" | "named" => ("To confirm it", String::new()),
-        "unknown" => ("To decide", format!(", {EQUALLY_LIKELY}")),
+    let (purpose, premise) = match gap.verdict {
+        Verdict::NoGap | Verdict::Named(_) => ("To confirm it", String::new()),
+        Verdict::Unknown => ("To decide", format!(", {EQUALLY_LIKELY}")),
         _ => ("To decide", String::new()),
     };
-    if test.id == CONFIRM {
+    if confirms(test) {
         return Some(format!("{purpose}: {}.", test.action));
     }
     Some(format!(
         "{purpose}: {} (about {:.2} bit{premise}; it tells {} apart{}).",
         test.action,
-        test.bits,
+        test.expected_information,
         test.separates.join(", "),
         not_predicted(test, "; it could not be predicted for ")
     ))
 }
 
-/// How a step is called that tells nothing new about which hypothesis holds.
-const CONFIRM: &str = "confirm";
+/// Whether a test tells nothing new about which hypothesis holds.
+fn confirms(test: &NextTest) -> bool {
+    matches!(test.proposal, Proposal::Confirm { .. })
+}
 
 /// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
-fn not_predicted(test: &NextTestSection, lead: &str) -> String {
+fn not_predicted(test: &NextTest, lead: &str) -> String {
     match test.unpredicted.as_slice() {
         [] => String::new(),
         names => format!("{lead}{}", names.join(", ")),
@@ -45,16 +48,16 @@ pub fn next_tests(document: &Document) -> Option<Table> {
     if tests.is_empty() {
         return None;
     }
-    let premise = match gap.verdict.kind.as_str() {
-        "unknown" => EQUALLY_LIKELY,
+    let premise = match gap.verdict {
+        Verdict::Unknown => EQUALLY_LIKELY,
         _ => "by the hypotheses above",
     };
-    let row = |test: &NextTestSection| {
+    let row = |test: &NextTest| {
         vec![
             test.action.clone() + &not_predicted(test, "; could not be predicted for "),
-            match test.id.as_str() {
-                CONFIRM => MISSING.to_owned(),
-                _ => format!("{:.2}", test.bits),
+            match confirms(test) {
+                true => MISSING.to_owned(),
+                false => format!("{:.2}", test.expected_information),
             },
             format!("{:.0}", test.effort),
             test.separates.join(", "),

@@ -1,34 +1,24 @@
 //! Tables of verdicts on how well a test was made.
 
-use super::super::document::{Document, VerdictSection};
+use std::cmp::Reverse;
+
+use super::super::document::Document;
 use super::super::format::{MISSING, significant, trimmed, with_minus_signs};
 use super::{Column, Table, number, words};
+use tapjoint_signal::quality::{Check, Outcome, Verdict};
 
-/// Outcomes from the worst to the best.
-const OUTCOMES: [&str; 4] = ["bad", "doubtful", "good", "not applicable"];
-
-/// Place of a verdict's outcome: 0 for the worst.
-fn rank(verdict: &VerdictSection) -> usize {
-    let place = OUTCOMES.iter().position(|name| *name == verdict.outcome);
-    place.unwrap_or(OUTCOMES.len())
-}
-
-fn is_doubt(verdict: &VerdictSection) -> bool {
-    rank(verdict) < 2
-}
-
-fn verdicts(document: &Document) -> &[VerdictSection] {
+fn verdicts(document: &Document) -> &[Verdict] {
     document.quality.as_deref().unwrap_or_default()
 }
 
 /// "checks: 41 good, 2 doubtful, 1 bad"; `None` where no check applies.
 pub fn quality_count(document: &Document) -> Option<String> {
-    let counts: Vec<String> = ["good", "doubtful", "bad"]
+    let counts: Vec<String> = [Outcome::Good, Outcome::Doubtful, Outcome::Bad]
         .into_iter()
-        .filter_map(|name| {
-            let of_it = verdicts(document).iter().filter(|v| v.outcome == name);
-            let count = of_it.count();
-            (count > 0).then(|| format!("{count} {name}"))
+        .filter_map(|outcome| {
+            let all = verdicts(document).iter();
+            let count = all.filter(|verdict| verdict.outcome == outcome).count();
+            (count > 0).then(|| format!("{count} {}", outcome.name()))
         })
         .collect();
     (!counts.is_empty()).then(|| format!("checks: {}", counts.join(", ")))
@@ -37,10 +27,10 @@ pub fn quality_count(document: &Document) -> Option<String> {
 /// One row for each check: its worst verdict, and how many of all are no doubt; `None` without any.
 pub fn quality(document: &Document) -> Option<Table> {
     let verdicts = verdicts(document);
-    let mut checks: Vec<&str> = Vec::new();
+    let mut checks: Vec<Check> = Vec::new();
     for verdict in verdicts {
-        if !checks.contains(&verdict.check.as_str()) {
-            checks.push(&verdict.check);
+        if !checks.contains(&verdict.check) {
+            checks.push(verdict.check);
         }
     }
     let rows: Vec<Vec<String>> = checks
@@ -65,43 +55,43 @@ pub fn quality(document: &Document) -> Option<Table> {
     })
 }
 
-fn summary_row(verdicts: &[VerdictSection], check: &str) -> Option<Vec<String>> {
+fn summary_row(verdicts: &[Verdict], check: Check) -> Option<Vec<String>> {
     let of_check = || verdicts.iter().filter(move |v| v.check == check);
-    let worse = |a: &&VerdictSection, b: &&VerdictSection| {
-        let by_size = b.severity.total_cmp(&a.severity);
-        rank(a).cmp(&rank(b)).then(by_size)
+    let worse = |a: &&Verdict, b: &&Verdict| {
+        let by_size = b.severity().total_cmp(&a.severity());
+        b.outcome.cmp(&a.outcome).then(by_size)
     };
     let worst = of_check().min_by(worse)?;
-    let good = of_check().filter(|v| v.outcome == "good").count();
-    let apply = of_check().filter(|v| v.outcome != "not applicable");
+    let good = of_check().filter(|v| v.outcome == Outcome::Good).count();
+    let apply = of_check().filter(|v| v.outcome != Outcome::NotApplicable);
     let count = match apply.count() {
         0 => MISSING.to_owned(),
         all => format!("{good} of {all}"),
     };
     Some(vec![
-        check.to_owned(),
-        worst.outcome.clone(),
+        check.code().to_owned(),
+        worst.outcome.name().to_owned(),
         count,
         value(worst),
         limit(worst),
         unit(worst),
-        worst.subject.clone(),
-        with_minus_signs(&worst.text),
+        worst.subject.to_string(),
+        with_minus_signs(&worst.happened),
     ])
 }
 
 /// One row for each doubt, the worst first: what happened, why it might be, what helps; `None` without
 /// any.
 pub fn quality_doubts(document: &Document) -> Option<Table> {
-    let mut doubts: Vec<&VerdictSection> = verdicts(document)
+    let mut doubts: Vec<&Verdict> = verdicts(document)
         .iter()
-        .filter(|verdict| is_doubt(verdict))
+        .filter(|verdict| verdict.is_doubt())
         .collect();
-    doubts.sort_by_key(|verdict| rank(verdict));
-    let row = |verdict: &&VerdictSection| {
+    doubts.sort_by_key(|verdict| Reverse(verdict.outcome));
+    let row = |verdict: &&Verdict| {
         let mut row = row(verdict);
-        row.push(verdict.cause.clone().unwrap_or_default());
-        row.push(verdict.remedy.clone().unwrap_or_default());
+        row.push(verdict.cause.unwrap_or_default().to_owned());
+        row.push(verdict.remedy.unwrap_or_default().to_owned());
         row
     };
     (!doubts.is_empty()).then(|| Table {
@@ -117,9 +107,12 @@ pub fn quality_doubts(document: &Document) -> Option<Table> {
 
 /// One row for each verdict, doubts first; `None` without any.
 pub fn quality_all(document: &Document) -> Option<Table> {
-    let mut all: Vec<&VerdictSection> = verdicts(document).iter().collect();
-    all.sort_by_key(|verdict| rank(verdict));
-    let apart = all.iter().filter(|v| v.outcome == "not applicable").count();
+    let mut all: Vec<&Verdict> = verdicts(document).iter().collect();
+    all.sort_by_key(|verdict| Reverse(verdict.outcome));
+    let apart = all
+        .iter()
+        .filter(|v| v.outcome == Outcome::NotApplicable)
+        .count();
     let note = match apart {
         0 => String::new(),
         count => format!(
@@ -147,15 +140,15 @@ fn columns() -> Vec<Column> {
     ]
 }
 
-fn row(verdict: &VerdictSection) -> Vec<String> {
+fn row(verdict: &Verdict) -> Vec<String> {
     vec![
-        verdict.check.clone(),
-        verdict.outcome.clone(),
-        verdict.subject.clone(),
+        verdict.check.code().to_owned(),
+        verdict.outcome.name().to_owned(),
+        verdict.subject.to_string(),
         value(verdict),
         limit(verdict),
         unit(verdict),
-        with_minus_signs(&verdict.text),
+        with_minus_signs(&verdict.happened),
     ]
 }
 
@@ -163,16 +156,16 @@ fn row(verdict: &VerdictSection) -> Vec<String> {
 ///
 /// A share is said in percent and a multiple with a times sign, as the sentences say them. What agrees best at 1
 /// is known to everyone as it is.
-fn scale(verdict: &VerdictSection) -> (f64, &str) {
-    match (verdict.unit.as_str(), verdict.check.as_str()) {
-        ("1", "tap-levels" | "weak-tap") => (1.0, "\u{d7}"),
-        ("1", "coherence" | "reciprocity") => (1.0, "1"),
+fn scale(verdict: &Verdict) -> (f64, &str) {
+    match (verdict.unit, verdict.check) {
+        ("1", Check::TapLevels | Check::WeakTap) => (1.0, "\u{d7}"),
+        ("1", Check::Coherence | Check::Reciprocity) => (1.0, "1"),
         ("1", _) => (100.0, "%"),
         (unit, _) => (1.0, unit),
     }
 }
 
-fn value(verdict: &VerdictSection) -> String {
+fn value(verdict: &Verdict) -> String {
     let (factor, unit) = scale(verdict);
     match verdict.value.map(|value| factor * value) {
         None => MISSING.to_owned(),
@@ -189,22 +182,22 @@ fn value(verdict: &VerdictSection) -> String {
 const LEAST_PERCENT: f64 = 0.001;
 
 /// Limits are round numbers, whose zeros say nothing; a computed one has three digits.
-fn limit(verdict: &VerdictSection) -> String {
+fn limit(verdict: &Verdict) -> String {
     trimmed(scale(verdict).0 * verdict.limit, 3)
 }
 
-fn unit(verdict: &VerdictSection) -> String {
+fn unit(verdict: &Verdict) -> String {
     scale(verdict).1.to_owned()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::convert_quality::verdict_section;
     use super::*;
-    use tapjoint_signal::quality::{Check, Outcome, Subject, Verdict};
+    use tapjoint_signal::quality::Subject;
 
-    fn verdict(check: Check, outcome: Outcome, value: f64) -> VerdictSection {
-        verdict_section(&Verdict {
+    fn verdict(check: Check, outcome: Outcome, value: f64) -> Verdict {
+        let is_doubt = matches!(outcome, Outcome::Doubtful | Outcome::Bad);
+        Verdict {
             check,
             subject: Subject::Test,
             value: Some(value),
@@ -212,10 +205,12 @@ mod tests {
             unit: check.unit(),
             outcome,
             happened: format!("found {value}"),
-        })
+            cause: is_doubt.then(|| check.cause()),
+            remedy: is_doubt.then(|| check.remedy()),
+        }
     }
 
-    fn document(verdicts: &[VerdictSection]) -> Document {
+    fn document(verdicts: &[Verdict]) -> Document {
         Document {
             quality: Some(verdicts.to_vec()),
             ..Document::default()
@@ -281,7 +276,7 @@ mod tests {
         ];
         for (check, value, expected) in cases {
             let mut section = verdict(check, Outcome::Bad, value);
-            section.text = "It moves by -0.299 % (of -1 to 3-5) in run-2.wav.".to_owned();
+            section.happened = "It moves by -0.299 % (of -1 to 3-5) in run-2.wav.".to_owned();
             let whole = document(&[section]);
             let table = quality_all(&whole).expect("one verdict");
             assert_eq!(table.rows[0][3..6], expected);

@@ -1,7 +1,7 @@
 //! Tables of how far the estimate moves when the frequencies do.
 
 use super::super::document::{
-    Document, EstimateSection, MonteCarloSection, ResolutionSpanSection, SensitivitySection,
+    Document, EstimateSection, Method, MonteCarloSection, ResolutionSpanSection, SensitivitySection,
 };
 use super::super::format::{
     MISSING, RIGID, bound_percent, optional, signed, signed_percent, significant, trimmed,
@@ -9,13 +9,13 @@ use super::super::format::{
 use super::{Column, Table, mode_of, number, words};
 
 /// The non-dimensional values that changes are counted from.
-fn base(document: &Document, method: &str) -> [Option<f64>; 3] {
+fn base(document: &Document, method: Method) -> [Option<f64>; 3] {
     let estimate = document.estimate.as_ref().and_then(Option::as_ref);
     let Some(estimate) = estimate else {
         return [None; 3];
     };
     match &estimate.pairs {
-        Some(pairs) if method == "pairs" => [pairs.kx, pairs.ky, pairs.kz],
+        Some(pairs) if method == Method::Pairs => [pairs.kx, pairs.ky, pairs.kz],
         _ => own(estimate),
     }
 }
@@ -25,7 +25,7 @@ fn own(estimate: &EstimateSection) -> [Option<f64>; 3] {
 }
 
 /// A column that says by which method, shown where there are several.
-fn method_column(methods: &[&str]) -> Column {
+fn method_column(methods: &[Method]) -> Column {
     let several = methods.iter().any(|method| Some(method) != methods.first());
     let column = words("Method");
     if several { column } else { column.on_page() }
@@ -36,10 +36,10 @@ fn method_column(methods: &[&str]) -> Column {
 fn side_by_side<T: Copy, K: PartialEq>(
     rows: impl Iterator<Item = T>,
     thing: impl Fn(T) -> K,
-    method: impl Fn(T) -> String,
+    method: impl Fn(T) -> Method,
 ) -> Vec<T> {
     let mut things: Vec<K> = Vec::new();
-    let mut placed: Vec<(usize, String, T)> = Vec::new();
+    let mut placed: Vec<(usize, Method, T)> = Vec::new();
     for row in rows {
         let key = thing(row);
         let known = things.iter().position(|other| *other == key);
@@ -49,7 +49,7 @@ fn side_by_side<T: Copy, K: PartialEq>(
         }
         placed.push((place, method(row), row));
     }
-    placed.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+    placed.sort_by_key(|(place, method, _)| (*place, *method));
     placed.into_iter().map(|(_, _, row)| row).collect()
 }
 
@@ -70,22 +70,18 @@ fn change(value: Option<f64>, base: Option<f64>) -> Option<f64> {
 pub fn perturbation(document: &Document) -> Option<Table> {
     let rows = document.perturbation.as_deref().filter(|p| !p.is_empty())?;
     let with_kz = rows.iter().any(|row| row.kz.is_some());
-    let methods: Vec<&str> = rows.iter().map(|row| row.method.as_str()).collect();
+    let methods: Vec<Method> = rows.iter().map(|row| row.method).collect();
     let mut columns = vec![number("Frequencies (%)"), method_column(&methods)];
     for name in names(with_kz) {
         columns.push(number(&format!("{name} (1)")));
         columns.push(number("change (%)"));
     }
-    let ordered = side_by_side(
-        rows.iter(),
-        |row| row.percent.to_bits(),
-        |row| row.method.clone(),
-    );
+    let ordered = side_by_side(rows.iter(), |row| row.percent.to_bits(), |row| row.method);
     let rows = ordered
         .into_iter()
         .map(|row| {
-            let mut cells = vec![signed(row.percent), row.method.clone()];
-            let base = base(document, &row.method);
+            let mut cells = vec![signed(row.percent), row.method.name().to_owned()];
+            let base = base(document, row.method);
             for (value, base) in [row.kx, row.ky, row.kz].into_iter().zip(base) {
                 cells.push(stiffness(value));
                 cells.push(signed_percent(change(value, base)));
@@ -117,17 +113,13 @@ fn names(with_kz: bool) -> &'static [&'static str] {
 pub fn averages(document: &Document) -> Option<Table> {
     let averages = document.perturbation_averages.as_deref();
     let list = averages.filter(|list| !list.is_empty())?;
-    let methods: Vec<&str> = list.iter().map(|row| row.method.as_str()).collect();
-    let ordered = side_by_side(
-        list.iter(),
-        |row| row.percent.to_bits(),
-        |row| row.method.clone(),
-    );
+    let methods: Vec<Method> = list.iter().map(|row| row.method).collect();
+    let ordered = side_by_side(list.iter(), |row| row.percent.to_bits(), |row| row.method);
     let rows = ordered.into_iter().map(|row| {
         let cell = |percent: Option<f64>| optional(percent, 3);
         vec![
             format!("\u{b1}{}", trimmed(row.percent, 4)),
-            row.method.clone(),
+            row.method.name().to_owned(),
             cell(row.kx_percent),
             cell(row.ky_percent),
             cell(row.kz_percent),
@@ -159,17 +151,17 @@ pub fn averages(document: &Document) -> Option<Table> {
 /// Median and 95 % interval under random errors of the frequencies; `None` where not computed.
 pub fn monte_carlo(document: &Document) -> Option<Table> {
     let list = document.monte_carlo.as_deref().filter(|l| !l.is_empty())?;
-    let methods: Vec<&str> = list.iter().map(|found| found.method.as_str()).collect();
+    let methods: Vec<Method> = list.iter().map(|found| found.method).collect();
     let parameters = list.iter().flat_map(|found| {
         let values = [found.kx, found.ky, found.kz];
         (0..3).filter_map(move |index| Some((index, found, values[index]?)))
     });
-    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method.clone());
+    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method);
     let rows = ordered.into_iter().map(|(index, found, value)| {
-        let base = base(document, &found.method)[index];
+        let base = base(document, found.method)[index];
         vec![
             names(true)[index].to_owned(),
-            found.method.clone(),
+            found.method.name().to_owned(),
             stiffness(base),
             stiffness(Some(value.value)),
             optional(value.low, 5),
@@ -201,7 +193,7 @@ fn draws(list: &[MonteCarloSection]) -> String {
     let samples = list.first().map_or(0, |found| found.samples);
     let failed = list.iter().filter(|found| found.failed > 0).map(|found| {
         let by = if list.len() > 1 {
-            format!(" by the method {}", found.method)
+            format!(" by the method {}", found.method.name())
         } else {
             String::new()
         };
@@ -210,7 +202,7 @@ fn draws(list: &[MonteCarloSection]) -> String {
             found.failed
         )
     });
-    let tolerances = if list.iter().any(|found| found.method == "consistent") {
+    let tolerances = if list.iter().any(|found| found.method == Method::Consistent) {
         " The consistent estimate draws the beam's properties that have a tolerance as well."
     } else {
         ""
@@ -224,17 +216,17 @@ fn draws(list: &[MonteCarloSection]) -> String {
 /// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
 pub fn spans(document: &Document) -> Option<Table> {
     let list = document.resolution_span.as_deref()?;
-    let methods: Vec<&str> = list.iter().map(|span| span.method.as_str()).collect();
+    let methods: Vec<Method> = list.iter().map(|span| span.method).collect();
     let parameters = list.iter().flat_map(|span| {
         let ranges = [span.kx, span.ky, span.kz];
         (0..3).filter_map(move |index| Some((index, span, ranges[index]?)))
     });
-    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method.clone());
+    let ordered = side_by_side(parameters, |row| row.0, |row| row.1.method);
     let rows = ordered.into_iter().map(|(index, span, [low, high])| {
-        let base = base(document, &span.method)[index];
+        let base = base(document, span.method)[index];
         vec![
             names(true)[index].to_owned(),
-            span.method.clone(),
+            span.method.name().to_owned(),
             stiffness(Some(low)),
             stiffness(base),
             stiffness(Some(high)),
@@ -262,7 +254,7 @@ pub fn spans(document: &Document) -> Option<Table> {
 fn tried(list: &[ResolutionSpanSection]) -> String {
     let patterns = list.first().map_or(0, |span| span.patterns);
     let failed = list.iter().filter(|span| span.failed > 0).map(|span| {
-        let method = &span.method;
+        let method = span.method.name();
         let by = if list.len() > 1 {
             format!(" by the method {method}")
         } else {
@@ -280,11 +272,11 @@ fn tried(list: &[ResolutionSpanSection]) -> String {
 /// What each mode's bound does to each parameter; `None` where not computed.
 pub fn sensitivity(document: &Document) -> Option<Table> {
     let list = document.resolution_span.as_deref()?;
-    let methods: Vec<&str> = list.iter().map(|span| span.method.as_str()).collect();
+    let methods: Vec<Method> = list.iter().map(|span| span.method).collect();
     let all = list
         .iter()
         .flat_map(|span| span.sensitivity.iter().map(move |row| (span, row)));
-    let ordered = side_by_side(all, |row| row.1.mode, |row| row.0.method.clone());
+    let ordered = side_by_side(all, |row| row.1.mode, |row| row.0.method);
     if ordered.is_empty() {
         return None;
     }
@@ -301,7 +293,7 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
     let rows = ordered.into_iter().map(|(span, row)| {
         let mut cells = vec![
             row.mode.to_string(),
-            span.method.clone(),
+            span.method.name().to_owned(),
             significant(row.half_line, 3),
             reading_percent(document, row),
             signed_percent(row.kx_percent),
@@ -326,7 +318,7 @@ fn all_drivers(list: &[ResolutionSpanSection], with_kz: bool) -> String {
         let said = (!drivers.is_empty()).then_some(drivers)?;
         Some(match list.len() {
             1 => said,
-            _ => format!("By the method {}: {said}", span.method),
+            _ => format!("By the method {}: {said}", span.method.name()),
         })
     });
     sentences.collect::<Vec<_>>().join(" ")

@@ -1,56 +1,69 @@
 //! The verdict of the diagnosis in a sentence or two: which effect, none, or that nobody can say.
 
-use super::super::document::{GapSection, HypothesisSection, UnplacedSection};
+use super::super::document::GapSection;
 use super::super::format::{probability, trimmed};
-use super::hypotheses::{LEAST_PROBABILITY, left, percent, sizes};
-use tapjoint_diagnosis::{MISFIT, SEEN};
+use super::hypotheses::{LEAST_PROBABILITY, left, names, percent, sizes};
+use tapjoint_beam::effects::EffectId;
+use tapjoint_diagnosis::{
+    DETECTED, Hypothesis, HypothesisResult, MISFIT, UnlocatedSensors, Verdict,
+};
 
 pub(super) fn verdict(gap: &GapSection, has_joint: bool) -> String {
     let odds = odds(gap).map_or_else(String::new, |odds| format!(" ({})", probability(odds)));
-    let effects = gap.verdict.effects.join(", ");
-    match gap.verdict.kind.as_str() {
-        "no-gap" => no_gap(gap),
-        "named" => {
-            let size = named(gap).map_or_else(String::new, |found| format!(": {}", sizes(found)));
-            let causes = match gap.verdict.effects.as_slice() {
-                [first, second] => format!("two causes, {first} and {second}"),
-                _ => format!("one cause, {effects}"),
+    match &gap.verdict {
+        Verdict::NoGap => no_gap(gap),
+        Verdict::Named(effects) => {
+            let size = gap.named().map(sizes);
+            let size = size.map_or_else(String::new, |size| format!(": {size}"));
+            let causes = match effects.as_slice() {
+                [first, second] => format!("two causes, {} and {}", first.name(), second.name()),
+                _ => format!("one cause, {}", names(effects)),
             };
             format!("The data are consistent with {causes}{odds}{size}.")
         }
-        "group" => {
-            format!("The cause is one of {effects}{odds}; these data cannot tell them apart.")
-        }
-        "set" if gap.verdict.effects.len() == 1 => format!(
-            "{effects} explains the readings best, but does not predict those that were kept from it any better: it \
-             is not held for the cause."
+        Verdict::Group(effects) => format!(
+            "The cause is one of {}{odds}; these data cannot tell them apart.",
+            names(effects)
         ),
-        "set" => format!("The cause is most likely one of {effects}; these data do not decide."),
-        "unknown" => unknown(gap, has_joint),
-        _ => undecided(gap, has_joint),
+        Verdict::Set(list) => {
+            let effects: Vec<String> = list.iter().map(Hypothesis::name).collect();
+            match effects.as_slice() {
+                [effect] => format!(
+                    "{effect} explains the readings best, but does not predict those that were kept from it any \
+                     better: it is not held for the cause."
+                ),
+                _ => format!(
+                    "The cause is most likely one of {}; these data do not decide.",
+                    effects.join(", ")
+                ),
+            }
+        }
+        Verdict::Unknown => unknown(gap, has_joint),
+        Verdict::NotEnoughData(reason) => undecided(gap, reason, has_joint),
     }
 }
 
 /// That the cause has no name, and what it looks like where two local changes would explain it.
 fn unknown(gap: &GapSection, has_joint: bool) -> String {
-    let likeness = |found: &&HypothesisSection| {
+    let is_likeness = |found: &&HypothesisResult| {
+        use EffectId::{AddedMass, LocalCrack};
+        let Hypothesis::Effects(effects) = &found.hypothesis else {
+            return false;
+        };
         matches!(
-            found.effect.as_str(),
-            "added-mass+local-crack" | "local-crack+added-mass"
+            effects.as_slice(),
+            [AddedMass, LocalCrack] | [LocalCrack, AddedMass]
         ) && found.goodness_of_fit.is_some_and(|p| p >= MISFIT)
             && found.probability >= LEAST_PROBABILITY
     };
-    let likeness = gap
-        .hypotheses
-        .iter()
-        .find(likeness)
-        .map_or_else(String::new, |found| {
-            format!(
-                " A crack and a mass would explain it ({}), and so would any change that is spread over a part of \
-                 the beam: look there first.",
-                sizes(found)
-            )
-        });
+    let found = gap.hypotheses.iter().find(is_likeness);
+    let likeness = found.map_or_else(String::new, |found| {
+        format!(
+            " A crack and a mass would explain it ({}), and so would any change that is spread over a part of \
+             the beam: look there first.",
+            sizes(found)
+        )
+    });
     let estimated = if has_joint {
         "the joint's stiffness"
     } else {
@@ -65,14 +78,14 @@ fn unknown(gap: &GapSection, has_joint: bool) -> String {
 /// That nothing is missing, and why so even where an effect leads the table.
 fn no_gap(gap: &GapSection) -> String {
     let first = gap.hypotheses.first();
-    let open = match first.filter(|first| first.effect != "none") {
+    let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
             " No effect is established: {:.0} to 1 against none is asked for.",
-            SEEN.exp()
+            DETECTED.exp()
         ),
         None => String::new(),
     };
-    let of_none = gap.hypotheses.iter().find(|found| found.effect == "none");
+    let of_none = gap.result(&Hypothesis::None);
     let misfit = of_none.and_then(|none| none.goodness_of_fit.filter(|p| *p < MISFIT));
     match misfit {
         Some(p) => format!(
@@ -89,14 +102,14 @@ fn no_gap(gap: &GapSection) -> String {
 
 /// What the described model itself leaves, where that is much more than the readings' uncertainty and than what is
 /// left with a joint that may differ between recordings.
-fn by_moving(none: &HypothesisSection, floor: Option<f64>) -> String {
-    let all = none.gap_before.zip(none.gap_after).zip(floor);
-    match all.filter(|((before, after), floor)| *before > 2.0 * after.max(*floor)) {
-        Some(((before, after), floor)) => format!(
+fn by_moving(none: &HypothesisResult, floor: Option<f64>) -> String {
+    let left_over = none.gap_after.zip(floor);
+    match left_over.filter(|(after, floor)| none.gap_before > 2.0 * after.max(*floor)) {
+        Some((after, floor)) => format!(
             ", once joint, geometry and masses may differ from what is described by their tolerances and from recording \
              to recording (errors {} %; exactly as described {} %)",
             left(Some(after), Some(floor)),
-            percent(Some(before))
+            percent(Some(none.gap_before))
         ),
         None => String::new(),
     }
@@ -107,22 +120,19 @@ const GAP: f64 = 0.1;
 
 /// Whether the readings show a gap, be its cause known or not.
 pub fn shows_gap(gap: &GapSection) -> bool {
-    let mut all = gap.hypotheses.iter();
-    let none = all.find(|found| found.effect == "none");
+    let none = gap.result(&Hypothesis::None);
     misfit_unplaced(gap).is_some() || none.is_some_and(|none| none.probability < GAP)
 }
 
 /// What the model misses without masses that sat nobody knows where, if it does.
-fn misfit_unplaced(gap: &GapSection) -> Option<&UnplacedSection> {
+fn misfit_unplaced(gap: &GapSection) -> Option<&UnlocatedSensors> {
     let unplaced = gap.unplaced.as_ref();
     unplaced.filter(|one| one.goodness_of_fit < MISFIT)
 }
 
 /// That there is no answer, and what is known all the same.
-fn undecided(gap: &GapSection, has_joint: bool) -> String {
-    let reason = gap.verdict.reason.as_deref().unwrap_or("too few data");
-    let of = |name: &str| gap.hypotheses.iter().find(|found| found.effect == name);
-    let Some(none) = of("none") else {
+fn undecided(gap: &GapSection, reason: &str, has_joint: bool) -> String {
+    let Some(none) = gap.result(&Hypothesis::None) else {
         return format!("No diagnosis: {reason}.");
     };
     let mut text = if let Some(without) = misfit_unplaced(gap) {
@@ -144,13 +154,14 @@ fn undecided(gap: &GapSection, has_joint: bool) -> String {
             } else {
                 ""
             },
-            percent(none.gap_before),
+            percent(Some(none.gap_before)),
             percent(gap.noise_floor),
         )
     } else {
         format!("These data do not decide whether there is a gap, nor what causes it: {reason}.")
     };
-    if let Some(coupling) = of("cross-coupling").filter(|_| has_joint) {
+    let coupling = gap.result(&Hypothesis::Effects(vec![EffectId::CrossCoupling]));
+    if let Some(coupling) = coupling.filter(|_| has_joint) {
         text.push_str(&format!(
             " A cross-coupling of the joint is not established ({}).",
             probability(coupling.probability)
@@ -161,23 +172,20 @@ fn undecided(gap: &GapSection, has_joint: bool) -> String {
 
 /// How probable the verdict is: of a group its members together, be they single effects or pairs.
 fn odds(gap: &GapSection) -> Option<f64> {
-    if gap.verdict.kind != "group" {
-        return named(gap).map(|found| found.probability);
-    }
-    let effects = &gap.verdict.effects;
-    let total = |is_member: &dyn Fn(&str) -> bool| {
-        let members = gap.hypotheses.iter().filter(|one| is_member(&one.effect));
+    let Verdict::Group(group) = &gap.verdict else {
+        return gap.named().map(|found| found.probability);
+    };
+    let total = |single: bool| {
+        let members = gap
+            .hypotheses
+            .iter()
+            .filter(|found| match &found.hypothesis {
+                Hypothesis::Effects(effects) => {
+                    (!single || effects.len() == 1) && effects.iter().all(|one| group.contains(one))
+                }
+                _ => false,
+            });
         members.map(|one| one.probability).reduce(|a, b| a + b)
     };
-    let is_in = |part: &str| effects.iter().any(|effect| effect == part);
-    total(&is_in).or_else(|| total(&|pair| pair.split('+').all(is_in)))
-}
-
-/// The hypothesis that the verdict names.
-pub(super) fn named(gap: &GapSection) -> Option<&HypothesisSection> {
-    let name = match gap.verdict.kind.as_str() {
-        "no-gap" => "none".to_owned(),
-        _ => gap.verdict.joined(),
-    };
-    gap.hypotheses.iter().find(|found| found.effect == name)
+    total(true).or_else(|| total(false))
 }

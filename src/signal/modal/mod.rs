@@ -20,10 +20,15 @@ mod projection;
 mod reading;
 
 pub use mode::{
-    BandReadings, FittedReading, FrequencySource, MergedMode, ModeReading, PeakLabel, merge_modes,
+    BandReadings, FittedReading, MergedMode, ModeReading, PeakLabel, ReadBy, merge_modes,
 };
 pub use peaks::{
     CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,
     near_mains,
 };
 pub use reading::{Interpolation, Unfit, interpolate_parabola, interpolate_pole, read_peaks};
+
+/// Writes a number that counts from 0 as one that counts from 1.
+fn from_one<S: serde::Serializer>(index: &usize, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_u64(*index as u64 + 1)
+}

@@ -4,8 +4,11 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
+use serde::Serialize;
 /// What is checked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(into = "&'static str")]
 pub enum Check {
     /// One impact per tap, by the force in time.
     DoubleHit,
@@ -224,10 +227,18 @@ impl Check {
     }
 }
 
+impl From<Check> for &'static str {
+    fn from(check: Check) -> &'static str {
+        check.code()
+    }
+}
+
 /// What came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// The check does not apply: something that it needs is not there.
+    #[serde(rename = "not applicable")]
     NotApplicable,
     /// As good practice asks.
     Good,
@@ -250,11 +261,13 @@ impl Outcome {
 }
 
 /// The result of one check.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "QualityVerdict")]
 pub struct Verdict {
     /// What was checked.
     pub check: Check,
     /// On what.
+    #[serde(flatten)]
     pub subject: Subject,
     /// What was found (unit: [`Verdict::unit`]); `None` where there is nothing to measure.
     pub value: Option<f64>,
@@ -265,7 +278,12 @@ pub struct Verdict {
     /// What came out.
     pub outcome: Outcome,
     /// What happened, with its numbers: a sentence.
+    #[serde(rename = "text")]
     pub happened: String,
+    /// Of a doubt why it might be; else `None`.
+    pub cause: Option<&'static str>,
+    /// Of a doubt what helps; else `None`.
+    pub remedy: Option<&'static str>,
 }
 
 impl Verdict {
@@ -278,6 +296,8 @@ impl Verdict {
             unit: check.unit(),
             outcome: Outcome::NotApplicable,
             happened: String::new(),
+            cause: None,
+            remedy: None,
         }
     }
 
@@ -293,6 +313,8 @@ impl Verdict {
         self.value = Some(value);
         self.outcome = outcome;
         self.happened = happened;
+        self.cause = self.is_doubt().then(|| self.check.cause());
+        self.remedy = self.is_doubt().then(|| self.check.remedy());
         self
     }
 
@@ -334,15 +356,16 @@ impl fmt::Display for Verdict {
     /// What happened; of a doubt also why it might be and what helps.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.subject, self.happened)?;
-        if self.is_doubt() {
-            write!(f, " {} {}", self.check.cause(), self.check.remedy())?;
+        match self.cause.zip(self.remedy) {
+            Some((cause, remedy)) => write!(f, " {cause} {remedy}"),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 
 /// What a verdict is about.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "WrittenSubject")]
 pub enum Subject {
     /// A recording.
     Recording {
@@ -386,6 +409,40 @@ impl Subject {
             | Subject::Sensor { file, .. } => Some(file),
             Subject::Test => None,
         }
+    }
+}
+
+/// A subject as `report.json` has it.
+#[derive(Serialize, JsonSchema)]
+struct WrittenSubject {
+    /// On what, in words: "full.wav, tap 2".
+    subject: String,
+    /// File of the recording; null of the test as a whole.
+    recording: Option<String>,
+    /// Number of the tap, from 1; null of anything else.
+    tap: Option<usize>,
+    /// Frequency of the mode (Hz); null of anything else.
+    frequency: Option<f64>,
+    /// Name of the sensor; null of anything else.
+    sensor: Option<String>,
+}
+
+impl From<Subject> for WrittenSubject {
+    fn from(about: Subject) -> Self {
+        let mut written = WrittenSubject {
+            subject: about.to_string(),
+            recording: about.file().map(str::to_owned),
+            tap: None,
+            frequency: None,
+            sensor: None,
+        };
+        match about {
+            Subject::Tap { tap, .. } => written.tap = Some(tap),
+            Subject::Mode { frequency, .. } => written.frequency = Some(frequency),
+            Subject::Sensor { sensor, .. } => written.sensor = Some(sensor),
+            Subject::Recording { .. } | Subject::Test => {}
+        }
+        written
     }
 }
 

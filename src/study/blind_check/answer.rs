@@ -82,7 +82,7 @@ fn classes(diagnosis: &Diagnosis) -> BTreeMap<Class, f64> {
 }
 
 fn places(diagnosis: &Diagnosis) -> Vec<(Option<Place>, f64)> {
-    let p = &diagnosis.places;
+    let p = &diagnosis.locations;
     vec![
         (Some(Place::Joint), p.joint),
         (Some(Place::Fixture), p.fixture),

@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use tapjoint::modal::polyreference::PoleStability;
+use tapjoint::quality::{Check, Outcome, Subject, Verdict};
 use tapjoint::report::document::*;
 use tapjoint::report::figures::*;
 use tapjoint::spectral::Lines;
@@ -61,20 +62,25 @@ pub fn figures() -> Vec<RecordingFigure> {
 }
 
 /// One good check and one doubt.
-fn quality() -> Vec<VerdictSection> {
-    let verdict = |outcome: &str, tap: usize, value: f64| VerdictSection {
-        check: "force-ripple".into(),
-        subject: format!("full.wav, tap {tap}"),
-        recording: Some("full.wav".into()),
-        tap: Some(tap),
+fn quality() -> Vec<Verdict> {
+    let verdict = |outcome: Outcome, tap: usize, value: f64| Verdict {
+        check: Check::ForceRipple,
+        subject: Subject::Tap {
+            file: "full.wav".into(),
+            tap,
+        },
         value: Some(value),
         limit: 1.7,
-        unit: "dB".into(),
-        outcome: outcome.into(),
-        text: format!("The force spectrum ripples by {value} dB."),
-        ..VerdictSection::default()
+        unit: "dB",
+        outcome,
+        happened: format!("The force spectrum ripples by {value} dB."),
+        cause: None,
+        remedy: None,
     };
-    vec![verdict("good", 1, 0.4), verdict("doubtful", 2, 2.9)]
+    vec![
+        verdict(Outcome::Good, 1, 0.4),
+        verdict(Outcome::Doubtful, 2, 2.9),
+    ]
 }
 
 fn test() -> TestSection {
@@ -158,7 +164,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         random_error: Some(0.016),
         mode: Some(index + 1),
         frequency,
-        method: "interpolated".into(),
+        method: ReadBy::Interpolated,
         line_frequency: Some((frequency / lines.spacing).round() * lines.spacing),
         half_line: Some(lines.half_line()),
         interpolated_frequency: Some(frequency),
@@ -191,7 +197,7 @@ fn modes() -> Vec<ModeSection> {
     modes.push(ModeSection {
         mode: None,
         frequency: 50.0,
-        method: "line".into(),
+        method: ReadBy::Line,
         line_frequency: Some(50.0),
         half_line: Some(0.125),
         recording: Some("low.wav".into()),
@@ -214,7 +220,7 @@ fn value(value: f64, relative: f64) -> Option<ValueSection> {
 
 fn estimate() -> EstimateSection {
     EstimateSection {
-        method: "pairs".into(),
+        method: Method::Pairs,
         modes_used: vec![1, 2, 3, 4],
         reason: None,
         kx: value(970.5, 0.041),
@@ -254,7 +260,7 @@ fn perturbation() -> Vec<PerturbationSection> {
         .iter()
         .map(|percent| PerturbationSection {
             percent: *percent,
-            method: "pairs".into(),
+            method: Method::Pairs,
             kx: (*percent < 0.1).then_some(970.5 * (1.0 + 0.9 * percent)),
             ky: (*percent < 0.1).then_some(1.251 * (1.0 + 0.06 * percent)),
             kz: None,
@@ -271,7 +277,7 @@ fn span() -> ResolutionSpanSection {
         })
         .collect();
     ResolutionSpanSection {
-        method: "pairs".into(),
+        method: Method::Pairs,
         patterns: 16,
         failed: 0,
         kx: Some([860.0, 1090.0]),

@@ -1,12 +1,18 @@
 //! Pictures of the gap: where its errors stand, and what each point says.
 
-use tapjoint::report::document::{
-    Document, GapPlaceSection, GapSection, HypothesisSection, PlaceMapSection, PullSection,
-};
-use tapjoint::report::live_model::{live_gap, live_place_map};
-use tapjoint::report::live_points::PointSet;
-use tapjoint::report::plot::gap::{draw_gap, gap_caption};
-use tapjoint::report::plot::render_svg;
+use tapjoint::effects::EffectId;
+use tapjoint::gap::{Hypothesis, HypothesisResult, LocationMap, Residual, Verdict};
+use tapjoint::report::chart::{Chart, PageChart, PointSet, Points, render_svg};
+use tapjoint::report::charts::gap::{gap, place_map};
+use tapjoint::report::document::{Document, GapPlaceSection, GapSection};
+
+/// The chart's points as the page has them.
+fn points(chart: &Chart) -> Points {
+    match chart.page() {
+        Some(PageChart::Points(points)) => points,
+        other => panic!("no points: {other:?}"),
+    }
+}
 
 fn document(gap: GapSection) -> Document {
     Document {
@@ -17,12 +23,12 @@ fn document(gap: GapSection) -> Document {
 
 /// One mode, seen in a hard and in a soft level of one recording and in another recording.
 fn of_three_levels() -> Document {
-    let pull = |recording: &str, level: f64, error_percent: f64| PullSection {
+    let pull = |recording: &str, level: f64, error_percent: f64| Residual {
         mode: 1,
         recording: recording.into(),
         level: Some(level),
         error_percent,
-        ..PullSection::default()
+        ..Residual::default()
     };
     document(GapSection {
         place: Some(GapPlaceSection {
@@ -33,7 +39,7 @@ fn of_three_levels() -> Document {
             ],
             ..GapPlaceSection::default()
         }),
-        hypotheses: vec![HypothesisSection::default()],
+        hypotheses: vec![HypothesisResult::default()],
         ..GapSection::default()
     })
 }
@@ -41,7 +47,8 @@ fn of_three_levels() -> Document {
 #[test]
 fn regress_two_levels_of_one_recording_stand_apart_and_are_told_apart() {
     let document = of_three_levels();
-    let live = live_gap(&document).unwrap();
+    let chart = gap(&document).unwrap();
+    let live = points(&chart);
     let errors = &live.views[0].panels[0].sets;
     let before = errors.iter().find(|set| set.mark == "ring").unwrap();
     // Three seats over half of the mode's width, each in the middle of its third.
@@ -57,23 +64,27 @@ fn regress_two_levels_of_one_recording_stand_apart_and_are_told_apart() {
     ];
     assert_eq!(before.words, words);
     assert_eq!(before.said[1], "\u{2212}12 %");
-    let svg = render_svg(&draw_gap(&document).unwrap()).unwrap();
+    let svg = render_svg(&chart.draw());
     for words in words {
-        assert_eq!(svg.matches(&format!("{words}:")).count(), 1, "{words}");
+        assert_eq!(
+            svg.matches(&format!("{words} \u{b7}")).count(),
+            1,
+            "{words}"
+        );
     }
 }
 
 /// Two levels, with an effect or none at the head of the hypotheses.
-fn with_verdict(kind: &str, hypotheses: &[&str]) -> Document {
+fn with_verdict(verdict: &Verdict, hypotheses: &[Hypothesis]) -> Document {
     let mut document = of_three_levels();
     let gap = document.gap.as_mut().unwrap();
-    gap.verdict.kind = kind.into();
+    gap.verdict = verdict.clone();
     for pull in &mut gap.place.as_mut().unwrap().modes {
         pull.error_percent_after = 99.0;
     }
-    let found = hypotheses.iter().map(|effect| HypothesisSection {
-        effect: (*effect).into(),
-        ..HypothesisSection::default()
+    let found = hypotheses.iter().map(|hypothesis| HypothesisResult {
+        hypothesis: hypothesis.clone(),
+        ..HypothesisResult::default()
     });
     gap.hypotheses = found.collect();
     document
@@ -81,44 +92,59 @@ fn with_verdict(kind: &str, hypotheses: &[&str]) -> Document {
 
 #[test]
 fn regress_an_effect_that_nobody_holds_for_the_cause_is_not_shown() {
-    let cases: [(&str, &[&str], &str); 6] = [
-        ("named", &["sensor-mass", "none"], "and with sensor-mass"),
+    use EffectId::{JointDamping, Length, LocalCrack, Modulus, SensorMass};
+    let one = |effect: EffectId| Hypothesis::Effects(vec![effect]);
+    let cases = [
         (
-            "group",
-            &["unknown", "modulus", "length"],
+            Verdict::Named(vec![SensorMass]),
+            vec![one(SensorMass), Hypothesis::None],
+            "and with sensor-mass",
+        ),
+        (
+            Verdict::Group(vec![Modulus, Length]),
+            vec![Hypothesis::Unknown, one(Modulus), one(Length)],
             "and with modulus",
         ),
-        ("set", &["local-crack", "none"], "and with local-crack"),
-        ("no-gap", &["joint-damping", "none"], "(nothing is missing)"),
         (
-            "unknown",
-            &["modulus", "unknown"],
+            Verdict::Set(vec![one(LocalCrack), Hypothesis::None]),
+            vec![one(LocalCrack), Hypothesis::None],
+            "and with local-crack",
+        ),
+        (
+            Verdict::NoGap,
+            vec![one(JointDamping), Hypothesis::None],
+            "(nothing is missing)",
+        ),
+        (
+            Verdict::Unknown,
+            vec![one(Modulus), Hypothesis::Unknown],
             "(nothing in the catalogue explains the rest)",
         ),
         (
-            "not-enough-data",
-            &["modulus", "none"],
+            Verdict::NotEnoughData(String::new()),
+            vec![one(Modulus), Hypothesis::None],
             "(these data do not decide what is missing)",
         ),
     ];
     for (kind, hypotheses, words) in cases {
-        let document = with_verdict(kind, hypotheses);
-        let live = live_gap(&document).unwrap();
+        let document = with_verdict(&kind, &hypotheses);
+        let chart = gap(&document).unwrap();
+        let live = points(&chart);
         let panel = &live.views[0].panels[0];
         let shown: Vec<&str> = panel.sets.iter().map(|set| set.name.as_str()).collect();
-        let svg = render_svg(&draw_gap(&document).unwrap()).unwrap();
-        assert!(svg.contains(words), "{kind}");
-        assert!(gap_caption(&document).contains(words), "{kind}");
+        let svg = render_svg(&chart.draw());
+        assert!(svg.contains(words), "{kind:?}");
+        assert!(chart.caption.contains(words), "{kind:?}");
         match words.strip_prefix("and ") {
             Some(name) => {
-                assert_eq!(shown.last(), Some(&name), "{kind}");
-                assert!(svg.contains(&format!("+99 % {name}")), "{kind}");
+                assert_eq!(shown.last(), Some(&name), "{kind:?}");
+                assert!(svg.contains("+99 %"), "{kind:?}");
             }
             None => {
-                assert_eq!(shown.len(), 2, "{kind}: {shown:?}");
-                assert!(!svg.contains("+99 %"), "{kind}");
+                assert_eq!(shown.len(), 2, "{kind:?}: {shown:?}");
+                assert!(!svg.contains("+99 %"), "{kind:?}");
                 // Nor does it stretch the axis.
-                assert!(panel.y.range[1] < 20.0, "{kind}: {:?}", panel.y.range);
+                assert!(panel.y.range[1] < 20.0, "{kind:?}: {:?}", panel.y.range);
             }
         }
     }
@@ -126,17 +152,17 @@ fn regress_an_effect_that_nobody_holds_for_the_cause_is_not_shown() {
 
 #[test]
 fn regress_local_changes_have_the_digits_of_their_uncertainty() {
-    let map = PlaceMapSection {
+    let map = LocationMap {
         positions: vec![0.1, 0.2],
         stiffness: vec![0.034_12, 0.123_45],
         stiffness_std: vec![0.12, 0.000_005],
-        ..PlaceMapSection::default()
+        ..LocationMap::default()
     };
     let document = document(GapSection {
         map: Some(map),
         ..GapSection::default()
     });
-    let live = live_place_map(&document).unwrap();
+    let live = points(&place_map(&document).unwrap());
     let is_curve = |set: &&PointSet| set.mark == "curve";
     let set = live.views[0].panels[1].sets.iter().find(is_curve).unwrap();
     assert_eq!(set.said, ["3 \u{b1} 12 %", "12.34500 \u{b1} 0.00050 %"]);

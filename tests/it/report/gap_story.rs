@@ -1,31 +1,32 @@
 //! What is said of the gap, by verdict.
 
+use tapjoint::effects::EffectId;
+use tapjoint::gap::{
+    AmplitudeDependence, FrequencyChange, Hypothesis, HypothesisResult, JointShift,
+    LocationProbabilities, NextTest, ParameterValue, Proposal, Residual, Verdict,
+};
 use tapjoint::report::document::{
-    AlongDecaysSection, BaselineSection, DecayChangeSection, Document, GapPlaceSection, GapSection,
-    GapVerdictSection, HypothesisSection, JointShiftSection, NextTestSection, ParameterSection,
-    PullSection, RecordingSection, TestSection,
+    Baseline, BaselineSection, Document, GapPlaceSection, GapSection, RecordingSection, TestSection,
 };
 use tapjoint::report::render_text;
 use tapjoint::report::tables::{gap_in_short, gap_story, hypotheses, next_tests};
 
 #[test]
 fn val_the_odds_of_a_group_are_those_of_its_members_together() {
-    let member = |effect: &str, probability: f64| HypothesisSection {
-        effect: effect.into(),
+    use EffectId::{Length, Modulus, Timebase};
+    let member = |hypothesis: Hypothesis, probability: f64| HypothesisResult {
+        hypothesis,
         probability,
-        ..HypothesisSection::default()
+        ..HypothesisResult::default()
     };
+    let effect = |effect: EffectId| Hypothesis::Effects(vec![effect]);
     let mut gap = GapSection {
-        verdict: GapVerdictSection {
-            kind: "group".into(),
-            effects: vec!["length".into(), "modulus".into(), "timebase".into()],
-            reason: None,
-        },
+        verdict: Verdict::Group(vec![Length, Modulus, Timebase]),
         hypotheses: vec![
-            member("modulus", 0.4),
-            member("length", 0.35),
-            member("timebase", 0.2),
-            member("none", 0.05),
+            member(effect(Modulus), 0.4),
+            member(effect(Length), 0.35),
+            member(effect(Timebase), 0.2),
+            member(Hypothesis::None, 0.05),
         ],
         ..GapSection::default()
     };
@@ -36,48 +37,60 @@ fn val_the_odds_of_a_group_are_those_of_its_members_together() {
         })
     };
     assert!(story(&gap)[0].contains("(95.0 %)"), "{:?}", story(&gap));
-    gap.verdict.kind = "named".into();
-    gap.verdict.effects = vec!["length".into()];
+    gap.verdict = Verdict::Named(vec![Length]);
     assert!(story(&gap)[0].contains("(35.0 %)"), "{:?}", story(&gap));
 }
 
+fn damping() -> Hypothesis {
+    Hypothesis::Effects(vec![EffectId::JointDamping])
+}
+
+fn named() -> Verdict {
+    Verdict::Named(vec![EffectId::JointDamping])
+}
+
+/// Two hypotheses that the readings do not tell apart.
+fn undecided() -> Verdict {
+    Verdict::Set(vec![damping(), Hypothesis::None])
+}
+
 /// A gap with this verdict, led by an effect, with a test to make and a softer recording that fits worst.
-fn gap_with(kind: &str) -> Document {
-    let found = |effect: &str, probability: f64, shift: f64| HypothesisSection {
-        effect: effect.into(),
+fn gap_with(verdict: Verdict) -> Document {
+    let found = |hypothesis: Hypothesis, probability: f64, shift: f64| HypothesisResult {
+        hypothesis,
         probability,
-        gap_before: Some(2.0),
+        gap_before: 2.0,
         gap_after: Some(0.05),
-        joint_shift: JointShiftSection {
+        joint_shift: JointShift {
             kx_percent: Some(shift),
             ky_percent: None,
         },
-        ..HypothesisSection::default()
+        ..HypothesisResult::default()
     };
     let gap = GapSection {
-        verdict: GapVerdictSection {
-            kind: kind.into(),
-            ..GapVerdictSection::default()
-        },
+        verdict,
         hypotheses: vec![
-            found("joint-damping", 0.614, -3.0),
-            found("none", 0.277, 0.0),
+            found(damping(), 0.614, -3.0),
+            found(Hypothesis::None, 0.277, 0.0),
         ],
         place: Some(GapPlaceSection {
-            modes: vec![PullSection {
+            modes: vec![Residual {
                 mode: 4,
                 recording: "high.wav".into(),
                 level: Some(0.73),
                 error_percent: -0.962,
                 z: -9.0,
-                ..PullSection::default()
+                ..Residual::default()
             }],
             ..GapPlaceSection::default()
         }),
-        next_test: vec![NextTestSection {
+        next_test: vec![NextTest {
+            proposal: Proposal::WeighSensor,
             action: "weigh the sensor".into(),
-            bits: 3.26,
-            ..NextTestSection::default()
+            separates: Vec::new(),
+            unpredicted: Vec::new(),
+            expected_information: 3.26,
+            effort: 2.0,
         }],
         ..GapSection::default()
     };
@@ -89,7 +102,7 @@ fn gap_with(kind: &str) -> Document {
 
 #[test]
 fn regress_without_a_gap_nothing_is_added_and_the_leader_of_the_table_is_explained() {
-    let mut document = gap_with("no-gap");
+    let mut document = gap_with(Verdict::NoGap);
     let story = gap_story(&document).join("\n");
     assert!(!story.contains("Adding it"), "{story}");
     assert!(story.contains("No effect is established"), "{story}");
@@ -102,7 +115,7 @@ fn regress_without_a_gap_nothing_is_added_and_the_leader_of_the_table_is_explain
 
 #[test]
 fn regress_an_unknown_gap_is_not_said_to_shrink_and_its_information_has_a_premise() {
-    let document = gap_with("unknown");
+    let document = gap_with(Verdict::Unknown);
     let story = gap_story(&document).join("\n");
     assert!(!story.contains("How far"), "{story}");
     assert!(
@@ -112,18 +125,19 @@ fn regress_an_unknown_gap_is_not_said_to_shrink_and_its_information_has_a_premis
     let premise = "taking the catalogue's effects as equally likely";
     assert!(story.contains(premise), "{story}");
     assert!(next_tests(&document).unwrap().note.contains(premise));
-    let decided = gap_with("set");
+    let decided = gap_with(undecided());
     assert!(!gap_story(&decided).join("\n").contains(premise));
     assert!(!next_tests(&decided).unwrap().note.contains(premise));
 }
 
 #[test]
 fn regress_what_two_local_changes_explain_is_said_to_be_spread() {
-    let mut document = gap_with("unknown");
+    let mut document = gap_with(Verdict::Unknown);
     let spread = "spread over a part of the beam";
     assert!(!gap_story(&document)[0].contains(spread));
     if let Some(gap) = &mut document.gap {
-        gap.hypotheses[0].effect = "added-mass+local-crack".into();
+        let two = vec![EffectId::AddedMass, EffectId::LocalCrack];
+        gap.hypotheses[0].hypothesis = Hypothesis::Effects(two);
         gap.hypotheses[0].goodness_of_fit = Some(0.9);
     }
     assert!(gap_story(&document)[0].contains(spread));
@@ -135,16 +149,17 @@ fn regress_what_two_local_changes_explain_is_said_to_be_spread() {
 }
 
 /// What is said of the size of the effect that is named.
-fn size_of(name: &str, value: f64, std: Option<f64>) -> String {
-    let mut document = gap_with("named");
+fn size_of(name: &'static str, value: f64, std: Option<f64>) -> String {
+    let mut document = gap_with(named());
     if let Some(gap) = &mut document.gap {
-        gap.verdict.effects = vec!["joint-damping".into()];
-        let parameter = ParameterSection {
+        gap.hypotheses[0].parameters = vec![ParameterValue {
+            effect: EffectId::JointDamping,
+            name,
             value,
             std,
-            ..ParameterSection::default()
-        };
-        gap.hypotheses[0].parameters = [(name.to_owned(), parameter)].into();
+            smallest_detectable: None,
+            smallest_separable: None,
+        }];
     }
     let said = gap_story(&document).remove(0);
     said.rsplit_once("): ").unwrap().1.to_owned()
@@ -172,18 +187,20 @@ fn regress_digits_of_a_size_follow_its_uncertainty() {
 
 #[test]
 fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
-    let mut document = gap_with("named");
+    let mut document = gap_with(named());
     let sensor = RecordingSection {
         sensor_positions: [("A".to_owned(), 0.338)].into(),
         ..RecordingSection::default()
     };
     document.recordings = Some(vec![sensor.clone(), sensor]);
     if let Some(gap) = &mut document.gap {
-        gap.verdict.effects = vec!["joint-damping".into()];
         gap.hypotheses[0].joint = Some([1.9954e6, 1222.6]);
         gap.hypotheses[0].joint_shift.kx_percent = Some(11.46);
         if let Some(place) = &mut gap.place {
-            place.probability = [("sensor".to_owned(), 0.997)].into();
+            place.probability = LocationProbabilities {
+                sensor: 0.997,
+                ..LocationProbabilities::default()
+            };
         }
     }
     let story = gap_story(&document).join("\n").replace('\u{a0}', " ");
@@ -201,7 +218,7 @@ fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
 
 #[test]
 fn regress_of_a_free_beam_no_joint_is_said_to_be_refitted() {
-    let mut document = gap_with("not-enough-data");
+    let mut document = gap_with(Verdict::NotEnoughData("too few data".into()));
     if let Some(gap) = &mut document.gap {
         gap.hypotheses[1].probability = 0.01;
     }
@@ -217,20 +234,20 @@ fn regress_of_a_free_beam_no_joint_is_said_to_be_refitted() {
 #[test]
 fn regress_a_change_as_large_as_is_looked_for_is_a_bound() {
     let told = |at_bound: bool| {
-        let mut document = gap_with("unknown");
+        let mut document = gap_with(Verdict::Unknown);
         if let Some(gap) = &mut document.gap {
-            gap.along_decays = Some(AlongDecaysSection {
-                effect: Some("joint-nonlinearity".into()),
+            gap.along_decays = Some(AmplitudeDependence {
+                effect: Some(EffectId::JointNonlinearity),
                 lawful: true,
                 ratio: -0.7,
                 ratio_std: 0.01,
                 at_bound,
-                changes: vec![DecayChangeSection {
+                changes: vec![FrequencyChange {
                     mode: 1,
                     std: 0.1,
-                    ..DecayChangeSection::default()
+                    ..FrequencyChange::default()
                 }],
-                ..AlongDecaysSection::default()
+                ..AmplitudeDependence::default()
             });
         }
         gap_story(&document).join("\n")
@@ -241,7 +258,7 @@ fn regress_a_change_as_large_as_is_looked_for_is_a_bound() {
 
 #[test]
 fn regress_what_drift_explains_is_said_beside_what_an_effect_does() {
-    let mut document = gap_with("set");
+    let mut document = gap_with(undecided());
     let told = |document: &Document| gap_story(document).join(" ");
     let drift = "where a joint that drifts and the tolerances leave 0.050 %";
     assert!(told(&document).contains(drift), "{}", told(&document));
@@ -264,7 +281,7 @@ fn regress_what_drift_explains_is_said_beside_what_an_effect_does() {
 
 #[test]
 fn regress_the_table_says_why_none_leaves_less_than_the_described_model() {
-    let mut document = gap_with("set");
+    let mut document = gap_with(undecided());
     let note = |document: &Document| hypotheses(document).unwrap().note;
     assert!(note(&document).contains("geometry, shear and masses exactly as described"));
     assert!(note(&document).contains("the estimate, which weighs all modes, may differ"));
@@ -274,7 +291,7 @@ fn regress_the_table_says_why_none_leaves_less_than_the_described_model() {
     let gap = document.gap.as_mut().unwrap();
     gap.fitted_modes = Some(5);
     let pulls = &mut gap.place.as_mut().unwrap().modes;
-    pulls.push(PullSection {
+    pulls.push(Residual {
         recording: "low.wav".into(),
         ..pulls[0].clone()
     });
@@ -284,7 +301,7 @@ fn regress_the_table_says_why_none_leaves_less_than_the_described_model() {
 
 #[test]
 fn regress_a_terminal_explains_the_columns_of_the_diagnosis() {
-    let said = render_text(&gap_with("set"));
+    let said = render_text(&gap_with(undecided()));
     let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in ["Ranked by one over the other", "Fitted, withheld: errors"] {
         assert!(said.contains(part), "{part} is missing in:\n{said}");
@@ -294,9 +311,9 @@ fn regress_a_terminal_explains_the_columns_of_the_diagnosis() {
 #[test]
 fn regress_no_gap_beside_a_misfit_says_so() {
     let story = |goodness: f64| {
-        let mut told = gap_with("no-gap");
+        let mut told = gap_with(Verdict::NoGap);
         let all = told.gap.iter_mut().flat_map(|gap| &mut gap.hypotheses);
-        for none in all.filter(|found| found.effect == "none") {
+        for none in all.filter(|found| found.hypothesis == Hypothesis::None) {
             none.goodness_of_fit = Some(goodness);
         }
         gap_story(&told)[0].clone()
@@ -316,25 +333,24 @@ fn regress_no_gap_beside_a_misfit_says_so() {
 /// All digits are those that the interval supports, and nothing is said of what is not missing.
 #[test]
 fn val_the_short_answer_has_the_joint_with_its_interval_and_the_next_test() {
-    let said = |kind: &str| {
-        let mut document = gap_with(kind);
+    let said = |verdict: Verdict| {
+        let mut document = gap_with(verdict);
         let gap = document.gap.as_mut().unwrap();
-        gap.verdict.effects = vec!["joint-damping".into()];
         gap.hypotheses[0].joint = Some([1.9954e6, f64::INFINITY]);
         gap.hypotheses[0].joint_intervals = [Some([1.9906e6, 2.0001e6]), None];
         gap_in_short(&document).join("\n").replace('\u{a0}', " ")
     };
-    let named = said("named");
+    let named = said(named());
     let answer = "With joint-damping the errors of the frequencies shrink from 2.0 to 0.050 % (rms), and the joint is \
                   Kt = 1.9954 MN/m (95 %: 1.9906 to 2.0001), Kr = \u{221e} (rigid).\nTo confirm it: weigh the sensor";
     assert!(named.starts_with(answer), "{named:?}");
-    assert_eq!(said("no-gap"), "");
+    assert_eq!(said(Verdict::NoGap), "");
 }
 
 #[test]
 fn regress_a_joint_that_has_moved_is_said_where_nothing_is_missing() {
     let told = |after: f64| {
-        let mut document = gap_with("no-gap");
+        let mut document = gap_with(Verdict::NoGap);
         let gap = document.gap.as_mut().unwrap();
         gap.noise_floor = Some(0.01);
         gap.hypotheses[1].gap_after = Some(after);
@@ -353,14 +369,14 @@ fn regress_a_joint_that_has_moved_is_said_where_nothing_is_missing() {
 #[test]
 fn regress_a_change_of_one_frequency_alone_is_nobodys() {
     let told = |enough: bool| {
-        let mut document = gap_with("unknown");
-        document.gap.as_mut().unwrap().along_decays = Some(AlongDecaysSection {
+        let mut document = gap_with(Verdict::Unknown);
+        document.gap.as_mut().unwrap().along_decays = Some(AmplitudeDependence {
             enough,
-            changes: vec![DecayChangeSection {
+            changes: vec![FrequencyChange {
                 std: 0.1,
-                ..DecayChangeSection::default()
+                ..FrequencyChange::default()
             }],
-            ..AlongDecaysSection::default()
+            ..AmplitudeDependence::default()
         });
         gap_story(&document).join("\n")
     };
@@ -370,20 +386,21 @@ fn regress_a_change_of_one_frequency_alone_is_nobodys() {
 
 #[test]
 fn regress_the_table_has_the_size_told_apart_and_the_baseline() {
-    let mut document = gap_with("named");
+    let mut document = gap_with(named());
     let gap = document.gap.as_mut().unwrap();
-    let mass = ParameterSection {
+    gap.hypotheses[0].hypothesis = Hypothesis::Effects(vec![EffectId::SensorMass]);
+    gap.hypotheses[0].parameters = vec![ParameterValue {
+        effect: EffectId::SensorMass,
+        name: "mass",
         value: 0.024,
         std: Some(0.001),
-        smallest_isolable: Some(0.0051),
-        ..ParameterSection::default()
-    };
-    gap.hypotheses[0].effect = "sensor-mass".into();
-    gap.hypotheses[0].parameters = [("mass".to_owned(), mass)].into();
+        smallest_detectable: None,
+        smallest_separable: Some(0.0051),
+    }];
     gap.baselines = vec![BaselineSection {
-        name: "scale".into(),
+        name: Baseline::Scale,
         gap_after: Some(0.71),
-        withheld_after: Some(0.93),
+        holdout_after: Some(0.93),
     }];
     let table = hypotheses(&document).unwrap();
     let place = |name: &str| {

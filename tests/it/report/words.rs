@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 use tapjoint::report::document::{
-    AverageSection, ChannelSection, Document, ModeSection, MonteCarloSection, PredictionSection,
-    TapSection, ValueSection, WarningSection,
+    AverageSection, ChannelSection, Document, Method, ModeSection, MonteCarloSection,
+    PredictionSection, ReadBy, TapSection, ValueSection, WarningSection,
 };
 use tapjoint::report::tables::parameters;
 use tapjoint::report::{
@@ -655,7 +655,7 @@ fn val_averages_and_monte_carlo_are_shown() {
     };
     let document = Document {
         perturbation_averages: Some(vec![AverageSection {
-            method: "pairs".into(),
+            method: Method::Pairs,
             kx_of_mean_percent: Some(0.011),
             ky_of_mean_percent: Some(0.012),
             kz_of_mean_percent: None,
@@ -665,7 +665,7 @@ fn val_averages_and_monte_carlo_are_shown() {
             kz_percent: None,
         }]),
         monte_carlo: Some(vec![MonteCarloSection {
-            method: "pairs".into(),
+            method: Method::Pairs,
             cloud: Vec::new(),
             samples: 2000,
             failed: 3,
@@ -829,7 +829,10 @@ fn regress_a_mode_without_a_fit_is_named_in_the_note() {
     let modes = document.modes.as_mut().expect("modes");
     let numbered = modes.iter_mut().filter(|mode| mode.mode.is_some());
     for (index, mode) in numbered.enumerate() {
-        mode.method = if index == 1 { "interpolated" } else { "fit" }.to_owned();
+        mode.method = match index {
+            1 => ReadBy::Interpolated,
+            _ => ReadBy::Fit,
+        };
     }
     let text = render_text(&document).replace('\n', " ");
     assert!(

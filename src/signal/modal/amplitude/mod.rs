@@ -23,6 +23,9 @@
 //! thousandths of it and is left in. A neighbour that nobody listed nearer than about the half-power width
 //! cannot be told from a drift by one decay.
 
+use super::from_one;
+use schemars::JsonSchema;
+use serde::Serialize;
 mod band;
 mod decay_model;
 mod trend;
@@ -91,9 +94,10 @@ impl Default for AmplitudeSettings {
 }
 
 /// One segment of one decay.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudePoint {
-    /// Which decay (0-based).
+    /// Number of the tap, from 0; in outputs from 1.
+    #[serde(serialize_with = "from_one")]
     pub tap: usize,
     /// Time after the tap (s).
     pub time: f64,
@@ -104,6 +108,7 @@ pub struct AmplitudePoint {
     /// Its standard uncertainty (Hz).
     pub frequency_std: f64,
     /// Damping ratio (1).
+    #[serde(rename = "damping")]
     pub damping_ratio: f64,
     /// Its standard uncertainty (1).
     pub damping_std: f64,
@@ -132,7 +137,8 @@ pub enum Origin {
 }
 
 /// What a curve says.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(into = "&'static str")]
 pub enum AmplitudeVerdict {
     /// Frequency or damping changes along the decay by more than its uncertainty.
     Changes,
@@ -151,6 +157,18 @@ pub enum AmplitudeVerdict {
     },
     /// Fewer points than a trend needs.
     TooFewPoints,
+}
+
+impl From<AmplitudeVerdict> for &'static str {
+    fn from(verdict: AmplitudeVerdict) -> &'static str {
+        match verdict {
+            AmplitudeVerdict::Changes => "changes",
+            AmplitudeVerdict::Steady => "steady",
+            AmplitudeVerdict::Beating { .. } => "beating",
+            AmplitudeVerdict::Unresolved { .. } => "unresolved",
+            AmplitudeVerdict::TooFewPoints => "too-few-points",
+        }
+    }
 }
 
 /// Frequency and damping of one mode against amplitude.

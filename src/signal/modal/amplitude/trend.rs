@@ -2,6 +2,8 @@
 //!
 //! Weighted polynomials with covariance.
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
@@ -29,25 +31,31 @@ const BEYOND: f64 = 0.1;
 const BEYOND_TIME: f64 = 0.5;
 
 /// One quantity (frequency in Hz, or damping ratio) against log amplitude.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Trend {
     /// Change per e-fold of the amplitude (unit of the quantity): slope of the weighted straight line.
+    #[serde(skip)]
     pub slope: f64,
     /// Its standard uncertainty, scatter of the points about the line included.
+    #[serde(skip)]
     pub slope_std: f64,
-    /// Probability of a slope at least as large without any change (Student's test).
-    pub p_value: f64,
     /// Scatter of the points about the curve over their own uncertainties; above 1 they differ by more
     /// than noise (between taps: the structure changed).
+    #[serde(skip)]
     pub scatter: f64,
     /// Value at the largest amplitude: the first usable time of the hardest tap.
+    #[serde(skip)]
     pub first: f64,
     /// Value at the smallest amplitude: the last usable time of some tap.
+    #[serde(skip)]
     pub last: f64,
     /// Last less first.
     pub change: f64,
     /// 95 % bound of the change.
     pub change_bound: f64,
+    /// Probability of a slope at least as large without any change (Student's test).
+    pub p_value: f64,
+    #[serde(skip)]
     curve: Curve,
 }
 

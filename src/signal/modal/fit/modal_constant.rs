@@ -2,7 +2,10 @@
 
 use nalgebra::{Matrix2, Vector2};
 use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::Serialize;
 
+use super::super::from_one;
 use super::mode_fit::{ColumnAmplitude, ModeFit};
 use crate::recording::ResponseForm;
 
@@ -20,9 +23,10 @@ pub struct TapForce {
 }
 
 /// Modal constant of one sensor and tap place.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct ModalConstant {
-    /// Number of the sensor.
+    /// Number of the sensor, from 0; in outputs from 1, in the order of the recording's responses.
+    #[serde(serialize_with = "from_one")]
     pub sensor: usize,
     /// A (1/kg for a sensor in SI units) in the receptance A/(omega_n^2 - omega^2 + 2 j zeta omega_n
     /// omega): product of the mass-normalised shapes at sensor and tap, with its sign.
@@ -32,6 +36,7 @@ pub struct ModalConstant {
     /// Phase of A away from the real axis (degrees, -90 to 90): 0 for a real mode.
     pub phase_deviation: f64,
     /// Number of taps used.
+    #[serde(skip)]
     pub taps: usize,
 }
 

@@ -3,6 +3,9 @@
 //! The standard deviation of a frequency or damping comes from the noise that the fit leaves, or from the
 //! scatter of the taps where that is larger.
 
+use super::super::from_one;
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, Matrix2};
@@ -24,11 +27,13 @@ const CORRELATED: f64 = 3.0;
 const TAP_STEPS: usize = 6;
 
 /// Origin of a standard deviation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum UncertaintySource {
     /// The noise that the fit leaves on the lines.
     Residual,
     /// The scatter of the taps, where it exceeds that noise.
+    #[serde(rename = "taps")]
     TapScatter,
 }
 
@@ -52,15 +57,17 @@ pub struct FittedValue {
 }
 
 /// Frequency and damping of one tap alone.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct TapFit {
-    /// Number of the tap.
+    /// Number of the tap, from 0; in outputs from 1.
+    #[serde(serialize_with = "from_one")]
     pub tap: usize,
     /// Natural frequency (Hz).
     pub frequency: f64,
     /// Standard deviation of the frequency from the noise (Hz).
     pub frequency_std: f64,
     /// Damping ratio.
+    #[serde(rename = "damping")]
     pub damping_ratio: f64,
     /// Standard deviation of the damping ratio from the noise.
     pub damping_std: f64,

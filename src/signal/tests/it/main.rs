@@ -1,4 +1,4 @@
-//! Tests of measurement alone: one module per stage.
+//! Tests of measurement: one module per stage, with files that the tests write and with recordings by others.
 
 #![allow(clippy::unwrap_used, reason = "in a test a panic is the message")]
 
@@ -7,6 +7,10 @@ mod modal_fit;
 mod modal_matrix_pencil;
 mod modal_polyreference;
 mod quality;
+mod recording;
+mod recording_uff;
+mod shared;
 mod spectral;
 mod spectral_frf;
 mod taps;
+mod written;

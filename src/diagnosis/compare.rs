@@ -1,0 +1,409 @@
+//! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
+
+use crate::amplitude::{set_joint_motions, set_levels};
+use crate::dataset::{Dataset, ObservableKind};
+use crate::effect_pairs::{add_pairs, stands};
+use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
+use crate::fit::{Search, fit_nominal};
+use crate::forward::Forward;
+use crate::multi_start::add_by_multi_start;
+use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effects};
+use crate::posterior::{Candidate, set_probabilities};
+use crate::result::{Hypothesis, UnlocatedSensors};
+use crate::settings::{GapError, GapSettings};
+use crate::structure::{Nominal, NominalSensor};
+use crate::validate::Residuals;
+use rayon::prelude::*;
+use tapjoint_beam::effects::EffectId;
+use tapjoint_identify::observation::Observations;
+use tapjoint_numerics::stats::root_mean_square;
+
+/// Fits of all hypotheses.
+pub struct ModelComparison {
+    /// The data.
+    pub dataset: Dataset,
+    /// Nominal model as described, only its joint refitted, which is the same in all set-ups: the gap is
+    /// measured from it.
+    pub described: Fit,
+    /// Described model with a joint and a temperature that may differ between set-ups, as they may under every
+    /// hypothesis: no effect is credited with what these explain of hold-out data.
+    pub drifting: Fit,
+    /// Drifting model with masses that may differ from the stated ones: causes along the beam are searched from it.
+    pub baseline: Fit,
+    /// Hypotheses, the most probable first.
+    pub candidates: Vec<Candidate>,
+}
+
+/// Fits all hypotheses.
+///
+/// # Errors
+/// [`GapError::NoFit`] where the nominal model has no fit.
+pub fn compare(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Result<ModelComparison, GapError> {
+    let all: Vec<ModelComparison> = with_locations(observations, nominal, settings)
+        .iter()
+        .filter_map(|located| compare_singles(located, nominal, settings))
+        .collect();
+    let mut comparison = over_locations(all).ok_or(GapError::NoFit)?;
+    set_probabilities(&mut comparison.candidates, 0);
+    add_pairs(&comparison.dataset, &mut comparison.candidates);
+    Ok(comparison)
+}
+
+/// Returns the observations with the described sensors where they name none: given frequencies were
+/// read with all of them somewhere.
+fn with_sensors(observations: &Observations, nominal: &Nominal) -> Observations {
+    let mut filled = observations.clone();
+    for configuration in &mut filled.configurations {
+        if configuration.sensors.is_empty() && configuration.recording.is_none() {
+            let sensors = nominal.sensors.iter();
+            configuration.sensors = sensors.map(NominalSensor::observed).collect();
+        }
+    }
+    filled
+}
+
+/// Returns the observations with every unknown position of a sensor filled in: once each for a row of positions along
+/// the structure.
+fn with_locations(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Vec<Observations> {
+    let filled = with_sensors(observations, nominal);
+    // A sensor without a position and without a mass has no effect.
+    let mut sensors = filled.configurations.iter().flat_map(|c| &c.sensors);
+    if !sensors.any(|s| s.position.is_none() && nominal.mass_of(&s.name) > 0.0) {
+        return vec![filled];
+    }
+    let mut all = Vec::new();
+    for k in 0..settings.unknown_positions {
+        let position = nominal.length() * (k as f64 + 0.5) / settings.unknown_positions as f64;
+        let mut located = filled.clone();
+        for configuration in &mut located.configurations {
+            for sensor in &mut configuration.sensors {
+                sensor.position.get_or_insert(position);
+            }
+        }
+        all.push(located);
+    }
+    all
+}
+
+/// Returns the largest evidence of all candidates.
+fn best_evidence(candidates: &[Candidate]) -> f64 {
+    let evidences = candidates.iter().map(|one| one.fit.log_evidence);
+    evidences.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Averages the evidence over the locations of sensors; fits and residuals are those of the location that explains most.
+fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
+    let mut averages: Vec<(Hypothesis, f64)> = Vec::new();
+    for candidate in &all.first()?.candidates {
+        let hypothesis = &candidate.hypothesis;
+        let same = all.iter().filter_map(|one| {
+            let mut candidates = one.candidates.iter();
+            candidates.find(|one| one.hypothesis == *hypothesis)
+        });
+        let mut logs: Vec<f64> = same.map(|one| one.fit.log_evidence).collect();
+        // A fit that failed has no evidence.
+        logs.resize(all.len(), f64::NEG_INFINITY);
+        let log = if all.len() > 1 {
+            log_mean(&logs)
+        } else {
+            logs[0]
+        };
+        averages.push((hypothesis.clone(), log));
+    }
+    let mut best: Option<(f64, ModelComparison)> = None;
+    for one in all {
+        let own = best_evidence(&one.candidates);
+        if best.as_ref().is_none_or(|(most, _)| own > *most) {
+            best = Some((own, one));
+        }
+    }
+    let (_, mut best) = best?;
+    for candidate in &mut best.candidates {
+        let average = averages.iter().find(|one| one.0 == candidate.hypothesis);
+        if let Some((_, log)) = average {
+            candidate.fit.log_evidence = *log;
+        }
+    }
+    Some(best)
+}
+
+/// Returns the least chi square of the nominal model over the unknown positions of sensors.
+pub fn least_nominal_chi_square(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<f64> {
+    with_locations(observations, nominal, settings)
+        .iter()
+        .filter_map(|located| Some(prepared(located, nominal, settings)?.1))
+        .map(|none| 2.0 * none.best.optimum.objective)
+        .min_by(f64::total_cmp)
+}
+
+/// Returns the data, with amplitudes and slopes by the nominal model, and the fit of that model.
+fn prepared(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<(Dataset, Fit)> {
+    let mut dataset = Dataset::new(observations, nominal, settings);
+    let first = fit_nominal(&dataset)?;
+    set_levels(&mut dataset, &first);
+    set_joint_motions(&mut dataset, observations, &first);
+    set_shear_slopes(&mut dataset, &first)?;
+    dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);
+    let none = fit_nominal(&dataset)?;
+    Some((dataset, none))
+}
+
+/// Number of modes that a next test may add.
+pub const MORE_MODES: usize = 2;
+
+/// Sets the slopes with respect to shear and rotary inertia at an optimum of the nominal model; none for Euler's beam.
+///
+/// `None` where the model has no solution.
+pub fn set_shear_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
+    if dataset.nominal.specimen.shear_rotary > 0.0 {
+        let mut planned = dataset.clone();
+        planned.modes += MORE_MODES;
+        let models = Forward::new(&planned, &[]).solve(nominal.parameters())?;
+        dataset.shear_slopes = models.first()?.shear_slopes(planned.modes)?;
+    }
+    Some(())
+}
+
+/// Fits all hypotheses but pairs of effects.
+fn compare_singles(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<ModelComparison> {
+    let (dataset, none) = prepared(observations, nominal, settings)?;
+    let effects = candidate_effects(&dataset.nominal, &dataset.arrangements);
+    let search = Search {
+        dataset: &dataset,
+        without: &none,
+    };
+    let fits: Vec<Option<Fit>> = effects.par_iter().map(|one| search.add(*one)).collect();
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (effect, fit) in effects.iter().zip(fits) {
+        candidates.extend(fit.map(|fit| single(effect.effect, fit)));
+    }
+    let one_stands = candidates.iter().any(|one| stands(&dataset, &one.fit));
+    if !one_stands && !stands(&dataset, &none) {
+        add_large_effects(&search, &effects, &mut candidates);
+    }
+    if let Some((fit, drift)) = fit_drift(&dataset, &none) {
+        let mut candidate = single(EffectId::JointDrift, fit);
+        candidate.drift = Some(drift);
+        candidates.push(candidate);
+    }
+    if let Some(fit) = fit_unknown(&dataset, &none) {
+        candidates.push(Candidate::new(Hypothesis::Unknown, fit));
+    }
+    let baseline = fit_exact(&dataset, is_geometry);
+    let baseline = baseline.unwrap_or_else(|| none.clone());
+    let drifting = fit_exact(&dataset, is_described);
+    let drifting = drifting.unwrap_or_else(|| baseline.clone());
+    let described = fit_described(&dataset).unwrap_or_else(|| drifting.clone());
+    candidates.push(Candidate::new(Hypothesis::None, none));
+    Some(ModelComparison {
+        dataset,
+        described,
+        drifting,
+        baseline,
+        candidates,
+    })
+}
+
+fn single(effect: EffectId, fit: Fit) -> Candidate {
+    Candidate::new(Hypothesis::Effects(vec![effect]), fit)
+}
+
+/// Searches every effect again by multi-start, if no single one suffices: it may be larger than a search from zero
+/// can reach.
+fn add_large_effects(
+    search: &Search<'_>,
+    effects: &[CandidateEffect],
+    candidates: &mut Vec<Candidate>,
+) {
+    let found: Vec<Option<Fit>> = effects
+        .par_iter()
+        .map(|effect| {
+            let known = candidates
+                .iter()
+                .find(|one| one.effects() == [effect.effect]);
+            add_by_multi_start(search, *effect, known.map(|one| &one.fit))
+        })
+        .collect();
+    for (effect, fit) in effects.iter().zip(found) {
+        let Some(fit) = fit else { continue };
+        let mut known = candidates.iter_mut();
+        match known.find(|one| one.effects() == [effect.effect]) {
+            Some(one) if fit.log_evidence > one.fit.log_evidence => one.fit = fit,
+            Some(_) => {}
+            None => candidates.push(single(effect.effect, fit)),
+        }
+    }
+}
+
+/// Standard deviation (1) of a parameter that is taken as exact: far below the resolution of any datum.
+const EXACT: f64 = 1e-8;
+
+/// Fits the nominal model with some nuisance parameters taken as exact.
+fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) -> Option<Fit> {
+    let mut exact = dataset.clone();
+    for nuisance in &mut exact.nuisances {
+        if is_exact(nuisance.parameter) {
+            nuisance.std = EXACT;
+        }
+    }
+    fit_nominal(&exact)
+}
+
+/// Fits the described model with a joint and a temperature that are the same in all set-ups.
+fn fit_described(dataset: &Dataset) -> Option<Fit> {
+    let mut dataset = dataset.clone();
+    dataset.settings.drift_stds = vec![EXACT];
+    fit_exact(&dataset, |nuisance| {
+        is_described(nuisance) || matches!(nuisance, NuisanceParameter::Temperature { .. })
+    })
+}
+
+/// Returns whether a description states a nuisance parameter.
+fn is_described(nuisance: NuisanceParameter) -> bool {
+    use NuisanceParameter::{FastenedMass, SensorInertia, SensorMass};
+    is_geometry(nuisance)
+        || matches!(
+            nuisance,
+            SensorMass { .. } | SensorInertia { .. } | FastenedMass { .. }
+        )
+}
+
+fn is_geometry(nuisance: NuisanceParameter) -> bool {
+    matches!(
+        nuisance,
+        NuisanceParameter::Scale | NuisanceParameter::Shear
+    )
+}
+
+/// Spreads of a discrepancy that no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
+const DISCREPANCIES: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
+
+/// Fits a discrepancy outside the catalogue: every mode's frequency off by an amount of its own,
+/// the same in all configurations, with a tenth of it for each datum and twice of it in the shapes.
+fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
+    let mut found: Vec<LocalOptimum> = Vec::new();
+    for spread in DISCREPANCIES {
+        let loose = with_discrepancy(dataset, spread);
+        let forward = Forward::new(&loose, &[]);
+        let priors = forward.priors();
+        let mut start = nominal.parameters().to_vec();
+        start.resize(priors.len(), 0.0);
+        found.extend(evaluate(&forward, &priors, &start));
+    }
+    let all: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
+    let best = found
+        .into_iter()
+        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+    Some(Fit {
+        effects: Vec::new(),
+        best,
+        log_evidence: log_mean(&all),
+    })
+}
+
+/// Returns the data if no prediction is better than `spread`.
+fn with_discrepancy(dataset: &Dataset, spread: f64) -> Dataset {
+    let mut loose = dataset.clone();
+    for mode in 1..=dataset.fitted_modes {
+        loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
+    }
+    let pairs = dataset.observables.iter().zip(&dataset.data);
+    let shapes = pairs.filter(|(observable, _)| observable.is_shape());
+    let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
+    let size = root_mean_square(&values);
+    for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
+        let extra = match observable.kind {
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => 2.0 * spread * size,
+            // Damping may be anything if the cause is not known.
+            ObservableKind::Damping => 50.0 * spread,
+            ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
+        };
+        datum.std = datum.std.hypot(extra);
+    }
+    loose
+}
+
+/// Spreads of the joint between set-ups that are no longer a nuisance (1).
+const LARGE_DRIFTS: [f64; 3] = [0.04, 0.07, 0.12];
+
+/// Fits the nominal model with a joint that differs from set-up to set-up; returns the spread too.
+fn fit_drift(dataset: &Dataset, nominal: &Fit) -> Option<(Fit, f64)> {
+    dataset.first_drift()?;
+    let layout = dataset.layout(&[]);
+    let (priors, optimum) = (&nominal.best.priors, &nominal.best.optimum);
+    let mut all = Vec::new();
+    let mut best: Option<(LocalOptimum, f64)> = None;
+    for drift in LARGE_DRIFTS {
+        let found = over_drifts(dataset, &layout, priors, optimum, &[drift]);
+        all.push(found.log_evidence);
+        if best
+            .as_ref()
+            .is_none_or(|(best, _)| found.log_evidence > best.log_evidence)
+        {
+            best = Some((found, drift));
+        }
+    }
+    let (best, drift) = best?;
+    let fit = Fit {
+        effects: Vec::new(),
+        best,
+        log_evidence: log_mean(&all),
+    };
+    Some((fit, drift))
+}
+
+/// Fits the nominal model without the masses that have no position in any recording; `None` where there are none.
+pub fn without_unlocated(
+    observations: &Observations,
+    nominal: &Nominal,
+    settings: &GapSettings,
+) -> Option<UnlocatedSensors> {
+    let observations = with_sensors(observations, nominal);
+    let mut without = nominal.clone();
+    let (mut sensors, mut mass) = (Vec::new(), 0.0);
+    for sensor in &mut without.sensors {
+        let observed = observations.configurations.iter().flat_map(|c| &c.sensors);
+        let mut positions = observed
+            .filter(|observed| observed.name == sensor.name)
+            .map(|observed| observed.position)
+            .peekable();
+        let is_observed = positions.peek().is_some();
+        let own = sensor.mass.unwrap_or(0.0);
+        if own > 0.0 && is_observed && positions.all(|position| position.is_none()) {
+            sensors.push(sensor.name.clone());
+            mass += own;
+            sensor.mass = Some(0.0);
+        }
+    }
+    if sensors.is_empty() {
+        return None;
+    }
+    let (dataset, fit) = prepared(&observations, &without, settings)?;
+    let residuals = Residuals::new(&dataset, &fit)?;
+    Some(UnlocatedSensors {
+        sensors,
+        mass,
+        gap: residuals.frequency_rms(&dataset),
+        goodness_of_fit: residuals.goodness()?,
+    })
+}

@@ -1,0 +1,658 @@
+//! The data that are compared with predictions, their uncertainties, and the nuisance parameters that every
+//! hypothesis shares.
+//!
+//! A standard deviation from five taps is itself known to a third. The data of one kind share their common
+//! value (Smyth 2004, "Linear models and empirical Bayes methods", section 6.2): their
+//! variances are taken as draws from a scaled inverse chi-square distribution whose own two parameters
+//! are estimated from all of them, and each is moved towards the common value as far as its repeats allow.
+//! The remaining uncertainty makes the likelihood a Student t one, never a Gaussian.
+
+use crate::observations::{
+    UnpairedPeaks, average_std, constant_model_std, highest_mode, split_pole, up_to,
+};
+use crate::parameters::{
+    CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior, priors, with_drift,
+};
+use crate::settings::GapSettings;
+use crate::structure::{Arrangement, ELEMENTS, Inventory, Nominal};
+use crate::thresholds::DISTINCT_AMPLITUDES;
+use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::function::gamma::{digamma, ln_gamma};
+use tapjoint_identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
+use tapjoint_numerics::stats::root_mean_square;
+
+/// Quantity that is observed and predicted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Observable {
+    /// Kind of quantity.
+    pub kind: ObservableKind,
+    /// Index of its configuration; 0 for a damping ratio, which belongs to all configurations together.
+    pub configuration: usize,
+    /// Number of its mode.
+    pub mode: usize,
+}
+
+/// Kind of an observable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObservableKind {
+    /// Logarithm of a natural frequency.
+    Frequency,
+    /// Modal constant at a sensor and the tap (1/kg).
+    Constant { sensor: usize },
+    /// Shape at a sensor over that at the reference sensor (1).
+    Ratio { sensor: usize, reference: usize },
+    /// Logarithm of a damping ratio.
+    Damping,
+    /// Change of the logarithm of a frequency per e-fold of the amplitude along the decay (1).
+    Slope,
+}
+
+impl Observable {
+    /// Returns a natural frequency.
+    pub fn frequency(configuration: usize, mode: usize) -> Self {
+        Observable {
+            kind: ObservableKind::Frequency,
+            configuration,
+            mode,
+        }
+    }
+
+    /// Returns another quantity of the same mode.
+    fn with_kind(self, kind: ObservableKind) -> Self {
+        Observable { kind, ..self }
+    }
+
+    /// Returns whether it is a natural frequency.
+    pub fn is_frequency(&self) -> bool {
+        self.kind == ObservableKind::Frequency
+    }
+
+    /// Returns whether it is a change along the decay.
+    pub fn is_slope(&self) -> bool {
+        self.kind == ObservableKind::Slope
+    }
+
+    /// Returns whether it is a damping ratio.
+    pub fn is_damping(&self) -> bool {
+        self.kind == ObservableKind::Damping
+    }
+
+    /// Returns whether it is a modal constant or a ratio of a shape.
+    pub fn is_shape(&self) -> bool {
+        matches!(
+            self.kind,
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. }
+        )
+    }
+}
+
+/// Measured value with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Datum {
+    /// Value.
+    pub value: f64,
+    /// Standard uncertainty (unit of the value).
+    pub std: f64,
+    /// Degrees of freedom of that uncertainty: taps less one, infinite where it is stated and not
+    /// estimated.
+    pub freedom: f64,
+}
+
+/// Degrees of freedom beyond which Student's t is taken as the normal distribution: their tails
+/// differ by less than 1 % at five standard deviations.
+const NORMAL_FREEDOM: f64 = 2000.0;
+
+impl Datum {
+    /// Returns the datum of an observed value.
+    fn new(value: f64, std: f64, freedom: Option<f64>) -> Self {
+        Datum {
+            value,
+            std,
+            freedom: freedom.unwrap_or(f64::INFINITY),
+        }
+    }
+
+    /// Returns (value - predicted)/std.
+    pub fn residual(&self, predicted: f64) -> f64 {
+        (self.value - predicted) / self.std
+    }
+
+    /// Adds a standard uncertainty that is known, not estimated: the degrees of freedom grow with its share
+    /// (Welch & Satterthwaite).
+    pub fn inflate_std(&mut self, known: f64) {
+        let wider = self.std.hypot(known);
+        if wider > self.std {
+            self.freedom *= (wider / self.std).powi(4);
+            self.std = wider;
+        }
+    }
+
+    /// Returns the logarithm of Student's t density of a residual (in standard deviations) over its value at 0.
+    pub fn log_density_drop(&self, residual: f64) -> f64 {
+        if self.freedom >= NORMAL_FREEDOM {
+            return -0.5 * residual * residual;
+        }
+        -0.5 * (self.freedom + 1.0) * (residual * residual / self.freedom).ln_1p()
+    }
+
+    /// Returns the logarithm of the density at residual 0.
+    pub fn log_density_peak(&self) -> f64 {
+        let shape = if self.freedom >= NORMAL_FREEDOM {
+            -0.5 * (2.0 * std::f64::consts::PI).ln()
+        } else {
+            ln_gamma(0.5 * (self.freedom + 1.0))
+                - ln_gamma(0.5 * self.freedom)
+                - 0.5 * (self.freedom * std::f64::consts::PI).ln()
+        };
+        shape - self.std.ln()
+    }
+
+    /// Returns the weight of a residual in iteratively reweighted least squares, (n + 1)/(n + r^2).
+    pub fn weight(&self, residual: f64) -> f64 {
+        if self.freedom >= NORMAL_FREEDOM {
+            return 1.0;
+        }
+        (self.freedom + 1.0) / (self.freedom + residual * residual)
+    }
+
+    /// Returns the square of the normal deviate that is as improbable as this residual under Student's t.
+    pub fn gaussian_square(&self, residual: f64) -> f64 {
+        if self.freedom >= NORMAL_FREEDOM {
+            return residual * residual;
+        }
+        let student = StudentsT::new(0.0, 1.0, self.freedom);
+        let (Ok(student), Ok(normal)) = (student, Normal::new(0.0, 1.0)) else {
+            return residual * residual;
+        };
+        // Beyond 1e-14 the tail is no longer resolved: it is 7.7 standard deviations.
+        let tail = student.cdf(-residual.abs()).clamp(1e-14, 0.5);
+        normal.inverse_cdf(tail).powi(2)
+    }
+}
+
+/// Moves the standard deviations of data of one kind towards their common value; those
+/// without degrees of freedom of their own (stated ones) stay.
+///
+/// `std` and `freedom` of each datum are replaced; `std` must be relative to a scale on which the
+/// data can be compared.
+fn moderate(data: &mut [Datum]) {
+    let estimated: Vec<Datum> = (data.iter().copied())
+        .filter(|datum| datum.freedom < NORMAL_FREEDOM && datum.std > 0.0)
+        .collect();
+    // Two variances do not show how variances scatter.
+    if estimated.len() < 3 {
+        return;
+    }
+    // E ln(chi2_n / n) = psi(n/2) - ln(n/2): the rest of ln s^2 is ln sigma^2 and its scatter.
+    let logs: Vec<f64> = estimated
+        .iter()
+        .map(|r| (r.std * r.std).ln() - digamma(0.5 * r.freedom) + (0.5 * r.freedom).ln())
+        .collect();
+    let count = logs.len() as f64;
+    let mean = logs.iter().sum::<f64>() / count;
+    let scatter = logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let by_chance = estimated.iter().map(|r| trigamma(0.5 * r.freedom));
+    let chance = by_chance.sum::<f64>() / count;
+    let common_freedom = if scatter > chance {
+        2.0 * inverse_trigamma(scatter - chance)
+    } else {
+        // No more scatter than chance: one variance for all, known as well as all together know it.
+        estimated.iter().map(|r| r.freedom).sum::<f64>()
+    };
+    let common = (mean + digamma(0.5 * common_freedom) - (0.5 * common_freedom).ln()).exp();
+    for datum in data {
+        if datum.freedom < NORMAL_FREEDOM {
+            let total = common_freedom + datum.freedom;
+            let own = datum.freedom * datum.std * datum.std;
+            datum.std = ((common_freedom * common + own) / total).sqrt();
+            datum.freedom = total;
+        }
+    }
+}
+
+/// Returns the probability that chi square exceeds a value; `None` without a degree of freedom.
+pub fn chi_square_tail(value: f64, freedom: f64) -> Option<f64> {
+    if freedom < 0.5 || !value.is_finite() {
+        return None;
+    }
+    let chi = ChiSquared::new(freedom).ok()?;
+    Some(chi.sf(value.max(0.0)))
+}
+
+/// Returns psi'(x) by recurrence to x > 6 and the asymptotic series (Abramowitz & Stegun 6.4.12).
+fn trigamma(mut x: f64) -> f64 {
+    let mut sum = 0.0;
+    while x < 6.0 {
+        sum += 1.0 / (x * x);
+        x += 1.0;
+    }
+    let y = 1.0 / (x * x);
+    sum + 0.5 * y + (1.0 + y * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))) / x
+}
+
+/// Returns the x > 0 with psi'(x) = value, by bisection in ln x: psi' falls from infinity to 0.
+fn inverse_trigamma(value: f64) -> f64 {
+    let (mut low, mut high) = (1e-4_f64.ln(), 1e4_f64.ln());
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if trigamma(middle.exp()) > value {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (0.5 * (low + high)).exp()
+}
+
+/// Data of a test, with its arrangements and nuisance parameters.
+#[derive(Debug, Clone)]
+pub struct Dataset {
+    /// The described structure.
+    pub nominal: Nominal,
+    /// One for each configuration.
+    pub arrangements: Vec<Arrangement>,
+    /// Observables that are fitted.
+    pub observables: Vec<Observable>,
+    /// Their data.
+    pub data: Vec<Datum>,
+    /// Nuisance parameters with their priors.
+    pub nuisances: Vec<Nuisance>,
+    /// Number of modes that are solved for.
+    pub modes: usize,
+    /// Number of elements of the structure.
+    pub elements: usize,
+    /// Settings of the diagnosis.
+    pub settings: GapSettings,
+    /// Modes above this one are held out.
+    pub fitted_modes: usize,
+    /// Frequencies that take no part in the fit.
+    pub holdout: Vec<(Observable, Datum)>,
+    /// Change of a frequency's logarithm for one standard deviation of the taps' common scatter, by configuration and
+    /// mode.
+    pub scatter: Vec<((usize, usize), f64)>,
+    /// Derivatives of the frequencies' logarithms with respect to the relative size of shear and rotary inertia, by
+    /// mode, at the nominal optimum of the first configuration: what is fastened to the beam changes
+    /// them little. They include the modes that a next test may add.
+    pub shear_slopes: Vec<f64>,
+    /// Slopes of all observables but frequencies with respect to the joint's stiffnesses, at the
+    /// nominal optimum: shapes depend little on the joint.
+    pub shape_slopes: Option<DMatrix<f64>>,
+    /// Modes with a damping ratio, and the logarithm of the frequency of each over their geometric mean.
+    pub tilts: Vec<(usize, f64)>,
+    /// Peaks of no mode.
+    pub peaks: UnpairedPeaks,
+}
+
+/// Least uncertainty of a modal constant or ratio over the root mean square of its kind (1): 1 %, the effect of
+/// modes beyond the model and of real beams.
+const SHAPE_FLOOR: f64 = 0.01;
+/// Least uncertainty of a change along the decay, in relative frequency per e-fold: the bias of the fits.
+const SLOPE_FLOOR: f64 = 5e-6;
+/// Standard deviation of the logarithm of the joint's amplitude about the one that follows from the sensors' amplitudes
+/// and the shapes: the largest rotation under the hammer is not measured, nor all modes that share in it.
+const AMPLITUDE_STD: f64 = 0.25;
+
+impl Dataset {
+    /// Takes the data from observations in which every sensor with a mass has a position.
+    pub fn new(observations: &Observations, nominal: &Nominal, settings: &GapSettings) -> Self {
+        let highest = highest_mode(observations).min(settings.highest_mode);
+        let observations = &up_to(highest, observations);
+        let held_out = if highest >= settings.withhold_from {
+            settings.withheld_modes
+        } else {
+            0
+        };
+        let mut inventory = Inventory::default();
+        let mut arrangements = Vec::new();
+        for (index, one) in observations.configurations.iter().enumerate() {
+            arrangements.push(Arrangement::new(index, one, nominal, &mut inventory));
+        }
+        let mut dataset = Dataset {
+            nominal: nominal.clone(),
+            arrangements,
+            observables: Vec::new(),
+            data: Vec::new(),
+            nuisances: Vec::new(),
+            modes: highest,
+            elements: ELEMENTS,
+            settings: settings.clone(),
+            fitted_modes: highest.saturating_sub(held_out),
+            holdout: Vec::new(),
+            scatter: Vec::new(),
+            shear_slopes: Vec::new(),
+            shape_slopes: None,
+            tilts: Vec::new(),
+            peaks: UnpairedPeaks::new(observations),
+        };
+        dataset.add_frequencies(observations);
+        dataset.add_shapes(observations);
+        dataset.add_damping(observations);
+        dataset.add_slopes(observations);
+        dataset.add_nuisances(&inventory);
+        dataset
+    }
+
+    fn push(&mut self, observable: Observable, datum: Datum) {
+        self.observables.push(observable);
+        self.data.push(datum);
+    }
+
+    fn add_frequencies(&mut self, observations: &Observations) {
+        let mut observed: Vec<(usize, &ObservedMode)> = Vec::new();
+        let mut data = Vec::new();
+        for (configuration, one) in observations.configurations.iter().enumerate() {
+            for mode in &one.modes {
+                if let Some(std) = mode.std.filter(|std| *std > 0.0) {
+                    observed.push((configuration, mode));
+                    let std = std / mode.frequency;
+                    data.push(Datum::new(mode.frequency.ln(), std, mode.freedom));
+                }
+            }
+        }
+        moderate(&mut data);
+        for ((configuration, observed), mut datum) in observed.into_iter().zip(data) {
+            let (one, mode) = (&observations.configurations[configuration], observed.mode);
+            let share = self.common_share(configuration, mode);
+            if share != 0.0 {
+                // The common part is a nuisance parameter of its own.
+                let moved = share * datum.std;
+                self.scatter.push(((configuration, mode), moved));
+                datum.std *= (1.0 - share * share).max(0.0).sqrt();
+            }
+            // The common part of a recording is far below the floor: as good as independent.
+            datum.inflate_std(self.settings.frequency_floor.hypot(one.common));
+            // Anywhere between the poles of a decay that was split, on either side of this one.
+            let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
+            datum.inflate_std(split.hypot(average_std(observed)));
+            let observable = Observable::frequency(configuration, mode);
+            if mode > self.fitted_modes {
+                self.holdout.push((observable, datum));
+            } else {
+                self.push(observable, datum);
+            }
+        }
+    }
+
+    /// Share of a frequency's scatter that its configuration has in common; 0 for held-out modes.
+    fn common_share(&self, configuration: usize, mode: usize) -> f64 {
+        let shares = &self.arrangements[configuration].scatter;
+        let own = shares.iter().find(|share| share.0 == mode);
+        own.filter(|_| mode <= self.fitted_modes)
+            .map_or(0.0, |share| share.1)
+    }
+
+    fn add_shapes(&mut self, observations: &Observations) {
+        let mut constants: Vec<(Observable, Datum)> = Vec::new();
+        let mut ratios: Vec<(Observable, Datum)> = Vec::new();
+        for (configuration, one) in observations.configurations.iter().enumerate() {
+            let modes = one.modes.iter();
+            for observed in modes.filter(|mode| mode.mode <= self.fitted_modes) {
+                let own = Observable::frequency(configuration, observed.mode);
+                let Some(reference) = observed.reference.filter(|&sensor| is_placed(one, sensor))
+                else {
+                    continue;
+                };
+                if split_pole(one, observed).is_some() {
+                    continue;
+                }
+                if let (Some(constant), Some(_)) = (observed.constant, one.tap) {
+                    let mut datum = Datum::new(constant.value, constant.std, constant.freedom);
+                    datum.inflate_std(constant.value * constant_model_std(observed));
+                    let kind = ObservableKind::Constant { sensor: reference };
+                    constants.push((own.with_kind(kind), datum));
+                }
+                for value in &observed.shape {
+                    let sensor = value.sensor;
+                    if sensor != reference && is_placed(one, sensor) && value.std > 0.0 {
+                        let kind = ObservableKind::Ratio { sensor, reference };
+                        let datum = Datum::new(value.value, value.std, observed.freedom);
+                        ratios.push((own.with_kind(kind), datum));
+                    }
+                }
+            }
+        }
+        for kind in [constants, ratios] {
+            let values: Vec<f64> = kind.iter().map(|(_, datum)| datum.value).collect();
+            let floor = SHAPE_FLOOR * root_mean_square(&values);
+            for (observable, mut datum) in kind {
+                datum.inflate_std(floor);
+                self.push(observable, datum);
+            }
+        }
+    }
+
+    /// Adds one damping ratio for each mode: the weighted mean of all configurations, since only
+    /// noise and level distinguish them.
+    fn add_damping(&mut self, observations: &Observations) {
+        for mode in 1..=self.fitted_modes {
+            let configurations = observations.configurations.iter();
+            let observed: Vec<&ObservedMode> =
+                configurations.filter_map(|one| one.mode(mode)).collect();
+            let (mut weights, mut sum) = (0.0, 0.0);
+            for damping in observed.iter().filter_map(|mode| mode.damping) {
+                if damping.value > 0.0 && damping.std > 0.0 {
+                    let weight = (damping.value / damping.std).powi(2);
+                    weights += weight;
+                    sum += weight * damping.value.ln();
+                }
+            }
+            if weights > 0.0 {
+                let std = weights.powf(-0.5).hypot(self.settings.damping_scatter);
+                let datum = Datum::new(sum / weights, std, None);
+                let own = Observable::frequency(0, mode);
+                self.push(own.with_kind(ObservableKind::Damping), datum);
+                self.tilts.push((mode, observed[0].frequency.ln()));
+            }
+        }
+        let mean = self.tilts.iter().map(|tilt| tilt.1).sum::<f64>() / self.tilts.len() as f64;
+        for tilt in &mut self.tilts {
+            tilt.1 -= mean;
+        }
+    }
+
+    /// Adds the changes of the frequencies along the decays.
+    fn add_slopes(&mut self, observations: &Observations) {
+        for (configuration, one) in observations.configurations.iter().enumerate() {
+            for mode in &one.modes {
+                if let Some(mut datum) = slope_of(mode)
+                    && mode.mode <= self.fitted_modes
+                {
+                    datum.inflate_std(SLOPE_FLOOR);
+                    let own = Observable::frequency(configuration, mode.mode);
+                    self.push(own.with_kind(ObservableKind::Slope), datum);
+                }
+            }
+        }
+    }
+
+    /// Adds a nuisance parameter.
+    pub fn add_nuisance(&mut self, parameter: NuisanceParameter, centre: f64, std: f64) {
+        self.nuisances.push(Nuisance {
+            parameter,
+            centre,
+            std,
+        });
+    }
+
+    fn add_nuisances(&mut self, inventory: &Inventory) {
+        use NuisanceParameter::{
+            AddedInertia, Amplitude, FastenedMass, FastenedPosition, Scale, Scatter, SensorInertia,
+            SensorMass, Shear,
+        };
+        let scale = self.nominal.scale_std.unwrap_or(self.settings.scale_std);
+        self.add_nuisance(Scale, 0.0, scale);
+        if self.nominal.specimen.shear_rotary > 0.0 {
+            self.add_nuisance(Shear, 0.0, self.settings.shear_std);
+        }
+        self.add_drifts();
+        for configuration in 0..self.arrangements.len() {
+            if !self.arrangements[configuration].scatter.is_empty() {
+                self.add_nuisance(Scatter { configuration }, 0.0, 1.0);
+            }
+        }
+        for (name, text) in inventory.names.iter().enumerate() {
+            if self.nominal.mass_of(text) > 0.0 {
+                self.add_nuisance(SensorMass { name }, 0.0, self.settings.sensor_mass_std);
+            }
+            self.add_nuisance(SensorInertia { name }, 0.0, 1.0);
+        }
+        self.add_nuisance(AddedInertia, 0.0, 1.0);
+        self.add_positions_and_gains(inventory);
+        self.add_damping_level();
+        self.add_nuisance(Amplitude, 0.0, AMPLITUDE_STD);
+        for fastened in 0..inventory.fastened.len() {
+            let (mass, position) = (self.settings.fastened_mass_std, self.settings.position_std);
+            self.add_nuisance(FastenedMass { fastened }, 0.0, mass);
+            self.add_nuisance(FastenedPosition { fastened }, 0.0, position);
+        }
+    }
+
+    /// Numbers of the set-ups, ascending.
+    pub fn setups(&self) -> Vec<usize> {
+        let mut setups: Vec<usize> = self.arrangements.iter().map(|one| one.setup).collect();
+        setups.sort_unstable();
+        setups.dedup();
+        setups
+    }
+
+    /// Adds the joint's stiffness and the temperature, which differ between set-ups.
+    fn add_drifts(&mut self) {
+        let setups = self.setups();
+        if setups.len() > 1 {
+            for setup in setups {
+                for direction in self.nominal.fitted_springs() {
+                    let drift = NuisanceParameter::Drift { setup, direction };
+                    self.add_nuisance(drift, 0.0, self.settings.drift_stds[0]);
+                }
+                let temperature = NuisanceParameter::Temperature { setup };
+                self.add_nuisance(temperature, 0.0, self.settings.temperature_std);
+            }
+        }
+    }
+
+    /// Adds positions of sensors and of the taps, and calibrations, on which shapes and modal constants depend.
+    fn add_positions_and_gains(&mut self, inventory: &Inventory) {
+        use NuisanceParameter::{Gain, SensorPosition, TapPosition};
+        let mut observables = self.observables.iter();
+        let constants = observables.any(|one| matches!(one.kind, ObservableKind::Constant { .. }));
+        let shapes = self.observables.iter().any(Observable::is_shape);
+        for position in 0..inventory.positions.len() {
+            self.add_nuisance(SensorPosition { position }, 0.0, self.settings.position_std);
+        }
+        if constants {
+            for setup in self.setups() {
+                self.add_nuisance(TapPosition { setup }, 0.0, self.settings.position_std);
+            }
+        }
+        if shapes {
+            for setup in self.setups() {
+                for name in 0..inventory.names.len() {
+                    self.add_nuisance(Gain { setup, name }, 0.0, self.settings.gain_std);
+                }
+            }
+        }
+    }
+
+    /// Adds level and tilt of the nominal damping ratios, where any was observed.
+    fn add_damping_level(&mut self) {
+        let (mut count, mut sum) = (0.0, 0.0);
+        for (observable, datum) in self.observables.iter().zip(&self.data) {
+            if observable.is_damping() {
+                count += 1.0;
+                sum += datum.value;
+            }
+        }
+        if count > 0.0 {
+            // Wide: the damping of a beam is not known beforehand.
+            self.add_nuisance(NuisanceParameter::Damping, sum / count, 2.0);
+            let tilt = self.settings.damping_tilt;
+            self.add_nuisance(NuisanceParameter::DampingTilt, 0.0, tilt);
+        }
+    }
+
+    /// Returns the derivative of a frequency with respect to shear and rotary inertia; 0 before it is known.
+    pub fn shear_slope(&self, mode: usize) -> f64 {
+        self.shear_slopes.get(mode - 1).copied().unwrap_or(0.0)
+    }
+
+    /// Returns the logarithm of a mode's frequency over the geometric mean of all that have a damping ratio; 0 for others.
+    pub fn tilt(&self, mode: usize) -> f64 {
+        let own = self.tilts.iter().find(|tilt| tilt.0 == mode);
+        own.map_or(0.0, |tilt| tilt.1)
+    }
+
+    /// Returns the change of a frequency for one standard deviation of the taps' common scatter (logarithm).
+    pub fn scatter_of(&self, configuration: usize, mode: usize) -> f64 {
+        let mut all = self.scatter.iter();
+        all.find(|one| one.0 == (configuration, mode))
+            .map_or(0.0, |one| one.1)
+    }
+
+    /// Index of a nuisance parameter, if the data have it.
+    pub fn nuisance_index(&self, parameter: NuisanceParameter) -> Option<usize> {
+        let mut all = self.nuisances.iter();
+        all.position(|one| one.parameter == parameter)
+    }
+
+    /// Index of the first drift of the joint, if there are several set-ups.
+    pub fn first_drift(&self) -> Option<usize> {
+        self.nuisances
+            .iter()
+            .position(|one| one.parameter.is_drift())
+    }
+
+    /// Indices of the natural frequencies among the observables.
+    pub fn frequencies(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.observables.len()).filter(|&row| self.observables[row].is_frequency())
+    }
+
+    /// Indices of the changes along the decays among the observables.
+    pub fn slopes(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.observables.len()).filter(|&row| self.observables[row].is_slope())
+    }
+
+    /// Order of the parameters of a hypothesis with these effects.
+    pub fn layout(&self, effects: &[CandidateEffect]) -> Layout {
+        Layout::new(&self.nominal, effects)
+    }
+
+    /// Priors of all parameters, with the middle spread of the drift.
+    pub fn priors(&self, layout: &Layout) -> Vec<Prior> {
+        priors(&self.nominal, layout, &self.nuisances, &self.settings)
+    }
+
+    /// Priors with this spread of the drift.
+    pub fn with_drift(&self, layout: &Layout, priors: &[Prior], drift: f64) -> Vec<Prior> {
+        with_drift(&self.nuisances, layout, priors, drift)
+    }
+}
+
+/// Returns whether the position of a sensor is known.
+fn is_placed(configuration: &Configuration, sensor: usize) -> bool {
+    let sensor = configuration.sensors.get(sensor);
+    sensor.is_some_and(|sensor| sensor.position.is_some())
+}
+
+/// Returns the change of the logarithm of a frequency per e-fold of the amplitude, between the ends of the followed
+/// decay where their amplitudes are known.
+fn slope_of(mode: &ObservedMode) -> Option<Datum> {
+    let decay = mode.decay?;
+    if decay.verdict == DecayVerdict::Doubtful {
+        return None;
+    }
+    let ends = (decay.early.amplitude, decay.late.amplitude);
+    let (seen, log_amplitude_span) = match (decay.frequency_change, ends) {
+        (Some(change), (Some(early), Some(late)))
+            if early > DISTINCT_AMPLITUDES * late && late > 0.0 =>
+        {
+            (change, (early / late).ln())
+        }
+        _ => (decay.frequency_slope, 1.0),
+    };
+    let [value, std] =
+        [seen.value, seen.std].map(|part| part / mode.frequency / log_amplitude_span);
+    let mut datum = Datum::new(value, std, seen.freedom);
+    datum.freedom = datum.freedom.max(3.0);
+    (std.is_finite() && std > 0.0).then_some(datum)
+}

@@ -1,0 +1,369 @@
+//! Two effects at once, where no single one suffices.
+
+use crate::dataset::Dataset;
+use crate::evidence::Fit;
+use crate::fit::Search;
+use crate::goodness_of_fit::{GoodnessOfFit, refutes_by_holdout};
+use crate::multi_start::{CoarseModel, Start, settle, unexplained};
+use crate::parameters::{CandidateEffect, LocationKind};
+use crate::posterior::{Candidate, set_probabilities};
+use crate::result::Hypothesis;
+use crate::thresholds::{LEAST_DATA_FOR_PAIRS, MISSED_HOLDOUT, PROMISED_BY_SECOND, SECOND_EFFECT};
+use crate::validate::{HoldoutErrors, Residuals, holdout_goodness};
+use rayon::prelude::*;
+use tapjoint_beam::effects::EffectId;
+
+/// Number of the best single effects beside which a second one is tried.
+const FIRST_EFFECTS: usize = 2;
+/// Number of pairs that are fitted completely.
+const FITTED_PAIRS: usize = 4;
+/// Number of pairs that are searched again with finer data.
+const FINER_PAIRS: usize = 12;
+/// Optima from which each pair is searched.
+const PAIR_OPTIMA: usize = 3;
+/// Number of screened pairs that are fitted beside those of the multi-start search.
+const SCREENED_PAIRS: usize = 2;
+
+/// Adds a second effect beside each of the best single ones, where none of these suffices or the second promises
+/// much.
+pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
+    let is_seen = candidates
+        .first()
+        .is_some_and(|one| one.hypothesis != Hypothesis::None);
+    if dataset.observables.len() < LEAST_DATA_FOR_PAIRS || !is_seen {
+        return;
+    }
+    let suffices_one = candidates
+        .iter()
+        .any(|one| !one.is_unknown() && one.drift.is_none() && stands(dataset, &one.fit));
+    let singles: Vec<&Candidate> = candidates
+        .iter()
+        .filter(|one| one.effects().len() == 1 && one.drift.is_none())
+        .collect();
+    let search = PairSearch { dataset, singles };
+    let needed = if suffices_one {
+        PROMISED_BY_SECOND
+    } else {
+        f64::NEG_INFINITY
+    };
+    let (mut tried, mut pairs) = search.screened(needed);
+    if !suffices_one {
+        let (asked, far) = search.by_multi_start();
+        pairs.truncate(SCREENED_PAIRS);
+        pairs.extend(far);
+        tried = tried.max(asked);
+    }
+    let found: Vec<Option<Candidate>> = pairs.par_iter().map(|pair| search.fit(pair)).collect();
+    candidates.extend(distinct(found.into_iter().flatten().collect()));
+    compare_with_unknown(dataset, candidates);
+    set_probabilities(candidates, tried);
+}
+
+/// Two single effects that are tried together, and points where a multi-start search ended, the most
+/// promising first.
+#[derive(Clone)]
+struct Pair<'a> {
+    first: &'a Candidate,
+    second: &'a Candidate,
+    starts: Vec<Start>,
+}
+
+impl Pair<'_> {
+    /// Least objective of the starts.
+    fn objective(&self) -> f64 {
+        let first = self.starts.first();
+        first.map_or(f64::INFINITY, |one| one.objective)
+    }
+}
+
+/// Returns the only effect of a single candidate.
+fn effect_of(single: &Candidate) -> CandidateEffect {
+    single.fit.effects[0]
+}
+
+/// Search for pairs of single effects.
+struct PairSearch<'a> {
+    dataset: &'a Dataset,
+    singles: Vec<&'a Candidate>,
+}
+
+impl<'a> PairSearch<'a> {
+    fn beside<'b>(&'b self, without: &'b Fit) -> Search<'b> {
+        Search {
+            dataset: self.dataset,
+            without,
+        }
+    }
+
+    /// Returns the pairs of one of the best effects with a second whose linearised models explain the data best, and
+    /// better than the first by `needed`; and how many were tried.
+    fn screened(&self, needed: f64) -> (usize, Vec<Pair<'a>>) {
+        let mut tasks: Vec<(&Candidate, &Candidate)> = Vec::new();
+        for first in self.singles.iter().take(FIRST_EFFECTS) {
+            let others = self.singles.iter();
+            let others = others.filter(|second| first.groups() != second.groups());
+            tasks.extend(others.map(|second| (*first, *second)));
+        }
+        let promises: Vec<Option<(f64, f64)>> = tasks
+            .par_iter()
+            .map(|(first, second)| {
+                let search = self.beside(&first.fit);
+                let promised = search.linear_screen(effect_of(second));
+                Some((search.objective_without()?, promised?))
+            })
+            .collect();
+        let alone = promises.iter().flatten().map(|promise| promise.0);
+        let alone = alone.fold(f64::INFINITY, f64::min);
+        let mut order: Vec<(f64, usize)> = Vec::new();
+        for (k, promise) in promises.iter().enumerate() {
+            let promised = promise.map_or(f64::INFINITY, |promise| promise.1);
+            if promised < alone - needed {
+                order.push((promised, k));
+            }
+        }
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order.truncate(FITTED_PAIRS);
+        let pairs = order.into_iter().map(|(_, k)| Pair {
+            first: tasks[k].0,
+            second: tasks[k].1,
+            starts: Vec::new(),
+        });
+        (tasks.len(), pairs.collect())
+    }
+
+    /// Returns of all pairs those that explain the frequencies best, which count at first as uncertain as the best single
+    /// effect leaves them unexplained; and how many were tried.
+    fn by_multi_start(&self) -> (usize, Vec<Pair<'a>>) {
+        let singles = &self.singles;
+        let left = singles
+            .iter()
+            .map(|one| unexplained(self.dataset, &one.fit));
+        let factor = left.fold(f64::INFINITY, f64::min);
+        let coarse = CoarseModel::new(self.dataset, factor);
+        let alone: Vec<Option<Start>> = singles
+            .par_iter()
+            .map(|one| coarse.alone(effect_of(one)).into_iter().next())
+            .collect();
+        let mut all: Vec<(usize, usize)> = Vec::new();
+        for b in 0..singles.len() {
+            for a in 0..b {
+                if singles[a].groups() != singles[b].groups() {
+                    all.push((a, b));
+                }
+            }
+            if is_local(&effect_of(singles[b])) {
+                all.push((b, b));
+            }
+        }
+        let found: Vec<Pair<'a>> = all
+            .par_iter()
+            .map(|&(a, b)| {
+                let mut starts = Vec::new();
+                for (first, second) in [(a, b), (b, a)] {
+                    if let Some(first) = &alone[first] {
+                        starts.extend(coarse.with_second(first, effect_of(singles[second])));
+                    }
+                }
+                Pair {
+                    first: singles[a],
+                    second: singles[b],
+                    starts: best_starts(starts),
+                }
+            })
+            .collect();
+        let finer = CoarseModel::new(self.dataset, factor.sqrt());
+        let found: Vec<Pair<'a>> = best_pairs(found, FINER_PAIRS)
+            .into_par_iter()
+            .map(|pair| {
+                let starts = pair.starts.iter();
+                let starts = starts.filter_map(|start| finer.continued(start)).collect();
+                Pair {
+                    starts: best_starts(starts),
+                    ..pair
+                }
+            })
+            .collect();
+        // Two of a kind are no name, but `unknown` may look like them.
+        let (alike, others): (Vec<Pair<'a>>, Vec<Pair<'a>>) = best_pairs(found, FINER_PAIRS)
+            .into_iter()
+            .partition(|pair| pair.first.effects() == pair.second.effects());
+        let mut pairs = best_pairs(others, FITTED_PAIRS);
+        pairs.extend(best_pairs(alike, 1));
+        (all.len(), pairs)
+    }
+
+    /// Fits a pair, if it is accepted: it has to beat the better of the two by
+    /// themselves in evidence, and hold on data outside the fit.
+    fn fit(&self, pair: &Pair<'_>) -> Option<Candidate> {
+        let (first, second) = (&pair.first.fit, &pair.second.fit);
+        let mut fits: Vec<Fit> = Vec::new();
+        if pair.starts.is_empty() {
+            let search = self.beside(first);
+            fits.extend(search.add(effect_of(pair.second)));
+            fits.extend(search.add_from(second));
+        }
+        for start in &pair.starts {
+            let is_first = pair.first.effects() == [start.first()];
+            let search = self.beside(if is_first { first } else { second });
+            fits.extend(settle(&search, std::slice::from_ref(start)));
+        }
+        let fit = fits
+            .into_iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        let alone = if first.log_evidence > second.log_evidence {
+            first
+        } else {
+            second
+        };
+        let [own, one, other] = [&fit, first, second].map(|fit| fit.best.optimum.objective);
+        // A pair that explains less than one of its members has not reached its optimum.
+        if own > one.min(other)
+            || fit.log_evidence < alone.log_evidence + SECOND_EFFECT
+            || !improves(self.dataset, alone, &fit)
+        {
+            return None;
+        }
+        let effects = fit.effects.iter().map(|one| one.effect).collect();
+        Some(Candidate::new(Hypothesis::Effects(effects), fit))
+    }
+}
+
+/// Returns the distinct starts of least objective, the best first.
+fn best_starts(mut starts: Vec<Start>) -> Vec<Start> {
+    starts.sort_by(|a, b| a.objective.total_cmp(&b.objective));
+    starts.dedup_by(|one, better| one.is_like(better));
+    starts.truncate(PAIR_OPTIMA);
+    starts
+}
+
+/// Returns the pairs of least objective, the best first.
+fn best_pairs(mut pairs: Vec<Pair<'_>>, count: usize) -> Vec<Pair<'_>> {
+    pairs.sort_by(|a, b| a.objective().total_cmp(&b.objective()));
+    pairs.truncate(count);
+    pairs
+}
+
+/// Returns whether an effect sits somewhere along the beam.
+fn is_local(effect: &CandidateEffect) -> bool {
+    let location = effect.location;
+    location.is_some_and(|location| location.kind == LocationKind::Position)
+}
+
+/// Returns whether a fit has as many free parameters as a change that is spread over the beam: all its effects
+/// choose their locations, or a frequency that no peak states.
+fn is_flexible(dataset: &Dataset, fit: &Fit) -> bool {
+    let layout = dataset.layout(&fit.effects);
+    let mut effects = fit.effects.iter().enumerate();
+    let all_choose = effects.all(
+        |(k, effect)| match effect.location.map(|range| range.kind) {
+            Some(LocationKind::Position) => true,
+            // A frequency that a peak states is known to a standard deviation; else only its range is.
+            Some(LocationKind::FixtureFrequency) => layout
+                .location(k)
+                .is_some_and(|location| !fit.best.priors[location].std.is_finite()),
+            _ => false,
+        },
+    );
+    all_choose && fit.effects.iter().any(is_local)
+}
+
+/// Returns whether a fit predicts the hold-out data within their own uncertainty, however large that of the prediction;
+/// true without hold-out data.
+fn predicts_holdout(dataset: &Dataset, fit: &Fit) -> bool {
+    let errors = HoldoutErrors::new(dataset, fit);
+    errors.is_none_or(|errors| errors.rms() <= MISSED_HOLDOUT * errors.floor())
+}
+
+/// Gives `unknown` the evidence of pairs that imitate it, and removes pairs of one kind.
+///
+/// An unknown change may be spread over a part of the beam. Two changes at locations of their own imitate every
+/// such change, with as many parameters as its location, extent, mass and stiffness: it explains what they
+/// explain, and these data cannot separate them. So does one beside a fixture at a frequency of
+/// its choice, and the best two effects of any kind that miss the hold-out data by more than its noise. Two
+/// of the same kind are no hypothesis of their own: they are one way of being unknown.
+fn compare_with_unknown(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
+    let pairs = candidates.iter().filter(|one| one.effects().len() > 1);
+    let fits: Vec<&Fit> = pairs.map(|one| &one.fit).collect();
+    let best = (fits.iter()).max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
+    let failing = best.filter(|fit| !predicts_holdout(dataset, fit));
+    let imitating = fits.iter().filter(|fit| is_flexible(dataset, fit));
+    let most = imitating
+        .chain(failing)
+        .map(|fit| fit.log_evidence)
+        .fold(f64::NEG_INFINITY, f64::max);
+    if let Some(unknown) = candidates.iter_mut().find(|one| one.is_unknown()) {
+        unknown.fit.log_evidence = unknown.fit.log_evidence.max(most);
+    }
+    candidates.retain(|one| match one.effects() {
+        [first, second] => first != second,
+        _ => true,
+    });
+}
+
+/// Returns the more probable of the same two effects in either order.
+fn distinct(found: Vec<Candidate>) -> Vec<Candidate> {
+    let mut pairs: Vec<Candidate> = Vec::new();
+    for pair in found {
+        let reversed: Vec<EffectId> = pair.effects().iter().rev().copied().collect();
+        let same = pairs
+            .iter_mut()
+            .find(|other| [pair.effects(), &reversed[..]].contains(&other.effects()));
+        match same {
+            Some(other) if other.fit.log_evidence < pair.fit.log_evidence => *other = pair,
+            Some(_) => {}
+            None => pairs.push(pair),
+        }
+    }
+    pairs
+}
+
+/// Returns whether neither the fitted data refute a fit nor the hold-out data.
+pub fn stands(dataset: &Dataset, fit: &Fit) -> bool {
+    GoodnessOfFit::new(dataset, fit).is_some_and(|goodness| !goodness.is_refuted())
+}
+
+/// Returns whether the hold-out data are predicted better, or at least do not refute the fit: two effects leave
+/// more open than one does. Without hold-out data, whether each mode is predicted better from the others.
+fn improves(dataset: &Dataset, before: &Fit, after: &Fit) -> bool {
+    let [errors_before, errors_after] = [before, after].map(|fit| HoldoutErrors::new(dataset, fit));
+    if let (Some(errors_before), Some(errors_after)) = (errors_before, errors_after) {
+        return errors_after.rms() < errors_before.rms()
+            || holdout_goodness(dataset, after, refutes_by_holdout)
+                .is_some_and(|p| !refutes_by_holdout(p));
+    }
+    let [before, after] =
+        [before, after].map(|fit| Residuals::new(dataset, fit)?.left_out_rms(dataset));
+    before
+        .zip(after)
+        .is_some_and(|(before, after)| after < before)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::fitted;
+
+    /// Two effects that chance did not favour: where they miss the hold-out data by more than their uncertainty,
+    /// an unknown cause explains the others as well.
+    #[test]
+    fn regress_two_effects_that_predict_badly_are_as_good_as_something_unknown() {
+        let (mut dataset, fit) = fitted();
+        let exact = HoldoutErrors::new(&dataset, &fit).unwrap();
+        assert!(predicts_holdout(&dataset, &fit), "{exact:?}");
+        let unknown_beside = |dataset: &Dataset| {
+            let pair = vec![EffectId::CrossCoupling, EffectId::SensorMass];
+            let mut candidates = vec![
+                Candidate::new(Hypothesis::Effects(pair), fit.clone()),
+                Candidate::new(Hypothesis::Unknown, fit.clone()),
+            ];
+            candidates[1].fit.log_evidence -= 50.0;
+            compare_with_unknown(dataset, &mut candidates);
+            candidates[1].fit.log_evidence - fit.log_evidence
+        };
+        assert_eq!(unknown_beside(&dataset), -50.0);
+        for (_, datum) in &mut dataset.holdout {
+            datum.value += 2.0 * MISSED_HOLDOUT * datum.std;
+        }
+        assert_eq!(unknown_beside(&dataset), 0.0);
+    }
+}

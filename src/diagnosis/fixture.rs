@@ -1,0 +1,353 @@
+//! The fixture's own resonance as a datum: a peak that belongs to no mode of the beam.
+//!
+//! Peaks of other causes (torsion, bending the other way, something on the structure) may stand anywhere
+//! between the lowest and the highest mode. Under every hypothesis each has the same density 1/B over
+//! the logarithm of the frequency, B being the logarithm of the band. A fixture adds a mode of its own,
+//! at x_b, which is read with a probability v that follows from how strongly sensors and hammer meet it,
+//! and which may be any of the n peaks. The peaks x_1 .. x_n then count for it with
+//!
+//! ```text
+//! p(peaks | fixture)                   v
+//! -------------------- = (1 - v)  +  -  sum_i B delta(x_i - x_b)
+//! p(peaks | any other)                 n
+//! ```
+//!
+//! Integrated with the likelihood of all other data over the fixture's frequency, every peak gives a
+//! fit whose frequency the peak states, with the factor v B/n. The remaining fit
+//! without a peak has the factor 1 - v. Nothing changes where the mode lies outside the band or is too
+//! weak (v = 0), and a fixture of zero size has no peak. A fit that should show a peak and has none is
+//! refuted with the probability 1 - v; one whose frequency is stated, by how well it fits.
+
+use crate::dataset::{Dataset, chi_square_tail};
+use crate::evidence::{Fit, LocalOptimum, evaluate, linear_fit, log_sum};
+use crate::forward::Forward;
+use crate::observations::{DECIBEL, FIXTURE_FREQUENCY_STD, UnpairedPeak};
+use crate::parameters::{LocationKind, Prior};
+use crate::structure::{ModalModel, fixture_strength};
+use crate::thresholds::{FIXTURE_LEVEL, SPLIT_POLE};
+use std::f64::consts::TAU;
+use tapjoint_numerics::stats::median;
+
+/// Standard deviation (dB) of the level at which a fixture's peak is read: damping of the fixture and noise, within a
+/// factor of two or three.
+const LEVEL_STD: f64 = 8.0;
+/// Standard deviation of the logarithm of the modal constant of a fixture's own mode about the model's, a factor
+/// of 1.6: the model's fixture only rocks about the joint.
+const STRENGTH_STD: f64 = 0.5;
+/// Range of the logarithm of the modal constant of peaks of other causes: 60 dB.
+const STRENGTH_RANGE: f64 = 6.9;
+
+/// Returns the probability that a peak is not read which is this much (dB) over the level at which half are.
+fn missed(over: f64) -> f64 {
+    let away = over / LEVEL_STD;
+    let tail = two_sided(away) / 2.0;
+    if away > 0.0 { tail } else { 1.0 - tail }
+}
+
+/// Returns the probability of a normal deviate as large, of either sign.
+fn two_sided(deviate: f64) -> f64 {
+    chi_square_tail(deviate * deviate, 1.0).unwrap_or(1.0)
+}
+
+/// The fixture's own mode at some parameters, in the mean of all configurations.
+struct FixtureMode {
+    /// Logarithm of its measured frequency.
+    log: f64,
+    /// Share of the fixture in its kinetic energy: d x_b/d ln(frequency of the fixture alone), since
+    /// Rayleigh's quotient is stationary.
+    share: f64,
+    /// Level (dB) of its peak over that at which half are read; `None` where it is not determined.
+    over: Option<f64>,
+    /// Logarithm of its modal constant (1/kg) in each configuration.
+    constants: Vec<Option<f64>>,
+}
+
+impl FixtureMode {
+    fn new(forward: &Forward<'_>, parameters: &[f64]) -> Option<Self> {
+        let models = forward.solve(parameters)?;
+        let (dataset, peaks) = (forward.dataset, &forward.dataset.peaks);
+        let mut own = FixtureMode {
+            log: 0.0,
+            share: 0.0,
+            over: None,
+            constants: Vec::new(),
+        };
+        let mut over = Vec::new();
+        let count = models.len() as f64;
+        for (index, (one, arrangement)) in models.iter().zip(&dataset.arrangements).enumerate() {
+            let (fixture, frequency) = one.fixture_frequency()?;
+            own.log += frequency.ln() / count;
+            own.share += one.modes().base_participation(fixture) / count;
+            let sensors: Vec<f64> = arrangement.sensors.iter().map(|s| s.position).collect();
+            let numbers: Vec<usize> = (1..=dataset.fitted_modes)
+                .filter_map(|mode| one.index(mode))
+                .collect();
+            let tap = arrangement.tap;
+            let strength = fixture_strength(one.modes(), fixture, &numbers, &sensors, tap);
+            own.constants.push(strength.map(|strength| strength.own));
+            let mut searched = peaks.searched.iter();
+            let searched = searched.find(|searched| searched.configuration == index);
+            if let (Some(strength), Some(searched)) = (strength, searched) {
+                let half = strength.median + FIXTURE_LEVEL / DECIBEL;
+                let least = searched
+                    .least_log_constant
+                    .map_or(half, |least| half.min(least));
+                over.push(DECIBEL * (strength.own - least));
+            }
+        }
+        let is_determined = peaks.contains(own.log) && !peaks.is_doubtful(own.log);
+        if !over.is_empty() && is_determined && is_apart(&models, own.log) {
+            own.over = Some(median(&mut over));
+        }
+        Some(own)
+    }
+
+    /// Returns the probability that its peak is not read.
+    fn missed(&self) -> f64 {
+        self.over.map_or(1.0, missed)
+    }
+
+    /// Returns the probability that its peak is not read, over all sizes that a fit leaves open: normal about `size` and
+    /// above zero. The modal constant of a weak mode is proportional to the size.
+    fn missed_by_size(&self, size: f64, std: f64) -> f64 {
+        const SIZES: usize = 400;
+        let Some(over) = self.over else { return 1.0 };
+        let first = (size - 5.0 * std).max(0.0);
+        let step = (size + 5.0 * std - first) / SIZES as f64;
+        let (mut all, mut unread) = (0.0, 0.0);
+        for k in 0..SIZES {
+            let own = first + step * (k as f64 + 0.5);
+            let weight = (-0.5 * ((own - size) / std).powi(2)).exp();
+            all += weight;
+            unread += weight * missed(over + 20.0 * (own / size).log10());
+        }
+        unread / all
+    }
+
+    /// Returns by how many standard deviations a peak is stronger than this mode, and the standard deviation. The size
+    /// is known to the relative one of `size_std`, and the constant of a weak mode grows with it.
+    fn excess_of(&self, peak: &UnpairedPeak, size_std: f64) -> Option<(f64, f64)> {
+        let pairs = peak.constants.iter();
+        let mut all: Vec<f64> = pairs
+            .filter_map(|(index, log)| Some(log - self.constants.get(*index).copied()??))
+            .collect();
+        let std = STRENGTH_STD.hypot(size_std);
+        (!all.is_empty()).then(|| (median(&mut all) / std, std))
+    }
+
+    /// Returns the logarithm of the density of a peak's strength over that of a peak of another cause.
+    fn log_strength(&self, peak: &UnpairedPeak, size_std: f64) -> f64 {
+        self.excess_of(peak, size_std).map_or(0.0, |(away, std)| {
+            STRENGTH_RANGE.ln() - 0.5 * away * away - (std * TAU.sqrt()).ln()
+        })
+    }
+}
+
+/// Returns the relative standard deviation of the size of the fixture whose frequency is the parameter `at`.
+fn size_std(found: &LocalOptimum, at: usize) -> f64 {
+    let size = found.optimum.parameters[at - 1].abs();
+    found.covariance().map_or(f64::INFINITY, |covariance| {
+        covariance[(at - 1, at - 1)].max(0.0).sqrt() / size
+    })
+}
+
+/// Returns whether no mode of the beam is so near that both are read as one.
+fn is_apart(models: &[ModalModel], log: f64) -> bool {
+    models.iter().all(|one| {
+        let mut frequencies = (1..).map_while(|mode| one.frequency(mode));
+        frequencies.all(|frequency| (frequency.ln() - log).abs() >= SPLIT_POLE)
+    })
+}
+
+/// Returns how probable the peak, or its absence, is under a fit with a fixture. Where a peak states its frequency: a
+/// strength as far from the predicted one; elsewhere: that its peak is not read. `None` for
+/// fits without a fixture.
+pub fn goodness(dataset: &Dataset, fit: &Fit) -> Option<f64> {
+    let forward = Forward::new(dataset, &fit.effects);
+    let at = forward
+        .layout
+        .location_of_kind(LocationKind::FixtureFrequency)?;
+    if !fit.best.priors[at].std.is_finite() {
+        return unread(&forward, at, &fit.best);
+    }
+    let own = FixtureMode::new(&forward, fit.parameters())?;
+    let peaks = dataset.peaks.all.iter();
+    let distances = peaks.map(|peak| ((peak.log - own.log).abs(), peak));
+    let (_, peak) = distances.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (excess, _) = own.excess_of(peak, size_std(&fit.best, at))?;
+    Some(two_sided(excess))
+}
+
+/// Returns the probability that the peak is not read, over the sizes that the fit leaves open.
+fn unread(forward: &Forward<'_>, at: usize, found: &LocalOptimum) -> Option<f64> {
+    let parameters = &found.optimum.parameters;
+    let size = parameters[at - 1];
+    let std = size * size_std(found, at);
+    let own = FixtureMode::new(forward, parameters)?;
+    (size > 0.0 && std > 0.0 && std.is_finite()).then(|| own.missed_by_size(size, std))
+}
+
+/// Returns the logarithms of the frequencies at which a fixture is tried beyond the nodes of its range.
+pub fn peak_locations(dataset: &Dataset, kind: LocationKind) -> Vec<f64> {
+    match kind {
+        LocationKind::FixtureFrequency => dataset.peaks.all.iter().map(|peak| peak.log).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Returns the fit with the likelihood of the peaks for its fixture; any other as it is. `without` is the fit without
+/// the last effect.
+pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit) -> Fit {
+    let peaks = &forward.dataset.peaks;
+    let at = forward
+        .layout
+        .location_of_kind(LocationKind::FixtureFrequency);
+    let (Some(at), Some((low, high))) = (at, peaks.band) else {
+        return fit;
+    };
+    let missed = unread(forward, at, &fit.best).unwrap_or(1.0);
+    let mut all = vec![(fit.log_evidence + missed.ln(), fit.best.clone())];
+    let factor = ((high - low) / peaks.all.len().max(1) as f64).ln();
+    for peak in &peaks.all {
+        let search = PeakSearch { forward, at, peak };
+        if let Some((found, own)) = search.best(&fit.best, without) {
+            let strength = own.log_strength(peak, size_std(&found, at));
+            let seen = (1.0 - own.missed()).ln() + strength;
+            let log = found.log_evidence + factor + seen - own.share.ln();
+            all.push((log, found));
+        }
+    }
+    let logs: Vec<f64> = all.iter().map(|one| one.0).collect();
+    let best = all.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    Fit {
+        best: best.map_or(fit.best, |one| one.1),
+        log_evidence: log_sum(&logs),
+        ..fit
+    }
+}
+
+/// Search for a fit whose fixture has its own mode at a peak; `at` is the parameter of the fixture's frequency.
+struct PeakSearch<'a> {
+    forward: &'a Forward<'a>,
+    at: usize,
+    peak: &'a UnpairedPeak,
+}
+
+impl PeakSearch<'_> {
+    /// Returns the best fit: from a fit with another frequency, and from the optimum of the model linearised there.
+    fn best(&self, other: &LocalOptimum, without: &Fit) -> Option<(LocalOptimum, FixtureMode)> {
+        let forward = self.forward;
+        let mut starts = vec![other.optimum.parameters.clone()];
+        starts[0][self.at] = self.peak.log;
+        if forward.layout.location(forward.layout.effects.len() - 1) == Some(self.at) {
+            let mut held = forward.priors();
+            held[self.at] = Prior::held(self.peak.log);
+            let linear = linear_fit(forward, without, &held, Some(self.peak.log));
+            starts.extend(linear.map(|optimum| optimum.parameters));
+        }
+        let found = starts
+            .into_iter()
+            .filter_map(|start| self.from(start, &other.priors));
+        found.max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))
+    }
+
+    /// Returns the fit from one start: first with the frequency held, then as well known as the peak states it.
+    fn from(&self, start: Vec<f64>, priors: &[Prior]) -> Option<(LocalOptimum, FixtureMode)> {
+        let start = self.tuned(start)?;
+        let (held, own) = self.with_frequency(&start, priors, Prior::held(start[self.at]))?;
+        let start = self.tuned(held.optimum.parameters)?;
+        let bounds = priors[self.at];
+        let stated = Prior {
+            low: bounds.low,
+            high: bounds.high,
+            ..Prior::normal(start[self.at], self.peak.std / own.share)
+        };
+        self.with_frequency(&start, priors, stated)
+    }
+
+    /// Returns the fit with this prior of the fixture's frequency.
+    fn with_frequency(
+        &self,
+        start: &[f64],
+        priors: &[Prior],
+        frequency: Prior,
+    ) -> Option<(LocalOptimum, FixtureMode)> {
+        let mut priors = priors.to_vec();
+        priors[self.at] = frequency;
+        let found = evaluate(self.forward, &priors, start)?;
+        let own = FixtureMode::new(self.forward, &found.optimum.parameters)?;
+        Some((found, own))
+    }
+
+    /// Gives the fixture the frequency with which its own mode is at the peak (Newton's method).
+    fn tuned(&self, mut parameters: Vec<f64>) -> Option<Vec<f64>> {
+        const ROUNDS: usize = 12;
+        for _ in 0..ROUNDS {
+            let own = FixtureMode::new(self.forward, &parameters)?;
+            let away = self.peak.log - own.log;
+            if away.abs() < 0.1 * FIXTURE_FREQUENCY_STD {
+                return Some(parameters);
+            }
+            // If the fixture shares its mode with the beam a full step leads past it.
+            parameters[self.at] += (away / own.share).clamp(-0.2, 0.2);
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn own(over: f64) -> FixtureMode {
+        FixtureMode {
+            log: 0.0,
+            share: 1.0,
+            over: Some(over),
+            constants: vec![Some(0.0)],
+        }
+    }
+
+    /// The normal distribution's 2.5 % at 1.959964 standard deviations.
+    #[test]
+    fn val_a_peak_is_missed_as_a_normal_deviate_says() {
+        assert!((missed(0.0) - 0.5).abs() < 1e-12);
+        assert!((missed(1.959_964 * LEVEL_STD) - 0.025).abs() < 1e-6);
+        assert!((missed(-1.959_964 * LEVEL_STD) - 0.975).abs() < 1e-6);
+    }
+
+    /// A size that is known is one level; one that may be nothing may have no peak, however strong the peak
+    /// of the best size is.
+    #[test]
+    fn limit_a_size_that_may_be_nothing_may_have_no_peak() {
+        let strong = own(40.0);
+        assert!((strong.missed_by_size(0.02, 1e-9) / strong.missed() - 1.0).abs() < 0.01);
+        let doubtful = strong.missed_by_size(0.02, 0.02);
+        assert!(
+            doubtful > 1e3 * strong.missed() && doubtful < 0.1,
+            "{doubtful}"
+        );
+        let nowhere = FixtureMode {
+            over: None,
+            ..own(0.0)
+        };
+        assert_eq!(nowhere.missed_by_size(0.02, 0.02), 1.0);
+    }
+
+    /// Over all strengths the density integrates to that of a peak of another cause.
+    #[test]
+    fn val_the_density_of_a_strength_is_normalised() {
+        let step = 0.01;
+        let sum: f64 = (-2000..2000)
+            .map(|k| {
+                let peak = UnpairedPeak {
+                    log: 0.0,
+                    std: FIXTURE_FREQUENCY_STD,
+                    constants: vec![(0, step * f64::from(k))],
+                };
+                step * own(0.0).log_strength(&peak, 0.1).exp() / STRENGTH_RANGE
+            })
+            .sum();
+        assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+    }
+}

@@ -1,0 +1,543 @@
+//! What the observations of a test show before any model is fitted: up to which mode, which peaks belong to no
+//! mode, and whether they show one structure at all.
+
+use crate::settings::GapError;
+use crate::structure::Nominal;
+use crate::thresholds::{
+    CHANGED_FREQUENCY, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
+    NODE_DISPLACEMENT, READABLE_LEVEL, SAME_MODE_RATIO, SAME_PEAK, SPLIT_POLE,
+};
+use tapjoint_identify::observation::{
+    Configuration, DecayVerdict, Observations, ObservedMode, UNCLEAR, UNPAIRED,
+};
+
+/// Returns the highest mode that is shown by at least half of the recordings whose band reaches it; 0 without
+/// any. A mode that one of many shows may be a stray peak at the end of its band, and is not used.
+pub fn highest_mode(observations: &Observations) -> usize {
+    let all = &observations.configurations;
+    let mut highest = 0;
+    for mode in all.iter().flat_map(|one| &one.modes) {
+        let showing = all.iter().filter(|one| one.mode(mode.mode).is_some());
+        let able = all
+            .iter()
+            .filter(|one| one.reaches(mode.frequency) || one.mode(mode.mode).is_some());
+        if 2 * count_recordings(showing) >= count_recordings(able) {
+            highest = highest.max(mode.mode);
+        }
+    }
+    highest
+}
+
+/// Counts the recordings of some configurations: levels of one recording count once, given frequencies
+/// for themselves.
+fn count_recordings<'a>(configurations: impl Iterator<Item = &'a Configuration>) -> usize {
+    let all: Vec<Option<usize>> = configurations.map(|one| one.recording).collect();
+    let given = all.iter().filter(|recording| recording.is_none()).count();
+    let mut recorded: Vec<usize> = all.into_iter().flatten().collect();
+    recorded.sort_unstable();
+    recorded.dedup();
+    recorded.len() + given
+}
+
+/// Returns the observations without modes above this one.
+pub fn up_to(highest: usize, observations: &Observations) -> Observations {
+    let mut kept = observations.clone();
+    for one in &mut kept.configurations {
+        one.modes.retain(|mode| mode.mode <= highest);
+    }
+    kept
+}
+
+/// Returns the relative distance of the farthest peak that belongs to no mode and is so near that the fit has split
+/// one decay between the two: what is then measured of the mode alone is unreliable. A joint whose
+/// stiffness changes with the amplitude makes such pairs.
+pub fn split_pole(configuration: &Configuration, mode: &ObservedMode) -> Option<f64> {
+    let peaks = configuration.extra_peaks.iter();
+    peaks
+        .filter(|peak| peak.label == UNPAIRED)
+        .map(|peak| (peak.frequency / mode.frequency - 1.0).abs())
+        .filter(|distance| *distance < SPLIT_POLE)
+        .max_by(f64::total_cmp)
+}
+
+/// Share of a change along the decay that remains uncertain in the frequency fitted to all of it (1): the average is
+/// that of a small change, off by 15 % for one as large as the half-power width.
+const AVERAGE_ERROR: f64 = 0.15;
+/// Relative error of a modal constant per half-power width by which the frequency changes along the decay: the
+/// exponential that extrapolates to the blow does not hold.
+const CONSTANT_ERROR: f64 = 0.5;
+
+/// Returns the relative standard uncertainty that a change along the decay adds to the frequency fitted to all of it.
+pub fn average_std(mode: &ObservedMode) -> f64 {
+    AVERAGE_ERROR * change_along_decay(mode).unwrap_or(0.0)
+}
+
+/// Returns the relative standard uncertainty that a change along the decay adds to a modal constant.
+pub fn constant_model_std(mode: &ObservedMode) -> f64 {
+    let damping = mode.damping.map(|damping| damping.value);
+    let sweep_in_bandwidths = match (change_along_decay(mode), damping) {
+        (Some(change), Some(damping)) if damping > 0.0 => 0.5 * change / damping,
+        _ => 0.0,
+    };
+    CONSTANT_ERROR * sweep_in_bandwidths
+}
+
+/// Returns the change of the logarithm of the frequency along the followed decay; `None` where it is steady.
+fn change_along_decay(mode: &ObservedMode) -> Option<f64> {
+    let decay = mode.decay?;
+    let (early, late) = (decay.early.frequency.value, decay.late.frequency.value);
+    (decay.verdict != DecayVerdict::Steady).then(|| (early / late).ln().abs())
+}
+
+/// Refuses observations that cannot be diagnosed.
+pub fn check(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+    nominal.specimen.check()?;
+    let tested = up_to(highest_mode(observations), observations);
+    check_number_of_modes(&tested, nominal)?;
+    let mut modes = tested.configurations.iter().flat_map(|one| &one.modes);
+    if !modes.any(|mode| mode.std.is_some_and(|std| std > 0.0)) {
+        return Err(GapError::NoUncertainty);
+    }
+    check_same_modes(observations)?;
+    check_same_peaks(observations)?;
+    check_sensors(observations, nominal)
+}
+
+fn check_number_of_modes(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+    let configurations = observations.configurations.iter();
+    let modes = configurations.flat_map(|one| &one.modes);
+    let mut modes: Vec<usize> = modes.map(|mode| mode.mode).collect();
+    modes.sort_unstable();
+    modes.dedup();
+    let needed = nominal.joint_parameters().len();
+    let least = (needed + 1).max(2);
+    if modes.len() < least {
+        return Err(GapError::TooFewModes {
+            modes: modes.len(),
+            needed,
+            least,
+        });
+    }
+    Ok(())
+}
+
+/// Returns the name of a configuration.
+fn name_of(observations: &Observations, k: usize) -> String {
+    let file = observations.configurations[k].file.clone();
+    file.unwrap_or_else(|| format!("configuration {}", k + 1))
+}
+
+/// Refuses configurations with the same added masses that have a mode at very different frequencies.
+fn check_same_modes(observations: &Observations) -> Result<(), GapError> {
+    let all = &observations.configurations;
+    for (second, configuration) in all.iter().enumerate() {
+        for mode in &configuration.modes {
+            for (first, other) in all[..second].iter().enumerate() {
+                let Some(other) = other
+                    .mode(mode.mode)
+                    .filter(|_| other.masses == configuration.masses)
+                else {
+                    continue;
+                };
+                let ratio = mode.frequency / other.frequency;
+                if !(1.0 / SAME_MODE_RATIO..SAME_MODE_RATIO).contains(&ratio) {
+                    return Err(GapError::Contradictory {
+                        first: name_of(observations, first),
+                        second: name_of(observations, second),
+                        mode: mode.mode,
+                        low: other.frequency,
+                        high: mode.frequency,
+                    });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses two configurations if each shares fewer than half of its peaks with the other, where the bands of
+/// both reach. Peaks may be missing in one, where a sensor sits on nodes, or stray, but then most of the other's are
+/// found. If the peaks follow each other in order, though farther apart, one structure was changed. If
+/// most modes are the same, the other peaks (harmonics of a contact that rattles, say) belong to the structure. Both
+/// are left to the diagnosis.
+fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
+    let all = &observations.configurations;
+    let peaks: Vec<Vec<f64>> = all.iter().map(resonances).collect();
+    for second in 0..all.len() {
+        for first in (0..second).filter(|&first| all[first].masses == all[second].masses) {
+            let band = common_band(&all[second], &all[first]);
+            let one = SharedPeaks::new(&peaks[second], &peaks[first], band);
+            let other = SharedPeaks::new(&peaks[first], &peaks[second], band);
+            let known = are_in_order(&other.frequencies, &one.frequencies)
+                || share_modes(&all[first], &all[second], band);
+            if !known && one.are_mostly_new() && other.are_mostly_new() {
+                return Err(GapError::AnotherStructure {
+                    first: name_of(observations, first),
+                    second: name_of(observations, second),
+                    strangers: one.new,
+                    peaks: one.frequencies.len(),
+                    percent: 100.0 * MOVED_FREQUENCY,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Band of frequencies (Hz).
+#[derive(Clone, Copy)]
+struct Band {
+    low: f64,
+    high: f64,
+}
+
+impl Band {
+    fn contains(self, frequency: f64) -> bool {
+        self.low <= frequency && frequency <= self.high
+    }
+
+    /// Counts the modes with a number in this band.
+    fn count_modes(self, configuration: &Configuration) -> usize {
+        let modes = configuration.modes.iter();
+        modes.filter(|mode| self.contains(mode.frequency)).count()
+    }
+}
+
+/// Returns the frequencies that both bands reach, less the shift of a peak across an end.
+fn common_band(one: &Configuration, other: &Configuration) -> Band {
+    let bands = [one, other].map(|one| one.band.unwrap_or((0.0, f64::INFINITY)));
+    Band {
+        low: bands[0].0.max(bands[1].0) * (1.0 + MOVED_FREQUENCY),
+        high: bands[0].1.min(bands[1].1) * (1.0 - MOVED_FREQUENCY),
+    }
+}
+
+/// Returns whether most modes with a number of either configuration lie where the other has them.
+fn share_modes(one: &Configuration, other: &Configuration, band: Band) -> bool {
+    let modes = one
+        .modes
+        .iter()
+        .filter(|mode| band.contains(mode.frequency));
+    let pairs = modes.filter_map(|mode| Some((mode.frequency, other.mode(mode.mode)?.frequency)));
+    let alike = pairs.filter(|&(a, b)| is_near(a, b)).count();
+    alike >= LEAST_SHARED_MODES && 2 * alike > band.count_modes(one).max(band.count_modes(other))
+}
+
+/// Returns whether a frequency may be another one that has moved (both in Hz).
+fn is_near(frequency: f64, other: f64) -> bool {
+    (frequency / other - 1.0).abs() <= MOVED_FREQUENCY
+}
+
+/// Peaks of one configuration in the band of another.
+struct SharedPeaks {
+    /// Frequencies (Hz), ascending.
+    frequencies: Vec<f64>,
+    /// Number of peaks that the other does not have.
+    new: usize,
+}
+
+impl SharedPeaks {
+    fn new(own: &[f64], other: &[f64], band: Band) -> Self {
+        let own = own.iter().copied();
+        let frequencies: Vec<f64> = own.filter(|own| band.contains(*own)).collect();
+        let known = frequencies
+            .iter()
+            .filter(|own| other.iter().any(|other| is_near(**own, *other)))
+            .count();
+        SharedPeaks {
+            new: frequencies.len() - known,
+            frequencies,
+        }
+    }
+
+    fn are_mostly_new(&self) -> bool {
+        self.frequencies.len() >= LEAST_PEAKS && 2 * self.new > self.frequencies.len()
+    }
+}
+
+/// Returns whether most frequencies of two ascending lists lie in pairs beside each other.
+fn are_in_order(one: &[f64], other: &[f64]) -> bool {
+    let pairs = one.iter().zip(other);
+    let near = pairs.filter(|(a, b)| (*a / *b - 1.0).abs() <= CHANGED_FREQUENCY);
+    2 * near.count() > one.len().min(other.len())
+}
+
+/// Returns the frequencies of all resonances (Hz), with a mode number or without, ascending.
+fn resonances(configuration: &Configuration) -> Vec<f64> {
+    let peaks = configuration.extra_peaks.iter();
+    let unpaired = peaks.filter(|peak| peak.label == UNPAIRED);
+    let modes = configuration.modes.iter().map(|mode| mode.frequency);
+    let mut all: Vec<f64> = modes.chain(unpaired.map(|peak| peak.frequency)).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// Refuses sensors that all sit at nodes of all modes.
+fn check_sensors(observations: &Observations, nominal: &Nominal) -> Result<(), GapError> {
+    let configurations = observations.configurations.iter();
+    let numbers = configurations.flat_map(|one| one.modes.iter().map(|mode| mode.mode));
+    let highest = numbers.max().unwrap_or(1);
+    let modes = nominal.modes(highest)?;
+    let length = nominal.length();
+    let mut largest: Option<f64> = None;
+    for configuration in &observations.configurations {
+        let sensors = configuration.sensors.iter();
+        for position in sensors.filter_map(|sensor| sensor.position) {
+            let seen = largest.get_or_insert(0.0);
+            for mode in &configuration.modes {
+                let top = (0..=100)
+                    .map(|k| length * f64::from(k) / 100.0)
+                    .map(|x| modes.displacement(mode.mode - 1, x).abs())
+                    .fold(0.0, f64::max);
+                *seen = seen.max(modes.displacement(mode.mode - 1, position).abs() / top);
+            }
+        }
+    }
+    if largest.is_some_and(|largest| largest < NODE_DISPLACEMENT) {
+        return Err(GapError::SensorsAtNodes {
+            percent: 100.0 * NODE_DISPLACEMENT,
+            distance: 0.1 * length,
+        });
+    }
+    Ok(())
+}
+
+/// Peaks of a test that belong to no mode.
+#[derive(Debug, Clone, Default)]
+pub struct UnpairedPeaks {
+    /// Peaks that at least half of the recordings show whose band reaches them.
+    pub all: Vec<UnpairedPeak>,
+    /// Logarithms of the frequencies of peaks that fewer recordings show, clear resonances or not.
+    pub doubtful: Vec<f64>,
+    /// Logarithms of the lowest and the highest frequency of a mode; `None` where no peaks were searched.
+    pub band: Option<(f64, f64)>,
+    /// Configurations whose peaks were searched.
+    pub searched: Vec<SearchedConfiguration>,
+}
+
+/// Configuration whose peaks were searched.
+#[derive(Debug, Clone)]
+pub struct SearchedConfiguration {
+    /// Index of the configuration.
+    pub configuration: usize,
+    /// Logarithm of the least modal constant (1/kg) that is read; `None` where no peak shows it.
+    pub least_log_constant: Option<f64>,
+}
+
+/// Peak of no mode that several recordings show.
+#[derive(Debug, Clone)]
+pub struct UnpairedPeak {
+    /// Logarithm of its frequency, the mean of the recordings.
+    pub log: f64,
+    /// Standard uncertainty of the logarithm as the frequency of a fixture (1).
+    pub std: f64,
+    /// Configurations, with the logarithm of its modal constant (1/kg).
+    pub constants: Vec<(usize, f64)>,
+}
+
+/// Peak of no mode in one recording.
+struct ObservedPeak {
+    configuration: usize,
+    log: f64,
+    /// Relative standard uncertainty of its frequency (1).
+    std: f64,
+    /// Logarithm of its modal constant (1/kg).
+    constant: Option<f64>,
+}
+
+/// Least relative uncertainty of a fixture's frequency from its peak: a rocking fixture has more
+/// than one way to move, and its open size adds as much.
+pub const FIXTURE_FREQUENCY_STD: f64 = 0.001;
+/// Decibels of a factor of e: 20/ln 10.
+pub const DECIBEL: f64 = 8.685_889_638_065_036;
+
+impl UnpairedPeaks {
+    /// Collects the peaks of all recordings; the first of several levels of one recording stands for it.
+    pub fn new(observations: &Observations) -> Self {
+        let mut searched: Vec<(usize, &Configuration)> = Vec::new();
+        for (index, one) in observations.configurations.iter().enumerate() {
+            let is_new = searched
+                .iter()
+                .all(|known| known.1.recording != one.recording);
+            if one.recording.is_some() && is_new {
+                searched.push((index, one));
+            }
+        }
+        let modes = searched.iter().flat_map(|one| &one.1.modes);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for log in modes.map(|mode| mode.frequency.ln()) {
+            (low, high) = (low.min(log), high.max(log));
+        }
+        let all = common_peaks(&searched);
+        UnpairedPeaks {
+            doubtful: doubtful_peaks(&searched, &all),
+            all,
+            band: (low < high).then_some((low, high)),
+            searched: searched
+                .iter()
+                .map(|(index, one)| SearchedConfiguration {
+                    configuration: *index,
+                    least_log_constant: least_log_constant(one),
+                })
+                .collect(),
+        }
+    }
+
+    /// Returns whether some recording shows a peak that may be that of a fixture at this logarithm of the frequency.
+    pub fn is_doubtful(&self, log: f64) -> bool {
+        self.doubtful
+            .iter()
+            .any(|peak| (peak - log).abs() < NEAR_FIXTURE)
+    }
+
+    /// Returns whether this logarithm of a frequency lies between the lowest and the highest mode.
+    pub fn contains(&self, log: f64) -> bool {
+        self.band.is_some_and(|(low, high)| log > low && log < high)
+    }
+}
+
+/// Returns the peaks that a recording shows beside its modes and the common peaks, without mains and the like.
+fn doubtful_peaks(searched: &[(usize, &Configuration)], common: &[UnpairedPeak]) -> Vec<f64> {
+    let peaks = searched.iter().flat_map(|(_, one)| &one.extra_peaks);
+    peaks
+        .filter(|peak| [UNPAIRED, UNCLEAR].contains(&peak.label.as_str()))
+        .map(|peak| peak.frequency.ln())
+        .filter(|log| common.iter().all(|one| (one.log - log).abs() >= SAME_PEAK))
+        .collect()
+}
+
+/// Returns the logarithm of the least modal constant that is read: a peak far over the noise
+/// would still be read if it were weaker by its distance to the readable level.
+fn least_log_constant(one: &Configuration) -> Option<f64> {
+    let peaks = one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED);
+    peaks
+        .filter_map(|peak| {
+            let spare = (peak.level_db? - READABLE_LEVEL).max(0.0);
+            Some(peak.constant?.abs().ln() - spare / DECIBEL)
+        })
+        .filter(|log| log.is_finite())
+        .min_by(f64::total_cmp)
+}
+
+/// Returns the peaks that at least half of the recordings show whose band reaches them.
+fn common_peaks(searched: &[(usize, &Configuration)]) -> Vec<UnpairedPeak> {
+    let mut all = Vec::new();
+    for (index, one) in searched {
+        all.extend(peaks_of_no_mode(*index, one));
+    }
+    all.sort_by(|a, b| a.log.total_cmp(&b.log));
+    let groups = all.chunk_by(|a, b| b.log - a.log < SAME_PEAK);
+    let common = groups.filter(|group| {
+        let showing: Vec<bool> = searched
+            .iter()
+            .map(|one| group.iter().any(|peak| peak.configuration == one.0))
+            .collect();
+        let able = searched.iter().zip(&showing);
+        let able = able.filter(|(one, shows)| **shows || one.1.reaches(group[0].log.exp()));
+        2 * showing.iter().filter(|shows| **shows).count() >= able.count()
+    });
+    common.map(mean_peak).collect()
+}
+
+/// Returns the mean of one peak in several recordings.
+fn mean_peak(group: &[ObservedPeak]) -> UnpairedPeak {
+    let count = group.len() as f64;
+    let log = group.iter().map(|one| one.log).sum::<f64>() / count;
+    let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
+    let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
+    let constants = group.iter();
+    UnpairedPeak {
+        log,
+        std: scatter.sqrt().hypot(read).hypot(FIXTURE_FREQUENCY_STD),
+        constants: constants
+            .filter_map(|one| Some((one.configuration, one.constant?)))
+            .collect(),
+    }
+}
+
+/// Returns the peaks of a recording that belong to no mode and are no halves of a split decay.
+fn peaks_of_no_mode(configuration: usize, one: &Configuration) -> Vec<ObservedPeak> {
+    let mut all = Vec::new();
+    for peak in one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED) {
+        let mut modes = one.modes.iter();
+        if modes.all(|mode| (peak.frequency / mode.frequency - 1.0).abs() > SPLIT_POLE) {
+            let constant = peak.constant.map(|constant| constant.abs().ln());
+            all.push(ObservedPeak {
+                configuration,
+                log: peak.frequency.ln(),
+                std: peak.std.unwrap_or(0.0) / peak.frequency,
+                constant: constant.filter(|constant| constant.is_finite()),
+            });
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tapjoint_identify::observation::{ExtraPeak, ObservedMode};
+
+    fn recording(index: usize, peaks: &[(f64, &str)]) -> Configuration {
+        let peak = |(frequency, label): &(f64, &str)| ExtraPeak {
+            frequency: *frequency,
+            std: Some(0.01),
+            level_db: Some(45.0),
+            constant: Some(-0.2),
+            label: (*label).to_owned(),
+        };
+        Configuration {
+            file: None,
+            recording: Some(index),
+            sensors: Vec::new(),
+            masses: Vec::new(),
+            tap: None,
+            peak_force: None,
+            level: None,
+            taps: 3,
+            decay_seconds: None,
+            band: None,
+            modes: [16.0, 1400.0]
+                .iter()
+                .zip(1..)
+                .map(|(f, mode)| ObservedMode::read_elsewhere(mode, *f, None))
+                .collect(),
+            covariance: None,
+            common: 0.0,
+            extra_peaks: peaks.iter().map(peak).collect(),
+        }
+    }
+
+    #[test]
+    fn limit_peaks_count_that_half_of_the_recordings_show_and_that_belong_to_no_mode() {
+        let lone = UNPAIRED;
+        let configurations = vec![
+            recording(0, &[(50.0, "mains 50 Hz"), (183.3, lone), (700.0, lone)]),
+            // Another level of the same recording.
+            recording(0, &[(183.3, lone), (700.0, lone)]),
+            recording(1, &[(50.0, "mains 50 Hz"), (183.4, lone), (1390.0, lone)]),
+            // Two of one recording are one sighting.
+            recording(2, &[(900.0, lone), (901.0, lone), (1390.0, lone)]),
+        ];
+        let peaks = UnpairedPeaks::new(&Observations { configurations });
+        assert_eq!(peaks.all.len(), 1);
+        assert!((peaks.all[0].log - 183.35_f64.ln()).abs() < 1e-6);
+        assert_eq!(peaks.all[0].constants.len(), 2);
+        assert!(peaks.contains(183.0_f64.ln()) && !peaks.contains(1500.0_f64.ln()));
+        // What one recording shows may be a fixture's all the same; what most show states where it is.
+        let doubtful = [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_doubtful(f.ln()));
+        assert_eq!(doubtful, [true, true, false, false, false]);
+        // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
+        let weakest = peaks.searched[0].least_log_constant.unwrap();
+        assert!((weakest - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn limit_frequencies_read_elsewhere_say_nothing_of_peaks() {
+        let mut one = recording(0, &[]);
+        one.recording = None;
+        let configurations = vec![one];
+        let peaks = UnpairedPeaks::new(&Observations { configurations });
+        assert!(peaks.all.is_empty() && !peaks.contains(100.0_f64.ln()));
+    }
+}

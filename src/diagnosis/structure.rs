@@ -1,0 +1,681 @@
+//! The tested structure: what is described of it, how a configuration loads it, and its modes.
+//!
+//! This chapter and [`forward`](crate::forward) alone know that the structure is a beam on a joint.
+
+use crate::joint_motion::{
+    JointMotion, ModeAmplitude, StiffnessChanges, initial_amplitude, log_stiffness,
+};
+use crate::thresholds::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
+use nalgebra::DMatrix;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use tapjoint_beam::StructureError;
+use tapjoint_beam::effects::{JointLaw, Seen, SensorPlace};
+use tapjoint_beam::specimen::{
+    BeamModes, Body, Mesh, PointInertia, PointMass, Specimen, SpecimenJoint, SpecimenModes,
+};
+use tapjoint_identify::observation::{
+    Configuration, ObservedMode, ObservedSensor, effective_share,
+};
+use tapjoint_numerics::stats::median;
+
+/// Number of elements of a structure.
+pub const ELEMENTS: usize = Mesh::DIAGNOSIS.elements;
+/// Index of the coupling among the parameters of a joint, after translation and rotation.
+pub const COUPLING: usize = 2;
+/// Index of the rotation among the parameters of a joint.
+pub const ROTATION: usize = 1;
+
+/// Tested structure as it was described.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nominal {
+    /// Beam, joint and permanent masses, without sensors. The search for the joint's stiffnesses begins at those
+    /// given here, stated ones too; those that are 0 or infinite stay so. A coupling other than 0 is
+    /// fitted with them.
+    pub specimen: Specimen,
+    /// The sensors by name.
+    pub sensors: Vec<NominalSensor>,
+    /// The joint's stiffnesses (N/m, N m/rad) as estimated from the same frequencies without any effect,
+    /// to state how far an effect moves them; `None` to take those of the nominal model's own fit.
+    pub joint_before: Option<[f64; 2]>,
+    /// Standard uncertainty of the one factor that beam length, thickness, modulus and density put on
+    /// all frequencies (1); `None` where the description states no tolerance.
+    pub scale_std: Option<f64>,
+    /// Largest bias of frequencies that are read on lines (Hz); `None` for fitted ones, which
+    /// have none.
+    pub reading_bias: Option<f64>,
+}
+
+/// Sensor as described.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NominalSensor {
+    /// Name.
+    pub name: String,
+    /// Mass (kg); `None` where it is not stated, 0 for a sensor that does not touch the structure.
+    pub mass: Option<f64>,
+    /// Position in the reference configuration (m); `None` where it is not stated.
+    pub position: Option<f64>,
+}
+
+impl Nominal {
+    /// Returns whether a sensor is known not to touch the structure.
+    fn is_contactless(&self, name: &str) -> bool {
+        let mut sensors = self.sensors.iter();
+        sensors.any(|sensor| sensor.name == name && sensor.mass == Some(0.0))
+    }
+
+    /// Returns the mass of a sensor (kg), 0 where it is unknown.
+    pub(crate) fn mass_of(&self, name: &str) -> f64 {
+        let mut sensors = self.sensors.iter();
+        let own = sensors.find(|sensor| sensor.name == name);
+        own.and_then(|sensor| sensor.mass).unwrap_or(0.0)
+    }
+
+    /// Returns the structure with sensors and added masses.
+    pub(crate) fn loaded(&self, sensors: &[SensorPlace], masses: &[PointMass]) -> Specimen {
+        let mut specimen = self.specimen.clone();
+        for sensor in sensors.iter().filter(|sensor| sensor.mass > 0.0) {
+            specimen.masses.push(PointMass {
+                position: sensor.position,
+                mass: sensor.mass,
+                inertia: 0.0,
+            });
+        }
+        specimen.masses.extend_from_slice(masses);
+        specimen
+    }
+
+    /// Returns the fitted parameters of the joint: direction (0 translation, 1 rotation, 2 the coupling of a joint that
+    /// has one) and start value.
+    pub(crate) fn joint_parameters(&self) -> Vec<(usize, f64)> {
+        let SpecimenJoint::Springs { coupling, .. } = self.specimen.joint else {
+            return Vec::new();
+        };
+        let stiffnesses = self.specimen.joint.stiffnesses().into_iter().enumerate();
+        let mut parameters: Vec<(usize, f64)> = stiffnesses
+            .filter(|(_, stiffness)| *stiffness > 0.0 && stiffness.is_finite())
+            .collect();
+        if coupling != 0.0 {
+            parameters.push((COUPLING, coupling));
+        }
+        parameters
+    }
+
+    /// Returns the directions of the fitted stiffnesses.
+    pub(crate) fn fitted_springs(&self) -> Vec<usize> {
+        let parameters = self.joint_parameters().into_iter();
+        let directions = parameters.map(|(direction, _)| direction);
+        directions
+            .filter(|direction| *direction != COUPLING)
+            .collect()
+    }
+
+    /// Returns whether a parameter of the joint is fitted.
+    pub(crate) fn fits(&self, direction: usize) -> bool {
+        self.joint_parameters().iter().any(|one| one.0 == direction)
+    }
+
+    /// Returns whether the structure has a joint.
+    pub(crate) fn has_joint(&self) -> bool {
+        !matches!(self.specimen.joint, SpecimenJoint::Free)
+    }
+
+    /// Returns whether the structure is one beam, not two.
+    pub(crate) fn is_one_beam(&self) -> bool {
+        matches!(self.specimen.body, Body::One(_))
+    }
+
+    /// Length of the structure (m).
+    pub(crate) fn length(&self) -> f64 {
+        self.specimen.body.length()
+    }
+
+    /// Modes of the described structure up to this number.
+    pub(crate) fn modes(&self, count: usize) -> Result<SpecimenModes, StructureError> {
+        self.specimen.modes(count, Mesh::DIAGNOSIS)
+    }
+
+    /// Mass of the beam or beams (kg).
+    pub(crate) fn beam_mass(&self) -> f64 {
+        let beams = self.specimen.body.beams();
+        beams.iter().map(tapjoint_beam::Beam::mass).sum()
+    }
+
+    /// Bending stiffness of the first beam (N m2).
+    pub(crate) fn bending_stiffness(&self) -> f64 {
+        self.specimen.body.beams()[0].bending_stiffness()
+    }
+
+    /// Returns the beam without its joint.
+    pub(crate) fn bare(&self) -> Nominal {
+        let mut bare = self.clone();
+        bare.specimen.joint = SpecimenJoint::Free;
+        bare.specimen.joint_mass = PointInertia::default();
+        bare.specimen.overlap = None;
+        bare
+    }
+}
+
+/// One configuration of the test as the model needs it: sensors, masses and hammer on the structure.
+#[derive(Debug, Clone)]
+pub struct Arrangement {
+    /// File of the recording, or the name of the given data.
+    pub file: String,
+    /// The structure with all known masses.
+    pub specimen: Specimen,
+    /// Positions and masses of the sensors, in the order of the observations. A sensor of unknown position has no
+    /// mass, and its shape is not compared.
+    pub sensors: Vec<SensorPlace>,
+    /// Known added masses, each with its index among all distinct ones.
+    pub fastened: Vec<(usize, PointMass)>,
+    /// Sensors that sit on the structure at a known position.
+    pub carried: Vec<SensorPlace>,
+    /// Indices of the sensors' names.
+    pub names: Vec<usize>,
+    /// Indices of the sensors' stated positions.
+    pub positions: Vec<usize>,
+    /// Position of the taps (m).
+    pub tap: Option<f64>,
+    /// Amplitude over that of the hardest configuration (1).
+    pub level: f64,
+    /// Tap force over that of the hardest configuration (1), where it was measured.
+    pub known_level: Option<f64>,
+    /// Mode, and amplitude at the begin and end of its followed decay over that of its first instant.
+    pub spans: Vec<(usize, [f64; 2])>,
+    /// Motion of the joint; `None` where no amplitude is known.
+    pub joint_motion: Option<JointMotion>,
+    /// Number of the set-up: configurations of one recording share it.
+    pub setup: usize,
+    /// There is a recording that could be read again.
+    pub is_recorded: bool,
+    /// Common scatter of the taps: mode, and share of its standard deviation with its sign.
+    pub scatter: Vec<(usize, f64)>,
+}
+
+/// Sensors and masses of all configurations, each once.
+#[derive(Debug, Default)]
+pub struct Inventory {
+    /// Names of the sensors.
+    pub names: Vec<String>,
+    /// Index of the name, and stated position (m), of the sensors.
+    pub positions: Vec<(usize, f64)>,
+    /// Known added masses.
+    pub fastened: Vec<PointMass>,
+}
+
+/// Returns the index of a value in a list, which grows where it is new.
+fn index_in<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    list.iter()
+        .position(|one| *one == value)
+        .unwrap_or_else(|| {
+            list.push(value);
+            list.len() - 1
+        })
+}
+
+impl Arrangement {
+    /// Takes over a configuration, the `index`-th; grows the inventory.
+    pub fn new(
+        index: usize,
+        configuration: &Configuration,
+        nominal: &Nominal,
+        inventory: &mut Inventory,
+    ) -> Self {
+        let mut sensors: Vec<SensorPlace> = Vec::new();
+        let (mut carried, mut names, mut positions) = (Vec::new(), Vec::new(), Vec::new());
+        for sensor in &configuration.sensors {
+            let mass = sensor
+                .position
+                .map_or(0.0, |_| nominal.mass_of(&sensor.name));
+            let position = sensor.position.unwrap_or(0.0);
+            let placed = SensorPlace { position, mass };
+            sensors.push(placed);
+            if sensor.position.is_some() && !nominal.is_contactless(&sensor.name) {
+                carried.push(placed);
+            }
+            let name = index_in(&mut inventory.names, sensor.name.clone());
+            names.push(name);
+            positions.push(index_in(&mut inventory.positions, (name, position)));
+        }
+        let masses = configuration.masses.iter();
+        let fastened = masses.map(|mass| (index_in(&mut inventory.fastened, *mass), *mass));
+        let file = configuration.file.clone();
+        Arrangement {
+            fastened: fastened.collect(),
+            file: file.unwrap_or_else(|| "the given frequencies".to_owned()),
+            specimen: nominal.loaded(&sensors, &configuration.masses),
+            sensors,
+            carried,
+            names,
+            positions,
+            tap: configuration.tap,
+            level: configuration.level.unwrap_or(1.0),
+            known_level: configuration.level,
+            spans: configuration.modes.iter().filter_map(span).collect(),
+            joint_motion: None,
+            setup: configuration.recording.unwrap_or(index),
+            is_recorded: configuration.recording.is_some(),
+            scatter: common_scatter(configuration),
+        }
+    }
+
+    /// Returns its file, and the level if the taps were softer than the hardest.
+    pub fn label(&self) -> String {
+        match self.known_level {
+            Some(level) if level < 0.999 => format!("{} (level {level:.2})", self.file),
+            _ => self.file.clone(),
+        }
+    }
+
+    /// Returns the amplitudes between which the decay of a mode was followed.
+    fn span(&self, mode: usize) -> Option<[f64; 2]> {
+        let span = self.spans.iter().find(|span| span.0 == mode);
+        span.map(|span| span.1)
+    }
+
+    /// Logarithm of the ratio of the amplitudes between which a decay was followed; 1 where they are unknown.
+    pub fn log_amplitude_span(&self, mode: usize) -> f64 {
+        self.span(mode)
+            .map_or(1.0, |[early, late]| (early / late).ln())
+    }
+
+    /// Returns d ln kr/d ln a that a mode feels, averaged over the followed part of its decay.
+    pub fn stiffness_slope(&self, mode: usize, law: &JointLaw) -> f64 {
+        if let (Some([early, late]), Some(motion)) = (self.span(mode), &self.joint_motion)
+            && let Some([first, last]) = motion.changes_at_shares(mode, [early, late], law)
+        {
+            return (log_stiffness(first) - log_stiffness(last)) / (early / late).ln();
+        }
+        // Without amplitudes: the derivative at the effective one, 1 % to either side.
+        let a = self.level * effective_share(law.exponent);
+        let [above, below] = [a * 1.01, a / 1.01].map(|a| log_stiffness(law.secant(a) - 1.0));
+        (above - below) / (2.0 * 1.01_f64.ln())
+    }
+
+    /// Moves its first carried sensor to another position (m), which has this index.
+    pub fn move_sensor(&mut self, position: f64, index: usize) {
+        let before = self.carried[0];
+        self.carried[0].position = position;
+        if let Some(k) = self.sensors.iter().position(|sensor| *sensor == before) {
+            self.sensors[k].position = position;
+            self.positions[k] = index;
+        }
+        let mut masses = self.specimen.masses.iter_mut();
+        if let Some(mass) =
+            masses.find(|mass| mass.position == before.position && mass.mass == before.mass)
+        {
+            mass.position = position;
+        }
+    }
+
+    /// Fastens a mass (kg) at a position (m), which has this index.
+    pub fn fasten(&mut self, mass: f64, position: f64, index: usize) {
+        let mass = PointMass {
+            position,
+            mass,
+            inertia: 0.0,
+        };
+        self.specimen.masses.push(mass);
+        self.fastened.push((index, mass));
+    }
+
+    /// Returns the bare beam in the place of the structure, without sensors and masses.
+    pub fn bare(&self, beam: &Nominal) -> Arrangement {
+        Arrangement {
+            specimen: beam.specimen.clone(),
+            sensors: Vec::new(),
+            carried: Vec::new(),
+            fastened: Vec::new(),
+            joint_motion: None,
+            names: Vec::new(),
+            positions: Vec::new(),
+            ..self.clone()
+        }
+    }
+}
+
+/// Returns the mode and its amplitudes at both ends of the followed decay, over the first one.
+fn span(mode: &ObservedMode) -> Option<(usize, [f64; 2])> {
+    let decay = mode.decay?;
+    let first = initial_amplitude(mode)?.0;
+    let (early, late) = (
+        decay.early.amplitude? / first,
+        decay.late.amplitude? / first,
+    );
+    (late > 0.0 && early > DISTINCT_AMPLITUDES * late).then_some((mode.mode, [early, late]))
+}
+
+/// Returns the one factor that explains most of the correlation of the taps' scatter. With the largest eigenvalue l
+/// of the correlation matrix and its vector v, the shares sqrt(l - 1) v leave the diagonal as it is and
+/// explain most of the rest (all of it where all correlations are equal and many).
+fn common_scatter(configuration: &Configuration) -> Vec<(usize, f64)> {
+    let Some(covariance) = &configuration.covariance else {
+        return Vec::new();
+    };
+    let size = configuration.modes.len();
+    let correlation = DMatrix::from_fn(size, size, |i, j| {
+        covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt()
+    });
+    if size < 2 || correlation.iter().any(|value| !value.is_finite()) {
+        return Vec::new();
+    }
+    let eigen = correlation.symmetric_eigen();
+    let (at, largest) = eigen.eigenvalues.argmax();
+    if largest < COMMON_SCATTER {
+        return Vec::new();
+    }
+    let vector = eigen.eigenvectors.column(at);
+    let shares = vector.iter().map(|v| (largest - 1.0).sqrt() * v);
+    let modes = configuration.modes.iter().map(|mode| mode.mode);
+    modes.zip(shares).collect()
+}
+
+/// Structure of a configuration under a hypothesis, and its modes.
+#[derive(Clone)]
+pub struct ModalModel {
+    /// The structure with its effects.
+    pub seen: Seen,
+    /// Its modes, or those of a structure next to it.
+    pub own: Arc<BeamModes>,
+    /// Its frequencies (Hz), where the modes are those of a structure next to it.
+    pub frequencies: Option<Vec<f64>>,
+    /// Stiffnesses that its modes feel of a joint whose stiffness depends on the amplitude.
+    pub stiffness_changes: Option<StiffnessChanges>,
+}
+
+/// Property of a piece of the beam that changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Property {
+    /// Bending stiffness.
+    Stiffness,
+    /// Mass per length.
+    Mass,
+}
+
+impl ModalModel {
+    /// All modes, that of a fixture among them.
+    pub fn modes(&self) -> &SpecimenModes {
+        &self.own.modes
+    }
+
+    /// Index of the mode with this number (1 = lowest); the mode of a fixture has no number.
+    pub fn index(&self, mode: usize) -> Option<usize> {
+        self.own.numbers.get(mode - 1).copied()
+    }
+
+    /// Angular frequency of a mode by its index (rad/s).
+    pub fn omega(&self, index: usize) -> f64 {
+        TAU * self.modes().frequencies()[index]
+    }
+
+    /// Returns the frequency as it is measured (Hz).
+    pub fn frequency(&self, mode: usize) -> Option<f64> {
+        let index = self.index(mode)?;
+        let all = self.frequencies.as_deref();
+        Some(
+            self.seen
+                .read(all.unwrap_or(self.modes().frequencies())[index]),
+        )
+    }
+
+    /// Returns the frequency of the fixture's own mode as it is measured (Hz), and its index.
+    pub fn fixture_frequency(&self) -> Option<(usize, f64)> {
+        let index = self.own.fixture?;
+        Some((index, self.seen.read(self.modes().frequencies()[index])))
+    }
+
+    /// Returns the share of each spring of the joint in the strain energy of a mode, q_t F_t/omega^2 for a shape of
+    /// unit modal mass that deforms the joint by q against the forces F = K q. With coupled springs the
+    /// shares belong to the stiffnesses at a fixed coupling: dK/d ln k_t = (E_t K + K E_t)/2.
+    pub fn joint_shares(&self, index: usize) -> [f64; 2] {
+        let SpecimenJoint::Springs { kt, kr, coupling } = self.seen.specimen.joint else {
+            return [0.0; 2];
+        };
+        let q = self.modes().joint_motion(index);
+        let omega = self.omega(index);
+        let square = 1.0 - coupling * coupling;
+        let mut shares = [0.0; 2];
+        for (own, [stiffness, other]) in [[kt, kr], [kr, kt]].into_iter().enumerate() {
+            // A rigid spring holds no energy; its deformation is 0 and its stiffness infinite.
+            if stiffness.is_finite() {
+                let cross = if coupling == 0.0 {
+                    0.0
+                } else {
+                    coupling * (stiffness * other).sqrt() * q[1 - own]
+                };
+                shares[own] = q[own] * (stiffness * q[own] + cross) / square / (omega * omega);
+            }
+        }
+        shares
+    }
+
+    /// Returns d ln f/d ln kr of a mode.
+    pub fn rotation_sensitivity(&self, index: usize) -> f64 {
+        0.5 * self.joint_shares(index)[ROTATION]
+    }
+
+    /// Returns d ln f/d ln k of all modes for a spring of the joint, or d ln f/d coupling: half the strain energy of that
+    /// spring in the mode over that of the structure (Rayleigh's quotient is stationary in the shape).
+    pub fn joint_slopes(&self, direction: usize) -> Vec<f64> {
+        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        if based || direction == COUPLING {
+            // The base's spring is tied to the joint's by their ratio: both move.
+            return self.stiffened_slopes(direction);
+        }
+        (0..self.modes().len())
+            .map(|index| 0.5 * self.joint_shares(index)[direction])
+            .collect()
+    }
+
+    /// Returns these slopes by Rayleigh's quotient of the changed structure.
+    fn stiffened_slopes(&self, direction: usize) -> Vec<f64> {
+        const STEP: f64 = 1e-4;
+        let mut other = self.seen.specimen.clone();
+        if let SpecimenJoint::Springs { kt, kr, coupling } = &mut other.joint {
+            match direction {
+                0 => *kt *= STEP.exp(),
+                COUPLING => *coupling += STEP,
+                _ => *kr *= STEP.exp(),
+            }
+        }
+        let own = self.modes().frequencies();
+        match self.modes().rayleigh_frequencies(&other) {
+            Ok(moved) => (moved.iter().zip(own))
+                .map(|(moved, own)| (moved / own).ln() / STEP)
+                .collect(),
+            Err(_) => vec![0.0; own.len()],
+        }
+    }
+
+    /// Returns d ln(s f + b)/d ln f = s f/(s f + b): a constant bias b does not move with the structure.
+    pub fn offset_factor(&self, index: usize) -> f64 {
+        let own = self.modes().frequencies()[index] * self.seen.frequency_scale;
+        own / (own + self.seen.frequency_offset)
+    }
+
+    /// Returns the difference of a mode's frequency to that of the structure as it was solved (logarithm): the mode
+    /// feels another stiffness than the mean of all modes.
+    pub fn own_change(&self, mode: usize) -> f64 {
+        let Some(changes) = &self.stiffness_changes else {
+            return 0.0;
+        };
+        let (Some(own), Some(index)) = (changes.of(mode), self.index(mode)) else {
+            return 0.0;
+        };
+        self.rotation_sensitivity(index) * (log_stiffness(own) - log_stiffness(changes.mean))
+    }
+
+    /// Returns derivatives of the frequencies' logarithms with respect to the relative size of shear and rotary
+    /// inertia, by Rayleigh's quotient of a beam that has a little less of both.
+    pub fn shear_slopes(&self, modes: usize) -> Option<Vec<f64>> {
+        const STEP: f64 = 1e-3;
+        let mut less = self.seen.specimen.clone();
+        less.shear_rotary -= STEP * less.shear_rotary;
+        let moved = self.modes().rayleigh_frequencies(&less).ok()?;
+        let numbers = (1..=modes).map_while(|mode| self.index(mode));
+        let own = self.modes().frequencies();
+        Some(
+            numbers
+                .map(|index| (own[index] / moved[index]).ln() / STEP)
+                .collect(),
+        )
+    }
+
+    /// Returns d ln f = (1/2) int EI w''^2 dx / omega^2 for the stiffness of the beam between two positions (m),
+    /// -(1/2) int rho A w^2 dx for its mass, with w of unit modal mass, by the midpoint rule.
+    pub fn local_slope(
+        &self,
+        index: usize,
+        property: Property,
+        first_step: usize,
+        steps: usize,
+        step: f64,
+    ) -> f64 {
+        let (body, modes) = (&self.seen.specimen.body, self.modes());
+        let omega = self.omega(index);
+        (0..steps)
+            .map(|point| {
+                let from = step * (first_step + point) as f64;
+                let x = from + 0.5 * step;
+                let beam = match body {
+                    Body::One(beam) => beam,
+                    Body::Joined([left, _]) if x < left.length => left,
+                    Body::Joined([_, right]) => right,
+                };
+                match property {
+                    Property::Stiffness => {
+                        let bend =
+                            (modes.slope(index, from + step) - modes.slope(index, from)) / step;
+                        0.5 * beam.bending_stiffness() * bend * bend * step / (omega * omega)
+                    }
+                    Property::Mass => {
+                        -0.5 * beam.mass_per_length() * modes.displacement(index, x).powi(2) * step
+                    }
+                }
+            })
+            .sum()
+    }
+
+    /// Returns the motion of the joint from the amplitudes that were observed at the sensors; `None`
+    /// where no amplitude is known.
+    pub fn joint_motion(
+        &self,
+        configuration: &Configuration,
+        arrangement: &Arrangement,
+    ) -> Option<JointMotion> {
+        let mut modes = Vec::new();
+        for mode in &configuration.modes {
+            let (Some((amplitude, damping)), Some(reference), Some(index)) = (
+                initial_amplitude(mode),
+                mode.reference,
+                self.index(mode.mode),
+            ) else {
+                continue;
+            };
+            let rotation = self.modes().joint_motion(index)[ROTATION];
+            let sensor = configuration.sensors.get(reference)?.position?;
+            let at_sensor = self.modes().displacement(index, sensor);
+            let tap = arrangement.tap;
+            let at_tap = tap.map_or(1.0, |tap| self.modes().displacement(index, tap));
+            let omega = TAU * mode.frequency;
+            let size = (amplitude * rotation / at_sensor).abs();
+            if size.is_finite() {
+                modes.push(ModeAmplitude {
+                    mode: mode.mode,
+                    amplitude: size.copysign(rotation * at_tap),
+                    omega,
+                    rate: damping * omega,
+                });
+            }
+        }
+        let seconds = configuration.decay_seconds.unwrap_or(f64::INFINITY);
+        (!modes.is_empty()).then_some(JointMotion { modes, seconds })
+    }
+
+    /// Returns the amplitude of the joint's rotation after a tap, over the modes up to this number; `None` where the
+    /// tap has no position.
+    pub fn joint_amplitude(&self, arrangement: &Arrangement, modes: usize) -> Option<f64> {
+        let numbers = (1..=modes).filter_map(|mode| self.index(mode));
+        let tap = arrangement.tap?;
+        Some(joint_amplitude(
+            self.modes(),
+            tap,
+            arrangement.level,
+            numbers,
+        ))
+    }
+}
+
+/// Returns the amplitude of the joint's rotation after a tap at a position (m) at a level (1), in units of the tap's
+/// force: sqrt(sum (phi_i(tap) theta_i/omega_i)^2) over these modes.
+pub fn joint_amplitude(
+    modes: &SpecimenModes,
+    tap: f64,
+    level: f64,
+    which: impl Iterator<Item = usize>,
+) -> f64 {
+    let squares = which.map(|mode| {
+        let omega = TAU * modes.frequencies()[mode];
+        (modes.displacement(mode, tap) * modes.joint_motion(mode)[ROTATION] / omega).powi(2)
+    });
+    level * squares.sum::<f64>().sqrt()
+}
+
+/// Logarithms of the modal constants (1/kg) at the strongest sensor that decide whether a fixture's mode is read.
+#[derive(Debug, Clone, Copy)]
+pub struct FixtureStrength {
+    /// Of the fixture's own mode.
+    pub own: f64,
+    /// Median of the beam's modes.
+    pub median: f64,
+}
+
+/// Returns the strength of the fixture's mode `fixture` beside the beam's modes `numbers`; without a position of the
+/// taps as if they were at the strongest sensor.
+pub fn fixture_strength(
+    modes: &SpecimenModes,
+    fixture: usize,
+    numbers: &[usize],
+    sensors: &[f64],
+    tap: Option<f64>,
+) -> Option<FixtureStrength> {
+    let mut all: Vec<f64> = Vec::new();
+    for mode in numbers.iter().chain([&fixture]) {
+        let at_sensors = sensors.iter().map(|x| modes.displacement(*mode, *x).abs());
+        let most = at_sensors.fold(0.0, f64::max);
+        let at_tap = tap.map_or(most, |tap| modes.displacement(*mode, tap).abs());
+        all.push((most * at_tap).ln());
+    }
+    let own = all.pop()?;
+    if all.is_empty() || sensors.is_empty() {
+        return None;
+    }
+    let median = median(&mut all);
+    (own.is_finite() && median.is_finite()).then_some(FixtureStrength { own, median })
+}
+
+impl NominalSensor {
+    /// Returns the sensor as a configuration has it.
+    pub(crate) fn observed(&self) -> ObservedSensor {
+        ObservedSensor {
+            name: self.name.clone(),
+            position: self.position,
+        }
+    }
+}
+
+/// Returns a structure with the joint that the parameters of these directions give it: logarithms of the stiffnesses,
+/// and the coupling.
+pub fn with_joint(specimen: &Specimen, directions: &[usize], parameters: &[f64]) -> Specimen {
+    let mut specimen = specimen.clone();
+    if let SpecimenJoint::Springs { kt, kr, coupling } = &mut specimen.joint {
+        for (direction, value) in directions.iter().zip(parameters) {
+            match *direction {
+                0 => *kt = value.exp(),
+                COUPLING => *coupling = *value,
+                _ => *kr = value.exp(),
+            }
+        }
+    }
+    specimen
+}

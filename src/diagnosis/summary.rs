@@ -1,0 +1,298 @@
+//! The result: from the comparison of the hypotheses to every stated number.
+
+use crate::amplitude::amplitude_dependence;
+use crate::compare::ModelComparison;
+use crate::dataset::Dataset;
+use crate::evidence::log_likelihood;
+use crate::goodness_of_fit::{DegreesOfFreedom, GoodnessOfFit};
+use crate::location_map::location_map;
+use crate::next_test::next_tests;
+use crate::parameters::{LocationKind, NuisanceParameter};
+use crate::posterior::{
+    Candidate, best_known, confounded, delta_chi_square, location_probabilities, none_of,
+};
+use crate::result::{
+    Closure, CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
+    ParameterValue, UnlocatedSensors, Verdict,
+};
+use crate::structure::COUPLING;
+use crate::thresholds::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
+use crate::validate::{
+    HoldoutErrors, LeftOutErrors, Residuals, closure, frequency_residuals, noise_floor,
+};
+use crate::verdict::verdict;
+use tapjoint_beam::effects::EffectId;
+use tapjoint_numerics::stats::NORMAL_95;
+
+/// Returns the result of a comparison.
+pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensors>) -> Diagnosis {
+    let (dataset, candidates) = (&comparison.dataset, &comparison.candidates);
+    let reference = Reference::new(comparison);
+    let hypotheses: Vec<HypothesisResult> = (0..candidates.len())
+        .map(|k| reference.hypothesis_result(k))
+        .collect();
+    let best = best_known(candidates).unwrap_or(0);
+    let fit = &candidates[best].fit;
+    let after = Residuals::new(dataset, fit);
+    let mut tested = GoodnessOfFit::new(dataset, fit);
+    if let Some(tested) = &mut tested {
+        tested.freedom = Some(DegreesOfFreedom::of(dataset, fit));
+        tested.closure = hypotheses[best].closure;
+        tested.is_decisive = reference.is_holdout_decisive(&candidates[best]);
+    }
+    let none = none_of(candidates).and_then(|none| GoodnessOfFit::new(dataset, &none.fit));
+    let verdict = match verdict(candidates, tested.as_ref(), none.as_ref()) {
+        // Masses at locations of their choice explain much that has other causes.
+        Verdict::NoGap
+            if unlocated
+                .as_ref()
+                .is_some_and(|without| without.goodness_of_fit < MISFIT) =>
+        {
+            Verdict::NotEnoughData(
+                "sensors whose place nobody said explain them, and so would other causes; state the places"
+                    .to_owned(),
+            )
+        }
+        answer => answer,
+    };
+    let residuals = reference.before.as_ref().zip(after.as_ref());
+    Diagnosis {
+        next_tests: next_tests(comparison, &verdict),
+        locations: location_probabilities(candidates),
+        residuals: residuals.map_or_else(Vec::new, |(before, after)| {
+            frequency_residuals(dataset, before, after)
+        }),
+        goodness_of_fit: tested.as_ref().and_then(|tested| tested.overall),
+        blocks: tested.map_or_else(Vec::new, |tested| tested.blocks),
+        noise_floor: noise_floor(dataset),
+        misfit: after.as_ref().map(Residuals::misfit),
+        joint_shift: match verdict {
+            Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => hypotheses[best].joint_shift,
+            Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => JointShift::default(),
+        },
+        verdict,
+        hypotheses,
+        location_map: location_map(dataset, &comparison.baseline),
+        decided_by: decided_by(dataset, candidates),
+        amplitude_dependence: amplitude_dependence(dataset, &comparison.baseline),
+        fitted_modes: dataset.fitted_modes,
+        unlocated,
+    }
+}
+
+/// Returns what decided, by the likelihood ratio of the two best hypotheses at their optima, and by whether one had to
+/// give way. `unknown` has its own noise model, so that its likelihood is not comparable with the others.
+fn decided_by(dataset: &Dataset, candidates: &[Candidate]) -> DecidedBy {
+    let known: Vec<&Candidate> = candidates.iter().filter(|one| !one.is_unknown()).collect();
+    let weights = known.iter().map(|one| one.log_weight());
+    let most = weights.fold(f64::NEG_INFINITY, f64::max);
+    let [first, rival, ..] = known[..] else {
+        return DecidedBy::Data;
+    };
+    // A misfit of a better one has brought it to the top.
+    if first.log_weight() < most {
+        return DecidedBy::Data;
+    }
+    let [first, rival] =
+        [first, rival].map(|one| log_likelihood(&dataset.data, &one.fit.best.optimum));
+    if first - rival < DECISIVE_RATIO.ln() {
+        DecidedBy::Priors
+    } else {
+        DecidedBy::Data
+    }
+}
+
+/// Errors of the nominal model, with which every hypothesis is compared.
+struct Reference<'a> {
+    comparison: &'a ModelComparison,
+    before: Option<Residuals>,
+    holdout_before: Option<HoldoutErrors>,
+    left_out_before: Option<LeftOutErrors>,
+}
+
+impl<'a> Reference<'a> {
+    fn new(comparison: &'a ModelComparison) -> Self {
+        let dataset = &comparison.dataset;
+        Reference {
+            comparison,
+            before: Residuals::new(dataset, &comparison.described),
+            holdout_before: HoldoutErrors::new(dataset, &comparison.drifting),
+            left_out_before: LeftOutErrors::new(dataset, &comparison.drifting),
+        }
+    }
+
+    fn hypothesis_result(&self, index: usize) -> HypothesisResult {
+        let candidates = &self.comparison.candidates;
+        let (dataset, candidate) = (&self.comparison.dataset, &candidates[index]);
+        let fit = (!candidate.is_unknown()).then_some(&candidate.fit);
+        let residuals = fit.and_then(|fit| Residuals::new(dataset, fit));
+        let holdout = fit.and_then(|fit| HoldoutErrors::new(dataset, fit));
+        let none = none_of(candidates).map_or(f64::NAN, |none| none.fit.log_evidence);
+        let before = self.before.as_ref();
+        let layout = dataset.layout(&candidate.fit.effects);
+        let parameters = candidate.fit.parameters();
+        let scale = dataset.nuisance_index(NuisanceParameter::Scale);
+        let mut joint_parameters = dataset.nominal.joint_parameters().into_iter();
+        let coupling = joint_parameters.position(|(direction, _)| direction == COUPLING);
+        HypothesisResult {
+            hypothesis: candidate.hypothesis.clone(),
+            groups: candidate.groups(),
+            probability: candidate.probability,
+            log_bayes_factor: candidate.fit.log_evidence - none,
+            confounded_with: confounded(dataset, candidates, index),
+            parameters: self.parameter_values(candidate),
+            gap_before: before.map_or(f64::NAN, |r| r.frequency_rms(dataset)),
+            gap_after: residuals.as_ref().map(|r| r.frequency_rms(dataset)),
+            left_out_modes: residuals.as_ref().and_then(|r| r.left_out_rms(dataset)),
+            holdout_before: self.holdout_before.as_ref().map(HoldoutErrors::rms),
+            holdout_after: holdout.as_ref().map(HoldoutErrors::rms),
+            holdout_floor: holdout.as_ref().map(HoldoutErrors::floor),
+            closure: self.closure(holdout.as_ref()),
+            cross_validation: self.cross_validation(candidate),
+            goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
+            misfit: residuals.as_ref().map(Residuals::misfit),
+            joint_shift: fit.map_or_else(JointShift::default, |_| self.joint_shift(candidate)),
+            effects: layout.effects_at(parameters).unwrap_or_default(),
+            joint: fit.and_then(|_| self.joint(candidate)),
+            joint_intervals: fit.map_or([None; 2], |_| self.joint_intervals(candidate)),
+            coupling: coupling.map_or(0.0, |k| parameters[k]),
+            scale: scale.map_or(0.0, |k| parameters[layout.first_nuisance() + k]),
+        }
+    }
+
+    /// Returns whether the hold-out data could separate a hypothesis from the nominal model.
+    fn is_holdout_decisive(&self, candidate: &Candidate) -> bool {
+        let after = HoldoutErrors::new(&self.comparison.dataset, &candidate.fit);
+        let pair = after.zip(self.holdout_before.as_ref());
+        pair.is_some_and(|(after, before)| after.are_decisive(before))
+    }
+
+    fn closure(&self, after: Option<&HoldoutErrors>) -> Option<Closure> {
+        let seed = self.comparison.dataset.settings.seed;
+        closure(self.holdout_before.as_ref()?, after?, seed)
+    }
+
+    /// Predicts each recording from the others, for probable hypotheses and for `none`.
+    fn cross_validation(&self, candidate: &Candidate) -> Option<CrossValidation> {
+        let is_probable = candidate.probability > CROSS_VALIDATED;
+        if candidate.is_unknown() || !is_probable && candidate.hypothesis != Hypothesis::None {
+            return None;
+        }
+        let dataset = &self.comparison.dataset;
+        let after = LeftOutErrors::new(dataset, &candidate.fit)?;
+        after.against(self.left_out_before.as_ref()?, dataset.settings.seed)
+    }
+
+    /// Returns the joint's stiffnesses (N/m, N m/rad); `None` without a joint.
+    fn joint(&self, candidate: &Candidate) -> Option<[f64; 2]> {
+        let nominal = &self.comparison.dataset.nominal;
+        let mut joint = nominal.specimen.joint.stiffnesses();
+        if joint == [0.0; 2] {
+            return None;
+        }
+        for (k, direction) in nominal.fitted_springs().into_iter().enumerate() {
+            joint[direction] = candidate.fit.parameters()[k].exp();
+        }
+        Some(joint)
+    }
+
+    /// Returns the 95 % intervals of the stiffnesses, whose logarithms are fitted.
+    fn joint_intervals(&self, candidate: &Candidate) -> [Option<[f64; 2]>; 2] {
+        let mut intervals = [None; 2];
+        let (values, stds) = (candidate.fit.parameters(), candidate.stds());
+        let springs = self.comparison.dataset.nominal.fitted_springs();
+        for (k, direction) in springs.into_iter().enumerate() {
+            let ends = [-1.0, 1.0].map(|sign| (values[k] + sign * NORMAL_95 * stds[k]).exp());
+            intervals[direction] = Some(ends).filter(|ends| ends.iter().all(|end| end.is_finite()));
+        }
+        intervals
+    }
+
+    fn joint_shift(&self, candidate: &Candidate) -> JointShift {
+        let mut shift = JointShift::default();
+        let nominal = &self.comparison.dataset.nominal;
+        for (k, direction) in nominal.fitted_springs().into_iter().enumerate() {
+            let before = match nominal.joint_before {
+                Some(estimated) => f64::ln(estimated[direction]),
+                None => self.comparison.described.parameters()[k],
+            };
+            let after = candidate.fit.parameters()[k];
+            let percent = Some(100.0 * ((after - before).exp() - 1.0));
+            match direction {
+                0 => shift.kx_percent = percent,
+                _ => shift.ky_percent = percent,
+            }
+        }
+        shift
+    }
+
+    fn parameter_values(&self, candidate: &Candidate) -> Vec<ParameterValue> {
+        if let Some(drift) = candidate.drift {
+            return vec![value_of(EffectId::JointDrift, "std", drift, None)];
+        }
+        let layout = self.comparison.dataset.layout(&candidate.fit.effects);
+        let (values, stds) = (candidate.fit.parameters(), candidate.stds());
+        let mut parameters = Vec::new();
+        for (k, effect) in candidate.fit.effects.iter().enumerate() {
+            let at = layout.size(k);
+            let (size, size_std) = (values[at], stds[at]);
+            let detectable = DETECTABLE.sqrt() * size_std;
+            parameters.push(ParameterValue {
+                smallest_detectable: Some(detectable).filter(|size| size.is_finite()),
+                smallest_separable: self.smallest_separable(candidate, size - effect.size.neutral),
+                ..value_of(effect.effect, effect.size.name, size, Some(size_std))
+            });
+            if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
+                let value = range.from_searched(values[location]);
+                let std = match range.kind {
+                    LocationKind::FixtureFrequency | LocationKind::Gyration => {
+                        value * stds[location]
+                    }
+                    LocationKind::Position | LocationKind::Exponent => stds[location],
+                };
+                let is_known = std < 0.5 * (range.high - range.low);
+                let (name, value, std) = match range.kind {
+                    LocationKind::Position => ("position", value, std),
+                    LocationKind::FixtureFrequency => ("frequency", value, std),
+                    LocationKind::Exponent => ("exponent", value, std),
+                    // J = m r^2
+                    LocationKind::Gyration => {
+                        ("inertia", size * value * value, 2.0 * size * value * std)
+                    }
+                };
+                parameters.push(value_of(
+                    effect.effect,
+                    name,
+                    value,
+                    is_known.then_some(std),
+                ));
+            }
+        }
+        parameters
+    }
+
+    /// Returns the size at which every rival would be three standard deviations worse: chi square grows with the
+    /// square of the size.
+    fn smallest_separable(&self, own: &Candidate, size: f64) -> Option<f64> {
+        let rivals = self.comparison.candidates.iter().filter(|rival| {
+            rival.hypothesis == Hypothesis::None
+                || rival.effects().len() == 1 && rival.groups() != own.groups()
+        });
+        let nearest = rivals
+            .map(|rival| delta_chi_square(&own.fit, &rival.fit))
+            .fold(f64::INFINITY, f64::min);
+        (nearest > 0.0 && nearest.is_finite()).then(|| size.abs() * (SEPARATE / nearest).sqrt())
+    }
+}
+
+/// Returns a parameter with its value and standard uncertainty.
+fn value_of(effect: EffectId, name: &'static str, value: f64, std: Option<f64>) -> ParameterValue {
+    ParameterValue {
+        effect,
+        name,
+        value,
+        std: std.filter(|std| std.is_finite()),
+        smallest_detectable: None,
+        smallest_separable: None,
+    }
+}

@@ -1,0 +1,256 @@
+//! The report as data: what `report.json` holds.
+//!
+//! Units are SI, frequencies Hz. A value that does not exist is `null`, never 0. `low` and `high`
+//! are 95 % limits, `null` where unbounded or unknown.
+
+mod estimate;
+mod frf;
+mod gap;
+mod modes;
+mod perturbation;
+mod recordings;
+
+pub use estimate::{
+    EstimateSection, FreeBeamSection, IdentifiabilitySection, Method, MisfitSection, PairsSection,
+    PredictionSection, SingleModeSection, ValueSection,
+};
+pub use frf::{FrfResonanceSection, FrfSection, frf_document};
+pub use gap::{
+    Baseline, BaselineSection, GapPlaceSection, GapSection, UpdatedModelSection, gap_section,
+};
+pub use modes::{AmplitudeSection, FitSection, ModeSection, ReadBy};
+pub use perturbation::{
+    AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,
+    SensitivitySection,
+};
+pub use recordings::{ChannelSection, DatasetSection, RecordingSection, TapSection, datasets_of};
+
+use super::format::with_minus_signs;
+use estimate::{estimate_section, prediction_section};
+use schemars::JsonSchema;
+use serde::Serialize;
+use tapjoint_analysis::{
+    Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
+};
+use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
+use tapjoint_identify::{PairsModel, PredictedMode};
+use tapjoint_signal::quality::Verdict;
+
+/// Version of the document's layout.
+pub const VERSION: u32 = 1;
+
+/// The whole document. Sections that a command did not compute are left out.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct Document {
+    /// Version of the layout.
+    pub version: u32,
+    /// What was tested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub test: Option<TestSection>,
+    /// Each recording: taps, spectra, its own readings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recordings: Option<Vec<RecordingSection>>,
+    /// Datasets of universal files, by their headers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub datasets: Option<Vec<DatasetSection>>,
+    /// Resonances merged over the recordings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modes: Option<Vec<ModeSection>>,
+    /// Frequency response functions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frfs: Option<Vec<FrfSection>>,
+    /// The joint; `Some(None)` = asked for, but without an answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimate: Option<Option<EstimateSection>>,
+    /// Why there is no estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimate_reason: Option<String>,
+    /// Measured beside predicted frequencies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prediction: Option<Vec<PredictionSection>>,
+    /// Shapes of the predicted modes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode_shapes: Option<Vec<SampledShape>>,
+    /// Estimates under changed frequencies, by every method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbation: Option<Vec<PerturbationSection>>,
+    /// Average errors of the estimates under changed frequencies, as Ingole & Chatterjee state them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbation_averages: Option<Vec<AverageSection>>,
+    /// Estimates under random errors of the frequencies, one entry for each method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monte_carlo: Option<Vec<MonteCarloSection>>,
+    /// Spans of the estimates over all sign patterns of the half-line bounds, and what each mode
+    /// contributes, one entry for each method.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resolution_span: Option<Vec<ResolutionSpanSection>>,
+    /// The gap between model and measurement: where, which effect, how far it closes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gap: Option<GapSection>,
+    /// How well the test was made: every check of good practice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quality: Option<Vec<Verdict>>,
+    /// What a reader has to know.
+    pub warnings: Vec<WarningSection>,
+}
+
+/// What was tested.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct TestSection {
+    /// Name of the test.
+    pub name: String,
+    /// "cantilever", "lap" or "free"; null for a bare recording.
+    pub kind: Option<String>,
+    /// "2p" or "3p"; null where there is no joint.
+    pub model: Option<String>,
+    /// "timoshenko" or "euler": the beam theory of the prediction.
+    pub beam_theory: Option<String>,
+    /// Length (m).
+    pub length: Option<f64>,
+    /// Bending stiffness E I (N m2).
+    pub bending_stiffness: Option<f64>,
+    /// Mass per length (kg/m).
+    pub mass_per_length: Option<f64>,
+}
+
+/// A warning.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct WarningSection {
+    /// Short code that scripts may look for.
+    pub code: String,
+    /// What happened, why it might be, what helps.
+    pub text: String,
+    /// Whether it concerns only the pair regression that stands beside the estimate, and not the estimate.
+    pub beside: bool,
+}
+
+/// Those of some warnings that concern the result itself.
+pub fn of_the_result(warnings: &[WarningSection]) -> Vec<&WarningSection> {
+    warnings.iter().filter(|warning| !warning.beside).collect()
+}
+
+impl WarningSection {
+    fn of(warning: &Warning, beside: bool) -> Self {
+        WarningSection {
+            code: warning.code().to_string(),
+            text: with_minus_signs(&warning.to_string()),
+            beside,
+        }
+    }
+}
+
+impl Document {
+    /// The warnings that concern the result itself.
+    pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
+        of_the_result(&self.warnings).into_iter()
+    }
+
+    /// Those that concern only the pair regression beside it.
+    pub fn warnings_beside(&self) -> impl Iterator<Item = &WarningSection> {
+        self.warnings.iter().filter(|warning| warning.beside)
+    }
+}
+
+/// Returns the document of a whole analysis.
+pub fn document_of(analysis: &Analysis) -> Document {
+    let identification = analysis.identification.as_ref();
+    let recordings = analysis.recordings.iter().enumerate();
+    let recordings = recordings.map(|(index, recording)| {
+        let aside = analysis.aside.get(index).cloned().flatten();
+        RecordingSection::of(recording, aside)
+    });
+    let modes = analysis.modes.iter();
+    let modes = modes.map(|mode| ModeSection::of(mode, &analysis.recordings));
+    let shapes = sampled_shapes(analysis);
+    // Doubts about the pair regression concern the result only where it is the estimate.
+    let has_better = identification.is_some_and(|found| found.consistent.is_some());
+    let warnings = analysis.warnings.iter();
+    let warnings =
+        warnings.map(|warning| WarningSection::of(warning, has_better && warning.is_of_pairs()));
+    let mut document = Document {
+        version: VERSION,
+        test: Some(test_section(&analysis.name, analysis.structure.as_ref())),
+        recordings: (!analysis.recordings.is_empty()).then(|| recordings.collect()),
+        modes: Some(modes.collect()),
+        estimate: identification.map(estimate_section),
+        estimate_reason: identification.and_then(|found| found.reason.clone()),
+        prediction: identification
+            .map(|found| found.prediction.iter().map(prediction_section).collect()),
+        mode_shapes: (!shapes.is_empty()).then_some(shapes),
+        quality: (!analysis.verdicts.is_empty()).then(|| analysis.verdicts.clone()),
+        warnings: warnings.collect(),
+        ..Document::default()
+    };
+    if let Some(found) = identification {
+        document.add_perturbations(&found.perturbations);
+    }
+    document
+}
+
+/// Returns the document of recordings that were only looked at.
+pub fn inspection_of(recordings: &[RecordingResult], warnings: &[Warning]) -> Document {
+    let recordings = recordings.iter();
+    let recordings = recordings.map(|recording| RecordingSection::of(recording, None));
+    let warnings = warnings.iter();
+    Document {
+        version: VERSION,
+        recordings: Some(recordings.collect()),
+        warnings: warnings
+            .map(|warning| WarningSection::of(warning, false))
+            .collect(),
+        ..Document::default()
+    }
+}
+
+/// Returns the document of a prediction for a described beam.
+pub fn prediction_of(name: &str, structure: &TestedStructure, modes: &[PredictedMode]) -> Document {
+    Document {
+        version: VERSION,
+        test: Some(test_section(name, Some(structure))),
+        prediction: Some(modes.iter().map(prediction_section).collect()),
+        ..Document::default()
+    }
+}
+
+/// Returns the document of a prediction without a beam: lambda alone.
+pub fn lambdas_of(modes: &[NaturalMode]) -> Document {
+    let rows = modes.iter().enumerate();
+    let rows = rows.map(|(index, mode)| PredictionSection {
+        mode: index + 1,
+        lambda: Some(mode.lambda),
+        ..PredictionSection::default()
+    });
+    Document {
+        version: VERSION,
+        prediction: Some(rows.collect()),
+        ..Document::default()
+    }
+}
+
+fn test_section(name: &str, structure: Option<&TestedStructure>) -> TestSection {
+    let Some(structure) = structure else {
+        return TestSection {
+            name: name.to_string(),
+            ..Default::default()
+        };
+    };
+    let (kind, model) = match (structure.assembly, structure.regression) {
+        (Assembly::Free, _) => ("free", None),
+        (Assembly::Lap, _) => ("lap", Some("2p")),
+        (Assembly::Cantilever, Some(PairsModel::ThreeParameter)) => ("cantilever", Some("3p")),
+        (Assembly::Cantilever, _) => ("cantilever", Some("2p")),
+    };
+    let theory = match structure.theory {
+        BeamTheory::Timoshenko => "timoshenko",
+        BeamTheory::Euler => "euler",
+    };
+    TestSection {
+        name: name.to_string(),
+        kind: Some(kind.to_string()),
+        model: model.map(str::to_string),
+        beam_theory: Some(theory.to_string()),
+        length: Some(structure.beam.length),
+        bending_stiffness: Some(structure.beam.bending_stiffness()),
+        mass_per_length: Some(structure.beam.mass_per_length()),
+    }
+}

@@ -1,0 +1,124 @@
+//! Recordings by others, where the folder of TAPJOINT_DATA has them.
+
+use crate::shared::data;
+use tapjoint_signal::recording::{Format, ReadSettings, Recording, Separator, Timing};
+
+/// Opens a file of the data folder; `None` without the folder.
+fn open(name: &str) -> Option<Recording> {
+    let recording = Recording::open(&data(name)?, &ReadSettings::default());
+    Some(recording.unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Checks that blocks join to the whole and that the largest sample is the health's peak.
+fn assert_readable(recording: &Recording) {
+    for (channel, info) in recording.channels().iter().enumerate() {
+        let whole = recording
+            .read(channel, 0..u64::MAX)
+            .expect("a readable file");
+        let blocks = recording.blocks(&[channel], 10_007);
+        let joined: Vec<f64> = blocks
+            .flat_map(|b| b.expect("a readable file").samples.remove(0))
+            .collect();
+        assert_eq!(joined, whole, "{} {channel}", recording.name());
+        let peak = whole.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));
+        assert_eq!(peak, info.health.peak, "{} {channel}", recording.name());
+    }
+}
+
+#[test]
+fn val_the_spruce_bar_is_one_channel_of_float() {
+    let name = "guitar_tap_wav/brace-umik-1-swift-mac-1778816093.wav";
+    let Some(recording) = open(name) else {
+        return;
+    };
+    assert_eq!(recording.format(), Format::WavFloat { bits: 32 });
+    assert_eq!(recording.sample_rate(), 48_000.0);
+    assert_eq!(recording.frames(), 201_600);
+    assert_eq!(recording.channels().len(), 1);
+    assert!(
+        recording.warnings().is_empty(),
+        "{:?}",
+        recording.warnings()
+    );
+    assert_readable(&recording);
+    // The tap is at 2.924 s by its publisher: the largest sample comes at most 50 ms later.
+    let samples = recording.read(0, 0..u64::MAX).unwrap();
+    let largest = (0..samples.len()).max_by(|a, b| samples[*a].abs().total_cmp(&samples[*b].abs()));
+    let time = largest.unwrap() as f64 / 48_000.0;
+    assert!((2.92..2.98).contains(&time), "{time} s");
+}
+
+#[test]
+fn val_the_guitar_is_two_channels_of_integers() {
+    let Some(recording) = open("guitar_tap_wav/Recording.wav") else {
+        return;
+    };
+    assert_eq!(recording.format(), Format::WavInteger { bits: 16 });
+    assert_eq!(recording.sample_rate(), 48_000.0);
+    assert_eq!(recording.channels().len(), 2);
+    assert!(
+        recording.warnings().is_empty(),
+        "{:?}",
+        recording.warnings()
+    );
+    assert_readable(&recording);
+}
+
+#[test]
+fn val_the_bolted_beam_is_in_physical_units() {
+    let name = "brb_bolted_beam/DERIVED_HammerImpact_3acc_float32.wav";
+    let Some(recording) = open(name) else {
+        return;
+    };
+    assert_eq!(recording.sample_rate(), 12_800.0);
+    assert_eq!(recording.duration(), 5.12);
+    assert_eq!(recording.channels().len(), 3);
+    // Values far above 1: no clipping in a float file.
+    let peaks = recording.channels().iter().map(|c| c.health.peak);
+    assert!(
+        peaks.clone().all(|peak| peak > 100.0),
+        "{:?}",
+        peaks.collect::<Vec<_>>()
+    );
+    assert!(
+        recording.warnings().is_empty(),
+        "{:?}",
+        recording.warnings()
+    );
+    assert_readable(&recording);
+}
+
+#[test]
+fn val_the_slater_cantilever_opens_at_1280_hz() {
+    let Some(recording) = open("slater_cantilever/DERIVED_case1_time.csv") else {
+        return;
+    };
+    let format = Format::Csv {
+        separator: Separator::Comma,
+        decimal: '.',
+        timed: Timing::TimeColumn,
+    };
+    assert_eq!(recording.format(), format);
+    // Its time was summed in single precision: the mean step gives 1279.95 Hz.
+    assert_eq!(recording.sample_rate(), 1280.0);
+    assert_eq!(recording.frames(), 4096);
+    assert_eq!(recording.channel_by_name("ch2_response_V").unwrap(), 1);
+    let codes: Vec<_> = recording.warnings().iter().map(|w| w.code()).collect();
+    assert_eq!(codes, ["rate-rounded", "offset"]);
+    assert_readable(&recording);
+    let first = recording.read_channels(&[0, 1], 1..2).unwrap();
+    assert_eq!(first, [[0.0704776347], [-1.94204402]]);
+}
+
+#[test]
+fn val_an_analysers_frequency_table_is_not_taken_for_time() {
+    let Some(path) = data("modelab_freefree_beam/Hxysv00001.txt") else {
+        return;
+    };
+    let error = Recording::open(&path, &ReadSettings::default()).expect_err("no time series");
+    let message = error.to_string();
+    assert!(
+        message.contains(".txt:10: the first column is a frequency"),
+        "{message}"
+    );
+}

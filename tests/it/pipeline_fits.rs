@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tapjoint::description::{ChannelRef, ReadBy, TestDescription};
-use tapjoint::modal::{ModeReading, ReadBy};
+use tapjoint::modal::ModeReading;
 use tapjoint::pipeline::{IdentifySettings, MeasureSettings, measure_bare, run_test};
 use tapjoint::recording::{
     Channel, FrequencyResponse, FrequencyResponses, Point, Recording, ResponseForm, UffFormat,

@@ -6,7 +6,6 @@
 
 use num_complex::Complex64;
 
-use tapjoint_description::ReadingMethod;
 use tapjoint_signal::modal::fit::{
     Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
 };
@@ -14,7 +13,7 @@ use tapjoint_signal::modal::polyreference::{
     BandSearch, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, SubBandSettings,
     all_modes, find_modes,
 };
-use tapjoint_signal::modal::{FittedReading, FrequencySource, ModeReading, PeakLabel};
+use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
@@ -29,15 +28,6 @@ const UNLIKE: f64 = 0.9;
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
-
-/// What a description's way of reading asks for.
-pub(super) fn source_of(reading: ReadingMethod) -> FrequencySource {
-    match reading {
-        ReadingMethod::Fit => FrequencySource::Fit,
-        ReadingMethod::Interpolated => FrequencySource::BetweenLines,
-        ReadingMethod::Line => FrequencySource::Line,
-    }
-}
 
 /// What the polyreference fit over the band found.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -242,7 +232,7 @@ impl Candidates<'_> {
         let line = self.lines.nearest(fit.frequency.value);
         ModeReading {
             frequency: fit.frequency.value,
-            source: FrequencySource::Fit,
+            source: ReadBy::Fit,
             interval: (fit.frequency.low, fit.frequency.high),
             std: Some(fit.frequency.std),
             above_noise_db: Some(proposal.above_noise_db),

@@ -1,19 +1,19 @@
 //! Measuring one recording: taps, averaged spectra, free decays, readings.
 
-use super::fits::{Candidates, Stabilisation, source_of, stabilisation};
+use super::fits::{Candidates, Stabilisation, stabilisation};
 use super::noise::{PulseWindow, Quiet, pulse_window, remove_offset};
 use super::warning::Warning;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use tapjoint_description::{ReadingMethod, WindowKind};
+use tapjoint_description::WindowKind;
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::modal::amplitude::{AmplitudeSettings, Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Column, FitError, FreeDecayCollector, ModalData, TapForce, modal_constants,
 };
 use tapjoint_signal::modal::{
-    CompositeLevel, FittedReading, FrequencySource, MainsSettings, ModeReading, PeakLabel,
-    PeakSettings, find_peaks, read_peaks,
+    CompositeLevel, FittedReading, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
+    find_peaks, read_peaks,
 };
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
@@ -35,7 +35,7 @@ pub struct MeasureSettings {
     /// Window; `None` = by the decay in the record.
     pub window: Option<WindowKind>,
     /// How natural frequencies are read.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// What each response measures, for modal constants; `None` where nobody said, or it is no motion in
     /// SI units over a force in N.
     pub kinds: Vec<Option<ResponseForm>>,
@@ -55,7 +55,7 @@ impl MeasureSettings {
             band: None,
             block: None,
             window: None,
-            reading: ReadingMethod::default(),
+            reading: ReadBy::default(),
             kinds: Vec::new(),
             taps: TapSettings::default(),
             peaks: PeakSettings::default(),
@@ -325,7 +325,7 @@ impl<'a> Stage<'a> {
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = self.fit(&mut readings)?;
         for reading in &mut readings {
-            reading.prefer(source_of(self.settings.reading));
+            reading.prefer(self.settings.reading);
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
@@ -525,7 +525,7 @@ fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> Mod
         label: Some(label),
         ..reading.clone()
     };
-    reading.prefer(FrequencySource::Line);
+    reading.prefer(ReadBy::Line);
     reading
 }
 

@@ -16,7 +16,7 @@ use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict, Trend}
 use tapjoint_signal::modal::fit::{
     ColumnAmplitude, FittedValue, UncertaintySource, scatter_about_mean, weighted_mean,
 };
-use tapjoint_signal::modal::{FittedReading, FrequencySource, ModeReading};
+use tapjoint_signal::modal::{FittedReading, ModeReading, ReadBy};
 use tapjoint_signal::recording::ResponseForm;
 
 /// A 95 % bound over the standard uncertainty of a normal distribution.
@@ -46,7 +46,7 @@ impl<'a> ModeSeen<'a> {
         (recording, taps, only): (&'a RecordingResult, &'a [usize], bool),
     ) -> Self {
         let fit = reading.fit.as_deref().map(|fit| &fit.mode);
-        let fit = fit.filter(|_| reading.source == FrequencySource::Fit);
+        let fit = fit.filter(|_| reading.source == ReadBy::Fit);
         let of_taps = |of: fn(&tapjoint_signal::modal::fit::TapFit) -> (f64, f64)| {
             let fits = fit.map_or(&[][..], |fit| fit.taps.as_slice());
             let counted = fits.iter().filter(|tap| taps.contains(&tap.tap));

@@ -5,7 +5,7 @@ use super::analysis::{
     Analysis, CloseUp, Conditions, Overview, PipelineError, RecordingResult, Response,
 };
 use super::checks::{judge, of_amplitude, together};
-use super::fits::{Candidates, source_of, stabilisation};
+use super::fits::{Candidates, stabilisation};
 use super::measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 use super::modes::modes_of_bare;
 use super::warning::Warning;
@@ -14,8 +14,8 @@ use std::ops::Range;
 use std::path::Path;
 use tapjoint_description::described::fastened_masses;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, FrfForm, ReadingMethod, RecordingDescription, Scale,
-    SensorDescription, SensorKind, TestDescription,
+    ChannelPlace, ChannelRef, FrfForm, ReadBy, RecordingDescription, Scale, SensorDescription,
+    SensorKind, TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use tapjoint_signal::modal::{CompositeLevel, ModeReading, PeakSettings, find_peaks, read_peaks};
@@ -409,7 +409,7 @@ pub struct FunctionSettings {
     /// Band to be analysed (Hz); `None` = all lines.
     pub band: Option<(f64, f64)>,
     /// How natural frequencies are read.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
 }
 
 /// Takes frequency response functions about which nothing is described as far as they go.
@@ -548,7 +548,7 @@ fn spectra(
         add_constants(&mut readings, (functions, settings));
     }
     for reading in &mut readings {
-        reading.prefer(source_of(settings.reading));
+        reading.prefer(settings.reading);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     MeasuredSpectra {

@@ -1,5 +1,7 @@
 //! `[analysis]`: how to analyse.
 
+use tapjoint_signal::modal::ReadBy;
+
 use super::error::{DescriptionError, DescriptionProblem};
 use super::limits::Limits;
 use super::reader::{Entry, Table};
@@ -10,10 +12,10 @@ const WINDOWS: [(&str, WindowKind); 3] = [
     ("hann", WindowKind::Hann),
     ("exponential", WindowKind::Exponential),
 ];
-const READINGS: [(&str, ReadingMethod); 3] = [
-    ("fit", ReadingMethod::Fit),
-    ("interpolated", ReadingMethod::Interpolated),
-    ("line", ReadingMethod::Line),
+const READINGS: [(&str, ReadBy); 3] = [
+    ("fit", ReadBy::Fit),
+    ("interpolated", ReadBy::Interpolated),
+    ("line", ReadBy::Line),
 ];
 const WEIGHTS: [(&str, Weights); 2] = [
     ("measured", Weights::Measured),
@@ -37,19 +39,6 @@ pub enum WindowKind {
     Hann,
     /// e^{-at} on force and response alike.
     Exponential,
-}
-
-/// How natural frequencies are read from a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ReadingMethod {
-    /// By a fit of decaying oscillations, with a standard deviation; what cannot be fitted is read
-    /// between the lines or on its line.
-    #[default]
-    Fit,
-    /// Between the lines about the peak; what cannot be had so, on its line.
-    Interpolated,
-    /// On the highest spectral line, as Ingole & Chatterjee read theirs.
-    Line,
 }
 
 /// Weights of the frequencies in an estimate.
@@ -82,7 +71,7 @@ pub struct AnalysisDescription {
     /// Window; `None` = chosen from the decay in the record.
     pub window: Option<WindowKind>,
     /// How natural frequencies are read.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// The first so many modes enter the estimate; `None` = all.
     pub fit_modes: Option<usize>,
     /// Weights of the frequencies; `None` = measured where bounds are known.
@@ -100,7 +89,7 @@ pub(super) fn read_analysis(
 ) -> Result<AnalysisDescription, DescriptionError> {
     let mut analysis = AnalysisDescription {
         window: None,
-        reading: ReadingMethod::default(),
+        reading: ReadBy::default(),
         fit_modes: None,
         weights: None,
         sensor_mass: true,

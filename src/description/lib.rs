@@ -19,10 +19,11 @@ mod recordings;
 mod sensors;
 mod template;
 
-pub use analysis::{AnalysisDescription, FitParameter, ReadingMethod, Weights, WindowKind};
+pub use analysis::{AnalysisDescription, FitParameter, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
 pub use parse::ChannelRefError;
 pub use tapjoint_beam::BeamTheory;
+pub use tapjoint_signal::modal::ReadBy;
 pub use template::{runnable_template, template, template_of};
 
 use std::collections::BTreeMap;

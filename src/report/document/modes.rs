@@ -6,7 +6,7 @@ use serde::Serialize;
 use tapjoint_analysis::{AmplitudeChange, ModeResult, RecordingResult};
 use tapjoint_signal::modal::amplitude::{AmplitudePoint, AmplitudeVerdict, Trend};
 use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
-use tapjoint_signal::modal::{FittedReading, FrequencySource, ModeReading};
+use tapjoint_signal::modal::{self, FittedReading, ModeReading};
 
 /// One resonance.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
@@ -161,9 +161,9 @@ impl ModeSection {
             mode: None,
             frequency: reading.frequency,
             method: match reading.source {
-                FrequencySource::Fit => ReadBy::Fit,
-                FrequencySource::BetweenLines => ReadBy::Interpolated,
-                FrequencySource::Line => ReadBy::Line,
+                modal::ReadBy::Fit => ReadBy::Fit,
+                modal::ReadBy::Interpolated => ReadBy::Interpolated,
+                modal::ReadBy::Line => ReadBy::Line,
             },
             line_frequency: Some(reading.line_frequency),
             half_line: Some(reading.half_line),

@@ -7,8 +7,7 @@ use super::plan::BandPlan;
 use super::result::{ReadingName, WindowName};
 use tapjoint_signal::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
 use tapjoint_signal::modal::{
-    CompositeLevel, FittedReading, FrequencySource, ModeReading, PeakSettings, find_peaks,
-    read_peaks,
+    CompositeLevel, FittedReading, ModeReading, PeakSettings, ReadBy, find_peaks, read_peaks,
 };
 use tapjoint_signal::spectral::{
     AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, band_limited, choose_window,
@@ -26,15 +25,15 @@ pub(super) struct Read {
     /// Its stated standard uncertainty (Hz).
     pub std: f64,
     /// How it was read: what was wanted, or the next best.
-    pub source: FrequencySource,
+    pub source: ReadBy,
 }
 
 impl ReadingName {
-    pub(super) fn source(self) -> FrequencySource {
+    pub(super) fn source(self) -> ReadBy {
         match self {
-            ReadingName::Line => FrequencySource::Line,
-            ReadingName::Interpolated => FrequencySource::BetweenLines,
-            ReadingName::Fit => FrequencySource::Fit,
+            ReadingName::Line => ReadBy::Line,
+            ReadingName::Interpolated => ReadBy::Interpolated,
+            ReadingName::Fit => ReadBy::Fit,
         }
     }
 }

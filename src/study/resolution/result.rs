@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::estimate::Estimators;
 use super::plan::{BlockPlan, Layout};
 use super::{ResolutionSettings, StudiedTest, answer};
-use tapjoint_description::{ReadingMethod, WindowKind};
+use tapjoint_description::{ReadBy, WindowKind};
 
 /// A window of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -73,12 +73,12 @@ impl ReadingName {
     }
 }
 
-impl From<ReadingMethod> for ReadingName {
-    fn from(method: ReadingMethod) -> Self {
+impl From<ReadBy> for ReadingName {
+    fn from(method: ReadBy) -> Self {
         match method {
-            ReadingMethod::Line => ReadingName::Line,
-            ReadingMethod::Interpolated => ReadingName::Interpolated,
-            ReadingMethod::Fit => ReadingName::Fit,
+            ReadBy::Line => ReadingName::Line,
+            ReadBy::Interpolated => ReadingName::Interpolated,
+            ReadBy::Fit => ReadingName::Fit,
         }
     }
 }

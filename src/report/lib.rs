@@ -3,20 +3,14 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 pub mod blind_check;
-mod convert_figures;
+pub mod chart;
+pub mod charts;
 mod data_files;
 pub mod deck;
 pub mod document;
 pub mod figures;
 pub mod format;
 pub mod html;
-pub mod live;
-pub mod live_amplitude;
-pub mod live_close_up;
-mod live_lines;
-pub mod live_model;
-pub mod live_points;
-pub mod plot;
 pub mod tables;
 pub mod text;
 pub mod words;
@@ -27,7 +21,6 @@ mod run;
 mod short_names;
 mod text_table;
 
-pub use convert_figures::{figures as figures_of, frf_figure};
 pub use data_files::{
     render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
     render_perturbation_csv,
@@ -35,6 +28,7 @@ pub use data_files::{
 pub use document::{
     datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
 };
+pub use figures::{figures as figures_of, frf_figure};
 pub use html::render_html;
 pub use report_json::{MODEL_FILE, earlier_files, render_json, render_schema};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};

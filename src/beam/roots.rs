@@ -6,6 +6,8 @@
 
 use super::receptance::EndFunctions;
 use super::{Beam, BeamTheory, JointStiffness, Slenderness, StructureError};
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::f64::consts::PI;
 
 /// No beam bends like a beam at its thousandth mode; the limit only keeps a slip of the hand from
@@ -13,7 +15,8 @@ use std::f64::consts::PI;
 pub const MODE_LIMIT: usize = 1000;
 
 /// What the joint joins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Assembly {
     /// A beam held at one end by the joint.
     Cantilever,

@@ -22,6 +22,8 @@ mod template;
 pub use analysis::{AnalysisDescription, FitParameter, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
 pub use parse::ChannelRefError;
+use schemars::JsonSchema;
+use serde::Serialize;
 pub use tapjoint_beam::BeamTheory;
 pub use tapjoint_signal::modal::ReadBy;
 pub use template::{runnable_template, template, template_of};
@@ -111,11 +113,13 @@ pub enum JointKind {
 }
 
 /// How many stiffnesses describe the joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub enum JointModel {
     /// Translation and rotation.
+    #[serde(rename = "2p")]
     TwoParameter,
     /// Translation, rotation and their coupling.
+    #[serde(rename = "3p")]
     ThreeParameter,
 }
 

@@ -694,7 +694,7 @@ mod tests {
         assert_eq!(left(Some(3.5e-6), Some(0.0052)), "<0.001");
         assert_eq!(left(Some(0.0011), Some(0.0052)), "0.0011");
         assert_eq!(left(Some(3.5e-6), None), "0.0000035");
-        assert_eq!(left(None, Some(0.0052)), crate::format::MISSING);
+        assert_eq!(left(None, Some(0.0052)), "\u{2013}");
     }
 
     #[test]

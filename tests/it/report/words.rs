@@ -845,7 +845,7 @@ fn regress_a_free_beam_has_no_joint_line() {
     let mut document = fixture::document();
     assert!(render_text(&document).contains("\nJoint   "));
     let test = document.test.as_mut().expect("a test");
-    test.kind = Some("free".to_owned());
+    test.kind = Some(tapjoint::structure::Assembly::Free);
     let text = render_text(&document);
     assert!(
         text.contains("\nBeam    ") && !text.contains("\nJoint   "),

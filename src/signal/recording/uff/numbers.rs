@@ -1,11 +1,14 @@
-//! Values as text: fixed columns, which may run together, or blanks between numbers.
+//! Numbers as text: fixed columns, which may run together, or blanks between numbers.
 
 use super::header::{Abscissa, Function, Ordinate, Precision};
 
 /// Columns of the formats of dataset 58, by their widths.
 const SINGLE: &[usize] = &[13; 6];
+
 const DOUBLE_EVEN: &[usize] = &[20; 4];
+
 const DOUBLE_REAL_UNEVEN: &[usize] = &[13, 20, 13, 20];
+
 const DOUBLE_COMPLEX_UNEVEN: &[usize] = &[13, 20, 20];
 
 /// Widths of the columns of a function's lines: 6E13.5, 4E20.12, 2(E13.5,E20.12) or E13.5,2E20.12.

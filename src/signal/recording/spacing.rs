@@ -1,4 +1,4 @@
-//! Whether a printed time column is evenly sampled, and how fast.
+//! Even spacing of printed times or frequencies: the check of each step, and the rate.
 
 /// Largest deviation of a step from the step elsewhere, as a part of it.
 const TOLERANCE: f64 = 1e-3;

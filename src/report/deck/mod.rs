@@ -10,6 +10,7 @@ mod with_effects;
 
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
 use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::SpecimenJoint;
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 use tapjoint_description::TestDescription;
 use tapjoint_identify::consistent::JointedStructure;
@@ -189,11 +190,15 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
         springs: Vec::new(),
         frequencies: source.frequencies.clone(),
     };
-    let masses = structure.all_masses();
+    let body = structure.body()?;
+    let specimen = structure.specimen(SpecimenJoint::Free);
+    let mut masses = specimen.masses.clone();
+    masses.extend(specimen.overlap_masses());
+    masses.retain(|mass| mass.mass != 0.0);
     let places: Vec<f64> = masses.iter().map(|mass| mass.position).collect();
-    deck.mesh(&structure.pieces()?, &places);
+    deck.mesh(body.beams(), &places);
     for mass in masses {
-        deck.add_mass(mass.position, mass.size, 0.0);
+        deck.add_mass(mass.position, mass.mass, 0.0);
     }
     let (beam, joint) = (&structure.beam, &source.joint);
     deck.joint = match structure.assembly {

@@ -12,7 +12,7 @@ use super::signature::{CHECKSUMS, carries_mark, checksum_list, signed};
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use tapjoint::report::plot::PictureFormat;
+use tapjoint::report::chart::PictureFormat;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// Beginning of the names of everything temporary.

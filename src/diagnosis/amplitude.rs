@@ -122,17 +122,16 @@ impl LawRegression<'_> {
     }
 }
 
-/// Returns the change that a law predicts for an observable; 0 for other observables than changes along a decay.
+/// Returns the change along a decay that a law predicts.
 fn predicted_slope(
     dataset: &Dataset,
     observable: &Observable,
     models: &[ModalModel],
     law: &JointLaw,
 ) -> f64 {
-    observable.as_slope().map_or(0.0, |(configuration, mode)| {
-        let arrangement = &dataset.arrangements[configuration];
-        slope_along_decay(arrangement, mode, &models[configuration], law)
-    })
+    let configuration = observable.configuration;
+    let arrangement = &dataset.arrangements[configuration];
+    slope_along_decay(arrangement, observable.mode, &models[configuration], law)
 }
 
 /// Returns the law that explains the changes along the decays best, with the joint of a fitted model.
@@ -180,17 +179,15 @@ pub fn amplitude_dependence(dataset: &Dataset, nominal: &Fit) -> Option<Amplitud
         let (observable, datum) = (&dataset.observables[row], dataset.data[row]);
         let explained = predicted_slope(dataset, observable, &models, &found.law);
         chi_square += datum.gaussian_square(datum.residual(explained));
-        if let Some((configuration, mode)) = observable.as_slope() {
-            let arrangement = &dataset.arrangements[configuration];
-            changes.push(FrequencyChange {
-                mode,
-                recording: arrangement.file.clone(),
-                level: arrangement.known_level,
-                percent_per_fold: 100.0 * datum.value,
-                std: 100.0 * datum.std,
-                explained: 100.0 * explained,
-            });
-        }
+        let arrangement = &dataset.arrangements[observable.configuration];
+        changes.push(FrequencyChange {
+            mode: observable.mode,
+            recording: arrangement.file.clone(),
+            level: arrangement.known_level,
+            percent_per_fold: 100.0 * datum.value,
+            std: 100.0 * datum.std,
+            explained: 100.0 * explained,
+        });
     }
     // Size and exponent were fitted.
     let goodness_of_fit = chi_square_tail(chi_square, count - 2.0);
@@ -292,33 +289,27 @@ fn inflate_shared(dataset: &mut Dataset, models: &[ModalModel], law: &JointLaw) 
         JointLawKind::MicroSlip => SHARED_MODEL[1],
     };
     let mut changes = vec![0.0; models.len()];
-    for observable in &dataset.observables {
-        if let Some((configuration, mode)) = observable.as_slope() {
-            let arrangement = &dataset.arrangements[configuration];
-            let per_fold = arrangement.stiffness_slope(mode, law);
-            let change = per_fold.abs() * arrangement.log_amplitude_span(mode);
-            changes[configuration] = f64::max(changes[configuration], change);
-        }
+    for observable in dataset.observables.iter().filter(|one| one.is_slope()) {
+        let arrangement = &dataset.arrangements[observable.configuration];
+        let per_fold = arrangement.stiffness_slope(observable.mode, law);
+        let change = per_fold.abs() * arrangement.log_amplitude_span(observable.mode);
+        let largest = &mut changes[observable.configuration];
+        *largest = f64::max(*largest, change);
     }
-    for (observable, datum) in dataset.observables.iter().zip(&mut dataset.data) {
-        let slope = observable.as_slope();
-        if let Some((configuration, mode)) = slope.or(observable.as_frequency()) {
-            let felt = sensitivity(&models[configuration], mode) * changes[configuration];
-            let arrangement = &dataset.arrangements[configuration];
-            let (tones, span) = match slope {
-                Some(_) => (
-                    intermodulation(arrangement.joint_motion.as_ref(), mode),
-                    arrangement.log_amplitude_span(mode),
-                ),
-                None => (1.0, 1.0),
-            };
-            datum.inflate_std(tones * share * felt / span);
-        }
-    }
-    for (observable, datum) in &mut dataset.holdout {
-        if let Some((configuration, mode)) = observable.as_frequency() {
-            let felt = sensitivity(&models[configuration], mode) * changes[configuration];
+    let fitted = dataset.observables.iter().zip(&mut dataset.data);
+    let held_out = dataset
+        .holdout
+        .iter_mut()
+        .map(|(one, datum)| (&*one, datum));
+    for (observable, datum) in fitted.chain(held_out) {
+        let (configuration, mode) = (observable.configuration, observable.mode);
+        let felt = sensitivity(&models[configuration], mode) * changes[configuration];
+        if observable.is_frequency() {
             datum.inflate_std(share * felt);
+        } else if observable.is_slope() {
+            let arrangement = &dataset.arrangements[configuration];
+            let tones = intermodulation(arrangement.joint_motion.as_ref(), mode);
+            datum.inflate_std(tones * share * felt / arrangement.log_amplitude_span(mode));
         }
     }
 }

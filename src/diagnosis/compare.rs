@@ -1,7 +1,7 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
 use crate::amplitude::{set_joint_motions, set_levels};
-use crate::dataset::{Dataset, Observable};
+use crate::dataset::{Dataset, ObservableKind};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
 use crate::fit::{Search, fit_nominal};
@@ -49,7 +49,7 @@ pub fn compare(
         .collect();
     let mut comparison = over_locations(all).ok_or(GapError::NoFit)?;
     set_probabilities(&mut comparison.candidates, 0);
-    add_pairs(&comparison.dataset, &mut comparison.candidates, settings);
+    add_pairs(&comparison.dataset, &mut comparison.candidates);
     Ok(comparison)
 }
 
@@ -155,12 +155,12 @@ fn prepared(
     settings: &GapSettings,
 ) -> Option<(Dataset, Fit)> {
     let mut dataset = Dataset::new(observations, nominal, settings);
-    let first = fit_nominal(&dataset, settings)?;
+    let first = fit_nominal(&dataset)?;
     set_levels(&mut dataset, &first);
     set_joint_motions(&mut dataset, observations, &first);
     set_shear_slopes(&mut dataset, &first)?;
     dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);
-    let none = fit_nominal(&dataset, settings)?;
+    let none = fit_nominal(&dataset)?;
     Some((dataset, none))
 }
 
@@ -190,7 +190,6 @@ fn compare_singles(
     let effects = candidate_effects(&dataset.nominal, &dataset.arrangements);
     let search = Search {
         dataset: &dataset,
-        settings,
         without: &none,
     };
     let fits: Vec<Option<Fit>> = effects.par_iter().map(|one| search.add(*one)).collect();
@@ -207,14 +206,14 @@ fn compare_singles(
         candidate.drift = Some(drift);
         candidates.push(candidate);
     }
-    if let Some(fit) = fit_unknown(&dataset, settings, &none) {
+    if let Some(fit) = fit_unknown(&dataset, &none) {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));
     }
-    let baseline = fit_exact(&dataset, settings, is_geometry);
+    let baseline = fit_exact(&dataset, is_geometry);
     let baseline = baseline.unwrap_or_else(|| none.clone());
-    let drifting = fit_exact(&dataset, settings, is_described);
+    let drifting = fit_exact(&dataset, is_described);
     let drifting = drifting.unwrap_or_else(|| baseline.clone());
-    let described = fit_described(&dataset, settings).unwrap_or_else(|| drifting.clone());
+    let described = fit_described(&dataset).unwrap_or_else(|| drifting.clone());
     candidates.push(Candidate::new(Hypothesis::None, none));
     Some(ModelComparison {
         dataset,
@@ -260,27 +259,21 @@ fn add_large_effects(
 const EXACT: f64 = 1e-8;
 
 /// Fits the nominal model with some nuisance parameters taken as exact.
-fn fit_exact(
-    dataset: &Dataset,
-    settings: &GapSettings,
-    is_exact: impl Fn(NuisanceParameter) -> bool,
-) -> Option<Fit> {
+fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) -> Option<Fit> {
     let mut exact = dataset.clone();
     for nuisance in &mut exact.nuisances {
         if is_exact(nuisance.parameter) {
             nuisance.std = EXACT;
         }
     }
-    fit_nominal(&exact, settings)
+    fit_nominal(&exact)
 }
 
 /// Fits the described model with a joint and a temperature that are the same in all set-ups.
-fn fit_described(dataset: &Dataset, settings: &GapSettings) -> Option<Fit> {
-    let settings = GapSettings {
-        drift_stds: vec![EXACT],
-        ..settings.clone()
-    };
-    fit_exact(dataset, &settings, |nuisance| {
+fn fit_described(dataset: &Dataset) -> Option<Fit> {
+    let mut dataset = dataset.clone();
+    dataset.settings.drift_stds = vec![EXACT];
+    fit_exact(&dataset, |nuisance| {
         is_described(nuisance) || matches!(nuisance, NuisanceParameter::Temperature { .. })
     })
 }
@@ -307,15 +300,15 @@ const DISCREPANCIES: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
 
 /// Fits a discrepancy outside the catalogue: every mode's frequency off by an amount of its own,
 /// the same in all configurations, with a tenth of it for each datum and twice of it in the shapes.
-fn fit_unknown(dataset: &Dataset, settings: &GapSettings, nominal: &Fit) -> Option<Fit> {
+fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
     let mut found: Vec<LocalOptimum> = Vec::new();
     for spread in DISCREPANCIES {
         let loose = with_discrepancy(dataset, spread);
         let forward = Forward::new(&loose, &[]);
-        let priors = loose.priors(&forward.layout, settings);
+        let priors = forward.priors();
         let mut start = nominal.parameters().to_vec();
         start.resize(priors.len(), 0.0);
-        found.extend(evaluate(&forward, &priors, &start, &settings.drift_stds));
+        found.extend(evaluate(&forward, &priors, &start));
     }
     let all: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
     let best = found
@@ -339,11 +332,11 @@ fn with_discrepancy(dataset: &Dataset, spread: f64) -> Dataset {
     let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
     let size = root_mean_square(&values);
     for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
-        let extra = match observable {
-            Observable::Constant { .. } | Observable::Ratio { .. } => 2.0 * spread * size,
+        let extra = match observable.kind {
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => 2.0 * spread * size,
             // Damping may be anything if the cause is not known.
-            Observable::Damping { .. } => 50.0 * spread,
-            Observable::Frequency { .. } | Observable::Slope { .. } => 0.1 * spread,
+            ObservableKind::Damping => 50.0 * spread,
+            ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
         };
         datum.std = datum.std.hypot(extra);
     }

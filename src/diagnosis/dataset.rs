@@ -14,81 +14,76 @@ use crate::parameters::{
     CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior, priors, with_drift,
 };
 use crate::settings::GapSettings;
-use crate::structure::{Arrangement, Inventory, Nominal};
+use crate::structure::{Arrangement, ELEMENTS, Inventory, Nominal};
 use crate::thresholds::DISTINCT_AMPLITUDES;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
-use tapjoint_beam::specimen::Mesh;
 use tapjoint_identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Quantity that is observed and predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Observable {
+pub struct Observable {
+    /// Kind of quantity.
+    pub kind: ObservableKind,
+    /// Index of its configuration; 0 for a damping ratio, which belongs to all configurations together.
+    pub configuration: usize,
+    /// Number of its mode.
+    pub mode: usize,
+}
+
+/// Kind of an observable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObservableKind {
     /// Logarithm of a natural frequency.
-    Frequency { configuration: usize, mode: usize },
+    Frequency,
     /// Modal constant at a sensor and the tap (1/kg).
-    Constant {
-        configuration: usize,
-        mode: usize,
-        sensor: usize,
-    },
+    Constant { sensor: usize },
     /// Shape at a sensor over that at the reference sensor (1).
-    Ratio {
-        configuration: usize,
-        mode: usize,
-        sensor: usize,
-        reference: usize,
-    },
-    /// Logarithm of a damping ratio, all configurations together.
-    Damping { mode: usize },
+    Ratio { sensor: usize, reference: usize },
+    /// Logarithm of a damping ratio.
+    Damping,
     /// Change of the logarithm of a frequency per e-fold of the amplitude along the decay (1).
-    Slope { configuration: usize, mode: usize },
+    Slope,
 }
 
 impl Observable {
+    /// Returns a natural frequency.
+    pub fn frequency(configuration: usize, mode: usize) -> Self {
+        Observable {
+            kind: ObservableKind::Frequency,
+            configuration,
+            mode,
+        }
+    }
+
+    /// Returns another quantity of the same mode.
+    fn with_kind(self, kind: ObservableKind) -> Self {
+        Observable { kind, ..self }
+    }
+
     /// Returns whether it is a natural frequency.
     pub fn is_frequency(&self) -> bool {
-        matches!(self, Observable::Frequency { .. })
+        self.kind == ObservableKind::Frequency
+    }
+
+    /// Returns whether it is a change along the decay.
+    pub fn is_slope(&self) -> bool {
+        self.kind == ObservableKind::Slope
+    }
+
+    /// Returns whether it is a damping ratio.
+    pub fn is_damping(&self) -> bool {
+        self.kind == ObservableKind::Damping
     }
 
     /// Returns whether it is a modal constant or a ratio of a shape.
     pub fn is_shape(&self) -> bool {
-        matches!(self, Observable::Constant { .. } | Observable::Ratio { .. })
-    }
-
-    /// Returns configuration and mode of a natural frequency.
-    pub fn as_frequency(&self) -> Option<(usize, usize)> {
-        match *self {
-            Observable::Frequency {
-                configuration,
-                mode,
-            } => Some((configuration, mode)),
-            _ => None,
-        }
-    }
-
-    /// Returns configuration and mode of a change along the decay.
-    pub fn as_slope(&self) -> Option<(usize, usize)> {
-        match *self {
-            Observable::Slope {
-                configuration,
-                mode,
-            } => Some((configuration, mode)),
-            _ => None,
-        }
-    }
-
-    /// Returns its configuration; `None` for a damping ratio, which belongs to all.
-    pub fn configuration(&self) -> Option<usize> {
-        match *self {
-            Observable::Frequency { configuration, .. }
-            | Observable::Constant { configuration, .. }
-            | Observable::Ratio { configuration, .. }
-            | Observable::Slope { configuration, .. } => Some(configuration),
-            Observable::Damping { .. } => None,
-        }
+        matches!(
+            self.kind,
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. }
+        )
     }
 }
 
@@ -267,8 +262,8 @@ pub struct Dataset {
     pub modes: usize,
     /// Number of elements of the structure.
     pub elements: usize,
-    /// Radius of gyration of a sensor (m).
-    pub sensor_radius: f64,
+    /// Settings of the diagnosis.
+    pub settings: GapSettings,
     /// Modes above this one are held out.
     pub fitted_modes: usize,
     /// Frequencies that take no part in the fit.
@@ -320,8 +315,8 @@ impl Dataset {
             data: Vec::new(),
             nuisances: Vec::new(),
             modes: highest,
-            elements: Mesh::DIAGNOSIS.elements,
-            sensor_radius: settings.sensor_radius,
+            elements: ELEMENTS,
+            settings: settings.clone(),
             fitted_modes: highest.saturating_sub(held_out),
             holdout: Vec::new(),
             scatter: Vec::new(),
@@ -330,11 +325,11 @@ impl Dataset {
             tilts: Vec::new(),
             peaks: UnpairedPeaks::new(observations),
         };
-        dataset.add_frequencies(observations, settings);
+        dataset.add_frequencies(observations);
         dataset.add_shapes(observations);
-        dataset.add_damping(observations, settings);
+        dataset.add_damping(observations);
         dataset.add_slopes(observations);
-        dataset.add_nuisances(&inventory, settings);
+        dataset.add_nuisances(&inventory);
         dataset
     }
 
@@ -343,7 +338,7 @@ impl Dataset {
         self.data.push(datum);
     }
 
-    fn add_frequencies(&mut self, observations: &Observations, settings: &GapSettings) {
+    fn add_frequencies(&mut self, observations: &Observations) {
         let mut observed: Vec<(usize, &ObservedMode)> = Vec::new();
         let mut data = Vec::new();
         for (configuration, one) in observations.configurations.iter().enumerate() {
@@ -366,14 +361,11 @@ impl Dataset {
                 datum.std *= (1.0 - share * share).max(0.0).sqrt();
             }
             // The common part of a recording is far below the floor: as good as independent.
-            datum.inflate_std(settings.frequency_floor.hypot(one.common));
+            datum.inflate_std(self.settings.frequency_floor.hypot(one.common));
             // Anywhere between the poles of a decay that was split, on either side of this one.
             let split = split_pole(one, observed).unwrap_or(0.0) / 3.0_f64.sqrt();
             datum.inflate_std(split.hypot(average_std(observed)));
-            let observable = Observable::Frequency {
-                configuration,
-                mode,
-            };
+            let observable = Observable::frequency(configuration, mode);
             if mode > self.fitted_modes {
                 self.holdout.push((observable, datum));
             } else {
@@ -396,7 +388,7 @@ impl Dataset {
         for (configuration, one) in observations.configurations.iter().enumerate() {
             let modes = one.modes.iter();
             for observed in modes.filter(|mode| mode.mode <= self.fitted_modes) {
-                let mode = observed.mode;
+                let own = Observable::frequency(configuration, observed.mode);
                 let Some(reference) = observed.reference.filter(|&sensor| is_placed(one, sensor))
                 else {
                     continue;
@@ -407,24 +399,15 @@ impl Dataset {
                 if let (Some(constant), Some(_)) = (observed.constant, one.tap) {
                     let mut datum = Datum::new(constant.value, constant.std, constant.freedom);
                     datum.inflate_std(constant.value * constant_model_std(observed));
-                    let observable = Observable::Constant {
-                        configuration,
-                        mode,
-                        sensor: reference,
-                    };
-                    constants.push((observable, datum));
+                    let kind = ObservableKind::Constant { sensor: reference };
+                    constants.push((own.with_kind(kind), datum));
                 }
                 for value in &observed.shape {
                     let sensor = value.sensor;
                     if sensor != reference && is_placed(one, sensor) && value.std > 0.0 {
-                        let observable = Observable::Ratio {
-                            configuration,
-                            mode,
-                            sensor,
-                            reference,
-                        };
+                        let kind = ObservableKind::Ratio { sensor, reference };
                         let datum = Datum::new(value.value, value.std, observed.freedom);
-                        ratios.push((observable, datum));
+                        ratios.push((own.with_kind(kind), datum));
                     }
                 }
             }
@@ -441,7 +424,7 @@ impl Dataset {
 
     /// Adds one damping ratio for each mode: the weighted mean of all configurations, since only
     /// noise and level distinguish them.
-    fn add_damping(&mut self, observations: &Observations, settings: &GapSettings) {
+    fn add_damping(&mut self, observations: &Observations) {
         for mode in 1..=self.fitted_modes {
             let configurations = observations.configurations.iter();
             let observed: Vec<&ObservedMode> =
@@ -455,9 +438,10 @@ impl Dataset {
                 }
             }
             if weights > 0.0 {
-                let std = weights.powf(-0.5).hypot(settings.damping_scatter);
+                let std = weights.powf(-0.5).hypot(self.settings.damping_scatter);
                 let datum = Datum::new(sum / weights, std, None);
-                self.push(Observable::Damping { mode }, datum);
+                let own = Observable::frequency(0, mode);
+                self.push(own.with_kind(ObservableKind::Damping), datum);
                 self.tilts.push((mode, observed[0].frequency.ln()));
             }
         }
@@ -475,12 +459,8 @@ impl Dataset {
                     && mode.mode <= self.fitted_modes
                 {
                     datum.inflate_std(SLOPE_FLOOR);
-                    let mode = mode.mode;
-                    let slope = Observable::Slope {
-                        configuration,
-                        mode,
-                    };
-                    self.push(slope, datum);
+                    let own = Observable::frequency(configuration, mode.mode);
+                    self.push(own.with_kind(ObservableKind::Slope), datum);
                 }
             }
         }
@@ -495,17 +475,17 @@ impl Dataset {
         });
     }
 
-    fn add_nuisances(&mut self, inventory: &Inventory, settings: &GapSettings) {
+    fn add_nuisances(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{
             AddedInertia, Amplitude, FastenedMass, FastenedPosition, Scale, Scatter, SensorInertia,
             SensorMass, Shear,
         };
-        let scale = self.nominal.scale_std.unwrap_or(settings.scale_std);
+        let scale = self.nominal.scale_std.unwrap_or(self.settings.scale_std);
         self.add_nuisance(Scale, 0.0, scale);
         if self.nominal.specimen.shear_rotary > 0.0 {
-            self.add_nuisance(Shear, 0.0, settings.shear_std);
+            self.add_nuisance(Shear, 0.0, self.settings.shear_std);
         }
-        self.add_drifts(settings);
+        self.add_drifts();
         for configuration in 0..self.arrangements.len() {
             if !self.arrangements[configuration].scatter.is_empty() {
                 self.add_nuisance(Scatter { configuration }, 0.0, 1.0);
@@ -513,16 +493,16 @@ impl Dataset {
         }
         for (name, text) in inventory.names.iter().enumerate() {
             if self.nominal.mass_of(text) > 0.0 {
-                self.add_nuisance(SensorMass { name }, 0.0, settings.sensor_mass_std);
+                self.add_nuisance(SensorMass { name }, 0.0, self.settings.sensor_mass_std);
             }
             self.add_nuisance(SensorInertia { name }, 0.0, 1.0);
         }
         self.add_nuisance(AddedInertia, 0.0, 1.0);
-        self.add_positions_and_gains(inventory, settings);
-        self.add_damping_level(settings);
+        self.add_positions_and_gains(inventory);
+        self.add_damping_level();
         self.add_nuisance(Amplitude, 0.0, AMPLITUDE_STD);
         for fastened in 0..inventory.fastened.len() {
-            let (mass, position) = (settings.fastened_mass_std, settings.position_std);
+            let (mass, position) = (self.settings.fastened_mass_std, self.settings.position_std);
             self.add_nuisance(FastenedMass { fastened }, 0.0, mass);
             self.add_nuisance(FastenedPosition { fastened }, 0.0, position);
         }
@@ -537,48 +517,48 @@ impl Dataset {
     }
 
     /// Adds the joint's stiffness and the temperature, which differ between set-ups.
-    fn add_drifts(&mut self, settings: &GapSettings) {
+    fn add_drifts(&mut self) {
         let setups = self.setups();
         if setups.len() > 1 {
             for setup in setups {
                 for direction in self.nominal.fitted_springs() {
                     let drift = NuisanceParameter::Drift { setup, direction };
-                    self.add_nuisance(drift, 0.0, settings.drift_stds[0]);
+                    self.add_nuisance(drift, 0.0, self.settings.drift_stds[0]);
                 }
                 let temperature = NuisanceParameter::Temperature { setup };
-                self.add_nuisance(temperature, 0.0, settings.temperature_std);
+                self.add_nuisance(temperature, 0.0, self.settings.temperature_std);
             }
         }
     }
 
     /// Adds positions of sensors and of the taps, and calibrations, on which shapes and modal constants depend.
-    fn add_positions_and_gains(&mut self, inventory: &Inventory, settings: &GapSettings) {
+    fn add_positions_and_gains(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{Gain, SensorPosition, TapPosition};
         let mut observables = self.observables.iter();
-        let constants = observables.any(|one| matches!(one, Observable::Constant { .. }));
+        let constants = observables.any(|one| matches!(one.kind, ObservableKind::Constant { .. }));
         let shapes = self.observables.iter().any(Observable::is_shape);
         for position in 0..inventory.positions.len() {
-            self.add_nuisance(SensorPosition { position }, 0.0, settings.position_std);
+            self.add_nuisance(SensorPosition { position }, 0.0, self.settings.position_std);
         }
         if constants {
             for setup in self.setups() {
-                self.add_nuisance(TapPosition { setup }, 0.0, settings.position_std);
+                self.add_nuisance(TapPosition { setup }, 0.0, self.settings.position_std);
             }
         }
         if shapes {
             for setup in self.setups() {
                 for name in 0..inventory.names.len() {
-                    self.add_nuisance(Gain { setup, name }, 0.0, settings.gain_std);
+                    self.add_nuisance(Gain { setup, name }, 0.0, self.settings.gain_std);
                 }
             }
         }
     }
 
     /// Adds level and tilt of the nominal damping ratios, where any was observed.
-    fn add_damping_level(&mut self, settings: &GapSettings) {
+    fn add_damping_level(&mut self) {
         let (mut count, mut sum) = (0.0, 0.0);
         for (observable, datum) in self.observables.iter().zip(&self.data) {
-            if matches!(observable, Observable::Damping { .. }) {
+            if observable.is_damping() {
                 count += 1.0;
                 sum += datum.value;
             }
@@ -586,7 +566,7 @@ impl Dataset {
         if count > 0.0 {
             // Wide: the damping of a beam is not known beforehand.
             self.add_nuisance(NuisanceParameter::Damping, sum / count, 2.0);
-            let tilt = settings.damping_tilt;
+            let tilt = self.settings.damping_tilt;
             self.add_nuisance(NuisanceParameter::DampingTilt, 0.0, tilt);
         }
     }
@@ -629,7 +609,7 @@ impl Dataset {
 
     /// Indices of the changes along the decays among the observables.
     pub fn slopes(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.observables.len()).filter(|&row| self.observables[row].as_slope().is_some())
+        (0..self.observables.len()).filter(|&row| self.observables[row].is_slope())
     }
 
     /// Order of the parameters of a hypothesis with these effects.
@@ -638,8 +618,8 @@ impl Dataset {
     }
 
     /// Priors of all parameters, with the middle spread of the drift.
-    pub fn priors(&self, layout: &Layout, settings: &GapSettings) -> Vec<Prior> {
-        priors(&self.nominal, layout, &self.nuisances, settings)
+    pub fn priors(&self, layout: &Layout) -> Vec<Prior> {
+        priors(&self.nominal, layout, &self.nuisances, &self.settings)
     }
 
     /// Priors with this spread of the drift.

@@ -8,7 +8,6 @@ use crate::multi_start::{CoarseModel, Start, settle, unexplained};
 use crate::parameters::{CandidateEffect, LocationKind};
 use crate::posterior::{Candidate, set_probabilities};
 use crate::result::Hypothesis;
-use crate::settings::GapSettings;
 use crate::thresholds::{LEAST_DATA_FOR_PAIRS, MISSED_HOLDOUT, PROMISED_BY_SECOND, SECOND_EFFECT};
 use crate::validate::{HoldoutErrors, Residuals, holdout_goodness};
 use rayon::prelude::*;
@@ -27,7 +26,7 @@ const SCREENED_PAIRS: usize = 2;
 
 /// Adds a second effect beside each of the best single ones, where none of these suffices or the second promises
 /// much.
-pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>, settings: &GapSettings) {
+pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     let is_seen = candidates
         .first()
         .is_some_and(|one| one.hypothesis != Hypothesis::None);
@@ -41,11 +40,7 @@ pub fn add_pairs(dataset: &Dataset, candidates: &mut Vec<Candidate>, settings: &
         .iter()
         .filter(|one| one.effects().len() == 1 && one.drift.is_none())
         .collect();
-    let search = PairSearch {
-        dataset,
-        settings,
-        singles,
-    };
+    let search = PairSearch { dataset, singles };
     let needed = if suffices_one {
         PROMISED_BY_SECOND
     } else {
@@ -89,7 +84,6 @@ fn effect_of(single: &Candidate) -> CandidateEffect {
 /// Search for pairs of single effects.
 struct PairSearch<'a> {
     dataset: &'a Dataset,
-    settings: &'a GapSettings,
     singles: Vec<&'a Candidate>,
 }
 
@@ -97,7 +91,6 @@ impl<'a> PairSearch<'a> {
     fn beside<'b>(&'b self, without: &'b Fit) -> Search<'b> {
         Search {
             dataset: self.dataset,
-            settings: self.settings,
             without,
         }
     }
@@ -146,7 +139,7 @@ impl<'a> PairSearch<'a> {
             .iter()
             .map(|one| unexplained(self.dataset, &one.fit));
         let factor = left.fold(f64::INFINITY, f64::min);
-        let coarse = CoarseModel::new(self.dataset, self.settings, factor);
+        let coarse = CoarseModel::new(self.dataset, factor);
         let alone: Vec<Option<Start>> = singles
             .par_iter()
             .map(|one| coarse.alone(effect_of(one)).into_iter().next())
@@ -178,7 +171,7 @@ impl<'a> PairSearch<'a> {
                 }
             })
             .collect();
-        let finer = CoarseModel::new(self.dataset, self.settings, factor.sqrt());
+        let finer = CoarseModel::new(self.dataset, factor.sqrt());
         let found: Vec<Pair<'a>> = best_pairs(found, FINER_PAIRS)
             .into_par_iter()
             .map(|pair| {

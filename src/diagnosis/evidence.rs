@@ -56,13 +56,9 @@ const RETURNS: usize = 2;
 const LINEAR_ENOUGH: f64 = 0.3;
 
 /// Fits a hypothesis from a start and integrates over all parameters, the drift's spread included.
-pub fn evaluate(
-    forward: &Forward<'_>,
-    priors: &[Prior],
-    start: &[f64],
-    drifts: &[f64],
-) -> Option<LocalOptimum> {
+pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Option<LocalOptimum> {
     let (dataset, layout) = (forward.dataset, &forward.layout);
+    let drifts = &dataset.settings.drift_stds;
     let middle = drifts[drifts.len() / 2];
     let priors = dataset.with_drift(layout, priors, middle);
     let mut optimum = maximise(&dataset.data, &priors, start, forward)?;
@@ -169,10 +165,9 @@ pub fn evaluate_at_size(
     without: &Fit,
     priors: &[Prior],
     size: f64,
-    drifts: &[f64],
 ) -> Option<LocalOptimum> {
     let start = start_with(without, &forward.layout, size, None);
-    evaluate(forward, priors, &start, drifts)
+    evaluate(forward, priors, &start)
 }
 
 /// Returns the optimum of the model linearised where the last effect is next to nothing, beside a fit without it.
@@ -584,7 +579,7 @@ mod tests {
         let (laplace, force) = (case.by_laplace(), case.by_force());
         assert!((laplace - force).abs() < 0.2, "{laplace} {force}");
     }
-    /// The same beside a place that changes next to nothing.
+    /// Two parameters beside a location that changes next to nothing.
     struct Placed(TwoParameters);
 
     impl Model for Placed {

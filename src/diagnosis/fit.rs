@@ -10,15 +10,14 @@ use crate::fixture::{peak_locations, with_peaks};
 use crate::forward::Forward;
 use crate::least_squares::Optimum;
 use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
-use crate::settings::GapSettings;
 use crate::structure::COUPLING;
 use crate::thresholds::{LOCATED, SIZE_DETECTED};
 
 /// Fits the nominal model with its joint free.
-pub fn fit_nominal(dataset: &Dataset, settings: &GapSettings) -> Option<Fit> {
+pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
     let forward = Forward::new(dataset, &[]);
-    let priors = dataset.priors(&forward.layout, settings);
-    let priors = dataset.with_drift(&forward.layout, &priors, settings.drift_stds[0]);
+    let drift = dataset.settings.drift_stds[0];
+    let priors = dataset.with_drift(&forward.layout, &forward.priors(), drift);
     let mut start: Vec<f64> = priors.iter().map(|prior| prior.centre).collect();
     for (parameter, (direction, value)) in start.iter_mut().zip(dataset.nominal.joint_parameters())
     {
@@ -26,7 +25,7 @@ pub fn fit_nominal(dataset: &Dataset, settings: &GapSettings) -> Option<Fit> {
             *parameter = value;
         }
     }
-    let best = evaluate(&forward, &priors, &start, &settings.drift_stds)?;
+    let best = evaluate(&forward, &priors, &start)?;
     Some(Fit {
         effects: Vec::new(),
         log_evidence: best.log_evidence,
@@ -42,60 +41,50 @@ const CORRECTED: usize = 6;
 pub struct Search<'a> {
     /// The data.
     pub dataset: &'a Dataset,
-    /// Settings of the diagnosis.
-    pub settings: &'a GapSettings,
     /// Fit without the effect.
     pub without: &'a Fit,
 }
 
 impl<'a> Search<'a> {
-    /// Returns the model with these effects beside those of the fit without them, and the priors of its parameters.
-    fn model_with(&self, added: &[CandidateEffect]) -> (Forward<'a>, Vec<Prior>) {
-        let effects = [&self.without.effects[..], added].concat();
-        let forward = Forward::new(self.dataset, &effects);
-        let priors = self.dataset.priors(&forward.layout, self.settings);
-        (forward, priors)
+    /// Returns the model with these effects beside those of the fit without them.
+    fn model_with(&self, added: &[CandidateEffect]) -> Forward<'a> {
+        Forward::new(self.dataset, &[&self.without.effects[..], added].concat())
     }
 
     /// Fits the effect beside those of the fit without it.
     pub fn add(&self, candidate: CandidateEffect) -> Option<Fit> {
-        let (forward, priors) = self.model_with(&[candidate]);
+        let forward = self.model_with(&[candidate]);
         match candidate.location {
-            None => self.without_location(&forward, &priors),
-            Some(range) => self.with_location(&forward, &priors, range),
+            None => self.without_location(&forward),
+            Some(range) => self.with_location(&forward, range),
         }
     }
 
     /// Returns the objective of the fit without the effect, with the drift that the search begins with.
     pub fn objective_without(&self) -> Option<f64> {
-        let (_, priors) = self.model_with(&[]);
+        let priors = self.model_with(&[]).priors();
         let at = &self.without.best.optimum;
         Some(linear_optimum(&self.dataset.data, &priors, at)?.objective)
     }
 
     /// Returns the least objective that the model linearised without the effect promises, over its locations.
     pub fn linear_screen(&self, candidate: CandidateEffect) -> Option<f64> {
-        let (forward, priors) = self.model_with(&[candidate]);
+        let forward = self.model_with(&[candidate]);
         let Some(range) = candidate.location else {
-            return Some(linear_fit(&forward, self.without, &priors, None)?.objective);
+            return Some(linear_fit(&forward, self.without, &forward.priors(), None)?.objective);
         };
         let (low, high) = range.searched_bounds();
         let nodes = (0..range.nodes)
             .map(|node| low + (high - low) * (node as f64 + 0.5) / range.nodes as f64);
         nodes
             .chain(peak_locations(self.dataset, range.kind))
-            .filter_map(|location| Some(self.linear_at(&forward, &priors, location)?.0.objective))
+            .filter_map(|location| Some(self.linear_at(&forward, location)?.0.objective))
             .min_by(f64::total_cmp)
     }
 
     /// Returns the linearised optimum with the effect held at a location, and the priors.
-    fn linear_at(
-        &self,
-        forward: &Forward<'_>,
-        priors: &[Prior],
-        location: f64,
-    ) -> Option<(Optimum, Vec<Prior>)> {
-        let mut held = priors.to_vec();
+    fn linear_at(&self, forward: &Forward<'_>, location: f64) -> Option<(Optimum, Vec<Prior>)> {
+        let mut held = forward.priors();
         held[forward.layout.last_size() + 1] = Prior::held(location);
         let optimum = linear_fit(forward, self.without, &held, Some(location))?;
         Some((optimum, held))
@@ -104,19 +93,19 @@ impl<'a> Search<'a> {
     /// Fits both effects from where the second has its own optimum and the first is next to nothing: two effects explain
     /// no less than each of them.
     pub fn add_from(&self, alone: &Fit) -> Option<Fit> {
-        let (forward, priors) = self.model_with(&alone.effects);
+        let forward = self.model_with(&alone.effects);
         let joint = forward.layout.joint.len();
         let own = joint..self.dataset.layout(&self.without.effects).first_nuisance();
         let mut start = alone.parameters().to_vec();
         start.splice(joint..joint, self.without.parameters()[own].iter().copied());
         let size = &forward.layout.effects[0].size;
         start[joint] = size.neutral + 0.02 * size.scale;
-        self.fit_from(&forward, &priors, &start)
+        self.fit_from(&forward, &start)
     }
 
     /// Fits the effects of a model from one start.
-    pub fn fit_from(&self, forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Option<Fit> {
-        let best = evaluate(forward, priors, start, &self.settings.drift_stds)?;
+    pub fn fit_from(&self, forward: &Forward<'_>, start: &[f64]) -> Option<Fit> {
+        let best = evaluate(forward, &forward.priors(), start)?;
         let evidence = best.log_evidence;
         Some(self.finish(forward, best, evidence))
     }
@@ -130,15 +119,14 @@ impl<'a> Search<'a> {
             best,
             log_evidence: (log_evidence + correction).min(most),
         };
-        with_peaks(forward, fit, self.without, self.settings)
+        with_peaks(forward, fit, self.without)
     }
 
-    fn without_location(&self, forward: &Forward<'_>, priors: &[Prior]) -> Option<Fit> {
-        let size = forward.layout.last_size();
-        let drifts = &self.settings.drift_stds;
+    fn without_location(&self, forward: &Forward<'_>) -> Option<Fit> {
+        let (size, priors) = (forward.layout.last_size(), forward.priors());
         let mut found: Vec<LocalOptimum> = Vec::new();
-        for value in self.sizes(forward, priors) {
-            if let Some(one) = evaluate_at_size(forward, self.without, priors, value, drifts) {
+        for value in self.sizes(forward) {
+            if let Some(one) = evaluate_at_size(forward, self.without, &priors, value) {
                 keep(&mut found, one, &[size]);
             }
         }
@@ -149,15 +137,12 @@ impl<'a> Search<'a> {
 
     /// Returns sizes from which the search begins: that of the model linearised without the effect, and
     /// the other sign or a size well inside the range.
-    fn sizes(&self, forward: &Forward<'_>, priors: &[Prior]) -> Vec<f64> {
+    fn sizes(&self, forward: &Forward<'_>) -> Vec<f64> {
         let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
-        let asked = self
-            .linear_size(forward, priors)
-            .unwrap_or(size.neutral)
-            .clamp(
-                (size.neutral - 2.0 * size.scale).max(size.low),
-                (size.neutral + 2.0 * size.scale).min(size.high),
-            );
+        let asked = self.linear_size(forward).unwrap_or(size.neutral).clamp(
+            (size.neutral - 2.0 * size.scale).max(size.low),
+            (size.neutral + 2.0 * size.scale).min(size.high),
+        );
         let away = asked - size.neutral;
         let other = (size.neutral - 0.5 * away).clamp(size.low, size.high);
         if away.abs() < 1e-3 * size.scale {
@@ -170,8 +155,8 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the size by one step of Gauss-Newton from nothing of it.
-    fn linear_size(&self, forward: &Forward<'_>, priors: &[Prior]) -> Option<f64> {
-        let mut priors = priors.to_vec();
+    fn linear_size(&self, forward: &Forward<'_>) -> Option<f64> {
+        let mut priors = forward.priors();
         let at = forward.layout.last_size();
         priors[at].low = f64::NEG_INFINITY;
         priors[at].high = f64::INFINITY;
@@ -180,25 +165,20 @@ impl<'a> Search<'a> {
     }
 
     /// Fits the linearised model at every node of the location's range; then the true one, free, from the best.
-    fn with_location(
-        &self,
-        forward: &Forward<'_>,
-        priors: &[Prior],
-        range: LocationRange,
-    ) -> Option<Fit> {
+    fn with_location(&self, forward: &Forward<'_>, range: LocationRange) -> Option<Fit> {
         let (low, high) = range.searched_bounds();
         let spacing = (high - low) / range.nodes as f64;
         let mut nodes: Vec<LocalOptimum> = Vec::new();
         for node in 0..range.nodes {
             let location = low + spacing * (node as f64 + 0.5);
-            if let Some((optimum, held)) = self.linear_at(forward, priors, location) {
-                let drifts = &self.settings.drift_stds;
+            if let Some((optimum, held)) = self.linear_at(forward, location) {
+                let drifts = &self.dataset.settings.drift_stds;
                 let layout = &forward.layout;
                 nodes.push(over_drifts(self.dataset, layout, &held, &optimum, drifts));
             }
         }
         self.correct(forward, &mut nodes);
-        self.refine(forward, priors, spacing, &nodes)
+        self.refine(forward, spacing, &nodes)
     }
 
     /// Replaces the linearised model by the true one at the most promising nodes: a fixture near
@@ -211,7 +191,7 @@ impl<'a> Search<'a> {
         for &node in first {
             let linear = &nodes[node];
             let start = &linear.optimum.parameters;
-            match evaluate(forward, &linear.priors, start, &self.settings.drift_stds) {
+            match evaluate(forward, &linear.priors, start) {
                 Some(found) => nodes[node] = found,
                 None => nodes[node].log_evidence = f64::NEG_INFINITY,
             }
@@ -224,13 +204,7 @@ impl<'a> Search<'a> {
 
     /// Frees the location from the best nodes. If the data fix it within the nodes' spacing, the
     /// maxima are summed; if they do not, the effect is so small that the linearised nodes hold.
-    fn refine(
-        &self,
-        forward: &Forward<'_>,
-        priors: &[Prior],
-        spacing: f64,
-        nodes: &[LocalOptimum],
-    ) -> Option<Fit> {
+    fn refine(&self, forward: &Forward<'_>, spacing: f64, nodes: &[LocalOptimum]) -> Option<Fit> {
         let at = forward.layout.last_size();
         let evidence: Vec<f64> = nodes.iter().map(|node| node.log_evidence).collect();
         let mut starts: Vec<Vec<f64>> = local_maxima(&evidence)
@@ -239,7 +213,7 @@ impl<'a> Search<'a> {
             .collect();
         starts.extend(self.start_by_law(forward, nodes));
         let mut found: Vec<LocalOptimum> = Vec::new();
-        self.descend(forward, priors, &starts, &mut found);
+        descend(forward, &starts, &mut found);
         // A search along a bent valley may stop short of its end: search again from either side of it. Between
         // nodes that are far apart for the resolution of the data a deeper one may lie: search again from these.
         if let Some(best) = found.first()
@@ -252,7 +226,7 @@ impl<'a> Search<'a> {
                 from[at + 1] += aside;
                 starts.push(from);
             }
-            self.descend(forward, priors, &starts, &mut found);
+            descend(forward, &starts, &mut found);
         }
         let best = found.first()?.clone();
         let of_maxima: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
@@ -262,23 +236,6 @@ impl<'a> Search<'a> {
             log_mean(&evidence)
         };
         Some(self.finish(forward, best, total))
-    }
-
-    /// Adds the local optima that are reached from some starts; the deepest first.
-    fn descend(
-        &self,
-        forward: &Forward<'_>,
-        priors: &[Prior],
-        starts: &[Vec<f64>],
-        found: &mut Vec<LocalOptimum>,
-    ) {
-        let at = forward.layout.last_size();
-        for from in starts {
-            if let Some(one) = evaluate(forward, priors, from, &self.settings.drift_stds) {
-                keep(found, one, &[at, at + 1]);
-            }
-        }
-        found.sort_by(by_objective);
     }
 
     /// Returns the best node with the size and the exponent of the law that the changes along the decays call for, for a
@@ -297,6 +254,17 @@ impl<'a> Search<'a> {
         start[at + 1] = law.exponent;
         Some(start)
     }
+}
+
+/// Adds the local optima that are reached from some starts; the deepest first.
+fn descend(forward: &Forward<'_>, starts: &[Vec<f64>], found: &mut Vec<LocalOptimum>) {
+    let (at, priors) = (forward.layout.last_size(), forward.priors());
+    for from in starts {
+        if let Some(one) = evaluate(forward, &priors, from) {
+            keep(found, one, &[at, at + 1]);
+        }
+    }
+    found.sort_by(by_objective);
 }
 
 fn by_objective(a: &LocalOptimum, b: &LocalOptimum) -> std::cmp::Ordering {

@@ -23,7 +23,6 @@ use crate::evidence::{Fit, LocalOptimum, evaluate, linear_fit, log_sum};
 use crate::forward::Forward;
 use crate::observations::{DECIBEL, FIXTURE_FREQUENCY_STD, UnpairedPeak};
 use crate::parameters::{LocationKind, Prior};
-use crate::settings::GapSettings;
 use crate::structure::{ModalModel, fixture_strength};
 use crate::thresholds::{FIXTURE_LEVEL, SPLIT_POLE};
 use std::f64::consts::TAU;
@@ -198,7 +197,7 @@ pub fn peak_locations(dataset: &Dataset, kind: LocationKind) -> Vec<f64> {
 
 /// Returns the fit with the likelihood of the peaks for its fixture; any other as it is. `without` is the fit without
 /// the last effect.
-pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit, settings: &GapSettings) -> Fit {
+pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit) -> Fit {
     let peaks = &forward.dataset.peaks;
     let at = forward
         .layout
@@ -210,12 +209,7 @@ pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit, settings: &Gap
     let mut all = vec![(fit.log_evidence + missed.ln(), fit.best.clone())];
     let factor = ((high - low) / peaks.all.len().max(1) as f64).ln();
     for peak in &peaks.all {
-        let search = PeakSearch {
-            forward,
-            at,
-            peak,
-            settings,
-        };
+        let search = PeakSearch { forward, at, peak };
         if let Some((found, own)) = search.best(&fit.best, without) {
             let strength = own.log_strength(peak, size_std(&found, at));
             let seen = (1.0 - own.missed()).ln() + strength;
@@ -237,7 +231,6 @@ struct PeakSearch<'a> {
     forward: &'a Forward<'a>,
     at: usize,
     peak: &'a UnpairedPeak,
-    settings: &'a GapSettings,
 }
 
 impl PeakSearch<'_> {
@@ -247,7 +240,7 @@ impl PeakSearch<'_> {
         let mut starts = vec![other.optimum.parameters.clone()];
         starts[0][self.at] = self.peak.log;
         if forward.layout.location(forward.layout.effects.len() - 1) == Some(self.at) {
-            let mut held = forward.dataset.priors(&forward.layout, self.settings);
+            let mut held = forward.priors();
             held[self.at] = Prior::held(self.peak.log);
             let linear = linear_fit(forward, without, &held, Some(self.peak.log));
             starts.extend(linear.map(|optimum| optimum.parameters));
@@ -281,7 +274,7 @@ impl PeakSearch<'_> {
     ) -> Option<(LocalOptimum, FixtureMode)> {
         let mut priors = priors.to_vec();
         priors[self.at] = frequency;
-        let found = evaluate(self.forward, &priors, start, &self.settings.drift_stds)?;
+        let found = evaluate(self.forward, &priors, start)?;
         let own = FixtureMode::new(self.forward, &found.optimum.parameters)?;
         Some((found, own))
     }
@@ -341,7 +334,7 @@ mod tests {
         assert_eq!(nowhere.missed_by_size(0.02, 0.02), 1.0);
     }
 
-    /// Over all strengths within the range of what is nobody's, the densities are one and the same probability.
+    /// Over all strengths the density integrates to that of a peak of another cause.
     #[test]
     fn val_the_density_of_a_strength_is_normalised() {
         let step = 0.01;

@@ -1,6 +1,6 @@
 //! Predictions of all observables under a hypothesis, with their slopes.
 
-use crate::dataset::{Dataset, Observable};
+use crate::dataset::{Dataset, Observable, ObservableKind};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
 use crate::least_squares::{Linearised, Model};
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
@@ -94,6 +94,11 @@ impl<'a> Forward<'a> {
             layout: dataset.layout(effects),
             observables: &dataset.observables,
         }
+    }
+
+    /// Priors of all parameters, with the middle spread of the drift.
+    pub fn priors(&self) -> Vec<Prior> {
+        self.dataset.priors(&self.layout)
     }
 
     /// Returns the columns of one effect and the steps of their finite differences, away from the bounds. They are
@@ -230,54 +235,28 @@ impl<'a> Forward<'a> {
         models: &[ModalModel],
         parameters: &[f64],
     ) -> Option<f64> {
-        match *observable {
-            Observable::Frequency {
-                configuration,
-                mode,
-            } => {
-                let one = &models[configuration];
-                let frequency = one.frequency(mode)?;
-                let own = one.own_change(mode);
+        let one = &models[observable.configuration];
+        if observable.is_damping() {
+            let damping = self.damping(observable.mode, models, parameters)?;
+            return Some(damping.total.ln());
+        }
+        let place = ModeInPlace::new(self, observable, models)?;
+        match observable.kind {
+            ObservableKind::Frequency => {
+                let frequency = one.frequency(observable.mode)?;
+                let own = one.own_change(observable.mode);
                 (frequency > 0.0).then(|| frequency.ln() + own)
             }
-            Observable::Constant {
-                configuration,
-                mode,
-                sensor,
-            } => {
-                let (one, at) = (
-                    &models[configuration],
-                    &self.dataset.arrangements[configuration],
-                );
-                let index = one.index(mode)?;
-                let at_sensor = one.modes().displacement(index, at.sensors[sensor].position);
-                Some(at_sensor * one.modes().displacement(index, at.tap?))
+            ObservableKind::Constant { sensor } => {
+                Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
             }
-            Observable::Ratio {
-                configuration,
-                mode,
-                sensor,
-                reference,
-            } => {
-                let (one, at) = (
-                    &models[configuration],
-                    &self.dataset.arrangements[configuration],
-                );
-                let index = one.index(mode)?;
-                let [own, other] = [sensor, reference]
-                    .map(|sensor| one.modes().displacement(index, at.sensors[sensor].position));
-                Some(own / other)
+            ObservableKind::Ratio { sensor, reference } => {
+                Some(place.at_sensor(sensor) / place.at_sensor(reference))
             }
-            Observable::Damping { mode } => {
-                Some(self.damping(mode, models, parameters)?.total.ln())
-            }
-            Observable::Slope {
-                configuration,
-                mode,
-            } => {
-                let arrangement = &self.dataset.arrangements[configuration];
-                Some(self.law(parameters).map_or(0.0, |law| {
-                    slope_along_decay(arrangement, mode, &models[configuration], &law)
+            ObservableKind::Slope | ObservableKind::Damping => {
+                let law = self.law(parameters);
+                Some(law.map_or(0.0, |law| {
+                    slope_along_decay(place.arrangement, observable.mode, one, &law)
                 }))
             }
         }
@@ -297,10 +276,10 @@ impl<'a> Forward<'a> {
             });
         }
         for (row, observable) in self.observables.iter().enumerate() {
-            if let Some((configuration, mode)) = observable.as_frequency() {
-                let one = &models[configuration];
-                if let Some(index) = one.index(mode) {
-                    for (column, own) in all[configuration].iter().enumerate() {
+            if observable.is_frequency() {
+                let one = &models[observable.configuration];
+                if let Some(index) = one.index(observable.mode) {
+                    for (column, own) in all[observable.configuration].iter().enumerate() {
                         slopes[(row, column)] = own[index] * one.offset_factor(index);
                     }
                 }
@@ -356,55 +335,28 @@ impl<'a> Forward<'a> {
         predicted: f64,
         parameters: &[f64],
     ) -> f64 {
-        match *observable {
-            Observable::Frequency {
-                configuration,
-                mode,
-            } => {
-                let one = &models[configuration];
-                let index = one.index(mode);
-                index.map_or(0.0, |index| {
-                    let shape = ModeInPlace::new(self, one, configuration, index);
-                    shape.frequency_slope(mode, nuisance, parameters)
-                })
+        if observable.is_damping() {
+            let tilt = match nuisance {
+                NuisanceParameter::Damping => 1.0,
+                NuisanceParameter::DampingTilt => self.dataset.tilt(observable.mode),
+                _ => return 0.0,
+            };
+            let damping = self.damping(observable.mode, models, parameters);
+            return damping.map_or(1.0, |damping| damping.nominal / damping.total) * tilt;
+        }
+        let Some(place) = ModeInPlace::new(self, observable, models) else {
+            return 0.0;
+        };
+        match observable.kind {
+            ObservableKind::Frequency => place.frequency_slope(nuisance, parameters),
+            ObservableKind::Constant { sensor } => {
+                place.constant_slope(sensor, nuisance, predicted)
             }
-            Observable::Constant {
-                configuration,
-                mode,
-                sensor,
-            } => {
-                let one = &models[configuration];
-                let index = one.index(mode);
-                index.map_or(0.0, |index| {
-                    let shape = ModeInPlace::new(self, one, configuration, index);
-                    shape.constant_slope(sensor, nuisance, predicted)
-                })
+            ObservableKind::Ratio { sensor, reference } => {
+                let towards = place.relative_slope(sensor, nuisance);
+                predicted * (towards - place.relative_slope(reference, nuisance))
             }
-            Observable::Ratio {
-                configuration,
-                mode,
-                sensor,
-                reference,
-            } => {
-                let one = &models[configuration];
-                let [towards, away] = [sensor, reference].map(|sensor| {
-                    one.index(mode).map_or(0.0, |index| {
-                        let shape = ModeInPlace::new(self, one, configuration, index);
-                        shape.relative_slope(sensor, nuisance)
-                    })
-                });
-                predicted * (towards - away)
-            }
-            Observable::Damping { mode } => {
-                let tilt = match nuisance {
-                    NuisanceParameter::Damping => 1.0,
-                    NuisanceParameter::DampingTilt => self.dataset.tilt(mode),
-                    _ => return 0.0,
-                };
-                let damping = self.damping(mode, models, parameters);
-                damping.map_or(1.0, |damping| damping.nominal / damping.total) * tilt
-            }
-            Observable::Slope { .. } => 0.0,
+            ObservableKind::Slope | ObservableKind::Damping => 0.0,
         }
     }
 
@@ -522,29 +474,34 @@ struct DampingRatio {
     nominal: f64,
 }
 
-/// Mode of one configuration, with the sensors and masses that it moves.
+/// Mode of an observable, with the sensors and masses that it moves.
 struct ModeInPlace<'a> {
     forward: &'a Forward<'a>,
+    observable: Observable,
     arrangement: &'a Arrangement,
-    configuration: usize,
     model: &'a ModalModel,
     index: usize,
 }
 
 impl<'a> ModeInPlace<'a> {
+    /// Returns the mode; `None` where the structure does not have it.
     fn new(
         forward: &'a Forward<'a>,
-        model: &'a ModalModel,
-        configuration: usize,
-        index: usize,
-    ) -> Self {
-        ModeInPlace {
+        observable: &Observable,
+        models: &'a [ModalModel],
+    ) -> Option<Self> {
+        let model = &models[observable.configuration];
+        Some(ModeInPlace {
             forward,
-            arrangement: &forward.dataset.arrangements[configuration],
-            configuration,
+            observable: *observable,
+            arrangement: &forward.dataset.arrangements[observable.configuration],
             model,
-            index,
-        }
+            index: model.index(observable.mode)?,
+        })
+    }
+
+    fn at_sensor(&self, sensor: usize) -> f64 {
+        self.displacement(self.arrangement.sensors[sensor].position)
     }
 
     fn displacement(&self, position: f64) -> f64 {
@@ -563,15 +520,17 @@ impl<'a> ModeInPlace<'a> {
     }
 
     /// Returns d ln f with respect to a nuisance parameter.
-    fn frequency_slope(&self, mode: usize, nuisance: NuisanceParameter, parameters: &[f64]) -> f64 {
+    fn frequency_slope(&self, nuisance: NuisanceParameter, parameters: &[f64]) -> f64 {
         let (forward, arrangement) = (self.forward, self.arrangement);
-        let dataset = forward.dataset;
+        let (dataset, mode) = (forward.dataset, self.observable.mode);
         match nuisance {
             NuisanceParameter::Scale => 1.0,
             NuisanceParameter::Shear => dataset.shear_slope(mode),
             NuisanceParameter::Temperature { setup } if setup == arrangement.setup => 1.0,
             NuisanceParameter::Discrepancy { mode: own } if own == mode => 1.0,
-            NuisanceParameter::Scatter { configuration } if configuration == self.configuration => {
+            NuisanceParameter::Scatter { configuration }
+                if configuration == self.observable.configuration =>
+            {
                 dataset.scatter_of(configuration, mode)
             }
             NuisanceParameter::Drift { setup, direction } if setup == arrangement.setup => {
@@ -621,7 +580,7 @@ impl<'a> ModeInPlace<'a> {
 
     /// Returns d ln f with respect to the rotary inertia of a mass (kg) over its usual one.
     fn inertia_slope(&self, mass: f64, position: f64) -> f64 {
-        let inertia = mass * self.forward.dataset.sensor_radius.powi(2);
+        let inertia = mass * self.forward.dataset.settings.sensor_radius.powi(2);
         -0.5 * inertia * self.slope(position).powi(2)
     }
 

@@ -51,27 +51,23 @@ impl DegreesOfFreedom {
     /// masses, since these see other shapes and load other positions; slopes along decays, other levels and damping
     /// ratios count for the effects that make them.
     pub fn of(dataset: &Dataset, fit: &Fit) -> Self {
-        let has = |wanted| fit.effects.iter().any(|one| one.effect == wanted);
-        let slips = has(EffectId::JointNonlinearity);
-        let damps = has(EffectId::JointDamping);
+        let [slips, damps] = [EffectId::JointNonlinearity, EffectId::JointDamping]
+            .map(|wanted| fit.effects.iter().any(|one| one.effect == wanted));
         let mut seen: Vec<(usize, &Arrangement)> = Vec::new();
         let mut others = 0;
         for observable in &dataset.observables {
-            if let Some((configuration, mode)) = observable.as_frequency() {
-                let one = &dataset.arrangements[configuration];
-                let is_known = |old: &(usize, &Arrangement)| {
-                    old.0 == mode
-                        && are_alike(old.1, one)
-                        && !(slips && differ_in_level(old.1, one))
-                };
-                if !seen.iter().any(is_known) {
+            if observable.is_frequency() {
+                let (mode, one) = (
+                    observable.mode,
+                    &dataset.arrangements[observable.configuration],
+                );
+                let mut known = seen.iter().filter(|old| old.0 == mode);
+                if known.all(|old| differ(old.1, one, slips)) {
                     seen.push((mode, one));
                 }
-            } else if observable.as_slope().is_some() {
-                others += usize::from(slips);
-            } else if observable.configuration().is_none() {
-                others += usize::from(damps);
             }
+            others += usize::from(slips && observable.is_slope());
+            others += usize::from(damps && observable.is_damping());
         }
         DegreesOfFreedom {
             data: seen.len() + others,
@@ -85,18 +81,15 @@ impl DegreesOfFreedom {
     }
 }
 
-/// Returns whether two arrangements have the same sensor positions and added masses.
-fn are_alike(one: &Arrangement, other: &Arrangement) -> bool {
+/// Returns whether two arrangements have different sensor positions or added masses, or tap levels if these count.
+fn differ(one: &Arrangement, other: &Arrangement, levels_count: bool) -> bool {
     let sensors = one.sensors.iter().map(|sensor| sensor.position);
     let fastened = one.fastened.iter().map(|fastened| fastened.0);
-    sensors.eq(other.sensors.iter().map(|sensor| sensor.position))
-        && fastened.eq(other.fastened.iter().map(|fastened| fastened.0))
-}
-
-/// Returns whether the taps of two arrangements have different levels.
-fn differ_in_level(one: &Arrangement, other: &Arrangement) -> bool {
     let levels = one.known_level.zip(other.known_level);
-    levels.is_some_and(|(a, b)| (a / b).ln().abs() >= ANOTHER_LEVEL.ln())
+    let ratio = levels.map_or(0.0, |(a, b)| (a / b).ln().abs());
+    sensors.ne(other.sensors.iter().map(|sensor| sensor.position))
+        || fastened.ne(other.fastened.iter().map(|fastened| fastened.0))
+        || levels_count && ratio >= ANOTHER_LEVEL.ln()
 }
 
 impl GoodnessOfFit {

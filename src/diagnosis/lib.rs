@@ -98,5 +98,5 @@ pub fn diagnose(
     let mut comparison = compare::compare(observations, nominal, settings)?;
     posterior::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
     let unlocated = compare::without_unlocated(observations, nominal, settings);
-    Ok(summary::diagnosis(&comparison, unlocated, settings))
+    Ok(summary::diagnosis(&comparison, unlocated))
 }

@@ -64,13 +64,13 @@ fn slopes(dataset: &Dataset, models: &[ModalModel], property: Property) -> DMatr
     let mut slopes = DMatrix::zeros(dataset.observables.len(), PIECES);
     let step = dataset.nominal.length() / (PIECES * PIECE_POINTS) as f64;
     for (row, observable) in dataset.observables.iter().enumerate() {
-        if let Some((configuration, mode)) = observable.as_frequency()
-            && let Some(index) = models[configuration].index(mode)
-        {
+        let model = &models[observable.configuration];
+        let index = model.index(observable.mode);
+        if let Some(index) = index.filter(|_| observable.is_frequency()) {
             for piece in 0..PIECES {
-                let (first, points) = (piece * PIECE_POINTS, PIECE_POINTS);
+                let first = piece * PIECE_POINTS;
                 slopes[(row, piece)] =
-                    models[configuration].local_slope(index, property, first, points, step);
+                    model.local_slope(index, property, first, PIECE_POINTS, step);
             }
         }
     }

@@ -14,8 +14,7 @@ use crate::evidence::Fit;
 use crate::fit::Search;
 use crate::forward::Forward;
 use crate::least_squares::{Model, maximise, objective_at};
-use crate::parameters::{CandidateEffect, Layout, Prior};
-use crate::settings::GapSettings;
+use crate::parameters::{CandidateEffect, Layout};
 use crate::structure::COUPLING;
 use crate::thresholds::FOLLOWED_SHARE;
 use tapjoint_beam::effects::EffectId;
@@ -39,9 +38,8 @@ const SAME_MISFIT: f64 = 1e-3;
 const COARSE_ELEMENTS: usize = 24;
 
 /// Model of the frequencies alone, each with a multiple of its uncertainty.
-pub struct CoarseModel<'a> {
+pub struct CoarseModel {
     dataset: Dataset,
-    settings: &'a GapSettings,
 }
 
 /// Point at which a search for some effects may begin.
@@ -75,9 +73,9 @@ pub fn unexplained(dataset: &Dataset, fit: &Fit) -> f64 {
     root_mean_square(&all).max(1.0)
 }
 
-impl<'a> CoarseModel<'a> {
+impl CoarseModel {
     /// Returns the model with uncertainties multiplied by a factor.
-    pub fn new(dataset: &Dataset, settings: &'a GapSettings, factor: f64) -> Self {
+    pub fn new(dataset: &Dataset, factor: f64) -> Self {
         let mut coarse = dataset.clone();
         coarse.elements = COARSE_ELEMENTS;
         coarse.observables.retain(|one| one.is_frequency());
@@ -89,23 +87,14 @@ impl<'a> CoarseModel<'a> {
                 ..dataset.data[row]
             })
             .collect();
-        CoarseModel {
-            dataset: coarse,
-            settings,
-        }
-    }
-
-    fn model_of(&self, effects: &[CandidateEffect]) -> (Forward<'_>, Vec<Prior>) {
-        let forward = Forward::new(&self.dataset, effects);
-        let priors = self.dataset.priors(&forward.layout, self.settings);
-        (forward, priors)
+        CoarseModel { dataset: coarse }
     }
 
     /// Returns optima of one effect, from sizes and locations of its prior beside a softer or stiffer joint; the best
     /// first.
     pub fn alone(&self, candidate: CandidateEffect) -> Vec<Start> {
-        let (forward, priors) = self.model_of(&[candidate]);
-        let centre: Vec<f64> = priors.iter().map(|prior| prior.centre).collect();
+        let forward = Forward::new(&self.dataset, &[candidate]);
+        let centre: Vec<f64> = forward.priors().iter().map(|prior| prior.centre).collect();
         let mut joints = vec![centre.clone()];
         for (k, direction) in forward.layout.joint.iter().enumerate() {
             if *direction != COUPLING {
@@ -116,23 +105,24 @@ impl<'a> CoarseModel<'a> {
                 }
             }
         }
-        self.optima(&forward, &priors, &joints, TRIED_STARTS[0])
+        self.optima(&forward, &joints, TRIED_STARTS[0])
     }
 
     /// Returns optima of a second effect beside a first one, the best first.
     pub fn with_second(&self, first: &Start, candidate: CandidateEffect) -> Vec<Start> {
         let effects = [&first.effects[..], &[candidate]].concat();
-        let (forward, priors) = self.model_of(&effects);
+        let forward = Forward::new(&self.dataset, &effects);
         let at = forward.layout.last_size();
         let mut start = first.parameters.clone();
         let new = forward.layout.first_nuisance() - at;
         start.splice(at..at, std::iter::repeat_n(0.0, new));
-        self.optima(&forward, &priors, &[start], TRIED_STARTS[1])
+        self.optima(&forward, &[start], TRIED_STARTS[1])
     }
 
     /// Returns the optimum from where another search ended.
     pub fn continued(&self, start: &Start) -> Option<Start> {
-        let (forward, priors) = self.model_of(&start.effects);
+        let forward = Forward::new(&self.dataset, &start.effects);
+        let priors = forward.priors();
         let found = maximise(&self.dataset.data, &priors, &start.parameters, &forward)?;
         Some(Start {
             effects: start.effects.clone(),
@@ -141,30 +131,19 @@ impl<'a> CoarseModel<'a> {
         })
     }
 
-    /// Returns the objective of a fit to the data as they are.
-    fn misfit(&self, fit: &Fit) -> Option<f64> {
-        let (forward, priors) = self.model_of(&fit.effects);
-        self.objective(&forward, &priors, fit.parameters())
-    }
-
-    fn objective(&self, forward: &Forward<'_>, priors: &[Prior], at: &[f64]) -> Option<f64> {
+    fn objective(&self, forward: &Forward<'_>, at: &[f64]) -> Option<f64> {
         let (predicted, _) = forward.predict(at)?;
-        Some(objective_at(&self.dataset.data, priors, at, &predicted))
+        let priors = forward.priors();
+        Some(objective_at(&self.dataset.data, &priors, at, &predicted))
     }
 
     /// Returns optima from the starts of least misfit, the last effect at several sizes and locations; the best first.
-    fn optima(
-        &self,
-        forward: &Forward<'_>,
-        priors: &[Prior],
-        bases: &[Vec<f64>],
-        tried: usize,
-    ) -> Vec<Start> {
+    fn optima(&self, forward: &Forward<'_>, bases: &[Vec<f64>], tried: usize) -> Vec<Start> {
         let effects = &forward.layout.effects;
         let mut starts = Vec::new();
         for base in bases {
             for parameters in with_last(&forward.layout, base) {
-                if let Some(objective) = self.objective(forward, priors, &parameters) {
+                if let Some(objective) = self.objective(forward, &parameters) {
                     let effects = effects.clone();
                     starts.push(Start {
                         effects,
@@ -212,10 +191,13 @@ pub fn add_by_multi_start(
     found: Option<&Fit>,
 ) -> Option<Fit> {
     let factor = unexplained(search.dataset, search.without);
-    let starts = CoarseModel::new(search.dataset, search.settings, factor).alone(candidate);
-    let finer = CoarseModel::new(search.dataset, search.settings, factor.sqrt());
+    let starts = CoarseModel::new(search.dataset, factor).alone(candidate);
+    let finer = CoarseModel::new(search.dataset, factor.sqrt());
     let so_far = found
-        .and_then(|fit| finer.misfit(fit))
+        .and_then(|fit| {
+            let forward = Forward::new(&finer.dataset, &fit.effects);
+            finer.objective(&forward, fit.parameters())
+        })
         .unwrap_or(f64::INFINITY);
     let near: Vec<Start> = starts
         .iter()
@@ -230,8 +212,7 @@ pub fn add_by_multi_start(
 pub fn settle(search: &Search<'_>, starts: &[Start]) -> Option<Fit> {
     let fits = starts.iter().filter_map(|start| {
         let forward = Forward::new(search.dataset, &start.effects);
-        let priors = search.dataset.priors(&forward.layout, search.settings);
-        search.fit_from(&forward, &priors, &start.parameters)
+        search.fit_from(&forward, &start.parameters)
     });
     fits.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))
 }

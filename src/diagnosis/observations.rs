@@ -7,7 +7,6 @@ use crate::thresholds::{
     CHANGED_FREQUENCY, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
     NODE_DISPLACEMENT, READABLE_LEVEL, SAME_MODE_RATIO, SAME_PEAK, SPLIT_POLE,
 };
-use tapjoint_beam::specimen::Mesh;
 use tapjoint_identify::observation::{
     Configuration, DecayVerdict, Observations, ObservedMode, UNCLEAR, UNPAIRED,
 };
@@ -278,7 +277,7 @@ fn check_sensors(observations: &Observations, nominal: &Nominal) -> Result<(), G
     let configurations = observations.configurations.iter();
     let numbers = configurations.flat_map(|one| one.modes.iter().map(|mode| mode.mode));
     let highest = numbers.max().unwrap_or(1);
-    let modes = nominal.specimen.modes(highest, Mesh::DIAGNOSIS)?;
+    let modes = nominal.modes(highest)?;
     let length = nominal.length();
     let mut largest: Option<f64> = None;
     for configuration in &observations.configurations {

@@ -9,15 +9,18 @@ use crate::thresholds::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use tapjoint_beam::StructureError;
 use tapjoint_beam::effects::{JointLaw, Seen, SensorPlace};
 use tapjoint_beam::specimen::{
-    BeamModes, Body, PointInertia, PointMass, Specimen, SpecimenJoint, SpecimenModes,
+    BeamModes, Body, Mesh, PointInertia, PointMass, Specimen, SpecimenJoint, SpecimenModes,
 };
 use tapjoint_identify::observation::{
     Configuration, ObservedMode, ObservedSensor, effective_share,
 };
 use tapjoint_numerics::stats::median;
 
+/// Number of elements of a structure.
+pub const ELEMENTS: usize = Mesh::DIAGNOSIS.elements;
 /// Index of the coupling among the parameters of a joint, after translation and rotation.
 pub const COUPLING: usize = 2;
 /// Index of the rotation among the parameters of a joint.
@@ -125,6 +128,11 @@ impl Nominal {
     /// Length of the structure (m).
     pub(crate) fn length(&self) -> f64 {
         self.specimen.body.length()
+    }
+
+    /// Modes of the described structure up to this number.
+    pub(crate) fn modes(&self, count: usize) -> Result<SpecimenModes, StructureError> {
+        self.specimen.modes(count, Mesh::DIAGNOSIS)
     }
 
     /// Mass of the beam or beams (kg).

@@ -15,7 +15,6 @@ use crate::result::{
     Closure, CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
     ParameterValue, UnlocatedSensors, Verdict,
 };
-use crate::settings::GapSettings;
 use crate::structure::COUPLING;
 use crate::thresholds::{CROSS_VALIDATED, DECISIVE_RATIO, DETECTABLE, MISFIT, SEPARATE};
 use crate::validate::{
@@ -26,13 +25,9 @@ use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::NORMAL_95;
 
 /// Returns the result of a comparison.
-pub fn diagnosis(
-    comparison: &ModelComparison,
-    unlocated: Option<UnlocatedSensors>,
-    settings: &GapSettings,
-) -> Diagnosis {
+pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensors>) -> Diagnosis {
     let (dataset, candidates) = (&comparison.dataset, &comparison.candidates);
-    let reference = Reference::new(comparison, settings);
+    let reference = Reference::new(comparison);
     let hypotheses: Vec<HypothesisResult> = (0..candidates.len())
         .map(|k| reference.hypothesis_result(k))
         .collect();
@@ -62,7 +57,7 @@ pub fn diagnosis(
     };
     let residuals = reference.before.as_ref().zip(after.as_ref());
     Diagnosis {
-        next_tests: next_tests(comparison, &verdict, settings),
+        next_tests: next_tests(comparison, &verdict),
         locations: location_probabilities(candidates),
         residuals: residuals.map_or_else(Vec::new, |(before, after)| {
             frequency_residuals(dataset, before, after)
@@ -110,18 +105,16 @@ fn decided_by(dataset: &Dataset, candidates: &[Candidate]) -> DecidedBy {
 /// Errors of the nominal model, with which every hypothesis is compared.
 struct Reference<'a> {
     comparison: &'a ModelComparison,
-    settings: &'a GapSettings,
     before: Option<Residuals>,
     holdout_before: Option<HoldoutErrors>,
     left_out_before: Option<LeftOutErrors>,
 }
 
 impl<'a> Reference<'a> {
-    fn new(comparison: &'a ModelComparison, settings: &'a GapSettings) -> Self {
+    fn new(comparison: &'a ModelComparison) -> Self {
         let dataset = &comparison.dataset;
         Reference {
             comparison,
-            settings,
             before: Residuals::new(dataset, &comparison.described),
             holdout_before: HoldoutErrors::new(dataset, &comparison.drifting),
             left_out_before: LeftOutErrors::new(dataset, &comparison.drifting),
@@ -175,7 +168,8 @@ impl<'a> Reference<'a> {
     }
 
     fn closure(&self, after: Option<&HoldoutErrors>) -> Option<Closure> {
-        closure(self.holdout_before.as_ref()?, after?, self.settings.seed)
+        let seed = self.comparison.dataset.settings.seed;
+        closure(self.holdout_before.as_ref()?, after?, seed)
     }
 
     /// Predicts each recording from the others, for probable hypotheses and for `none`.
@@ -184,8 +178,9 @@ impl<'a> Reference<'a> {
         if candidate.is_unknown() || !is_probable && candidate.hypothesis != Hypothesis::None {
             return None;
         }
-        let after = LeftOutErrors::new(&self.comparison.dataset, &candidate.fit)?;
-        after.against(self.left_out_before.as_ref()?, self.settings.seed)
+        let dataset = &self.comparison.dataset;
+        let after = LeftOutErrors::new(dataset, &candidate.fit)?;
+        after.against(self.left_out_before.as_ref()?, dataset.settings.seed)
     }
 
     /// Returns the joint's stiffnesses (N/m, N m/rad); `None` without a joint.

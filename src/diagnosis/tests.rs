@@ -2,7 +2,7 @@
 
 use crate::amplitude::{sensitivity, set_joint_motions};
 use crate::compare::{MORE_MODES, set_shear_slopes};
-use crate::dataset::{Dataset, Datum, Observable};
+use crate::dataset::{Dataset, Datum, Observable, ObservableKind};
 use crate::evidence::Fit;
 use crate::fit::fit_nominal;
 use crate::forward::Forward;
@@ -72,7 +72,7 @@ pub fn fitted() -> (Dataset, Fit) {
     let settings = GapSettings::default();
     let observations = observe(&plan(&[0.34, 0.19]), &strip(0.004), &[], 3).unwrap();
     let dataset = Dataset::new(&observations, &strip(0.004), &settings);
-    let fit = fit_nominal(&dataset, &settings).unwrap();
+    let fit = fit_nominal(&dataset).unwrap();
     (dataset, fit)
 }
 
@@ -90,10 +90,9 @@ fn dataset(shape_std: Option<f64>) -> Dataset {
 /// Slopes with respect to size and place of an effect that is there, beside central differences of
 /// predictions that are solved anew: the largest difference in a column over its largest entry.
 fn worst(dataset: &Dataset, effect: CandidateEffect, share: f64, place: f64) -> f64 {
-    let settings = GapSettings::default();
     let forward = Forward::new(dataset, &[effect]);
-    let known = dataset.priors(&forward.layout, &settings);
-    let none = fit_nominal(dataset, &settings).unwrap();
+    let known = forward.priors();
+    let none = fit_nominal(dataset).unwrap();
     let mut here = none.best.optimum.parameters;
     let at = forward.layout.size(0);
     let mut unknowns = vec![(at, 1e-3 * effect.size.scale)];
@@ -154,7 +153,7 @@ fn thick(shear_rotary: f64) -> (Dataset, Fit) {
     };
     let observations = observe(&plan, &nominal, &[], 3).unwrap();
     let mut dataset = Dataset::new(&observations, &nominal, &GapSettings::default());
-    let fit = fit_nominal(&dataset, &GapSettings::default()).unwrap();
+    let fit = fit_nominal(&dataset).unwrap();
     set_shear_slopes(&mut dataset, &fit).unwrap();
     (dataset, fit)
 }
@@ -197,7 +196,7 @@ fn limit_an_euler_beam_has_none() {
 fn limit_the_damping_tilts_slope_is_that_of_predictions() {
     let (dataset, fit) = thick(1.0);
     let forward = Forward::new(&dataset, &[]);
-    let known = dataset.priors(&forward.layout, &GapSettings::default());
+    let known = forward.priors();
     let at = fit.best.optimum.parameters.clone();
     let column = forward.layout.first_nuisance()
         + dataset
@@ -245,7 +244,7 @@ fn change(observations: &mut Observations, mode: usize, values: [f64; 2]) {
 fn datasets(observations: &Observations) -> (Dataset, Dataset, Vec<f64>) {
     let settings = GapSettings::default();
     let before = Dataset::new(observations, &strip(0.0), &settings);
-    let fit = fit_nominal(&before, &settings).unwrap();
+    let fit = fit_nominal(&before).unwrap();
     let forward = Forward::new(&before, &[]);
     let solved = forward.solve(&fit.best.optimum.parameters).unwrap();
     let sensitivities = (1..=5).map(|mode| sensitivity(&solved[0], mode)).collect();
@@ -263,16 +262,13 @@ fn datum(dataset: &Dataset, observable: Observable) -> Datum {
 }
 
 fn frequency(configuration: usize, mode: usize) -> Observable {
-    Observable::Frequency {
-        configuration,
-        mode,
-    }
+    Observable::frequency(configuration, mode)
 }
 
 fn slope(configuration: usize, mode: usize) -> Observable {
-    Observable::Slope {
-        configuration,
-        mode,
+    Observable {
+        kind: ObservableKind::Slope,
+        ..frequency(configuration, mode)
     }
 }
 

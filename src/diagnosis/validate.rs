@@ -2,7 +2,7 @@
 //!
 //! A real cause explains data that took no part in the fit.
 
-use crate::dataset::{Dataset, Datum, Observable, chi_square_tail};
+use crate::dataset::{Dataset, Datum, Observable, ObservableKind, chi_square_tail};
 use crate::evidence::{Fit, log_sum};
 use crate::forward::Forward;
 use crate::least_squares::{Model, maximise};
@@ -124,10 +124,7 @@ impl Residuals {
         for mode in 1..=dataset.fitted_modes {
             let rows: Vec<usize> = dataset
                 .frequencies()
-                .filter(|&row| {
-                    let own = dataset.observables[row].as_frequency();
-                    own.is_some_and(|(_, own)| own == mode)
-                })
+                .filter(|&row| dataset.observables[row].mode == mode)
                 .collect();
             if !rows.is_empty() {
                 let predicted = self.predictor(&rows)? * &self.raw;
@@ -184,21 +181,18 @@ fn block_rows(dataset: &Dataset) -> Vec<(String, Vec<usize>)> {
     let mut blocks: Vec<(String, Vec<usize>)> = Vec::new();
     for (row, observable) in dataset.observables.iter().enumerate() {
         let mut names = Vec::new();
-        match *observable {
-            Observable::Frequency {
-                configuration,
-                mode,
-            } => {
-                names.push(format!("mode {mode}"));
+        match observable.kind {
+            ObservableKind::Frequency => {
+                names.push(format!("mode {}", observable.mode));
                 if dataset.arrangements.len() > 1 {
-                    names.push(dataset.arrangements[configuration].label());
+                    names.push(dataset.arrangements[observable.configuration].label());
                 }
             }
-            Observable::Constant { .. } | Observable::Ratio { .. } => {
+            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
                 names.push("shapes".to_string());
             }
-            Observable::Damping { .. } => names.push("damping".to_string()),
-            Observable::Slope { .. } => names.push("along the decays".to_string()),
+            ObservableKind::Damping => names.push("damping".to_string()),
+            ObservableKind::Slope => names.push("along the decays".to_string()),
         }
         for name in names {
             match blocks.iter_mut().find(|block| block.0 == name) {
@@ -221,22 +215,21 @@ pub fn frequency_residuals(
     before: &Residuals,
     after: &Residuals,
 ) -> Vec<Residual> {
-    let mut all = Vec::new();
-    for (row, observable) in dataset.observables.iter().enumerate() {
-        if let Some((configuration, mode)) = observable.as_frequency() {
-            let std = dataset.data[row].std;
-            all.push(Residual {
-                mode,
-                recording: dataset.arrangements[configuration].file.clone(),
-                level: dataset.arrangements[configuration].known_level,
-                error_percent: percent_of(before.raw[row]),
-                z: -before.raw[row] / std,
-                error_percent_after: percent_of(after.raw[row]),
-                z_after: -after.raw[row] / std,
-            });
+    let rows = dataset.frequencies();
+    rows.map(|row| {
+        let (observable, std) = (&dataset.observables[row], dataset.data[row].std);
+        let arrangement = &dataset.arrangements[observable.configuration];
+        Residual {
+            mode: observable.mode,
+            recording: arrangement.file.clone(),
+            level: arrangement.known_level,
+            error_percent: percent_of(before.raw[row]),
+            z: -before.raw[row] / std,
+            error_percent_after: percent_of(after.raw[row]),
+            z_after: -after.raw[row] / std,
         }
-    }
-    all
+    })
+    .collect()
 }
 
 /// Errors of one fit on frequencies that took no part in it.
@@ -501,8 +494,8 @@ fn predict_setup(
 ) -> Option<(Vec<usize>, DMatrix<f64>)> {
     let rows: Vec<usize> = (0..dataset.observables.len())
         .filter(|&row| {
-            let configuration = dataset.observables[row].configuration();
-            configuration.is_some_and(|k| dataset.arrangements[k].setup == setup)
+            let one = &dataset.observables[row];
+            !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
         })
         .collect();
     let frequencies: Vec<usize> = (0..rows.len())
@@ -522,7 +515,6 @@ fn predict_setup(
 mod tests {
     use super::*;
     use crate::fit::fit_nominal;
-    use crate::settings::GapSettings;
     use crate::tests::fitted;
 
     fn errors(size: f64, std: f64) -> HoldoutErrors {
@@ -551,7 +543,7 @@ mod tests {
         for datum in &mut dataset.data {
             datum.freedom = f64::INFINITY;
         }
-        let fit = fit_nominal(&dataset, &GapSettings::default()).unwrap();
+        let fit = fit_nominal(&dataset).unwrap();
         for (k, (_, datum)) in dataset.holdout.iter_mut().enumerate() {
             datum.value += [3.0, -2.0][k % 2] * datum.std;
         }
@@ -576,11 +568,11 @@ mod tests {
         fit.best.priors[first + dataset.first_drift().unwrap()].std
     }
 
-    /// What only a joint that drifts by more explains is refuted as long as it is known to drift by less.
+    /// A change that needs more drift is refuted as long as the joint is known to drift by less.
     #[test]
     fn regress_a_drift_that_is_as_probable_keeps_an_explanation_from_being_refuted() {
         let (mut dataset, _) = fitted();
-        // Readings so poor that they say nothing of the drift, and nothing else that could move the withheld ones.
+        // Data so poor that the drift is open, and nothing else that could move the held-out ones.
         for datum in &mut dataset.data {
             datum.std *= 1e3;
         }
@@ -589,11 +581,8 @@ mod tests {
                 nuisance.std = 1e-9;
             }
         }
-        let settings = GapSettings {
-            drift_stds: vec![0.002],
-            ..GapSettings::default()
-        };
-        let mut fit = fit_nominal(&dataset, &settings).unwrap();
+        dataset.settings.drift_stds = vec![0.002];
+        let mut fit = fit_nominal(&dataset).unwrap();
         let refutes = |p: f64| p < 1e-3;
         let errors = HoldoutErrors::new(&dataset, &fit).unwrap().errors;
         // Ten times what the smaller drift moves mode 6 by, against each other in both recordings.

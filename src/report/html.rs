@@ -1,17 +1,12 @@
 //! The report as one HTML page that needs nothing else.
 
 use askama::Template;
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
-use serde::Serialize;
 
 use super::ReportError;
 use super::document::{Document, RecordingSection, TestSection, WarningSection};
 use super::format::{significant, trimmed};
-use super::summary::sentences;
 use super::tables::{self, Table};
+use super::words::findings::sentences;
 
 /// A picture inside the page.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,25 +15,10 @@ pub struct InlineFigure {
     pub caption: String,
     /// An `<svg>` element that this crate made.
     pub svg: String,
-    /// The same curves for the page's script, as [`packed`] makes them.
+    /// The same curves for the page's script, as [`super::chart::packed`] makes them.
     pub live: Option<String>,
     /// Whether it is so high that in print it takes a page of its own.
     pub tall: bool,
-}
-
-/// How hard the page's curves are deflated: zlib's usual level 6 takes nearly three times as long and saves a tenth.
-const DEFLATION: Compression = Compression::new(3);
-
-/// Curves as they stand in the page: JSON, deflated, since numbers take up most of it, and in base 64. Browsers inflate
-/// them by themselves; one that cannot shows the picture.
-///
-/// # Errors
-/// [`ReportError::Json`] where they are no JSON.
-pub fn packed(curves: &impl Serialize) -> Result<String, ReportError> {
-    let mut deflated = ZlibEncoder::new(Vec::new(), DEFLATION);
-    serde_json::to_writer(&mut deflated, curves).map_err(ReportError::Json)?;
-    let finished = deflated.finish().map_err(serde_json::Error::io);
-    Ok(BASE64_STANDARD.encode(finished.map_err(ReportError::Json)?))
 }
 
 /// The plotting library, its style and the page's own script, all inside the page: a report opens

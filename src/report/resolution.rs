@@ -1,8 +1,8 @@
 //! The study of resolution as text, table of values and picture.
 
 use super::ReportError;
-use super::plot::resolution::draw_resolution;
-use super::plot::{PictureFormat, render_picture};
+use super::chart::{PictureFormat, render_picture};
+use super::charts::resolution::resolution;
 use super::tables::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 use super::text::{render_table, wrapped};
 use tapjoint_study::resolution::{EstimateMethod, ResolutionStudy, WindowName};
@@ -85,7 +85,7 @@ fn conditions(study: &ResolutionStudy) -> String {
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.
 pub fn render_resolution_csv(study: &ResolutionStudy) -> Result<String, ReportError> {
-    super::csv::write(&COLUMNS, rows(study))
+    super::data_files::write(&COLUMNS, rows(study))
 }
 
 fn rows(study: &ResolutionStudy) -> Vec<Vec<String>> {
@@ -153,5 +153,5 @@ pub fn render_resolution_picture(
     study: &ResolutionStudy,
     format: PictureFormat,
 ) -> Result<Vec<u8>, ReportError> {
-    render_picture(&draw_resolution(study), format)
+    render_picture(&resolution(study).draw(), format)
 }

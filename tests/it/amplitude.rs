@@ -8,9 +8,10 @@ use rand_distr::{Distribution, StandardNormal};
 use tapjoint::modal::amplitude::{
     AmplitudeCurve, AmplitudeSettings, AmplitudeVerdict, Decay, KnownMode, follow_amplitude,
 };
-use tapjoint::report::plot::amplitude::{AmplitudeFigure, draw_amplitude};
-use tapjoint::report::plot::drawing::Shape;
-use tapjoint::report::plot::render_png;
+use tapjoint::report::chart::drawing::Shape;
+use tapjoint::report::chart::render_png;
+use tapjoint::report::charts::amplitude::amplitude;
+use tapjoint::report::figures::AmplitudeFigure;
 
 const RATE: f64 = 2048.0;
 
@@ -463,7 +464,7 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
         amplitude: "amplitude (m/s\u{b2})".to_owned(),
         modes: vec![(1, slipping), (2, silent.clone()), (3, steady)],
     };
-    let drawing = draw_amplitude(&figure).expect("two modes have curves");
+    let drawing = amplitude(&figure).expect("two modes have curves").draw();
     let words = drawing.words().join("\n");
     for wanted in [
         "low.wav",
@@ -489,7 +490,7 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
     };
     for shape in &drawing.shapes {
         let inside = match shape {
-            Shape::Line { points, .. } => points.iter().all(held),
+            Shape::Line { points, .. } | Shape::Area { points, .. } => points.iter().all(held),
             Shape::Rectangle { from, to, .. } => held(from) && held(to),
             Shape::Dot { center, .. } | Shape::Ring { center, .. } => held(center),
             Shape::Text(text) => held(&text.at),
@@ -501,5 +502,5 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
         modes: vec![(2, silent)],
         ..figure
     };
-    assert!(draw_amplitude(&nothing).is_none());
+    assert!(amplitude(&nothing).is_none());
 }

@@ -11,7 +11,6 @@ mod proposals;
 use crate::compare::ModelComparison;
 use crate::posterior::Candidate;
 use crate::result::{NextTest, Proposal, Verdict};
-use crate::settings::GapSettings;
 use crate::thresholds::{
     LEAST_COMPARED, LEAST_INFORMATION, LISTED_INFORMATION, MOST_COMPARED, MOST_LISTED,
     MOST_PROPOSED,
@@ -26,12 +25,8 @@ const GRAVITY: f64 = 9.80665;
 
 /// Returns the tests that would decide between hypotheses, those with most information per cost first; and last how a
 /// named cause can be seen directly, where none of these shows it as well.
-pub fn next_tests(
-    comparison: &ModelComparison,
-    verdict: &Verdict,
-    settings: &GapSettings,
-) -> Vec<NextTest> {
-    let mut tests = deciding(comparison, verdict, settings);
+pub fn next_tests(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
+    let mut tests = deciding(comparison, verdict);
     if let Verdict::Named(effects) = verdict {
         tests.truncate(MOST_PROPOSED - effects.len());
         for &effect in effects {
@@ -54,11 +49,7 @@ pub fn next_tests(
 }
 
 /// Returns the tests that separate hypotheses, those with most information per cost first.
-fn deciding(
-    comparison: &ModelComparison,
-    verdict: &Verdict,
-    settings: &GapSettings,
-) -> Vec<NextTest> {
+fn deciding(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
     let dataset = &comparison.dataset;
     let compared = Compared::new(&comparison.candidates, verdict);
     if compared.candidates.len() < 2 {
@@ -70,7 +61,7 @@ fn deciding(
         .iter()
         .map(|candidate| Posterior::new(dataset, candidate, weight))
         .collect();
-    let planned = PlannedTests::new(dataset, settings);
+    let planned = PlannedTests::new(dataset);
     let predictions: Vec<Option<Predictions>> = posteriors
         .par_iter()
         .map(|posterior| Some(Predictions::new(posterior.as_ref()?, &planned)))

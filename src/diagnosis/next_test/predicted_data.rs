@@ -212,7 +212,7 @@ impl Posterior {
         ) {
             let factor = self.turning(column);
             for (row, observable) in observables.iter().enumerate() {
-                if observable.configuration() == Some(turned) {
+                if observable.configuration == turned {
                     slopes[(row, column)] *= factor;
                 }
             }
@@ -233,15 +233,11 @@ impl Posterior {
         observables: &[Observable],
         covariance: &mut DMatrix<f64>,
     ) {
-        let frequencies = observables.iter().map(|one| one.as_frequency());
-        let modes: Vec<usize> = frequencies
-            .map(|one| one.map_or(0, |(_, mode)| mode))
-            .collect();
         let variance = self.discrepancy_std * self.discrepancy_std;
-        for (i, one) in modes.iter().enumerate() {
-            for (j, other) in modes.iter().enumerate() {
-                let is_new = structure == TestedStructure::Bare || *one > self.discrepancies;
-                if is_new && one == other {
+        for (i, one) in observables.iter().enumerate() {
+            for (j, other) in observables.iter().enumerate() {
+                let is_new = structure == TestedStructure::Bare || one.mode > self.discrepancies;
+                if is_new && one.mode == other.mode {
                     covariance[(i, j)] += variance;
                 }
             }

@@ -4,7 +4,6 @@ use crate::compare::MORE_MODES;
 use crate::dataset::{Dataset, Observable};
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::Proposal;
-use crate::settings::GapSettings;
 use crate::structure::{Arrangement, ROTATION};
 use crate::thresholds::MOVED_SENSOR;
 use tapjoint_beam::effects::EffectId;
@@ -79,8 +78,6 @@ pub struct PlannedTests {
     pub whole: Dataset,
     /// Spreads of the nuisance parameters that were added for planned tests.
     pub added: Vec<AddedSpread>,
-    /// Standard deviation of the factor on the frequencies of a new set-up by its temperature (1).
-    temperature_std: f64,
     /// The beam alone.
     pub bare: Option<Dataset>,
     /// Configuration in which gravity is turned over.
@@ -111,7 +108,7 @@ const FIT_BIAS: f64 = 0.1;
 
 impl PlannedTests {
     /// Returns the tests that could be made next.
-    pub fn new(dataset: &Dataset, settings: &GapSettings) -> Self {
+    pub fn new(dataset: &Dataset) -> Self {
         let mut whole = dataset.clone();
         whole.arrangements.truncate(KEPT_CONFIGURATIONS);
         // The common scatter of other taps does not hold for planned ones.
@@ -124,17 +121,16 @@ impl PlannedTests {
             all: Vec::new(),
             whole,
             added: Vec::new(),
-            temperature_std: settings.temperature_std,
             bare: None,
             turned: None,
         };
-        if dataset.modes + MORE_MODES <= settings.highest_mode {
+        if dataset.modes + MORE_MODES <= dataset.settings.highest_mode {
             planned.read_higher(dataset);
         }
         planned.read_finer(dataset);
         planned.tap_again(dataset);
-        planned.move_sensor(dataset, settings);
-        planned.fasten_mass(dataset, settings);
+        planned.move_sensor(dataset);
+        planned.fasten_mass(dataset);
         planned.turn_and_take_apart(dataset);
         for proposal in [
             Proposal::WeighSensor,
@@ -158,7 +154,10 @@ impl PlannedTests {
         let mut planned = Vec::new();
         for configuration in 0..self.whole.arrangements.len() {
             for mode in first..=last {
-                planned.push((frequency(configuration, mode), std_of(dataset, mode)));
+                planned.push((
+                    Observable::frequency(configuration, mode),
+                    std_of(dataset, mode),
+                ));
             }
         }
         let proposal = Proposal::HigherModes {
@@ -172,8 +171,12 @@ impl PlannedTests {
     /// Plans to read on finer lines.
     fn read_finer(&mut self, dataset: &Dataset) {
         if let Some(bias) = dataset.nominal.reading_bias {
-            let planned = observed_modes(dataset)
-                .map(|mode| (frequency(0, mode), std_without_bias(dataset, mode, bias)));
+            let planned = observed_modes(dataset).map(|mode| {
+                (
+                    Observable::frequency(0, mode),
+                    std_without_bias(dataset, mode, bias),
+                )
+            });
             let proposal = Proposal::FinerLines {
                 spacing: 2.0 * FIT_BIAS * bias,
             };
@@ -209,7 +212,7 @@ impl PlannedTests {
     }
 
     /// Plans to move a sensor to positions where none was.
-    fn move_sensor(&mut self, dataset: &Dataset, settings: &GapSettings) {
+    fn move_sensor(&mut self, dataset: &Dataset) {
         let length = dataset.nominal.length();
         if dataset.arrangements[0].carried.is_empty() {
             return;
@@ -227,7 +230,10 @@ impl PlannedTests {
             let used = self.highest(dataset, |one| one.positions.iter().copied().max());
             let index = used.map_or(0, |most| most + 1);
             let parameter = NuisanceParameter::SensorPosition { position: index };
-            self.add(parameter, AddedSpread::Stated(settings.position_std));
+            self.add(
+                parameter,
+                AddedSpread::Stated(dataset.settings.position_std),
+            );
             let mut moved = dataset.arrangements[0].clone();
             moved.move_sensor(position, index);
             let planned = self.new_setup(dataset, moved, 0.0);
@@ -238,15 +244,15 @@ impl PlannedTests {
     }
 
     /// Plans to fasten a known mass at the tip and in the middle.
-    fn fasten_mass(&mut self, dataset: &Dataset, settings: &GapSettings) {
+    fn fasten_mass(&mut self, dataset: &Dataset) {
         let length = dataset.nominal.length();
         let mass = round_mass(KNOWN_MASS * dataset.nominal.beam_mass());
         for position in [length, 0.5 * length] {
             let used = self.highest(dataset, |one| one.fastened.iter().map(|one| one.0).max());
             let fastened = used.map_or(0, |most| most + 1);
-            let scale = AddedSpread::Stated(settings.fastened_mass_std);
+            let scale = AddedSpread::Stated(dataset.settings.fastened_mass_std);
             self.add(NuisanceParameter::FastenedMass { fastened }, scale);
-            let ruler = AddedSpread::Stated(settings.position_std);
+            let ruler = AddedSpread::Stated(dataset.settings.position_std);
             self.add(NuisanceParameter::FastenedPosition { fastened }, ruler);
             let mut heavier = dataset.arrangements[0].clone();
             heavier.fasten(mass, position, fastened);
@@ -301,24 +307,22 @@ impl PlannedTests {
             let parameter = NuisanceParameter::Drift { setup, direction };
             self.add(parameter, AddedSpread::Drift(drift));
         }
-        let temperature = AddedSpread::Stated(self.temperature_std);
+        let temperature = AddedSpread::Stated(self.whole.settings.temperature_std);
         self.add(NuisanceParameter::Temperature { setup }, temperature);
         self.whole.arrangements.push(one);
         planned_frequencies(dataset, self.whole.arrangements.len() - 1)
     }
 }
 
-fn frequency(configuration: usize, mode: usize) -> Observable {
-    Observable::Frequency {
-        configuration,
-        mode,
-    }
-}
-
 /// Returns the frequencies of all observed modes in a configuration, as uncertain as so far.
 fn planned_frequencies(dataset: &Dataset, configuration: usize) -> Planned {
     observed_modes(dataset)
-        .map(|mode| (frequency(configuration, mode), std_of(dataset, mode)))
+        .map(|mode| {
+            (
+                Observable::frequency(configuration, mode),
+                std_of(dataset, mode),
+            )
+        })
         .collect()
 }
 
@@ -332,7 +336,7 @@ fn stds_of(dataset: &Dataset, wanted: usize) -> Vec<f64> {
     let fitted = dataset.observables.iter().zip(&dataset.data);
     let held_out = dataset.holdout.iter().map(|(one, datum)| (one, datum));
     let all = fitted.chain(held_out);
-    let own = all.filter(|(one, _)| one.as_frequency().is_some_and(|(_, mode)| mode == wanted));
+    let own = all.filter(|(one, _)| one.is_frequency() && one.mode == wanted);
     own.map(|(_, datum)| datum.std).collect()
 }
 
@@ -348,11 +352,7 @@ fn std_of(dataset: &Dataset, mode: usize) -> f64 {
 fn std_without_bias(dataset: &Dataset, mode: usize, bias: f64) -> f64 {
     let std = std_of(dataset, mode);
     let mut frequencies = dataset.frequencies();
-    let own = frequencies.find(|&row| {
-        let frequency = dataset.observables[row].as_frequency();
-        frequency.is_some_and(|(_, own)| own == mode)
-    });
-    let Some(own) = own else {
+    let Some(own) = frequencies.find(|&row| dataset.observables[row].mode == mode) else {
         return std;
     };
     let line = bias / 3.0_f64.sqrt() / dataset.data[own].value.exp();

@@ -1,16 +1,14 @@
 //! The files of a blind check: its score as JSON, every case as CSV, the truths that were sealed, and
 //! pictures.
 
-mod closure_plot;
-mod confusion_plot;
-mod reliability_plot;
 mod tell_apart;
 
 pub use tell_apart::tell_apart;
 
 use serde_json::{Value, json};
 
-use super::plot::{PictureFormat, render_picture};
+use super::chart::{PictureFormat, render_picture};
+use super::charts::blind_check::{closure, confusion, reliability};
 use super::{ReportError, ReportFile};
 use tapjoint_study::blind_check::{Case, Conduct, Planted, Row, Scores, Target, Truth, rows};
 
@@ -36,22 +34,18 @@ pub fn render_blind_check(
         text("cases.csv", cases_csv(cases)),
         text("truth.json", truths_json(&truths)?),
     ];
-    let drawings = [
-        ("confusion", Some(confusion_plot::draw_confusion(cases))),
-        (
-            "reliability",
-            Some(reliability_plot::draw_reliability(&scores.calibration)),
-        ),
-        ("closure", closure_plot::draw_closure(cases)),
+    let charts = [
+        Some(confusion(cases)),
+        Some(reliability(&scores.calibration)),
+        closure(cases),
     ];
-    for (name, drawing) in drawings {
-        if let Some(drawing) = drawing {
-            for (ending, format) in [("png", PictureFormat::Png), ("svg", PictureFormat::Svg)] {
-                files.push(ReportFile {
-                    name: format!("{name}.{ending}"),
-                    bytes: render_picture(&drawing, format)?,
-                });
-            }
+    for chart in charts.into_iter().flatten() {
+        let drawing = chart.draw();
+        for (ending, format) in [("png", PictureFormat::Png), ("svg", PictureFormat::Svg)] {
+            files.push(ReportFile {
+                name: format!("{}.{ending}", chart.kind),
+                bytes: render_picture(&drawing, format)?,
+            });
         }
     }
     Ok(files)
@@ -65,7 +59,7 @@ pub fn render_confusion_picture(
     cases: &[Case],
     format: PictureFormat,
 ) -> Result<Vec<u8>, ReportError> {
-    render_picture(&confusion_plot::draw_confusion(cases), format)
+    render_picture(&confusion(cases).draw(), format)
 }
 
 /// The truths as a list of `{"name", "effects", "params"}`, one line for each.

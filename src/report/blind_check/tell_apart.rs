@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::confusion_plot::classes;
+use super::super::charts::blind_check::classes;
 use tapjoint_study::blind_check::{
     Case, Class, Row, Scores, Target, Verdict, render_rows, rows, score,
 };

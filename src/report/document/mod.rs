@@ -140,6 +140,18 @@ impl WarningSection {
 }
 
 impl Document {
+    /// Whether a joint is sought: a free beam has none.
+    pub fn has_joint(&self) -> bool {
+        let kind = self.test.as_ref().and_then(|test| test.kind.as_deref());
+        kind != Some("free")
+    }
+
+    /// Why there is no estimate.
+    pub fn no_estimate(&self) -> &str {
+        let reason = self.estimate_reason.as_deref();
+        reason.unwrap_or("no reason was recorded")
+    }
+
     /// The warnings that concern the result itself.
     pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
         of_the_result(&self.warnings).into_iter()

@@ -155,7 +155,7 @@ impl ModeSection {
     pub(super) fn of_reading(reading: &ModeReading, recording: Option<&RecordingResult>) -> Self {
         let spectra = recording.and_then(|recording| recording.measurement.spectra.as_ref());
         let quality = spectra.map(|spectra| spectra.averages.best_quality(reading.frequency));
-        let change = recording.and_then(|recording| AmplitudeChange::of(reading, recording));
+        let change = recording.and_then(|recording| recording.amplitude_change(reading));
         let fit = reading.fit.as_deref();
         ModeSection {
             mode: None,

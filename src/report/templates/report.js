@@ -126,7 +126,7 @@ function closeUp(figure, tap) {
       axes: axes({ x: { label: "time from the trigger of " + tap.name, unit: "ms" } }, panel, last),
       scales: { x: { time: false }, y: vertical(panel) },
       series: [{ label: "time", value: function (u, v) { return v == null ? "–" : digits(v) + " ms"; } },
-        { label: curve.label, stroke: color("--c" + (index ? 0 : 5)), width: 1.5, value: function (u, v) { return digits(v) + (v == null ? "" : unit(curve.unit)); } }],
+        { label: curve.label, stroke: color(index ? "--c0" : "--soft"), width: 1.5, value: function (u, v) { return digits(v) + (v == null ? "" : unit(curve.unit)); } }],
       cursor: { sync: { key: figure.key + "near", scales: ["x", null] }, drag: { x: true, y: false } }
     }, [x, values], figure.nearHost);
   });
@@ -163,11 +163,11 @@ function vertical(panel) {
 
 function options(figure, index) {
   var plot = figure.plot, panel = plot.panels[index], last = index === plot.panels.length - 1;
-  var log = panel.scale === "logarithmic", taps = plot.kind === "taps";
+  var taps = plot.kind === "taps";
   var series = [{ label: plot.x.label, value: function (u, v) { return v == null ? "–" : +v.toPrecision(7) + " " + plot.x.unit; } }];
   panel.series.forEach(function (curve) {
     series.push({
-      label: curve.name, stroke: taps ? color("--data") : color("--c" + curve.color % 6), width: 1.5, spanGaps: false,
+      label: curve.name, stroke: color("--" + curve.color), alpha: curve.opacity, width: 1.5, spanGaps: false,
       points: { show: taps ? false : undefined },
       value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.unit)); }
     });
@@ -175,7 +175,7 @@ function options(figure, index) {
   var draw = [taps ? drawTaps(plot, figure) : drawMarks(plot, index === 0)];
   return {
     width: Math.max(figure.host.clientWidth, 240),
-    height: (log ? 280 : panel.label === "coherence" ? 130 : taps ? 260 : 150) + (last ? 36 : 0),
+    height: Math.min(panel.height, 280) + (last ? 36 : 0),
     series: series, axes: axes(plot, panel, last),
     scales: { x: { time: false }, y: vertical(panel) },
     bands: taps ? [{ series: [2, 1], fill: color("--data") + "55" }] : [],
@@ -202,9 +202,9 @@ function build(figure) {
     var data = [figure.x].concat(panel.series.map(function (curve) {
       var values = curve.values;
       if (panel.scale === "logarithmic") return values.map(function (v) { return v > 0 ? v : null; });
-      // No line across the wrap of a phase.
-      return panel.label !== "phase" ? values : values.map(function (v, i) {
-        return i > 0 && v != null && values[i - 1] != null && Math.abs(v - values[i - 1]) > 180 ? null : v;
+      // No line where values come round again, as a phase does.
+      return !panel.period ? values : values.map(function (v, i) {
+        return i > 0 && v != null && values[i - 1] != null && Math.abs(v - values[i - 1]) > panel.period / 2 ? null : v;
       });
     }));
     var u = new uPlot(options(figure, index), data, figure.host);

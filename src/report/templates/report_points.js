@@ -47,16 +47,17 @@ function drawSet(u, panel, set, lit) {
   var curve = set.mark === "curve";
   c.lineWidth = (set.mark === "line" || curve ? set.size : 1.6) * ratio;
   if (mute(set) || curve) {
-    c.beginPath();
-    var upper = set.mark === "band" ? set.high : set.y;
-    upper.forEach(function (value, i) { c[i ? "lineTo" : "moveTo"](px(i), py(value)); });
-    if (set.mark !== "band") c.stroke();
-    else {
+    if (set.low) {
+      c.beginPath();
+      set.high.forEach(function (value, i) { c[i ? "lineTo" : "moveTo"](px(i), py(value)); });
       for (var i = set.low.length - 1; i >= 0; i--) c.lineTo(px(i), py(set.low[i]));
       c.globalAlpha = 0.25;
       c.fill();
       c.globalAlpha = 1;
     }
+    c.beginPath();
+    set.y.forEach(function (value, i) { c[i ? "lineTo" : "moveTo"](px(i), py(value)); });
+    c.stroke();
     if (!curve) return;
   }
   var xs = panel.view.x, ys = panel.view.y;
@@ -71,13 +72,14 @@ function drawSet(u, panel, set, lit) {
       c.globalAlpha = 1;
       return;
     }
-    if (set.low) {
+    if (set.low && !curve) {
       c.lineWidth = 1.2 * ratio;
       c.beginPath(); c.moveTo(x, py(set.low[i])); c.lineTo(x, py(set.high[i])); c.stroke();
     }
     if (curve && !chosen) return;
     c.beginPath();
-    if (set.mark === "cross") {
+    if (set.mark === "square") c.fillRect(x - r, y - r, 2 * r, 2 * r);
+    else if (set.mark === "cross") {
       c.moveTo(x - r, y - r); c.lineTo(x + r, y + r);
       c.moveTo(x - r, y + r); c.lineTo(x + r, y - r);
       c.stroke();
@@ -219,7 +221,7 @@ function pointOptions(figure, panel, holder) {
 }
 
 function key(panel) {
-  var signs = { dot: "●", ring: "○", cross: "✕", line: "―", curve: "―", band: "▮", bar: "▮" }, line = element("p", "key"), listed = {};
+  var signs = { dot: "●", ring: "○", cross: "✕", square: "■", line: "―", curve: "―", band: "▮", bar: "▮" }, line = element("p", "key"), listed = {};
   panel.sets.forEach(function (set) {
     if (!set.name || listed[set.name]) return;
     listed[set.name] = true;

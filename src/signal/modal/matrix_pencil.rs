@@ -108,7 +108,7 @@ const OVERSAMPLING: f64 = 2.5;
 const REFINEMENTS: usize = 4;
 
 /// Records at the band's own rate, around its centre.
-struct Demodulated {
+pub(super) struct Demodulated {
     columns: Vec<Vec<Complex64>>,
     /// Time of each sample from the record's start (s).
     times: Vec<f64>,

@@ -3,19 +3,15 @@
 use std::collections::HashMap;
 
 use proptest::prelude::*;
+use tapjoint::report::chart::axis::{Axis, Tick, nice_step};
+use tapjoint::report::chart::drawing::{Point, Rgb, Shape};
+use tapjoint::report::chart::labels::{decimate, spread};
+use tapjoint::report::chart::{Color, Drawing, PageChart, render_png, render_svg};
+use tapjoint::report::charts::joint::{cloud, frequencies};
+use tapjoint::report::charts::spectra::{frf, spectrum};
+use tapjoint::report::charts::stabilisation::stabilisation;
+use tapjoint::report::charts::taps::taps;
 use tapjoint::report::figures::PeakMark;
-use tapjoint::report::plot::axis::{Axis, Tick, nice_step};
-use tapjoint::report::plot::cloud::draw_cloud;
-use tapjoint::report::plot::comparison::draw_frequencies;
-use tapjoint::report::plot::decimate::decimate;
-use tapjoint::report::plot::drawing::{Point, Shape};
-use tapjoint::report::plot::frf::draw_frf;
-use tapjoint::report::plot::labels::spread;
-use tapjoint::report::plot::palette::{BLUE, Color, SKY, VERMILION};
-use tapjoint::report::plot::spectrum::draw_spectrum;
-use tapjoint::report::plot::stabilisation::draw_stabilisation;
-use tapjoint::report::plot::time::draw_taps;
-use tapjoint::report::plot::{Drawing, render_png, render_svg};
 
 use super::fixture;
 
@@ -26,16 +22,17 @@ pub(super) fn drawings() -> Vec<Drawing> {
         .iter()
         .flat_map(|figure| {
             [
-                draw_spectrum(figure),
-                draw_frf(figure),
-                draw_stabilisation(figure),
-                draw_taps(figure),
+                spectrum(figure),
+                frf(figure),
+                stabilisation(figure),
+                taps(figure),
             ]
         })
         .flatten()
+        .map(|chart| chart.draw())
         .collect();
-    drawings.extend(draw_frequencies(&document));
-    drawings.extend(draw_cloud(&document));
+    drawings.extend(frequencies(&document).map(|chart| chart.draw()));
+    drawings.extend(cloud(&document).map(|chart| chart.draw()));
     assert_eq!(drawings.len(), 10, "two recordings have four pictures each");
     drawings
 }
@@ -52,7 +49,7 @@ fn decoded(png: &[u8]) -> (u32, u32, HashMap<[u8; 3], usize>) {
     (info.width, info.height, colors)
 }
 
-fn count(colors: &HashMap<[u8; 3], usize>, color: Color) -> usize {
+fn count(colors: &HashMap<[u8; 3], usize>, color: Rgb) -> usize {
     let key = [color.0, color.1, color.2];
     colors.get(&key).copied().unwrap_or(0)
 }
@@ -64,12 +61,15 @@ fn prop_pictures_are_not_blank() {
         let png = render_png(&drawing).expect("the picture is drawn");
         let (width, height, colors) = decoded(&png);
         assert_eq!((width, height), (1200, drawing.height), "{name}");
-        let white = count(&colors, Color(255, 255, 255));
+        let white = count(&colors, Rgb(255, 255, 255));
         let total = (width * height) as usize;
         assert!(white > total / 2, "{name}: paper is white");
         // Frame, grid and words alone are more than a hundredth of a picture.
         assert!(total - white > total / 100, "{name}: almost nothing drawn");
-        assert!(count(&colors, BLUE) > 20, "{name}: no data in blue");
+        assert!(
+            count(&colors, Color::Blue.rgb()) > 20,
+            "{name}: no data in blue"
+        );
     }
 }
 
@@ -81,7 +81,9 @@ fn prop_nothing_lies_outside_a_picture() {
             |point: &Point| (0.0..=width).contains(&point.0) && (0.0..=height).contains(&point.1);
         for shape in &drawing.shapes {
             let held = match shape {
-                Shape::Line { points, .. } => points.iter().all(inside),
+                Shape::Line { points, .. } | Shape::Area { points, .. } => {
+                    points.iter().all(inside)
+                }
                 Shape::Rectangle { from, to, .. } => inside(from) && inside(to),
                 Shape::Dot { center, .. } | Shape::Ring { center, .. } => inside(center),
                 Shape::Text(text) => text_inside(text, &drawing),
@@ -91,8 +93,8 @@ fn prop_nothing_lies_outside_a_picture() {
     }
 }
 
-fn text_inside(text: &tapjoint::report::plot::drawing::Text, drawing: &Drawing) -> bool {
-    use tapjoint::report::plot::drawing::{Align, Direction};
+fn text_inside(text: &tapjoint::report::chart::drawing::Text, drawing: &Drawing) -> bool {
+    use tapjoint::report::chart::drawing::{Align, Direction};
     let width = text.width();
     let (before, after) = match text.align {
         Align::Start => (0.0, width),
@@ -118,7 +120,7 @@ fn text_inside(text: &tapjoint::report::plot::drawing::Text, drawing: &Drawing) 
 #[test]
 fn prop_spectrum_says_what_it_shows() {
     let figure = &fixture::figures()[0];
-    let drawing = draw_spectrum(figure).expect("there are spectra");
+    let drawing = spectrum(figure).expect("there are spectra").draw();
     let words = drawing.words().join("\n");
     for wanted in [
         "low.wav",
@@ -140,7 +142,9 @@ fn prop_spectrum_says_what_it_shows() {
 
 #[test]
 fn prop_frf_names_form_and_unit() {
-    let drawing = draw_frf(&fixture::figures()[1]).expect("there are functions");
+    let drawing = frf(&fixture::figures()[1])
+        .expect("there are functions")
+        .draw();
     let words = drawing.words();
     for wanted in ["accelerance ((m/s²)/N)", "phase (°)", "frequency (Hz)"] {
         assert!(words.contains(&wanted), "{wanted} is missing in {words:?}");
@@ -148,31 +152,61 @@ fn prop_frf_names_form_and_unit() {
 }
 
 #[test]
-fn prop_responses_of_different_units_share_an_axis_only_relatively() {
+fn prop_responses_of_different_units_have_a_panel_each() {
     let mut figure = fixture::figures().remove(0);
     if let Some(spectra) = &mut figure.spectra {
         spectra.responses[1].unit = "Pa s".into();
     }
-    let drawing = draw_spectrum(&figure).expect("there are spectra");
-    let words = drawing.words();
-    let title = "magnitude relative to each curve's peak (1)";
-    assert!(words.contains(&title), "{words:?}");
+    let chart = spectrum(&figure).expect("there are spectra");
+    let units = chart.blocks[0].panels.iter().map(|panel| panel.y.title());
+    let units: Vec<String> = units.collect();
+    let wanted = ["magnitude, rms (m/s² s)", "magnitude, rms (Pa s)"];
+    assert_eq!(units[..2], wanted, "{units:?}");
+}
+
+/// The page's curves are the picture's: same panels, same names, same values but for rounding.
+#[test]
+fn prop_the_page_has_the_curves_of_the_picture() {
+    for figure in fixture::figures() {
+        for chart in [spectrum(&figure), frf(&figure)].into_iter().flatten() {
+            let Some(PageChart::Curves(page)) = chart.page() else {
+                panic!("{} has no curves", chart.title);
+            };
+            let panels = &chart.blocks[0].panels;
+            assert_eq!(page.panels.len(), panels.len(), "{}", chart.title);
+            for (shown, panel) in page.panels.iter().zip(panels) {
+                assert_eq!(shown.label, panel.y.label);
+                assert_eq!(shown.series.len(), panel.series.len());
+                for (curve, series) in shown.series.iter().zip(&panel.series) {
+                    assert_eq!(curve.name, series.name);
+                    assert_eq!(curve.color, series.color.css());
+                    for (rounded, value) in curve.values.iter().zip(&series.y) {
+                        let rounded = rounded.unwrap_or(f64::NAN);
+                        let close = (rounded - value).abs() <= 5.1e-4 * value.abs();
+                        assert!(close || value.is_nan(), "{value} became {rounded}");
+                    }
+                }
+            }
+        }
+    }
 }
 
 #[test]
 fn prop_rejected_taps_carry_their_reason() {
-    let drawing = draw_taps(&fixture::figures()[0]).expect("there are samples");
+    let drawing = taps(&fixture::figures()[0])
+        .expect("there are samples")
+        .draw();
     let words = drawing.words();
     let reason = "tap 2 at 3.71 s: double hit: second excursion of 31 % after 14 ms";
     assert!(words.contains(&reason), "{words:?}");
-    let dots = dots(&drawing, BLUE);
+    let dots = dots(&drawing, Color::Blue);
     // Four taps used and one in the legend.
     assert_eq!(dots, 5, "blue dots");
 }
 
 fn dots(drawing: &Drawing, wanted: Color) -> usize {
     let is_dot = |shape: &&Shape| match shape {
-        Shape::Dot { color, .. } | Shape::Ring { color, .. } => *color == wanted,
+        Shape::Dot { color, .. } | Shape::Ring { color, .. } => *color == wanted.rgb(),
         _ => false,
     };
     drawing.shapes.iter().filter(is_dot).count()
@@ -180,18 +214,20 @@ fn dots(drawing: &Drawing, wanted: Color) -> usize {
 
 #[test]
 fn prop_used_and_unused_modes_differ() {
-    let drawing = draw_frequencies(&fixture::document()).expect("there is a prediction");
+    let drawing = frequencies(&fixture::document())
+        .expect("there is a prediction")
+        .draw();
     // Four used modes and the legend; one unused mode and the legend.
-    assert_eq!(dots(&drawing, BLUE), 5, "used modes");
-    assert_eq!(dots(&drawing, VERMILION), 2, "unused modes");
+    assert_eq!(dots(&drawing, Color::Blue), 5, "used modes");
+    assert_eq!(dots(&drawing, Color::Vermilion), 2, "unused modes");
 }
 
 #[test]
 fn prop_cloud_shows_every_pattern() {
     let document = fixture::document();
-    let drawing = draw_cloud(&document).expect("there is a cloud");
+    let drawing = cloud(&document).expect("there is a cloud").draw();
     // The fixture's 16 patterns lie apart; one more in the legend.
-    assert_eq!(dots(&drawing, SKY), 17, "patterns");
+    assert_eq!(dots(&drawing, Color::Sky), 17, "patterns");
     assert!(
         drawing.words().contains(&"−0.05 %"),
         "{:?}",
@@ -214,7 +250,7 @@ fn prop_many_marks_keep_their_labels_apart() {
             })
             .collect();
     }
-    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let drawing = spectrum(&figure).expect("there are spectra").draw();
     let words = drawing.words().join("\n");
     assert!(
         words.contains("more without a label, see the table"),
@@ -231,8 +267,8 @@ fn prop_many_marks_keep_their_labels_apart() {
 fn prop_svg_holds_the_picture_and_escapes_names() {
     let mut figure = fixture::figures().remove(0);
     figure.file = "<script>&\"x\".wav".into();
-    let drawing = draw_spectrum(&figure).expect("there are spectra");
-    let svg = render_svg(&drawing).expect("the picture is drawn");
+    let drawing = spectrum(&figure).expect("there are spectra").draw();
+    let svg = render_svg(&drawing);
     assert!(
         svg.starts_with("<svg viewBox=\"0 0 4800 "),
         "{}",
@@ -262,12 +298,12 @@ fn val_ticks_are_one_two_five() {
         assert!((step / wanted - 1.0).abs() < 1e-12, "{least}: {step}");
     }
     let labels = |low: f64, high: f64| -> Vec<String> {
-        let ticks = Axis::linear((low, high), (84.0, 1164.0)).ticks(110.0);
+        let ticks = Axis::linear(low, high).ticks(1080.0 / 110.0);
         ticks.into_iter().filter_map(|tick| tick.label).collect()
     };
     assert_eq!(labels(0.0, 200.0), ["0", "50", "100", "150", "200"]);
     assert_eq!(labels(-0.2, 0.2)[..2], ["−0.20", "−0.15"]);
-    let decades = Axis::logarithmic((2e-3, 40.0), (500.0, 160.0)).ticks(40.0);
+    let decades = Axis::logarithmic(2e-3, 40.0).ticks(340.0 / 40.0);
     let labels: Vec<String> = decades.into_iter().filter_map(|tick| tick.label).collect();
     assert_eq!(labels, ["10⁻²", "10⁻¹", "10⁰", "10¹"]);
 }
@@ -281,8 +317,7 @@ proptest! {
         let high = low + 10f64.powf(exponent);
         // Shorter ranges are widened on purpose.
         prop_assume!(high - low > 1e-6 * low.abs());
-        let axis = Axis::linear((low, high), (0.0, 1000.0));
-        let ticks = axis.ticks(100.0);
+        let ticks = Axis::linear(low, high).ticks(10.0);
         // Steps of 1, 2, 5 are at most 2.5 times the wish: at least 10/2.5 - 1 ticks.
         prop_assert!((3..=11).contains(&ticks.len()), "{} ticks", ticks.len());
         // Ticks a billionth of a step outside count as on the end.
@@ -321,7 +356,7 @@ proptest! {
         centers.sort_by(f64::total_cmp);
         let widths = &widths[..centers.len()];
         let total: f64 = widths.iter().sum::<f64>() + 5.0 * widths.len().saturating_sub(1) as f64;
-        let placed = spread(&centers, widths, 5.0, (0.0, 1000.0));
+        let placed = spread(&centers, widths, 5.0, 0.0, 1000.0);
         prop_assert_eq!(placed.is_some(), total <= 1000.0, "fits: {}", total);
         let mut end = -5.0;
         for (center, width) in placed.unwrap_or_default().iter().zip(widths) {
@@ -348,7 +383,7 @@ fn columns(points: &[Point]) -> Vec<(i64, f64, f64)> {
 
 #[test]
 fn limit_labels_with_room_stay_where_they_are() {
-    let placed = spread(&[100.0, 500.0], &[50.0, 50.0], 5.0, (0.0, 1000.0));
+    let placed = spread(&[100.0, 500.0], &[50.0, 50.0], 5.0, 0.0, 1000.0);
     assert_eq!(placed, Some(vec![100.0, 500.0]));
 }
 
@@ -378,7 +413,7 @@ fn prop_the_most_prominent_modes_keep_their_labels() {
             })
             .collect();
     }
-    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let drawing = spectrum(&figure).expect("there are spectra").draw();
     assert!(
         drawing.words().contains(&"mode 17"),
         "{:?}",
@@ -389,7 +424,7 @@ fn prop_the_most_prominent_modes_keep_their_labels() {
 #[test]
 fn prop_an_empty_upper_part_is_not_shown_and_said_so() {
     let mut figure = fixture::figures().remove(1);
-    let whole = draw_spectrum(&figure).expect("there are spectra");
+    let whole = spectrum(&figure).expect("there are spectra").draw();
     assert!(
         !whole.words().join(" ").contains("shown to"),
         "modes to 994 of 2000 Hz"
@@ -397,7 +432,7 @@ fn prop_an_empty_upper_part_is_not_shown_and_said_so() {
     if let Some(spectra) = &mut figure.spectra {
         spectra.peaks.retain(|peak| peak.frequency < 400.0);
     }
-    let drawing = draw_spectrum(&figure).expect("there are spectra");
+    let drawing = spectrum(&figure).expect("there are spectra").draw();
     let words = drawing.words().join(" ");
     assert!(words.contains("shown to 500 of 2000 Hz"), "{words}");
 }
@@ -410,7 +445,7 @@ fn prop_labels_in_the_cloud_cover_nothing() {
         row.kx = Some(970.5 * (1.0 + 0.02 * row.percent));
         row.ky = Some(1.251);
     }
-    let drawing = draw_cloud(&document).expect("there is a cloud");
+    let drawing = cloud(&document).expect("there is a cloud").draw();
     let labels: Vec<(f64, f64, f64)> = drawing
         .shapes
         .iter()
@@ -433,7 +468,7 @@ fn prop_labels_in_the_cloud_cover_nothing() {
 #[test]
 fn regress_ticks_of_one_axis_are_written_in_one_style() {
     let labels = |low: f64, high: f64| -> Vec<String> {
-        let ticks = Axis::linear((low, high), (0.0, 400.0)).ticks(80.0);
+        let ticks = Axis::linear(low, high).ticks(5.0);
         let label = |tick: Tick| tick.label;
         ticks.into_iter().filter_map(label).collect()
     };

@@ -6,9 +6,8 @@ use tapjoint::report::document::{
     PredictionSection, ReadBy, TapSection, ValueSection, WarningSection,
 };
 use tapjoint::report::tables::parameters;
-use tapjoint::report::{
-    render_json, render_modes_csv, render_parameters_csv, render_text, summary,
-};
+use tapjoint::report::words::findings as summary;
+use tapjoint::report::{render_json, render_modes_csv, render_parameters_csv, render_text};
 
 use super::{broken, fixture, incomplete, rendered, text_of};
 

@@ -356,7 +356,14 @@ fn of_pairs(
     let estimator = pairs_estimator(model, beam, &frequencies.numbers).ok()?;
     let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
     let random = random.and_then(|(repetitions, stds)| {
-        monte_carlo(&frequencies.values, stds, repetitions, &estimator).ok()
+        monte_carlo(
+            &frequencies.values,
+            stds,
+            repetitions.0,
+            repetitions.1,
+            &estimator,
+        )
+        .ok()
     });
     perturbation(
         (EstimateMethod::Pairs, random),

@@ -270,7 +270,7 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
         FREE_BEAM_MODES,
     )
     .unwrap_or_default();
-    let numbers = pair_by_ratio(&peaks, &nominal, (FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE));
+    let numbers = pair_by_ratio(&peaks, &nominal, FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE);
     if numbers.iter().any(Option::is_some) {
         let text = "none of the free beam's natural frequencies lies near them; another direction \
                     of bending, torsion, the supports or the room are the usual causes";

@@ -254,7 +254,7 @@ fn explained(
     shifts: &[Complex64],
     index: usize,
 ) -> Option<(Vec<Complex64>, f64)> {
-    let mut others = Basis::default();
+    let mut others = Basis::new(2);
     for (other, &shift) in shifts.iter().enumerate() {
         if other != index {
             others.add(oscillation(data, shift, 0));
@@ -314,7 +314,7 @@ fn needed(
 /// diagonal of the inverse normal matrix.
 fn refine(data: &Demodulated, shifts: &mut [Complex64]) -> Option<Vec<f64>> {
     let count = shifts.len();
-    let mut basis = Basis::default();
+    let mut basis = Basis::new(2);
     for &shift in shifts.iter() {
         basis.add(oscillation(data, shift, 0));
     }

@@ -1,4 +1,4 @@
-//! Complex columns projected on each other: the least squares that pole fits share.
+//! Projection of complex columns on each other, for the linear least squares of pole fits.
 
 use num_complex::Complex64;
 
@@ -12,17 +12,26 @@ pub(super) fn conjugate_product(a: &[Complex64], b: &[Complex64]) -> Complex64 {
     Complex64::new(re, im)
 }
 
-/// Orthonormal columns.
-#[derive(Default, Clone)]
+/// Orthonormal columns, by Gram and Schmidt.
+#[derive(Clone)]
 pub(super) struct Basis {
     pub(super) columns: Vec<Vec<Complex64>>,
+    /// Number of projections: a second one removes the rounding of nearly dependent columns.
+    passes: usize,
 }
 
 impl Basis {
-    /// What of a vector the columns leave. Twice, because once leaves rounding behind where the
-    /// columns are nearly dependent.
+    /// Begins without columns. `passes` is 1 for well separated columns, 2 for nearly dependent ones.
+    pub(super) fn new(passes: usize) -> Self {
+        Basis {
+            columns: Vec::new(),
+            passes,
+        }
+    }
+
+    /// Returns a vector without its projection on the columns.
     pub(super) fn rest(&self, mut vector: Vec<Complex64>) -> Vec<Complex64> {
-        for _ in 0..2 {
+        for _ in 0..self.passes {
             for column in &self.columns {
                 let share = conjugate_product(column, &vector);
                 for (value, basis) in vector.iter_mut().zip(column) {
@@ -33,7 +42,7 @@ impl Basis {
         vector
     }
 
-    /// Adds a column, unless it depends on those that are there.
+    /// Adds a column, unless it depends on the columns before it.
     pub(super) fn add(&mut self, column: Vec<Complex64>) {
         let whole = norm(&column);
         let rest = self.rest(column);

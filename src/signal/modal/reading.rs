@@ -15,6 +15,7 @@ use num_complex::Complex64;
 
 use super::mode::{ModeReading, PeakLabel, ReadBy};
 use super::peaks::{CompositeLevel, Peak};
+use super::projection::Basis;
 use crate::spectral::{Lines, Window};
 
 /// Reads all `peaks` of one recording.
@@ -282,7 +283,7 @@ fn solve_pole(
             .map(|(&line, weight)| spectrum[line] * weight.sqrt())
             .collect();
         let sloped: Vec<Complex64> = values.iter().zip(offsets).map(|(h, u)| h * u).collect();
-        let (h, uh) = (project(values, &basis), project(sloped, &basis));
+        let (h, uh) = (basis.rest(values), basis.rest(sloped));
         numerator += h
             .iter()
             .zip(&uh)
@@ -309,7 +310,7 @@ fn solve_pole(
     let agreement = (neighbours / squares.max(f64::MIN_POSITIVE)).clamp(0.0, 0.98);
     let squares = squares * (1.0 + agreement) / (1.0 - agreement);
     // Complex values less the polynomial's unknowns per spectrum less the common pole.
-    let unknowns = basis.len() * spectra.len() + 1;
+    let unknowns = basis.columns.len() * spectra.len() + 1;
     let freedom = (offsets.len() * spectra.len()).saturating_sub(unknowns);
     let std = if freedom == 0 {
         0.0
@@ -319,49 +320,19 @@ fn solve_pole(
     Some(PoleFit { pole, std })
 }
 
-/// Orthonormal basis of the polynomials 1, u (and u^2 where there are lines enough) under the
-/// weights, by Gram and Schmidt.
-fn polynomial_basis(offsets: &[f64], weights: &[f64]) -> Vec<Vec<f64>> {
-    let degrees = if offsets.len() > 2 * SLOPING_REACH {
-        3
-    } else {
-        2
-    };
-    let mut basis: Vec<Vec<f64>> = Vec::with_capacity(degrees);
-    for degree in 0..degrees {
-        let mut vector: Vec<f64> = offsets
-            .iter()
-            .zip(weights)
-            .map(|(u, w)| w.sqrt() * u.powi(degree as i32))
-            .collect();
-        for earlier in &basis {
-            let share: f64 = vector.iter().zip(earlier).map(|(v, e)| v * e).sum();
-            vector
-                .iter_mut()
-                .zip(earlier)
-                .for_each(|(v, e)| *v -= share * e);
-        }
-        let norm = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
-        vector.iter_mut().for_each(|v| *v /= norm);
-        basis.push(vector);
+/// Orthonormal basis of the polynomials 1, u, and u^2 where there are lines enough, under the weights.
+fn polynomial_basis(offsets: &[f64], weights: &[f64]) -> Basis {
+    let sloping = offsets.len() > 2 * SLOPING_REACH;
+    let mut basis = Basis::new(1);
+    for degree in 0..if sloping { 3 } else { 2 } {
+        let pairs = offsets.iter().zip(weights);
+        basis.add(
+            pairs
+                .map(|(u, w)| Complex64::from(w.sqrt() * u.powi(degree)))
+                .collect(),
+        );
     }
     basis
-}
-
-/// Takes the span of `basis` out of `values`.
-fn project(mut values: Vec<Complex64>, basis: &[Vec<f64>]) -> Vec<Complex64> {
-    for vector in basis {
-        let share = values
-            .iter()
-            .zip(vector)
-            .map(|(v, b)| v * b)
-            .sum::<Complex64>();
-        values
-            .iter_mut()
-            .zip(vector)
-            .for_each(|(v, b)| *v -= share * b);
-    }
-    values
 }
 
 /// Parabola through the three levels (dB) around the peak: for the Hann window, whose lines are not

@@ -5,8 +5,9 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
+use tapjoint_numerics::stats::median;
 
-use super::{AmplitudeSettings, Decay, KnownMode, median_of};
+use super::{AmplitudeSettings, Decay, KnownMode};
 
 /// Attenuation of the stop band (dB): a neighbour a hundred times as strong is left at 3 %.
 const ATTENUATION: f64 = 70.0;
@@ -299,9 +300,10 @@ pub(super) fn combine(band: &Band, reference: usize) -> Option<Vec<Complex64>> {
 /// undercuts, so that simulated signals without noise divide nothing by zero.
 pub(super) fn noise_variance(values: &[Complex64], band: &Band) -> f64 {
     let z = (band.decay * band.step).exp();
-    let squares = values
+    let mut squares: Vec<f64> = values
         .windows(3)
-        .map(|y| (y[1] - 0.5 * (z * y[0] + y[2] / z)).norm_sqr());
+        .map(|y| (y[1] - 0.5 * (z * y[0] + y[2] / z)).norm_sqr())
+        .collect();
     let power = values.iter().map(Complex64::norm_sqr).sum::<f64>() / values.len().max(1) as f64;
-    (median_of(squares) / (1.5 * std::f64::consts::LN_2)).max(FLOOR * power)
+    (median(&mut squares) / (1.5 * std::f64::consts::LN_2)).max(FLOOR * power)
 }

@@ -35,8 +35,6 @@ pub use trend::{AmplitudeReading, Trend};
 
 use rayon::prelude::*;
 
-use tapjoint_numerics::stats::median;
-
 /// The ringing after one tap, force no longer acting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decay {
@@ -287,9 +285,4 @@ fn judge(curve: &mut AmplitudeCurve, doubts: &[AmplitudeVerdict], settings: &Amp
         (true, None) => AmplitudeVerdict::Changes,
         (true, Some(doubt)) => *doubt,
     };
-}
-
-/// Median of values that are not to be reordered.
-fn median_of(values: impl Iterator<Item = f64>) -> f64 {
-    median(&mut values.collect::<Vec<f64>>())
 }

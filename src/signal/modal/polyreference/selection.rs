@@ -422,7 +422,7 @@ pub(super) fn contribution(
 ) -> Option<Contribution> {
     let own = poles.get(index)?;
     let window = Window::around(matrix, own.pole)?;
-    let mut basis = Basis::default();
+    let mut basis = Basis::new(2);
     for column in window.background(matrix.inputs()) {
         basis.add(column);
     }

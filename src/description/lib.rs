@@ -5,23 +5,18 @@
 //! nearest known key. It opens no files.
 
 mod analysis;
-mod beam;
 pub mod described;
-mod effects;
 mod error;
-mod joint;
 mod keys;
-mod limits;
-mod measured;
-mod parse;
 mod reader;
 mod recordings;
 mod sensors;
+mod structure;
 mod template;
 
 pub use analysis::{AnalysisDescription, FitParameter, ReadingMethod, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
-pub use parse::ChannelRefError;
+pub use keys::ChannelRefError;
 pub use tapjoint_beam::BeamTheory;
 pub use template::{runnable_template, template, template_of};
 

@@ -1,9 +1,9 @@
 //! Typed access to the tables of a TOML text: every value knows its line and its key path, so
 //! that whatever is wrong with it can say where.
 
+use super::analysis::Limits;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
 use super::keys::{self, KnownTable};
-use super::limits::Limits;
 use std::collections::BTreeMap;
 use tapjoint_numerics::quantity::{Dimension, parse_quantity};
 use toml::Spanned;

@@ -1,9 +1,8 @@
 //! From readings to stiffnesses, by both estimators, and how far they are from the draw's truth.
 
-use super::draw::{Truth, Truths};
 use super::plan::{BlockPlan, Layout};
-use super::reading::Read;
 use super::result::{EstimateMethod, ReadingName, StudiedStiffness};
+use super::virtual_test::{Read, Truth, Truths};
 use super::{ResolutionError, StudiedTest};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};

@@ -6,30 +6,27 @@
 //! by the measurement stage, and its joint estimated by the estimators that a real test meets. Each
 //! draw is judged by its own truth, so that nothing but the reading is left in its errors.
 
-mod answer;
-mod described;
-mod draw;
 mod estimate;
 mod plan;
-mod reading;
 mod result;
 mod statistics;
+mod virtual_test;
 
-pub use answer::formula_percent;
 pub use result::{
     Answer, BandLines, BlockLines, EstimateMethod, FrequencyError, Omitted, ReadingName,
     ResolutionStudy, StiffnessError, StudiedMode, StudiedStiffness, WindowName,
 };
+pub use statistics::formula_percent;
 
 use rayon::prelude::*;
 
-use draw::{Truths, drawn};
 use estimate::Estimators;
 use plan::{BlockPlan, Layout};
 use tapjoint_analysis::{StructureDetails, TestedStructure};
 use tapjoint_beam::{JointStiffness, StructureError};
 use tapjoint_identify::IdentifyError;
 use tapjoint_signal::spectral::SpectralError;
+use virtual_test::{Truths, drawn};
 
 /// What is tested virtually.
 #[derive(Debug, Clone, PartialEq)]
@@ -160,7 +157,7 @@ pub fn study_resolution(
     let mut study = result::empty(test, settings, (&layout, &plans), &estimators);
     for (number, plan) in plans.iter().enumerate() {
         // Collected in order: sums are then the same whatever the number of threads.
-        let outcomes: Vec<draw::Outcome> = (0..settings.draws)
+        let outcomes: Vec<virtual_test::Outcome> = (0..settings.draws)
             .into_par_iter()
             .map(|index| {
                 let outcome = drawn(
@@ -181,6 +178,6 @@ pub fn study_resolution(
             (settings, &layout, &estimators),
         );
     }
-    answer::conclude(&mut study, settings);
+    statistics::conclude(&mut study, settings);
     Ok(study)
 }

@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use super::estimate::Estimators;
 use super::plan::{BlockPlan, Layout};
-use super::{ResolutionSettings, StudiedTest, answer};
+use super::statistics::formula_percent;
+use super::{ResolutionSettings, StudiedTest};
 use tapjoint_description::{ReadingMethod, WindowKind};
 
 /// A window of the study.
@@ -336,7 +337,7 @@ fn block_lines(plan: &BlockPlan) -> BlockLines {
     BlockLines {
         block: plan.block,
         lines,
-        half_line_percent_of_band: answer::formula_percent(lines),
+        half_line_percent_of_band: formula_percent(lines),
         bands: plan.bands.iter().map(band).collect(),
     }
 }

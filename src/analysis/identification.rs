@@ -8,6 +8,7 @@ use super::model::TestedStructure;
 use super::perturbation::perturbations;
 use super::shapes::predicted_specimen;
 use super::warning::Warning;
+use serde::Serialize;
 use tapjoint_beam::specimen::Specimen;
 use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
 use tapjoint_identify::{
@@ -16,13 +17,27 @@ use tapjoint_identify::{
 };
 
 /// Which estimate is the main one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum EstimateMethod {
     /// Least squares on the frequencies themselves, the closed form beside it.
     #[default]
     Consistent,
     /// The closed form alone: the pair regression, or of a free beam its modulus.
     Pairs,
+}
+
+impl EstimateMethod {
+    /// Both methods.
+    pub const ALL: [Self; 2] = [Self::Consistent, Self::Pairs];
+
+    /// Name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Consistent => "consistent",
+            Self::Pairs => "pairs",
+        }
+    }
 }
 
 /// How the joint is identified.

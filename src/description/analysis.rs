@@ -5,6 +5,7 @@
 use super::error::{DescriptionError, DescriptionProblem, number, with_unit};
 use super::reader::{Entry, Table};
 use super::{JointDescription, JointKind, JointModel};
+use serde::Serialize;
 use std::ops::{Bound, RangeBounds};
 
 const WINDOWS: [(&str, WindowKind); 3] = [
@@ -42,7 +43,8 @@ pub enum WindowKind {
 }
 
 /// How natural frequencies are read from a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ReadingMethod {
     /// By a fit of decaying oscillations, with a standard deviation; what cannot be fitted is read
     /// between the lines or on its line.
@@ -52,6 +54,20 @@ pub enum ReadingMethod {
     Interpolated,
     /// On the highest spectral line, as Ingole & Chatterjee read theirs.
     Line,
+}
+
+impl ReadingMethod {
+    /// All methods, from the coarsest to the finest.
+    pub const ALL: [Self; 3] = [Self::Line, Self::Interpolated, Self::Fit];
+
+    /// Name in descriptions and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Interpolated => "interpolated",
+            Self::Fit => "fit",
+        }
+    }
 }
 
 /// Weights of the frequencies in an estimate.

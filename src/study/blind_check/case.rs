@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 use tapjoint_beam::effects::{EffectId, Group, Place};
-use tapjoint_diagnosis::{Diagnosis, Hypothesis, Verdict as Found};
+use tapjoint_diagnosis::{Diagnosis, Hypothesis, Verdict};
 
 /// What a diagnosis chooses between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -95,45 +95,11 @@ impl Truth {
     }
 }
 
-/// Kinds of verdicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// The nominal model explains the data.
-    NoGap,
-    /// One effect, or the two that are needed.
-    Named,
-    /// One group of effects that cannot be told apart.
-    Group,
-    /// A short list.
-    Set,
-    /// Something that the catalogue does not explain.
-    Unknown,
-    /// Too few data for the question.
-    NotEnoughData,
-    /// The test could not be analysed or diagnosed.
-    NoAnswer,
-}
-
-impl Verdict {
-    /// As in the report.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NoGap => "no-gap",
-            Self::Named => "named",
-            Self::Group => "group",
-            Self::Set => "set",
-            Self::Unknown => "unknown",
-            Self::NotEnoughData => "not-enough-data",
-            Self::NoAnswer => "no-answer",
-        }
-    }
-}
-
 /// What the diagnosis said of one test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
-    /// Its verdict.
-    pub verdict: Verdict,
+    /// Verdict of the diagnosis; `None` where the test could not be analysed or diagnosed.
+    pub verdict: Option<Verdict>,
     /// The effects that the verdict names.
     pub effects: Vec<EffectId>,
     /// Probability of each class, adding to 1.
@@ -147,6 +113,11 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Name of the verdict, as in the report; "no-answer" where there is none.
+    pub fn verdict_name(&self) -> &'static str {
+        self.verdict.as_ref().map_or("no-answer", Verdict::kind)
+    }
+
     /// The most probable class, and its probability.
     pub fn first(&self) -> Option<(Class, f64)> {
         self.ranked().into_iter().next()
@@ -194,13 +165,10 @@ impl Answer {
 impl Answer {
     /// Of a diagnosis.
     pub fn of(diagnosis: &Diagnosis) -> Self {
-        let (verdict, effects) = match &diagnosis.verdict {
-            Found::NoGap => (Verdict::NoGap, Vec::new()),
-            Found::Named(effects) => (Verdict::Named, effects.clone()),
-            Found::Group(effects) => (Verdict::Group, effects.clone()),
-            Found::Set(list) => (Verdict::Set, listed(list)),
-            Found::Unknown => (Verdict::Unknown, Vec::new()),
-            Found::NotEnoughData(_) => (Verdict::NotEnoughData, Vec::new()),
+        let effects = match &diagnosis.verdict {
+            Verdict::Named(effects) | Verdict::Group(effects) => effects.clone(),
+            Verdict::Set(list) => listed(list),
+            Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
         };
         let named = diagnosis
             .hypotheses
@@ -213,7 +181,7 @@ impl Answer {
                 .collect()
         });
         Self {
-            verdict,
+            verdict: Some(diagnosis.verdict.clone()),
             classes: classes(diagnosis),
             places: places(diagnosis),
             parameters: parameters.unwrap_or_default(),
@@ -227,7 +195,7 @@ impl Answer {
     /// Of a test that could not be diagnosed: no verdict and no probabilities.
     pub fn none() -> Self {
         Self {
-            verdict: Verdict::NoAnswer,
+            verdict: None,
             effects: Vec::new(),
             classes: BTreeMap::new(),
             places: Vec::new(),

@@ -16,7 +16,7 @@ mod score;
 mod table;
 mod truth_file;
 
-pub use case::{Answer, CaseKind, Class, Planted, Truth, Verdict};
+pub use case::{Answer, CaseKind, Class, Planted, Truth};
 pub use draw::{Campaign, DrawError, DrawnTest, Extent};
 pub use draw::{Recorded, RecordedTest};
 pub use planted_effects::{Fastened, OutsideKind};

@@ -6,13 +6,14 @@
 //!
 //! Checks of the check: answers that cannot know must score as if they did not know.
 
-use super::case::{Answer, CaseKind, Class, Planted, Truth, Verdict};
+use super::case::{Answer, CaseKind, Class, Planted, Truth};
 use super::draw::Extent;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{Beta, ContinuousCDF};
 use tapjoint_beam::effects::{EffectId, Group, Place};
+use tapjoint_diagnosis::Verdict;
 
 /// Share of the probability that an answer's set holds.
 pub const SET_SHARE: f64 = 0.9;
@@ -94,7 +95,7 @@ pub fn score(cases: &[Case]) -> Scores {
         counts: kinds.map(|kind| of(kind).count()),
         failed: cases
             .iter()
-            .filter(|(_, answer)| answer.verdict == Verdict::NoAnswer)
+            .filter(|(_, answer)| answer.verdict.is_none())
             .count(),
         top_1: Rate::of(of(Kind::Single), |case| rank_within(case, 1)),
         top_1_detectable: Rate::of(of(Kind::Single), |case| {
@@ -119,7 +120,7 @@ pub fn score(cases: &[Case]) -> Scores {
             (truth.refutable == Some(true)).then(|| is_refused(answer))
         }),
         outside_unknown: Rate::of(of(Kind::Outside), |(_, answer)| {
-            Some(answer.verdict == Verdict::Unknown)
+            Some(answer.verdict == Some(Verdict::Unknown))
         }),
         several_found_or_refused: Rate::of(of(Kind::Several), |case| Some(found_or_refused(case))),
         several_detectable: Rate::of(of(Kind::Several), |case| {
@@ -136,7 +137,9 @@ pub fn score(cases: &[Case]) -> Scores {
                 .map(|(_, answer)| answer.set(SET_SHARE).len() as f64),
         ),
         truth_probability: mean(of(Kind::Single).filter_map(|(truth, answer)| {
-            let class = truth.class().filter(|_| answer.verdict != Verdict::NoGap)?;
+            let class = truth
+                .class()
+                .filter(|_| answer.verdict != Some(Verdict::NoGap))?;
             Some(answer.classes.get(&class).copied().unwrap_or(0.0))
         })),
         calibration: calibrate(cases),
@@ -167,21 +170,24 @@ impl Kind {
 }
 
 fn is_named(answer: &Answer) -> bool {
-    answer.verdict == Verdict::Named
+    matches!(answer.verdict, Some(Verdict::Named(_)))
 }
 
 /// Whether somebody who reads the verdict believes in an effect.
 fn calls_effect(answer: &Answer) -> bool {
-    match answer.verdict {
-        Verdict::Named | Verdict::Group => true,
-        Verdict::Set => !answer.set(SET_SHARE).contains(&Class::None),
-        Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData | Verdict::NoAnswer => false,
+    match &answer.verdict {
+        Some(Verdict::Named(_) | Verdict::Group(_)) => true,
+        Some(Verdict::Set(_)) => !answer.set(SET_SHARE).contains(&Class::None),
+        Some(Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_)) | None => false,
     }
 }
 
 /// Neither a name nor a clean bill: the user is told that the catalogue does not decide it.
 fn is_refused(answer: &Answer) -> bool {
-    matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData)
+    matches!(
+        answer.verdict,
+        Some(Verdict::Unknown | Verdict::NotEnoughData(_))
+    )
 }
 
 fn found_or_refused(case: &Case) -> bool {
@@ -454,7 +460,7 @@ pub fn shuffled(cases: &[Case], seed: u64) -> Vec<Case> {
 /// What somebody would score who always answers with one common factor on all frequencies.
 pub fn always_scale(cases: &[Case]) -> Vec<Case> {
     let answer = Answer {
-        verdict: Verdict::Named,
+        verdict: Some(Verdict::Named(vec![EffectId::Modulus])),
         effects: vec![EffectId::Modulus],
         classes: [(Class::Group(EffectId::Modulus.group()), 1.0)].into(),
         places: vec![(Some(EffectId::Modulus.place()), 1.0)],

@@ -1,11 +1,13 @@
 //! From readings to stiffnesses, by both estimators, and how far they are from the draw's truth.
 
 use super::plan::{BlockPlan, Layout};
-use super::result::{EstimateMethod, ReadingName, StudiedStiffness};
+use super::result::StudiedStiffness;
 use super::virtual_test::{Read, Truth, Truths};
 use super::{ResolutionError, StudiedTest};
+use tapjoint_analysis::EstimateMethod;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_description::ReadingMethod;
 use tapjoint_identify::consistent::{
     ConsistentEstimator, ConsistentSettings, HeldJoint, JointedStructure, Neighbourhood, Parameter,
 };
@@ -97,7 +99,7 @@ impl Estimators {
         &self,
         truth: &Truth,
         (plan, bands): (&BlockPlan, &[Vec<[Option<Read>; 3]>]),
-        reading: ReadingName,
+        reading: ReadingMethod,
     ) -> [ParameterErrors; 2] {
         let modes: Option<Vec<MeasuredMode>> = self
             .used

@@ -2,11 +2,12 @@
 //!
 //! What a test description gives the study.
 
-use super::result::{Omitted, ReadingName};
+use super::result::Omitted;
 use super::virtual_test::{Truths, sample_draw, window_of};
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
 use tapjoint_analysis::{TestedStructure, structure_details};
 use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_description::ReadingMethod;
 use tapjoint_description::TestDescription;
 use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
 
@@ -244,8 +245,9 @@ impl BandPlan {
 }
 
 /// What a draw reads: fits are made of the first draws only.
-pub(super) fn readings_of(settings: &ResolutionSettings, draw: usize) -> Vec<ReadingName> {
-    let fitted = |reading: &ReadingName| *reading != ReadingName::Fit || draw < settings.fit_draws;
+pub(super) fn readings_of(settings: &ResolutionSettings, draw: usize) -> Vec<ReadingMethod> {
+    let fitted =
+        |reading: &ReadingMethod| *reading != ReadingMethod::Fit || draw < settings.fit_draws;
     settings.readings.iter().copied().filter(fitted).collect()
 }
 

@@ -6,6 +6,7 @@ use super::estimate::Estimators;
 use super::plan::{BlockPlan, Layout};
 use super::statistics::formula_percent;
 use super::{ResolutionSettings, StudiedTest};
+use tapjoint_analysis::EstimateMethod;
 use tapjoint_description::{ReadingMethod, WindowKind};
 
 /// A window of the study.
@@ -40,69 +41,6 @@ impl From<WindowKind> for WindowName {
             WindowKind::Rectangular => WindowName::Rectangular,
             WindowKind::Hann => WindowName::Hann,
             WindowKind::Exponential => WindowName::Exponential,
-        }
-    }
-}
-
-/// A way of reading frequencies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ReadingName {
-    /// On the line.
-    Line,
-    /// Between the lines.
-    Interpolated,
-    /// By a fit of the free decay.
-    Fit,
-}
-
-impl ReadingName {
-    /// All, from the coarsest to the finest.
-    pub const ALL: [ReadingName; 3] = [
-        ReadingName::Line,
-        ReadingName::Interpolated,
-        ReadingName::Fit,
-    ];
-
-    /// As written.
-    pub fn name(self) -> &'static str {
-        match self {
-            ReadingName::Line => "line",
-            ReadingName::Interpolated => "interpolated",
-            ReadingName::Fit => "fit",
-        }
-    }
-}
-
-impl From<ReadingMethod> for ReadingName {
-    fn from(method: ReadingMethod) -> Self {
-        match method {
-            ReadingMethod::Line => ReadingName::Line,
-            ReadingMethod::Interpolated => ReadingName::Interpolated,
-            ReadingMethod::Fit => ReadingName::Fit,
-        }
-    }
-}
-
-/// How a stiffness is estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum EstimateMethod {
-    /// Least squares on the frequencies.
-    Consistent,
-    /// Regression over pairs of modes; of a free beam the mean over its modes.
-    Pairs,
-}
-
-impl EstimateMethod {
-    /// Both.
-    pub const ALL: [EstimateMethod; 2] = [EstimateMethod::Consistent, EstimateMethod::Pairs];
-
-    /// As written.
-    pub fn name(self) -> &'static str {
-        match self {
-            EstimateMethod::Consistent => "consistent",
-            EstimateMethod::Pairs => "pairs",
         }
     }
 }
@@ -216,7 +154,7 @@ pub struct FrequencyError {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingName,
+    pub reading: ReadingMethod,
     /// Mode.
     pub mode: usize,
     /// Band (Hz).
@@ -254,7 +192,7 @@ pub struct StiffnessError {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingName,
+    pub reading: ReadingMethod,
     /// Estimator.
     pub method: EstimateMethod,
     /// "kx", "ky", "kz" or "modulus".
@@ -283,7 +221,7 @@ pub struct Answer {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingName,
+    pub reading: ReadingMethod,
     /// Estimator.
     pub method: EstimateMethod,
     /// Block (samples); `None` where none in the range does.

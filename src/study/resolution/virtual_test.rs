@@ -2,7 +2,7 @@
 
 use super::estimate::{Estimators, ParameterErrors};
 use super::plan::{BandPlan, BlockPlan, readings_of};
-use super::result::{ReadingName, WindowName};
+use super::result::WindowName;
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
 use num_complex::Complex64;
 use rand::{Rng, RngExt, SeedableRng};
@@ -11,6 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
+use tapjoint_description::ReadingMethod;
 use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
 use tapjoint_signal::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
 use tapjoint_signal::modal::{
@@ -263,7 +264,7 @@ pub(super) struct Outcome {
     /// What is true.
     pub truth: Truth,
     /// For each window, for each band, for each of its modes: what each reading of
-    /// [`super::ReadingName::ALL`] says.
+    /// [`super::ReadingMethod::ALL`] says.
     pub readings: Vec<Vec<Vec<[Option<Read>; 3]>>>,
     /// For each window, for each of the study's readings, for each estimator: errors of the
     /// stiffnesses; `None` where the draw was not read that way.
@@ -322,13 +323,11 @@ pub(super) struct Read {
     pub source: FrequencySource,
 }
 
-impl ReadingName {
-    pub(super) fn source(self) -> FrequencySource {
-        match self {
-            ReadingName::Line => FrequencySource::Line,
-            ReadingName::Interpolated => FrequencySource::BetweenLines,
-            ReadingName::Fit => FrequencySource::Fit,
-        }
+pub(super) fn source_of(reading: ReadingMethod) -> FrequencySource {
+    match reading {
+        ReadingMethod::Line => FrequencySource::Line,
+        ReadingMethod::Interpolated => FrequencySource::BetweenLines,
+        ReadingMethod::Fit => FrequencySource::Fit,
     }
 }
 
@@ -374,7 +373,7 @@ fn read_band(
     band: &BandPlan,
     window: usize,
     record: &VirtualRecord,
-    (truth, numbers, wanted): (&Truth, &[usize], &[ReadingName]),
+    (truth, numbers, wanted): (&Truth, &[usize], &[ReadingMethod]),
 ) -> Vec<[Option<Read>; 3]> {
     let window = band
         .windows
@@ -390,11 +389,11 @@ fn read_band(
             place_of(truth.frequencies[number - 1], &readings, &band.lines)
         })
         .collect();
-    if wanted.contains(&ReadingName::Fit) {
+    if wanted.contains(&ReadingMethod::Fit) {
         fit(band, record, &mut readings, &places);
     }
     let read = |place: &Option<usize>| {
-        ReadingName::ALL.map(|name| {
+        ReadingMethod::ALL.map(|name| {
             let reading = readings.get((*place)?).filter(|_| wanted.contains(&name))?;
             Some(read_as(reading, name))
         })
@@ -402,9 +401,9 @@ fn read_band(
     places.iter().map(read).collect()
 }
 
-fn read_as(reading: &ModeReading, name: ReadingName) -> Read {
+fn read_as(reading: &ModeReading, name: ReadingMethod) -> Read {
     let mut reading = reading.clone();
-    reading.prefer(name.source());
+    reading.prefer(source_of(name));
     Read {
         frequency: reading.frequency,
         std: reading.std.unwrap_or(reading.half_line),

@@ -1,12 +1,11 @@
 //! What the chain leaves: plain data, for the report and for callers.
 
-use std::collections::BTreeMap;
-
-use super::between::BetweenRecordings;
-use super::close_ups::CloseUp;
-use super::measure::Measurement;
-use super::model::TestedStructure;
+use super::amplitude::AmplitudeChange;
+use super::measure::{MeasureError, Measurement};
+use super::structure::TestedStructure;
 use super::warning::Warning;
+use serde::Serialize;
+use std::collections::BTreeMap;
 use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_identify::consistent::ConsistentEstimate;
@@ -14,7 +13,8 @@ use tapjoint_identify::perturbation::{ModeSensitivity, SignPatternSpans, Uniform
 use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
 use tapjoint_signal::modal::ModeReading;
 use tapjoint_signal::quality::Verdict;
-use tapjoint_signal::recording::{ChannelInfo, Format};
+use tapjoint_signal::recording::{ChannelInfo, Format, RecordingError};
+use tapjoint_signal::spectral::SpectralError;
 
 /// A finished analysis.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +37,30 @@ pub struct Analysis {
     pub verdicts: Vec<Verdict>,
     /// What a reader has to know.
     pub warnings: Vec<Warning>,
+}
+
+/// Which estimate is the main one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EstimateMethod {
+    /// Least squares on the frequencies themselves, the closed form beside it.
+    #[default]
+    Consistent,
+    /// The closed form alone: the pair regression, or of a free beam its modulus.
+    Pairs,
+}
+
+impl EstimateMethod {
+    /// Both methods.
+    pub const ALL: [Self; 2] = [Self::Consistent, Self::Pairs];
+
+    /// Name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Consistent => "consistent",
+            Self::Pairs => "pairs",
+        }
+    }
 }
 
 /// One recording.
@@ -204,7 +228,7 @@ pub enum Estimate {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Perturbation {
     /// By which method it was estimated.
-    pub method: super::EstimateMethod,
+    pub method: EstimateMethod,
     /// All frequencies up and down by a percentage.
     pub uniform: Vec<UniformPerturbation>,
     /// Average errors of the percentages as Ingole & Chatterjee state them.
@@ -228,4 +252,92 @@ pub struct BoundPerturbation {
     pub cloud: Vec<Stiffnesses>,
     /// Which mode drives which parameter.
     pub sensitivities: Vec<ModeSensitivity>,
+}
+
+/// The samples about a tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CloseUp {
+    /// First sample (s from the trigger).
+    pub start: f64,
+    /// Distance of the samples (s).
+    pub step: f64,
+    /// The force's samples (N), the channel's mean taken out; `None` without a hammer.
+    pub force: Option<Vec<f64>>,
+    /// The first response's (its unit).
+    pub response: Option<Vec<f64>>,
+}
+
+/// One mode in the recordings of one configuration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BetweenRecordings {
+    /// Variance of its frequency between the recordings, sum (f - mean)^2/(n - 1), over the mean's square (1).
+    pub variance: f64,
+    /// What the readings' own standard uncertainties make of that, over the same (1).
+    pub own: f64,
+    /// Recordings less one.
+    pub freedom: usize,
+}
+
+impl RecordingResult {
+    /// How a mode changes with its amplitude, where it is beyond the uncertainty and large enough to matter.
+    pub fn amplitude_change(&self, reading: &ModeReading) -> Option<AmplitudeChange> {
+        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+        let change = AmplitudeChange::of(curve)?;
+        let response = curve.sensor.and_then(|sensor| self.responses.get(sensor));
+        let unit = response.and_then(|response| response.unit.clone());
+        Some(AmplitudeChange { unit, ..change })
+    }
+}
+
+/// What stops an analysis.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// A recording could not be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A recording could not be measured.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// A band that does not fit a file of frequency response functions.
+    #[error("{file}: {problem}")]
+    Functions {
+        /// The recording.
+        file: String,
+        /// What does not fit.
+        problem: SpectralError,
+    },
+    /// A band or block of the description that does not fit its recording.
+    #[error("{file}:{line}: {recording}: {problem}")]
+    Setting {
+        /// The description.
+        file: String,
+        /// Its line.
+        line: usize,
+        /// The recording.
+        recording: String,
+        /// What does not fit.
+        problem: SpectralError,
+    },
+    /// A channel of the description that its recording does not have, or cannot be told from others, or
+    /// cannot be scaled.
+    #[error("{file}:{line}: `{key}`: {problem}")]
+    Channel {
+        /// The description.
+        file: String,
+        /// Its line.
+        line: usize,
+        /// The key: `sensor[2].channel`.
+        key: String,
+        /// What the recording has instead.
+        problem: Box<RecordingError>,
+    },
+    /// A description without sensors.
+    #[error(
+        "{file}: the recordings need at least one [[sensor]] with its channel, or there is no response \
+         to analyse"
+    )]
+    NoSensors {
+        /// The description.
+        file: String,
+    },
 }

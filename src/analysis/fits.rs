@@ -6,19 +6,14 @@
 
 use num_complex::Complex64;
 
-use super::decays::FreeDecays;
-use tapjoint_description::ReadingMethod;
-use tapjoint_signal::modal::amplitude::{AmplitudeSettings, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
-    Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit,
-    fit_modes, modal_constants,
+    Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
 };
 use tapjoint_signal::modal::polyreference::{
     BandSearch, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, SubBandSettings,
     all_modes, find_modes,
 };
-use tapjoint_signal::modal::{FittedReading, FrequencySource, ModeReading, PeakLabel};
-use tapjoint_signal::recording::ResponseForm;
+use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
@@ -33,15 +28,6 @@ const UNLIKE: f64 = 0.9;
 const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
-
-/// What a description's way of reading asks for.
-pub(super) fn source_of(reading: ReadingMethod) -> FrequencySource {
-    match reading {
-        ReadingMethod::Fit => FrequencySource::Fit,
-        ReadingMethod::Interpolated => FrequencySource::BetweenLines,
-        ReadingMethod::Line => FrequencySource::Line,
-    }
-}
 
 /// What the polyreference fit over the band found.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -246,7 +232,7 @@ impl Candidates<'_> {
         let line = self.lines.nearest(fit.frequency.value);
         ModeReading {
             frequency: fit.frequency.value,
-            source: FrequencySource::Fit,
+            source: ReadBy::Fit,
             interval: (fit.frequency.low, fit.frequency.high),
             std: Some(fit.frequency.std),
             above_noise_db: Some(proposal.above_noise_db),
@@ -285,29 +271,4 @@ fn is_clear(fit: &ModeFit) -> bool {
         .map(|amplitude| amplitude.value.norm() / amplitude.std)
         .fold(0.0, f64::max);
     strongest > CLEAR_AMPLITUDE && fit.damping_ratio.value > 2.0 * fit.damping_ratio.std
-}
-
-/// Adds to the fits what needs the decays themselves: modal constants, and frequency and damping against
-/// amplitude.
-pub(super) fn complete(
-    readings: &mut [ModeReading],
-    decays: &FreeDecays,
-    kinds: &[Option<ResponseForm>],
-) {
-    let fitted: Vec<&mut FittedReading> = readings
-        .iter_mut()
-        .filter_map(|reading| reading.fit.as_deref_mut())
-        .collect();
-    let known: Vec<KnownMode> = fitted
-        .iter()
-        .map(|fit| KnownMode {
-            frequency: fit.mode.frequency.value,
-            damping_ratio: fit.mode.damping_ratio.value,
-        })
-        .collect();
-    let curves = follow_amplitude(&decays.decays, &known, &AmplitudeSettings::default());
-    for (fit, curve) in fitted.into_iter().zip(curves) {
-        fit.amplitude = Some(curve);
-        fit.constants = modal_constants(&fit.mode, &decays.forces, kinds);
-    }
 }

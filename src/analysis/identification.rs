@@ -1,44 +1,24 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
-use super::analysis::{Estimate, Identification, ModeResult};
-use super::between::scatter;
-use super::consistent::{self, StructureDetails};
-use super::doubts;
-use super::model::TestedStructure;
-use super::perturbation::perturbations;
-use super::shapes::predicted_specimen;
-use super::warning::Warning;
-use serde::Serialize;
-use tapjoint_beam::specimen::Specimen;
-use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
-use tapjoint_identify::{
-    Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, PredictedMode, estimate_joint,
-    estimate_modulus, predict,
+use super::analysis::{
+    Analysis, BoundPerturbation, Estimate, EstimateMethod, Identification, ModeResult, Perturbation,
 };
-
-/// Which estimate is the main one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum EstimateMethod {
-    /// Least squares on the frequencies themselves, the closed form beside it.
-    #[default]
-    Consistent,
-    /// The closed form alone: the pair regression, or of a free beam its modulus.
-    Pairs,
-}
-
-impl EstimateMethod {
-    /// Both methods.
-    pub const ALL: [Self; 2] = [Self::Consistent, Self::Pairs];
-
-    /// Name in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Consistent => "consistent",
-            Self::Pairs => "pairs",
-        }
-    }
-}
+use super::between_recordings::scatter;
+use super::doubts;
+use super::structure::{StructureDetails, TestedStructure, estimator, predicted_specimen};
+use super::warning::Warning;
+use schemars::JsonSchema;
+use serde::Serialize;
+use tapjoint_beam::Beam;
+use tapjoint_beam::specimen::{Body, Mesh, Specimen};
+use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
+use tapjoint_identify::perturbation::{
+    average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates, spans_of,
+};
+use tapjoint_identify::{
+    Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PairsModel, PredictedMode,
+    Stiffnesses, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
+};
 
 /// How the joint is identified.
 #[derive(Debug, Clone, PartialEq)]
@@ -179,7 +159,7 @@ fn consistently(
     details: &StructureDetails,
     used: &[MeasuredMode],
 ) -> Result<(ConsistentEstimator, ConsistentEstimate), IdentifyError> {
-    let estimator = consistent::estimator(structure, details, used)?;
+    let estimator = estimator(structure, details, used)?;
     let estimate = estimator.estimate()?;
     Ok((estimator, estimate))
 }
@@ -221,7 +201,7 @@ fn prediction(
     let details = if detailed { &settings.details } else { &plain };
     let held = (&beam, &joint);
     let rows = if detailed {
-        consistent::predict(structure, details, held, beside, count)?
+        super::structure::predict(structure, details, held, beside, count)?
     } else {
         let held = (structure.assembly, &joint);
         predict(structure.theory, &beam, held, beside, count)?
@@ -256,5 +236,198 @@ fn of_doubt(doubt: &Doubt) -> Warning {
         other => Warning::UnphysicalEstimate {
             what: other.to_string(),
         },
+    }
+}
+
+/// Points along the beam: enough for five half waves between two of them to look smooth.
+const SHAPE_POINTS: usize = 121;
+
+/// The shape of one mode.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct SampledShape {
+    /// The model's number.
+    pub mode: usize,
+    /// Frequency of this shape (Hz).
+    pub frequency: f64,
+    /// Positions (m) from the joint; of a lap joint or a free beam from the left end. The place of a lap
+    /// joint stands twice, for either half's end.
+    pub positions: Vec<f64>,
+    /// Displacement relative to the largest (1).
+    pub displacements: Vec<f64>,
+}
+
+/// Shapes of the predicted modes: of the structure that the prediction is of, shear, masses of sensors
+/// and a lap joint's two halves included. Empty where nothing could be predicted.
+pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
+    let Some(found) = &analysis.identification else {
+        return Vec::new();
+    };
+    let Some(specimen) = &found.predicted else {
+        return Vec::new();
+    };
+    // A joint that no beam can stand on has no shapes; the warnings say so.
+    let Ok(modes) = specimen.modes(found.prediction.len(), Mesh::DIAGNOSIS) else {
+        return Vec::new();
+    };
+    let positions = positions(&specimen.body);
+    let shape = |mode: usize| {
+        let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
+        let raw: Vec<f64> = raw.collect();
+        let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        SampledShape {
+            mode: mode + 1,
+            frequency: modes.frequencies()[mode],
+            positions: positions.iter().map(|(x, _)| *x).collect(),
+            displacements: raw.iter().map(|value| value / largest).collect(),
+        }
+    };
+    (0..modes.len()).map(shape).collect()
+}
+
+/// Places along all beams (m), and where the model is asked for each: a hair inside the beam that is
+/// meant, since two beams meet at a lap joint.
+fn positions(body: &Body) -> Vec<(f64, f64)> {
+    let beams = body.beams();
+    let points = SHAPE_POINTS.div_ceil(beams.len());
+    let hair = 1e-9 * body.length();
+    let mut start = 0.0;
+    let mut all = Vec::new();
+    for beam in beams {
+        let end = start + beam.length;
+        let share = |point: usize| point as f64 / (points - 1) as f64;
+        let places = (0..points).map(|point| start + share(point) * beam.length);
+        all.extend(places.map(|x| (x, x.clamp(start + hair, end - hair))));
+        start = end;
+    }
+    all
+}
+
+/// Perturbs what is asked for and can be: first the pair regression, then the consistent estimate.
+/// Neither a free beam nor a joint of which no spring is estimated has anything to perturb.
+pub(super) fn perturbations(
+    structure: &TestedStructure,
+    consistent: Option<&ConsistentEstimator>,
+    (modes, used): (&[ModeResult], &[MeasuredMode]),
+    settings: &IdentifySettings,
+) -> Vec<Perturbation> {
+    let frequencies = Frequencies::new(modes, used);
+    let asked = |method: EstimateMethod| settings.perturbed.contains(&method);
+    let pairs = structure
+        .regression
+        .filter(|_| asked(EstimateMethod::Pairs))
+        .and_then(|model| of_pairs(model, &structure.beam, &frequencies, settings));
+    let consistent = consistent
+        .filter(|_| asked(EstimateMethod::Consistent))
+        .and_then(|estimator| of_consistent(estimator, &frequencies, settings));
+    pairs.into_iter().chain(consistent).collect()
+}
+
+/// The frequencies that enter the estimate, with what is known of their errors.
+struct Frequencies {
+    numbers: Vec<usize>,
+    values: Vec<f64>,
+    /// Half lines (Hz), where every mode has one.
+    bounds: Option<Vec<f64>>,
+    /// Standard uncertainties (Hz), where every mode has one.
+    stds: Option<Vec<f64>>,
+}
+
+impl Frequencies {
+    fn new(modes: &[ModeResult], used: &[MeasuredMode]) -> Self {
+        let half_line = |measured: &MeasuredMode| {
+            let listed = modes.iter().find(|mode| mode.mode == Some(measured.mode));
+            listed?.half_line
+        };
+        Self {
+            numbers: used.iter().map(|mode| mode.mode).collect(),
+            values: used.iter().map(|mode| mode.frequency).collect(),
+            bounds: used.iter().map(half_line).collect(),
+            stds: used.iter().map(|mode| mode.std).collect(),
+        }
+    }
+}
+
+fn of_pairs(
+    model: PairsModel,
+    beam: &Beam,
+    frequencies: &Frequencies,
+    settings: &IdentifySettings,
+) -> Option<Perturbation> {
+    let estimator = pairs_estimator(model, beam, &frequencies.numbers).ok()?;
+    let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
+    let random = random.and_then(|(repetitions, stds)| {
+        monte_carlo(
+            &frequencies.values,
+            stds,
+            repetitions.0,
+            repetitions.1,
+            &estimator,
+        )
+        .ok()
+    });
+    perturbation(
+        (EstimateMethod::Pairs, random),
+        frequencies,
+        settings,
+        estimator,
+    )
+}
+
+fn of_consistent(
+    estimator: &ConsistentEstimator,
+    frequencies: &Frequencies,
+    settings: &IdentifySettings,
+) -> Option<Perturbation> {
+    if !estimator.estimates_a_spring() {
+        return None;
+    }
+    let near = estimator.neighbourhood();
+    // Without the uncertainties of all modes there is nothing to draw from.
+    let random = settings.monte_carlo.and_then(|(samples, seed)| {
+        let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
+        Some(found.joint)
+    });
+    perturbation(
+        (EstimateMethod::Consistent, random),
+        frequencies,
+        settings,
+        estimator.stiffnesses_near(&near),
+    )
+}
+
+fn perturbation(
+    (method, random): (EstimateMethod, Option<MonteCarlo>),
+    frequencies: &Frequencies,
+    settings: &IdentifySettings,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
+) -> Option<Perturbation> {
+    let nominal = estimator(&frequencies.values)?;
+    let uniform = perturb_uniformly(&frequencies.values, &settings.percents, &estimator);
+    let bounds = frequencies.bounds.as_deref();
+    Some(Perturbation {
+        method,
+        averages: average_errors(&nominal, &uniform),
+        uniform,
+        bounds: bounds.map(|bounds| of_bounds((nominal, bounds), frequencies, &estimator)),
+        random,
+    })
+}
+
+/// The estimate under each mode's own bound.
+fn of_bounds(
+    (nominal, bounds): (Stiffnesses, &[f64]),
+    frequencies: &Frequencies,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
+) -> BoundPerturbation {
+    let patterns = sign_pattern_estimates(&frequencies.values, bounds, &estimator).ok();
+    let sensitivities = mode_sensitivities(&frequencies.values, bounds, &estimator);
+    BoundPerturbation {
+        modes: frequencies.numbers.clone(),
+        bounds: bounds.to_vec(),
+        spans: patterns
+            .as_ref()
+            .map(|found| spans_of(Some(nominal), found)),
+        cloud: patterns.into_iter().flatten().flatten().collect(),
+        sensitivities: sensitivities.unwrap_or_default(),
     }
 }

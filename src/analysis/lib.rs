@@ -9,62 +9,49 @@
 //! [`run_test`] is that chain; [`run_recording`] stops after the readings. Nothing here prints or
 //! writes.
 
+mod amplitude;
 mod analysis;
-mod between;
-mod close_ups;
-mod consistent;
-mod decays;
+mod between_recordings;
+mod checks;
 mod doubts;
-mod error;
-mod evidence;
 mod fits;
-mod force;
 mod frf;
-mod functions;
-mod gap;
 mod identification;
-mod loaded;
 mod measure;
-mod model;
 mod modes;
-mod neglect;
-mod numbering;
+mod noise;
 mod observations;
-mod perturbation;
-mod quiet;
+mod observed_mode;
 mod recordings;
-mod shapes;
-mod stage;
+mod structure;
 mod warning;
-mod wired;
 
 use std::path::Path;
 
 use rayon::prelude::*;
 
+pub use amplitude::AmplitudeChange;
+pub use analysis::PipelineError;
 pub use analysis::{
-    Analysis, BoundPerturbation, Conditions, Estimate, Identification, ModeResult, Overview,
-    Perturbation, RecordingResult, Response,
+    Analysis, BetweenRecordings, BoundPerturbation, CloseUp, Conditions, Estimate, EstimateMethod,
+    Identification, ModeResult, Overview, Perturbation, RecordingResult, Response,
 };
-pub use between::BetweenRecordings;
-pub use close_ups::CloseUp;
-pub use consistent::{
+pub use checks::together;
+pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
+pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
+pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
+pub use modes::{modes_of_measured, modes_of_recordings};
+pub use observations::observations;
+pub use observations::{diagnose_test, nominal, nominal_with};
+pub use recordings::{FunctionSettings, run_functions};
+pub use recordings::{Wiring, run_wired};
+pub use recordings::{inspect_bare, measure_bare, si_unit};
+pub use structure::{KnownJoint, TestedStructure, tested_structure};
+pub use structure::{
     StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
     structure_details,
 };
-pub use error::PipelineError;
-pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
-pub use functions::{FunctionSettings, run_functions};
-pub use gap::{diagnose_test, nominal, nominal_with};
-pub use identification::{EstimateMethod, IdentifySettings, identify};
-pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
-pub use model::{KnownJoint, TestedStructure, tested_structure};
-pub use modes::{modes_of_measured, modes_of_recordings};
-pub use observations::observations;
-pub use recordings::{inspect_bare, measure_bare, si_unit};
-pub use shapes::{SampledShape, sampled_shapes};
-pub use warning::{AmplitudeChange, Warning, together};
-pub use wired::{Wiring, run_wired};
+pub use warning::Warning;
 
 pub use tapjoint_description::described::fastened_masses;
 use tapjoint_description::{ChannelRef, TestDescription};
@@ -115,11 +102,11 @@ pub fn run_test(
             let known = (&structure, &details);
             let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
             warnings.extend(doubts);
-            warnings.extend(loaded::number_loaded(&mut recordings, &found, test, known));
+            warnings.extend(modes::number_loaded(&mut recordings, &found, test, known));
             found
         }
     };
-    warnings.extend(warning::of_amplitude(&recordings));
+    warnings.extend(checks::of_amplitude(&recordings));
     let settings = IdentifySettings {
         fit_modes: test.analysis.fit_modes.or(settings.fit_modes),
         details,
@@ -133,9 +120,9 @@ pub fn run_test(
         }
         _ => EstimateMethod::Pairs,
     };
-    warnings.extend(neglect::of_neglect(test, &structure, method));
+    warnings.extend(doubts::of_neglect(test, &structure, method));
     warnings.extend(doubts);
-    let (verdicts, doubts) = evidence::judge(&recordings);
+    let (verdicts, doubts) = checks::judge(&recordings);
     warnings.extend(doubts);
     Ok(Analysis {
         name: test.name.clone(),
@@ -159,5 +146,5 @@ pub fn run_recording(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    measure_bare(recording, hammer, adjust).map(wired::analysis_of)
+    measure_bare(recording, hammer, adjust).map(recordings::analysis_of)
 }

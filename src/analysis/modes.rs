@@ -1,15 +1,27 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
-use super::analysis::{ModeResult, RecordingResult};
-use super::between::{BetweenRecordings, between};
-use super::consistent::StructureDetails;
-use super::model::TestedStructure;
-use super::numbering::number_jointed;
+use super::analysis::{BetweenRecordings, ModeResult, RecordingResult};
+use super::between_recordings::between;
+use super::identification::measured_modes;
+use super::observed_mode::shape_of;
+use super::structure::{
+    NO_SPRING, StructureDetails, TestedStructure, estimator, fitted, frequencies_of, jointed,
+    masses_in,
+};
 use super::warning::Warning;
+use std::f64::consts::TAU;
+use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
-use tapjoint_description::{MeasuredFrequencies, TestDescription};
+use tapjoint_description::{
+    FitParameter, MeasuredFrequencies, RecordingDescription, TestDescription,
+};
+use tapjoint_identify::consistent::{FrequencyModel, Parameter};
 use tapjoint_identify::observation::UNPAIRED;
-use tapjoint_identify::{WeightedPeak, pair_by_ratio};
+use tapjoint_identify::pairing::{
+    MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, PeakStrength,
+    ShapeAt, is_plain,
+};
+use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::times;
 use tapjoint_signal::modal::{BandReadings, ModeReading, merge_modes};
 
@@ -258,7 +270,7 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
         FREE_BEAM_MODES,
     )
     .unwrap_or_default();
-    let numbers = pair_by_ratio(&peaks, &nominal, (FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE));
+    let numbers = pair_by_ratio(&peaks, &nominal, FREE_BEAM_RANGE, FREE_BEAM_TOLERANCE);
     if numbers.iter().any(Option::is_some) {
         let text = "none of the free beam's natural frequencies lies near them; another direction \
                     of bending, torsion, the supports or the room are the usual causes";
@@ -368,6 +380,311 @@ fn is_of_another(
     };
     let mut peaks = modes.iter().filter(unpaired).filter(apart);
     peaks.any(shows)
+}
+
+/// A reading of another recording is of the same peak within its half lines and this: what merges
+/// readings into one peak, and a little more.
+const SAME_PEAK: f64 = 0.005;
+
+/// Numbers the peaks of a jointed structure; in ascending order where nothing better can be had.
+pub(super) fn number_jointed(
+    modes: &mut [ModeResult],
+    known: (&TestedStructure, &StructureDetails),
+    recordings: &[&RecordingResult],
+) -> Vec<Warning> {
+    let free: Vec<usize> = (0..modes.len())
+        .filter(|&index| modes[index].label.is_none())
+        .collect();
+    let peaks: Vec<MeasuredPeak> = free
+        .iter()
+        .map(|&index| peak(index, modes, recordings))
+        .collect();
+    if fits_the_beam(known.1) {
+        // Beside an unknown beam the joint's bounds say nothing of a mode's number.
+        number_in_order(modes);
+        return Vec::new();
+    }
+    let jointed = jointed(known.0, known.1);
+    let found = pair_modes(&jointed, &peaks, &settings(known, recordings));
+    let Some(pairing) = found.ok().filter(|_| !peaks.is_empty()) else {
+        number_in_order(modes);
+        return Vec::new();
+    };
+    let numbers = &pairing.chosen.numbers;
+    let text = "with them no joint explains the peaks as well; torsion, another direction of \
+                bending, the fixture or the suspension are the usual causes"
+        .to_string();
+    let mut warnings = apply_numbers(modes, (&free, numbers), text);
+    warnings.extend(missing(&pairing.chosen.missing));
+    warnings.extend(ambiguous(&pairing, &peaks));
+    warnings
+}
+
+fn fits_the_beam(details: &StructureDetails) -> bool {
+    let beam = [FitParameter::Modulus, FitParameter::Density];
+    let fit = details.fit.as_deref().unwrap_or(&[]);
+    fit.iter().any(|parameter| beam.contains(parameter))
+}
+
+/// What is estimated and what is held, as the estimate has it.
+fn settings(
+    (structure, details): (&TestedStructure, &StructureDetails),
+    recordings: &[&RecordingResult],
+) -> PairingSettings {
+    let units = StiffnessUnits::of(&structure.beam);
+    let held = |known: Option<f64>, unit: f64| known.map(|value| value.max(NO_SPRING) * unit);
+    let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
+    let mut fit = fitted(structure, details);
+    fit.retain(|parameter| joint.contains(parameter));
+    let band = |recording: &&RecordingResult| looked_at(recording);
+    PairingSettings {
+        fit,
+        held: [
+            held(structure.known.kx, units.kt),
+            held(structure.known.ky, units.kr),
+            structure.known.cross_compliance.map(|c| units.ktr / c),
+        ],
+        bands: recordings.iter().filter_map(band).collect(),
+        ..PairingSettings::default()
+    }
+}
+
+fn peak(index: usize, modes: &[ModeResult], recordings: &[&RecordingResult]) -> MeasuredPeak {
+    let mode = &modes[index];
+    MeasuredPeak {
+        frequency: mode.frequency,
+        std: mode.std,
+        shape: recordings
+            .iter()
+            .enumerate()
+            .flat_map(|(index, recording)| shape(mode, recording, index))
+            .collect(),
+        strengths: recordings
+            .iter()
+            .map(|recording| strength(index, modes, recording))
+            .collect(),
+    }
+}
+
+/// How strongly one recording saw a peak; `None` where its reading nearest to the peak is another peak's.
+fn strength(
+    index: usize,
+    modes: &[ModeResult],
+    recording: &RecordingResult,
+) -> Option<PeakStrength> {
+    let reading = reading_of(&modes[index], recording)?;
+    let distance = |mode: &ModeResult| (mode.frequency - reading.frequency).abs();
+    let own = distance(&modes[index]);
+    if modes.iter().any(|other| distance(other) < own) {
+        return None;
+    }
+    Some(PeakStrength {
+        energy: energy(reading),
+        level_db: reading.prominence_db.and(reading.above_noise_db),
+    })
+}
+
+/// Energy of a fitted oscillation in all taps and sensors of its recording: the integral of
+/// (a e^{-zeta omega t})^2/2 is a^2/(4 zeta omega).
+fn energy(reading: &ModeReading) -> Option<f64> {
+    let mode = &reading.fit.as_deref()?.mode;
+    let squares: f64 = mode.amplitudes.iter().map(|a| a.value.norm_sqr()).sum();
+    let decay = TAU * mode.frequency.value * mode.damping_ratio.value;
+    (decay > 0.0 && squares > 0.0).then(|| squares / (4.0 * decay))
+}
+
+/// The peak's shape in one recording. Modal constants of all recordings share the hammer's unit; a
+/// shape without them has one of its own.
+fn shape(mode: &ModeResult, recording: &RecordingResult, index: usize) -> Vec<ShapeAt> {
+    let Some(reading) = reading_of(mode, recording) else {
+        return Vec::new();
+    };
+    let (shape, constant) = shape_of(reading, recording);
+    let tap = recording.conditions.tap.filter(|_| constant.is_some());
+    let unit = constant.filter(|_| tap.is_some()).map_or(1.0, |c| c.value);
+    let at = |value: &tapjoint_identify::observation::ShapeValue| {
+        let name = &recording.responses.get(value.sensor)?.name;
+        Some(ShapeAt {
+            sensor: *recording.conditions.sensor_positions.get(name)?,
+            tap,
+            value: value.value * unit,
+            // The reference's own noise is in the constant.
+            std: value
+                .std
+                .max(constant.map_or(0.0, |c| c.std / c.value.abs()))
+                * unit.abs(),
+            group: if tap.is_some() { 0 } else { index + 1 },
+        })
+    };
+    shape.iter().filter_map(at).collect()
+}
+
+/// The recording's own reading of a peak.
+fn reading_of<'a>(mode: &ModeResult, recording: &'a RecordingResult) -> Option<&'a ModeReading> {
+    let readings = &recording.measurement.spectra.as_ref()?.readings;
+    let distance = |reading: &&ModeReading| (reading.frequency - mode.frequency).abs();
+    let near = |reading: &&ModeReading| {
+        let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
+        reading.label.is_none() && distance(reading) <= half_lines + SAME_PEAK * mode.frequency
+    };
+    readings
+        .iter()
+        .filter(near)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+fn missing(modes: &[MissingMode]) -> Option<Warning> {
+    if modes.is_empty() {
+        return None;
+    }
+    let one = |missing: &MissingMode| {
+        let why = match missing.cause {
+            MissingCause::OutsideBand => "outside the measured band",
+            MissingCause::AtNode => "near a node of its shape at every sensor or tap",
+            MissingCause::Unknown => "within the band",
+        };
+        format!(
+            "mode {} (about {:.1} Hz, {why})",
+            missing.mode, missing.frequency
+        )
+    };
+    let list: Vec<String> = modes.iter().map(one).collect();
+    Some(Warning::Estimate {
+        code: "missing-mode",
+        text: format!(
+            "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
+             and measure elsewhere, or from a lower frequency on, to see it",
+            list.join(", ")
+        ),
+    })
+}
+
+/// Other numberings that explain the peaks comparably.
+fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
+    let other = pairing.others.first()?;
+    let chosen = &pairing.chosen;
+    let kept = if is_plain(&chosen.numbers) {
+        "kept in ascending order"
+    } else {
+        "taken as the most probable"
+    };
+    Some(Warning::Estimate {
+        code: "ambiguous-pairing",
+        text: format!(
+            "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
+             ({}); another sensor or tap position, or more modes, would decide",
+            words(chosen, peaks),
+            words(other, peaks),
+            compared(chosen.odds / other.odds),
+        ),
+    })
+}
+
+/// How probable the other is beside the chosen, from the ratio of the two.
+fn compared(times: f64) -> String {
+    if (0.95..1.05).contains(&times) {
+        "as probable".to_owned()
+    } else if times >= 1.0 {
+        format!("{times:.1} times as probable")
+    } else {
+        format!("{:.1} times less probable", 1.0 / times)
+    }
+}
+
+/// "1: 17.00 Hz, 3: 335.6 Hz, none: 50.00 Hz".
+fn words(numbering: &Numbering, peaks: &[MeasuredPeak]) -> String {
+    let one = |(number, peak): (&Option<usize>, &MeasuredPeak)| {
+        let number = number.map_or("none".to_string(), |number| number.to_string());
+        format!("{number}: {:.2} Hz", peak.frequency)
+    };
+    let list: Vec<String> = numbering.numbers.iter().zip(peaks).map(one).collect();
+    format!("({})", list.join(", "))
+}
+
+/// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
+/// which these masses take the reference configuration's modes. Where that is not known they lose the numbers
+/// that their neighbours of the reference gave them: a heavy mass takes a mode to another's place.
+pub(super) fn number_loaded(
+    recordings: &mut [RecordingResult],
+    modes: &[ModeResult],
+    test: &TestDescription,
+    known: (&TestedStructure, &StructureDetails),
+) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let first = test.recordings.first().map(|recording| &recording.masses);
+    for (recording, described) in recordings.iter_mut().zip(&test.recordings) {
+        if Some(&described.masses) == first {
+            continue;
+        }
+        match moved(modes, (test, described), known) {
+            Some(moved) => recording.mode_numbers = own_numbers(&moved, &own_readings(recording)),
+            None => {
+                recording.mode_numbers.fill(None);
+                warnings.push(unnumbered(&recording.file));
+            }
+        }
+    }
+    warnings
+}
+
+fn unnumbered(file: &str) -> Warning {
+    Warning::Recording {
+        code: "unnumbered",
+        file: file.to_owned(),
+        text: "its peaks have no mode numbers: the first recording gives no estimate of the joint, so that it is \
+               not known where the masses fastened here take the modes; read more modes in the first recording, \
+               or state kt and kr in [joint]"
+            .to_owned(),
+    }
+}
+
+/// The modes at the frequencies of another recording: the ratio that the masses on the beam make. `None` where
+/// nothing tells of the joint.
+fn moved(
+    modes: &[ModeResult],
+    (test, recording): (&TestDescription, &RecordingDescription),
+    (structure, details): (&TestedStructure, &StructureDetails),
+) -> Option<Vec<ModeResult>> {
+    let other = StructureDetails {
+        masses: masses_in(test, Some(recording)),
+        ..details.clone()
+    };
+    let [before, after] = frequencies(modes, structure, [details, &other])?;
+    let moved = |one: &ModeResult| {
+        let place = one.mode.and_then(|mode| mode.checked_sub(1));
+        let both = place.and_then(|place| before.get(place).zip(after.get(place)));
+        ModeResult {
+            frequency: both.map_or(1.0, |(before, after)| after / before) * one.frequency,
+            ..one.clone()
+        }
+    };
+    Some(modes.iter().map(moved).collect())
+}
+
+/// Frequencies (Hz) of the structure without and with the other masses, on the joint that the reference's
+/// frequencies have, else on the described one.
+fn frequencies(
+    modes: &[ModeResult],
+    structure: &TestedStructure,
+    both: [&StructureDetails; 2],
+) -> Option<[Vec<f64>; 2]> {
+    // Only the weights depend on the floor, and of these the numbering does not.
+    let measured = measured_modes(modes, FREQUENCY_FLOOR);
+    let count = measured.last()?.mode;
+    let found = estimator(structure, both[0], &measured).map(|estimator| estimator.fit());
+    let of = |details: &StructureDetails| {
+        let there = jointed(structure, details);
+        let Ok(found) = &found else {
+            // Of a joint that is known nothing is left to estimate.
+            let joint = structure.known.over(None)?;
+            return frequencies_of(&there, &joint, count).ok();
+        };
+        let model = FrequencyModel::new(&there, count).ok()?;
+        let frequency = |mode| model.response(&found.point, mode, mode as f64).frequency;
+        Some((1..=count).map(frequency).collect())
+    };
+    let [before, after] = both.map(of);
+    Some([before?, after?])
 }
 
 #[cfg(test)]

@@ -1,22 +1,10 @@
 //! Doubts about a result: what happened, why it might be, what helps.
 
+use super::amplitude::AmplitudeChange;
 use std::fmt;
-
-mod amplitude;
-mod estimate;
-mod groups;
-
-pub use amplitude::AmplitudeChange;
-pub(super) use amplitude::of_amplitude;
-pub(super) use groups::of_quality;
-pub use groups::together;
-
-use super::analysis::RecordingResult;
-use super::measure::MeasuredSpectra;
+use tapjoint_numerics::stats::times;
 use tapjoint_signal::modal::PeakLabel;
-use tapjoint_signal::recording::Recording;
-use tapjoint_signal::spectral::{DecayCheck, RUNG_DOWN, SpectralError, Window};
-use tapjoint_signal::taps::{TapSource, Taps};
+use tapjoint_signal::spectral::{SpectralError, Window};
 
 /// A warning that travels with the result.
 #[derive(Debug, Clone, PartialEq)]
@@ -248,7 +236,7 @@ impl fmt::Display for Warning {
                 file,
                 changes,
                 others,
-            } => amplitude::write_dependence(f, (file, changes), others),
+            } => super::amplitude::write_dependence(f, (file, changes), others),
             Warning::Misfit { .. }
             | Warning::Closure { .. }
             | Warning::CouplingNotEstablished
@@ -300,89 +288,59 @@ fn write_not_rung_down(
     }
 }
 
-/// Doubts about a recording and its taps.
-pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
-    let file = recording.name().to_string();
-    let mut warnings: Vec<Warning> = recording
-        .warnings()
-        .iter()
-        .map(|warning| Warning::Recording {
-            code: warning.code(),
-            file: file.clone(),
-            text: warning.to_string(),
-        })
-        .collect();
-    warnings.extend(taps.remarks.iter().map(|remark| Warning::Recording {
-        code: "taps",
-        file: file.clone(),
-        text: remark.to_string(),
-    }));
-    let accepted = taps.accepted().count();
-    let rejected = taps.taps.len() - accepted;
-    if rejected > 0 {
-        warnings.push(Warning::RejectedTaps {
-            file: file.clone(),
-            rejected,
-            total: taps.taps.len(),
-        });
-    }
-    if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
-        warnings.push(Warning::SingleTap { file });
-    }
-    warnings
-}
-
-/// A channel that is taken for a response, though its name says that it is the hammer's.
-pub(super) fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
-    let is_hammers = |name: &str| {
-        let name = name.to_lowercase();
-        name.contains("hammer") || name.contains("force")
-    };
-    let mut names = recording.responses.iter().map(|response| &response.name);
-    let name = names.find(|name| is_hammers(name))?;
-    let argument = match name.contains(char::is_whitespace) {
-        true => format!("\"{name}\""),
-        false => name.clone(),
-    };
-    Some(Warning::Recording {
-        code: "hammer-channel",
-        file: recording.file.clone(),
-        text: format!(
-            "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
-             say --hammer {argument}: taps are then judged by their force, and there are frequency \
-             response functions"
-        ),
-    })
-}
-
-/// Doubts about a recording's spectra.
-pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    let rings = |decay: &DecayCheck| decay.remaining > RUNG_DOWN && decay.remaining > decay.noise;
-    if let Some(decay) = spectra.decay.filter(rings) {
-        warnings.push(Warning::NotRungDown {
-            file: file.to_string(),
-            remaining: decay.remaining,
-            window: spectra.window,
-            others: Vec::new(),
-        });
-    }
-    if spectra.window == Window::Hann {
-        warnings.push(Warning::HannOnTaps {
-            file: file.to_string(),
-        });
-    }
-    for reading in &spectra.readings {
-        if let Some(label @ PeakLabel::Mains(_)) = reading.label {
-            warnings.push(Warning::Mains {
-                file: file.to_string(),
-                frequency: reading.line_frequency,
-                label,
-                others: Vec::new(),
-            });
+impl Warning {
+    pub(super) fn write_estimate_doubt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Warning::Misfit {
+                mode,
+                error_percent,
+                deviations,
+            } => write_misfit(f, *mode, *error_percent, *deviations),
+            Warning::Closure { closure } => write!(
+                f,
+                "the pair regression does not satisfy its own frequency equation: the product it \
+                 implies differs from the product of its estimates by {:+.0} %; the eliminated product \
+                 is left free by the method, and an error of this size means that the stiffnesses are \
+                 not to be trusted singly",
+                100.0 * closure
+            ),
+            Warning::CouplingNotEstablished => f.write_str(
+                "the interval of the cross coupling contains zero: these frequencies do not show one, \
+                 and Kz has no interval; the two-parameter model may do",
+            ),
+            Warning::UnphysicalEstimate { what } => write!(
+                f,
+                "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
+                 mode, a wrong model or readings too coarse for it are the usual causes"
+            ),
+            _ => f.write_str(
+                "no peak lies near a natural frequency of the described free beam, so the peaks were \
+                 numbered in ascending order; check the beam's dimensions and modulus",
+            ),
         }
     }
-    warnings
+}
+
+fn write_misfit(
+    f: &mut fmt::Formatter<'_>,
+    mode: usize,
+    error_percent: f64,
+    deviations: Option<f64>,
+) -> fmt::Result {
+    write!(
+        f,
+        "with the estimated joint the model misses mode {mode} by {error_percent:+.2} %"
+    )?;
+    if let Some(deviations) = deviations {
+        write!(
+            f,
+            " ({} standard deviations of its frequency)",
+            times(deviations)
+        )?;
+    }
+    f.write_str(
+        "; the estimator, a mode numbered wrongly, or something the model lacks may be the cause",
+    )
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ pub const SHEAR_COEFFICIENT: f64 = 5.0 / 6.0;
 pub const DEFAULT_POISSON: f64 = 0.3;
 
 /// Which deformations and inertias the beam's equation of motion knows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum BeamTheory {
     /// Bending and translational inertia only, as in Ingole & Chatterjee.
     Euler,

@@ -1,9 +1,12 @@
 //! The joint: two or three springs, from none at all to rigid.
 
 use super::{Beam, StructureError};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// Kind of jointed structure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Assembly {
     /// A beam held at one end by the joint.
     Cantilever,

@@ -3,7 +3,7 @@
 use super::arguments::RecordingArguments;
 use anyhow::bail;
 use std::path::Path;
-use tapjoint::description::{ReadingMethod, WindowKind};
+use tapjoint::description::{ReadBy, WindowKind};
 use tapjoint::pipeline::{Analysis, FunctionSettings, run_functions, run_recording};
 use tapjoint::recording::{RecordingError, ResponseError, UffError, open_frequency_responses};
 
@@ -13,7 +13,7 @@ pub(super) struct BareSettings {
     pub(super) block: Option<usize>,
     pub(super) band: Option<(f64, f64)>,
     pub(super) window: Option<WindowKind>,
-    pub(super) reading: ReadingMethod,
+    pub(super) reading: ReadBy,
 }
 
 /// Analyses a recording; a file that holds frequency response functions instead is read as such.

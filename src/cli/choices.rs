@@ -1,7 +1,7 @@
 //! Choices that the command line names, and what they stand for in the library.
 
 use clap::ValueEnum;
-use tapjoint::description::{JointKind, ReadingMethod, SensorKind, WindowKind};
+use tapjoint::description::{JointKind, ReadBy, SensorKind, WindowKind};
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
 use tapjoint::recording::ResponseForm;
 use tapjoint::spectral::FrfEstimator;
@@ -127,7 +127,7 @@ pub(super) enum ReadingArgument {
     Line,
 }
 
-impl From<ReadingArgument> for ReadingMethod {
+impl From<ReadingArgument> for ReadBy {
     fn from(reading: ReadingArgument) -> Self {
         match reading {
             ReadingArgument::Fit => Self::Fit,

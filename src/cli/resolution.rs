@@ -11,7 +11,7 @@ use anyhow::anyhow;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::description::{ReadingMethod, WindowKind};
+use tapjoint::description::{ReadBy, WindowKind};
 use tapjoint::pipeline::{IdentifySettings, TestedStructure, tested_structure};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::report::{
@@ -152,11 +152,11 @@ fn settings(arguments: &ResolutionArguments, seed: u64) -> ResolutionSettings {
     blocks.dedup();
     let windows = arguments.windows.iter();
     let windows: Vec<WindowName> = windows.map(|&w| WindowKind::from(w).into()).collect();
-    let asked = |name: &ReadingMethod| {
+    let asked = |name: &ReadBy| {
         let mut readings = arguments.readings.iter();
-        readings.any(|&reading| ReadingMethod::from(reading) == *name)
+        readings.any(|&reading| ReadBy::from(reading) == *name)
     };
-    let readings: Vec<ReadingMethod> = ReadingMethod::ALL.into_iter().filter(asked).collect();
+    let readings: Vec<ReadBy> = ReadBy::ALL.into_iter().filter(asked).collect();
     let or = |own: Vec<usize>, usual: Vec<usize>| if own.is_empty() { usual } else { own };
     ResolutionSettings {
         blocks: or(blocks, default.blocks),

@@ -5,18 +5,18 @@
 use super::error::{DescriptionError, DescriptionProblem, number, with_unit};
 use super::reader::{Entry, Table};
 use super::{JointDescription, JointKind, JointModel};
-use serde::Serialize;
 use std::ops::{Bound, RangeBounds};
+use tapjoint_signal::modal::ReadBy;
 
 const WINDOWS: [(&str, WindowKind); 3] = [
     ("rectangular", WindowKind::Rectangular),
     ("hann", WindowKind::Hann),
     ("exponential", WindowKind::Exponential),
 ];
-const READINGS: [(&str, ReadingMethod); 3] = [
-    ("fit", ReadingMethod::Fit),
-    ("interpolated", ReadingMethod::Interpolated),
-    ("line", ReadingMethod::Line),
+const READINGS: [(&str, ReadBy); 3] = [
+    ("fit", ReadBy::Fit),
+    ("interpolated", ReadBy::Interpolated),
+    ("line", ReadBy::Line),
 ];
 const WEIGHTS: [(&str, Weights); 2] = [
     ("measured", Weights::Measured),
@@ -40,34 +40,6 @@ pub enum WindowKind {
     Hann,
     /// e^{-at} on force and response alike.
     Exponential,
-}
-
-/// How natural frequencies are read from a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ReadingMethod {
-    /// By a fit of decaying oscillations, with a standard deviation; what cannot be fitted is read
-    /// between the lines or on its line.
-    #[default]
-    Fit,
-    /// Between the lines about the peak; what cannot be had so, on its line.
-    Interpolated,
-    /// On the highest spectral line, as Ingole & Chatterjee read theirs.
-    Line,
-}
-
-impl ReadingMethod {
-    /// All methods, from the coarsest to the finest.
-    pub const ALL: [Self; 3] = [Self::Line, Self::Interpolated, Self::Fit];
-
-    /// Name in descriptions and reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Line => "line",
-            Self::Interpolated => "interpolated",
-            Self::Fit => "fit",
-        }
-    }
 }
 
 /// Weights of the frequencies in an estimate.
@@ -100,7 +72,7 @@ pub struct AnalysisDescription {
     /// Window; `None` = chosen from the decay in the record.
     pub window: Option<WindowKind>,
     /// How natural frequencies are read.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// The first so many modes enter the estimate; `None` = all.
     pub fit_modes: Option<usize>,
     /// Weights of the frequencies; `None` = measured where bounds are known.
@@ -118,7 +90,7 @@ pub(super) fn read_analysis(
 ) -> Result<AnalysisDescription, DescriptionError> {
     let mut analysis = AnalysisDescription {
         window: None,
-        reading: ReadingMethod::default(),
+        reading: ReadBy::default(),
         fit_modes: None,
         weights: None,
         sensor_mass: true,

@@ -14,10 +14,13 @@ mod sensors;
 mod structure;
 mod template;
 
-pub use analysis::{AnalysisDescription, FitParameter, ReadingMethod, Weights, WindowKind};
+pub use analysis::{AnalysisDescription, FitParameter, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
 pub use keys::ChannelRefError;
+use schemars::JsonSchema;
+use serde::Serialize;
 pub use tapjoint_beam::BeamTheory;
+pub use tapjoint_signal::modal::ReadBy;
 pub use template::{runnable_template, template, template_of};
 
 use std::collections::BTreeMap;
@@ -105,11 +108,13 @@ pub enum JointKind {
 }
 
 /// How many stiffnesses describe the joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub enum JointModel {
     /// Translation and rotation.
+    #[serde(rename = "2p")]
     TwoParameter,
     /// Translation, rotation and their coupling.
+    #[serde(rename = "3p")]
     ThreeParameter,
 }
 

@@ -34,19 +34,28 @@ pub struct ModelComparison {
     pub candidates: Vec<Candidate>,
 }
 
+/// Observations of a test, the described structure, and the settings.
+#[derive(Clone, Copy)]
+pub struct Test<'a> {
+    /// The observations.
+    pub observations: &'a Observations,
+    /// The described structure.
+    pub nominal: &'a Nominal,
+    /// Settings of the diagnosis.
+    pub settings: &'a GapSettings,
+}
+
 /// Fits all hypotheses.
 ///
 /// # Errors
 /// [`GapError::NoFit`] where the nominal model has no fit.
-pub fn compare(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Result<ModelComparison, GapError> {
-    let all: Vec<ModelComparison> = with_locations(observations, nominal, settings)
-        .iter()
-        .filter_map(|located| compare_singles(located, nominal, settings))
-        .collect();
+pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
+    let located = with_locations(test);
+    let located = located.iter().map(|observations| Test {
+        observations,
+        ..test
+    });
+    let all: Vec<ModelComparison> = located.filter_map(compare_singles).collect();
     let mut comparison = over_locations(all).ok_or(GapError::NoFit)?;
     set_probabilities(&mut comparison.candidates, 0);
     add_pairs(&comparison.dataset, &mut comparison.candidates);
@@ -68,20 +77,17 @@ fn with_sensors(observations: &Observations, nominal: &Nominal) -> Observations 
 
 /// Returns the observations with every unknown position of a sensor filled in: once each for a row of positions along
 /// the structure.
-fn with_locations(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Vec<Observations> {
-    let filled = with_sensors(observations, nominal);
+fn with_locations(test: Test<'_>) -> Vec<Observations> {
+    let (nominal, count) = (test.nominal, test.settings.unknown_positions);
+    let filled = with_sensors(test.observations, nominal);
     // A sensor without a position and without a mass has no effect.
     let mut sensors = filled.configurations.iter().flat_map(|c| &c.sensors);
     if !sensors.any(|s| s.position.is_none() && nominal.mass_of(&s.name) > 0.0) {
         return vec![filled];
     }
     let mut all = Vec::new();
-    for k in 0..settings.unknown_positions {
-        let position = nominal.length() * (k as f64 + 0.5) / settings.unknown_positions as f64;
+    for k in 0..count {
+        let position = nominal.length() * (k as f64 + 0.5) / count as f64;
         let mut located = filled.clone();
         for configuration in &mut located.configurations {
             for sensor in &mut configuration.sensors {
@@ -136,28 +142,23 @@ fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
 }
 
 /// Returns the least chi square of the nominal model over the unknown positions of sensors.
-pub fn least_nominal_chi_square(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Option<f64> {
-    with_locations(observations, nominal, settings)
-        .iter()
-        .filter_map(|located| Some(prepared(located, nominal, settings)?.1))
-        .map(|none| 2.0 * none.best.optimum.objective)
+pub fn least_nominal_chi_square(test: Test<'_>) -> Option<f64> {
+    let located = with_locations(test);
+    let located = located.iter().map(|observations| Test {
+        observations,
+        ..test
+    });
+    let fits = located.filter_map(|test| Some(prepared(test)?.1));
+    fits.map(|none| 2.0 * none.best.optimum.objective)
         .min_by(f64::total_cmp)
 }
 
 /// Returns the data, with amplitudes and slopes by the nominal model, and the fit of that model.
-fn prepared(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Option<(Dataset, Fit)> {
-    let mut dataset = Dataset::new(observations, nominal, settings);
+fn prepared(test: Test<'_>) -> Option<(Dataset, Fit)> {
+    let mut dataset = Dataset::new(test.observations, test.nominal, test.settings);
     let first = fit_nominal(&dataset)?;
     set_levels(&mut dataset, &first);
-    set_joint_motions(&mut dataset, observations, &first);
+    set_joint_motions(&mut dataset, test.observations, &first);
     set_shear_slopes(&mut dataset, &first)?;
     dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);
     let none = fit_nominal(&dataset)?;
@@ -181,12 +182,8 @@ pub fn set_shear_slopes(dataset: &mut Dataset, nominal: &Fit) -> Option<()> {
 }
 
 /// Fits all hypotheses but pairs of effects.
-fn compare_singles(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Option<ModelComparison> {
-    let (dataset, none) = prepared(observations, nominal, settings)?;
+fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
+    let (dataset, none) = prepared(test)?;
     let effects = candidate_effects(&dataset.nominal, &dataset.arrangements);
     let search = Search {
         dataset: &dataset,
@@ -373,13 +370,9 @@ fn fit_drift(dataset: &Dataset, nominal: &Fit) -> Option<(Fit, f64)> {
 }
 
 /// Fits the nominal model without the masses that have no position in any recording; `None` where there are none.
-pub fn without_unlocated(
-    observations: &Observations,
-    nominal: &Nominal,
-    settings: &GapSettings,
-) -> Option<UnlocatedSensors> {
-    let observations = with_sensors(observations, nominal);
-    let mut without = nominal.clone();
+pub fn without_unlocated(test: Test<'_>) -> Option<UnlocatedSensors> {
+    let observations = with_sensors(test.observations, test.nominal);
+    let mut without = test.nominal.clone();
     let (mut sensors, mut mass) = (Vec::new(), 0.0);
     for sensor in &mut without.sensors {
         let observed = observations.configurations.iter().flat_map(|c| &c.sensors);
@@ -398,7 +391,11 @@ pub fn without_unlocated(
     if sensors.is_empty() {
         return None;
     }
-    let (dataset, fit) = prepared(&observations, &without, settings)?;
+    let (dataset, fit) = prepared(Test {
+        observations: &observations,
+        nominal: &without,
+        ..test
+    })?;
     let residuals = Residuals::new(&dataset, &fit)?;
     Some(UnlocatedSensors {
         sensors,

@@ -149,7 +149,7 @@ fn moved_optimum(data: &[Datum], layout: &Layout, priors: &[Prior], at: &Optimum
 }
 
 /// Returns the parameters without the last effect, and that effect with a size and a location.
-fn start_with(without: &Fit, layout: &Layout, size: f64, location: Option<f64>) -> Vec<f64> {
+pub fn start_with(without: &Fit, layout: &Layout, size: f64, location: Option<f64>) -> Vec<f64> {
     let at = layout.last_size();
     let mut start = without.parameters().to_vec();
     start.insert(at, size);
@@ -157,17 +157,6 @@ fn start_with(without: &Fit, layout: &Layout, size: f64, location: Option<f64>) 
         start.insert(at + 1, location);
     }
     start
-}
-
-/// Fits a hypothesis with its last effect at a size, from the optimum without it.
-pub fn evaluate_at_size(
-    forward: &Forward<'_>,
-    without: &Fit,
-    priors: &[Prior],
-    size: f64,
-) -> Option<LocalOptimum> {
-    let start = start_with(without, &forward.layout, size, None);
-    evaluate(forward, priors, &start)
 }
 
 /// Returns the optimum of the model linearised where the last effect is next to nothing, beside a fit without it.

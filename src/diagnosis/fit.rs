@@ -3,8 +3,8 @@
 use crate::amplitude::best_law;
 use crate::dataset::Dataset;
 use crate::evidence::{
-    Fit, LocalOptimum, evaluate, evaluate_at_size, linear_fit, linear_optimum, log_likelihood,
-    log_mean, log_sum, over_drifts, profile_correction,
+    Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean, log_sum,
+    over_drifts, profile_correction, start_with,
 };
 use crate::fixture::{peak_locations, with_peaks};
 use crate::forward::Forward;
@@ -126,7 +126,8 @@ impl<'a> Search<'a> {
         let (size, priors) = (forward.layout.last_size(), forward.priors());
         let mut found: Vec<LocalOptimum> = Vec::new();
         for value in self.sizes(forward) {
-            if let Some(one) = evaluate_at_size(forward, self.without, &priors, value) {
+            let start = start_with(self.without, &forward.layout, value, None);
+            if let Some(one) = evaluate(forward, &priors, &start) {
                 keep(&mut found, one, &[size]);
             }
         }

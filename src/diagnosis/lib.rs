@@ -78,9 +78,8 @@ pub fn nominal_chi_square(
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<f64, GapError> {
-    settings.check()?;
-    observations::check(observations, nominal)?;
-    compare::least_nominal_chi_square(observations, nominal, settings).ok_or(GapError::NoFit)
+    let test = checked(observations, nominal, settings)?;
+    compare::least_nominal_chi_square(test).ok_or(GapError::NoFit)
 }
 
 /// Diagnoses the observations of a test against the described structure.
@@ -93,10 +92,24 @@ pub fn diagnose(
     nominal: &Nominal,
     settings: &GapSettings,
 ) -> Result<Diagnosis, GapError> {
+    let test = checked(observations, nominal, settings)?;
+    let mut comparison = compare::compare(test)?;
+    posterior::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
+    let unlocated = compare::without_unlocated(test);
+    Ok(summary::diagnosis(&comparison, unlocated))
+}
+
+/// Returns the test if it can be diagnosed.
+fn checked<'a>(
+    observations: &'a Observations,
+    nominal: &'a Nominal,
+    settings: &'a GapSettings,
+) -> Result<compare::Test<'a>, GapError> {
     settings.check()?;
     observations::check(observations, nominal)?;
-    let mut comparison = compare::compare(observations, nominal, settings)?;
-    posterior::calibrate_by_p_value(&comparison.dataset, &mut comparison.candidates);
-    let unlocated = compare::without_unlocated(observations, nominal, settings);
-    Ok(summary::diagnosis(&comparison, unlocated))
+    Ok(compare::Test {
+        observations,
+        nominal,
+        settings,
+    })
 }

@@ -64,6 +64,22 @@ impl PairsModel {
         self.unknowns() + 1
     }
 
+    fn undetermined(self, rank: usize) -> IdentifyError {
+        IdentifyError::Undetermined {
+            model: self.words(),
+            unknowns: self.unknowns(),
+            rank,
+            remedy: match self {
+                Self::Lap => {
+                    "it needs a symmetric mode, which sees ky, and an antisymmetric one, which sees kx"
+                }
+                _ => {
+                    "add modes, or leave out those that coincide or sit on a clamped beam's frequency"
+                }
+            },
+        }
+    }
+
     fn body(self) -> JointedBody {
         match self {
             Self::TwoParameter | Self::ThreeParameter => JointedBody::Rooted(Slenderness::EULER),
@@ -108,11 +124,10 @@ pub struct ModeLambda {
 impl ModeLambda {
     /// Modes 1, 2, ... of a list of lambdas (1).
     pub fn numbered(lambdas: &[f64]) -> Vec<Self> {
-        let numbered = |(index, &lambda)| Self {
-            mode: index + 1,
-            lambda,
-        };
-        lambdas.iter().enumerate().map(numbered).collect()
+        let numbered = (1..).zip(lambdas);
+        numbered
+            .map(|(mode, &lambda)| Self { mode, lambda })
+            .collect()
     }
 }
 
@@ -204,18 +219,21 @@ pub fn estimate_pairs(
         });
     }
     for &ModeLambda { mode, lambda } in modes {
-        if !(lambda > 0.0 && lambda.is_finite()) {
-            return Err(IdentifyError::Frequency {
-                mode,
-                value: lambda,
-            });
-        }
+        check_frequency(mode, lambda)?;
     }
     let equations: Vec<Equation> = modes.iter().map(|m| model.equation(m.lambda)).collect();
     let solution = solve(model, &equations)?;
     let mut estimate = interpret(model, &solution);
     estimate.modes = modes.iter().map(|mode| mode.mode).collect();
     Ok(estimate)
+}
+
+fn check_frequency(mode: usize, value: f64) -> Result<(), IdentifyError> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(IdentifyError::Frequency { mode, value })
+    }
 }
 
 struct Solution {
@@ -227,17 +245,6 @@ struct Solution {
 /// Least squares of the equations less their mean, by singular values.
 fn solve(model: PairsModel, equations: &[Equation]) -> Result<Solution, IdentifyError> {
     let (rows, columns) = (equations.len(), model.unknowns());
-    let undetermined = |rank: usize| IdentifyError::Undetermined {
-        model: model.words(),
-        unknowns: columns,
-        rank,
-        remedy: match model {
-            PairsModel::Lap => {
-                "it needs a symmetric mode, which sees ky, and an antisymmetric one, which sees kx"
-            }
-            _ => "add modes, or leave out those that coincide or sit on a clamped beam's frequency",
-        },
-    };
     let mut matrix = DMatrix::from_fn(rows, columns, |row, column| {
         equations[row].coefficients[column]
     });
@@ -247,7 +254,7 @@ fn solve(model: PairsModel, equations: &[Equation]) -> Result<Solution, Identify
     let scales: Vec<f64> = matrix.column_iter().map(|column| column.amax()).collect();
     let finite = matrix.iter().chain(right.iter()).all(|x| x.is_finite());
     if !finite || scales.contains(&0.0) {
-        return Err(undetermined(0));
+        return Err(model.undetermined(0));
     }
     for (mut column, scale) in matrix.column_iter_mut().zip(&scales) {
         column /= *scale;
@@ -259,22 +266,26 @@ fn solve(model: PairsModel, equations: &[Equation]) -> Result<Solution, Identify
     }
     right.add_scalar_mut(-right_mean);
     // The iteration limit guards against a decomposition that never settles.
-    let svd = SVD::try_new(matrix, true, true, f64::EPSILON, 1000).ok_or(undetermined(0))?;
+    let svd = SVD::try_new(matrix, true, true, f64::EPSILON, 1000).ok_or(model.undetermined(0))?;
     let largest = svd.singular_values.max();
     let threshold = RANK_THRESHOLD * largest;
     let rank = svd.rank(threshold);
     if rank < columns {
-        return Err(undetermined(rank));
+        return Err(model.undetermined(rank));
     }
     let scaled = svd
         .solve(&right, threshold)
-        .map_err(|_| undetermined(rank))?;
+        .map_err(|_| model.undetermined(rank))?;
     let explained: f64 = scaled.iter().zip(&means).map(|(x, mean)| x * mean).sum();
     Ok(Solution {
         unknowns: DVector::from_fn(columns, |row, _| scaled[row] / scales[row]),
         product: right_mean - explained,
         condition: largest / svd.singular_values.min(),
     })
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
 }
 
 /// Stiffnesses, closure and doubts of a solution.
@@ -290,7 +301,6 @@ fn interpret(model: PairsModel, solution: &Solution) -> PairsEstimate {
             (1.0 / a, 1.0 / b, Some(1.0 / c), a * b - c * c)
         }
     };
-    let finite = |value: f64| value.is_finite().then_some(value);
     let mut doubts = Vec::new();
     for (parameter, value) in [("kx", Some(kx)), ("ky", Some(ky)), ("kz", kz)] {
         match value {
@@ -342,18 +352,13 @@ pub struct SingleModeStiffness {
 pub fn single_mode_stiffness(
     modes: &[ModeLambda],
 ) -> Result<Vec<SingleModeStiffness>, IdentifyError> {
-    let single = |&ModeLambda { mode, lambda }: &ModeLambda| {
-        if !(lambda > 0.0 && lambda.is_finite()) {
-            return Err(IdentifyError::Frequency {
-                mode,
-                value: lambda,
-            });
-        }
+    let modes = modes.iter().map(|&ModeLambda { mode, lambda }| {
+        check_frequency(mode, lambda)?;
         let Coefficients { p, x, y, .. } = PairsModel::Lap.body().coefficients(lambda);
         let [kx, ky] = [-p / x, -p / y].map(|k| (k > 0.0 && k.is_finite()).then_some(k));
         Ok(SingleModeStiffness { mode, kx, ky })
-    };
-    modes.iter().map(single).collect()
+    });
+    modes.collect()
 }
 
 // What speaks against an estimate that exists: warnings that travel with it.
@@ -477,12 +482,11 @@ impl Uncertain {
 
     /// In another unit, `factor` (positive) times the number.
     pub fn scaled(&self, factor: f64) -> Self {
-        let scale = |part: Option<f64>| part.map(|part| factor * part);
         Self {
             value: factor * self.value,
-            std: scale(self.std),
-            low: scale(self.low),
-            high: scale(self.high),
+            std: self.std.map(|std| factor * std),
+            low: self.low.map(|low| factor * low),
+            high: self.high.map(|high| factor * high),
         }
     }
 }
@@ -583,11 +587,13 @@ fn lambdas_of(
     numbers: impl Iterator<Item = usize>,
     frequencies: &[f64],
 ) -> Vec<ModeLambda> {
-    let lambda = |(mode, &frequency): (usize, &f64)| ModeLambda {
-        mode,
-        lambda: beam.lambda_of(frequency),
-    };
-    numbers.zip(frequencies).map(lambda).collect()
+    let modes = numbers.zip(frequencies);
+    modes
+        .map(|(mode, &frequency)| ModeLambda {
+            mode,
+            lambda: beam.lambda_of(frequency),
+        })
+        .collect()
 }
 
 /// The regression as a function of the frequencies.
@@ -605,15 +611,8 @@ impl<'a> Regression<'a> {
         beam: &'a Beam,
         modes: &'a [MeasuredMode],
     ) -> Result<Self, IdentifyError> {
-        let unusable = |mode: &&MeasuredMode| {
-            let frequency = mode.frequency;
-            !(frequency > 0.0 && frequency.is_finite())
-        };
-        if let Some(mode) = modes.iter().find(unusable) {
-            return Err(IdentifyError::Frequency {
-                mode: mode.mode,
-                value: mode.frequency,
-            });
+        for mode in modes {
+            check_frequency(mode.mode, mode.frequency)?;
         }
         Ok(Self {
             model,

@@ -31,24 +31,20 @@ pub struct Stiffnesses {
 impl Stiffnesses {
     /// 100 (self - nominal)/nominal (%) of each.
     pub fn percent_of(&self, nominal: &Self) -> Self {
-        let percent = |value: f64, nominal: f64| 100.0 * (value - nominal) / nominal;
-        Self {
-            kx: percent(self.kx, nominal.kx),
-            ky: percent(self.ky, nominal.ky),
-            kz: self.zip_kz(nominal, percent),
-        }
+        self.combined(nominal, |value, nominal| {
+            100.0 * (value - nominal) / nominal
+        })
     }
 
     fn combined(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Self {
         Self {
             kx: combine(self.kx, other.kx),
             ky: combine(self.ky, other.ky),
-            kz: self.zip_kz(other, combine),
+            kz: self
+                .kz
+                .zip(other.kz)
+                .map(|(own, other)| combine(own, other)),
         }
-    }
-
-    fn zip_kz(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Option<f64> {
-        Some(combine(self.kz?, other.kz?))
     }
 }
 
@@ -80,33 +76,34 @@ pub fn perturb_uniformly(
     percents: &[f64],
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
 ) -> Vec<UniformPerturbation> {
-    let perturbed = |percent: f64| {
+    let both = percents.iter().flat_map(|&percent| [percent, -percent]);
+    both.map(|percent| {
         let factor = 1.0 + percent / 100.0;
         let shifted: Vec<f64> = frequencies.iter().map(|f| factor * f).collect();
         UniformPerturbation {
             percent,
             estimate: estimator(&shifted),
         }
-    };
-    let both = percents.iter().flat_map(|&percent| [percent, -percent]);
-    both.map(perturbed).collect()
+    })
+    .collect()
 }
 
 /// Average errors of the pairs +p, -p among uniform perturbations; a pair without both estimates
 /// has none.
 pub fn average_errors(nominal: &Stiffnesses, rows: &[UniformPerturbation]) -> Vec<AverageError> {
     let rising = rows.iter().filter(|row| row.percent > 0.0);
-    let average = |plus: &UniformPerturbation| {
-        let minus = rows.iter().find(|row| row.percent == -plus.percent)?;
-        let errors = [plus.estimate?, minus.estimate?].map(|e| e.percent_of(nominal));
-        let [plus_error, minus_error] = errors;
-        Some(AverageError {
-            percent: plus.percent,
-            mean_magnitude: plus_error.combined(&minus_error, |p, m| 0.5 * (p.abs() + m.abs())),
-            of_mean: plus_error.combined(&minus_error, |p, m| (0.5 * (p + m)).abs()),
+    rising
+        .filter_map(|plus| {
+            let minus = rows.iter().find(|row| row.percent == -plus.percent)?;
+            let above = plus.estimate?.percent_of(nominal);
+            let below = minus.estimate?.percent_of(nominal);
+            Some(AverageError {
+                percent: plus.percent,
+                mean_magnitude: above.combined(&below, |p, m| 0.5 * (p.abs() + m.abs())),
+                of_mean: above.combined(&below, |p, m| (0.5 * (p + m)).abs()),
+            })
         })
-    };
-    rising.filter_map(average).collect()
+        .collect()
 }
 
 /// How one mode alone moves the estimate.
@@ -135,27 +132,36 @@ pub fn mode_sensitivities(
     // rounding, gives ten.
     const SMALL_PERCENT: f64 = 1e-3;
     let nominal = estimator(frequencies);
-    let half_difference = |index: usize, step: f64| {
-        let moved = |sign: f64| {
-            let mut shifted = frequencies.to_vec();
-            shifted[index] += sign * step;
-            estimator(&shifted)
-        };
-        let difference = moved(1.0)?.combined(&moved(-1.0)?, |high, low| 0.5 * (high - low));
-        Some(difference.combined(&nominal?, |change, nominal| 100.0 * change / nominal))
-    };
-    let sensitivity = |(index, (&frequency, &bound)): (usize, (&f64, &f64))| {
+    let mut sensitivities = Vec::with_capacity(frequencies.len());
+    for (index, (frequency, &bound)) in frequencies.iter().zip(bounds).enumerate() {
         let small = SMALL_PERCENT / 100.0 * frequency;
-        let per_percent = half_difference(index, small)
-            .map(|change| change.combined(&change, |change, _| change / SMALL_PERCENT));
-        ModeSensitivity {
+        let [by_small, by_bound] = [small, bound].map(|step| {
+            let change = half_difference(frequencies, index, step, &estimator)?;
+            Some(change.combined(&nominal?, |change, nominal| 100.0 * change / nominal))
+        });
+        sensitivities.push(ModeSensitivity {
             index,
-            percent_per_bound: half_difference(index, bound),
-            percent_per_percent: per_percent,
-        }
-    };
-    let each = frequencies.iter().zip(bounds).enumerate();
-    Ok(each.map(sensitivity).collect())
+            percent_per_bound: by_bound,
+            percent_per_percent: by_small
+                .map(|change| change.combined(&change, |change, _| change / SMALL_PERCENT)),
+        });
+    }
+    Ok(sensitivities)
+}
+
+/// Half of the difference between the estimates with one frequency a step (Hz) higher and lower.
+fn half_difference(
+    frequencies: &[f64],
+    index: usize,
+    step: f64,
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
+) -> Option<Stiffnesses> {
+    let mut shifted = frequencies.to_vec();
+    shifted[index] = frequencies[index] + step;
+    let high = estimator(&shifted)?;
+    shifted[index] = frequencies[index] - step;
+    let low = estimator(&shifted)?;
+    Some(high.combined(&low, |high, low| 0.5 * (high - low)))
 }
 
 /// Smallest and largest value of a parameter.
@@ -213,11 +219,20 @@ pub fn sign_pattern_estimates(
             limit: SIGN_PATTERN_MODES,
         });
     }
-    let patterns: Vec<Vec<f64>> = sign_patterns(frequencies, bounds).collect();
-    Ok(patterns
-        .par_iter()
-        .map(|shifted| estimator(shifted))
-        .collect())
+    let estimates = (0..1usize << frequencies.len())
+        .into_par_iter()
+        .map(|pattern| {
+            let mut shifted = frequencies.to_vec();
+            for (index, bound) in bounds.iter().enumerate() {
+                shifted[index] += if pattern >> index & 1 == 1 {
+                    *bound
+                } else {
+                    -bound
+                };
+            }
+            estimator(&shifted)
+        });
+    Ok(estimates.collect())
 }
 
 /// Smallest and largest values of the unperturbed estimate and those of all patterns.
@@ -245,25 +260,6 @@ pub fn spans_of(
         spans.kz = None;
     }
     spans
-}
-
-/// The frequencies (Hz) under each of the combinations, for at most as many modes as a machine word
-/// has bits.
-fn sign_patterns<'a>(
-    frequencies: &'a [f64],
-    bounds: &'a [f64],
-) -> impl Iterator<Item = Vec<f64>> + 'a {
-    (0..1usize << frequencies.len()).map(move |pattern| {
-        frequencies
-            .iter()
-            .zip(bounds)
-            .enumerate()
-            .map(|(index, (frequency, bound))| {
-                let up = pattern >> index & 1 == 1;
-                frequency + if up { *bound } else { -bound }
-            })
-            .collect()
-    })
 }
 
 fn widen(span: &mut Option<Span>, value: f64) {
@@ -327,13 +323,12 @@ pub struct MonteCarlo {
 impl MonteCarlo {
     /// From the estimates of `samples` repetitions, those without one left out.
     pub fn of(samples: usize, found: &[Stiffnesses]) -> Self {
-        let each = |pick: fn(&Stiffnesses) -> f64| spread(found.iter().map(pick));
         let compliance = spread(found.iter().filter_map(|e| e.kz).map(f64::recip));
         Self {
             samples,
             failed: samples - found.len(),
-            kx: each(|estimate| estimate.kx),
-            ky: each(|estimate| estimate.ky),
+            kx: spread(found.iter().map(|estimate| estimate.kx)),
+            ky: spread(found.iter().map(|estimate| estimate.ky)),
             kz: compliance.filter(|c| c.low * c.high > 0.0).map(|c| Spread {
                 median: 1.0 / c.median,
                 low: 1.0 / c.high,
@@ -352,7 +347,8 @@ impl MonteCarlo {
 pub fn monte_carlo(
     frequencies: &[f64],
     stds: &[f64],
-    (samples, seed): (usize, u64),
+    samples: usize,
+    seed: u64,
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses>,
 ) -> Result<MonteCarlo, IdentifyError> {
     if frequencies.len() != stds.len() {
@@ -382,10 +378,7 @@ pub(crate) fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
     let mut sorted: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len().checked_sub(1)? as f64;
-    let at = |share: f64| sorted[(share * last).round() as usize];
-    Some(Spread {
-        median: at(0.5),
-        low: at(0.025),
-        high: at(0.975),
-    })
+    let [median, low, high] =
+        [0.5, 0.025, 0.975].map(|share: f64| sorted[(share * last).round() as usize]);
+    Some(Spread { median, low, high })
 }

@@ -52,20 +52,20 @@ pub fn compare(
     predicted: &[f64],
     (measured, used): (&[MeasuredMode], &[usize]),
 ) -> Vec<PredictedMode> {
-    let row = |(index, &predicted): (usize, &f64)| {
-        let number = index + 1;
-        let found = measured.iter().find(|measured| measured.mode == number);
+    let mut modes = Vec::with_capacity(predicted.len());
+    for (mode, &predicted) in (1..).zip(predicted) {
+        let found = measured.iter().find(|measured| measured.mode == mode);
         let measured = found.map(|found| found.frequency);
-        PredictedMode {
-            mode: number,
+        modes.push(PredictedMode {
+            mode,
             measured,
             predicted,
             lambda: beam.lambda_of(predicted),
             error_percent: measured.map(|measured| 100.0 * (predicted - measured) / measured),
-            used: used.contains(&number),
-        }
-    };
-    predicted.iter().enumerate().map(row).collect()
+            used: used.contains(&mode),
+        });
+    }
+    modes
 }
 
 /// The first `count` lambda (1) of an Euler beam, where no beam is described.
@@ -176,17 +176,21 @@ pub fn pair_by_frequency(
     predicted: &[f64],
     tolerance: f64,
 ) -> Vec<Option<usize>> {
-    let distance = |f: f64, mode: usize| ((f - predicted[mode]) / predicted[mode]).abs();
-    let nearest_mode =
-        |f: f64| (0..predicted.len()).min_by(|&a, &b| distance(f, a).total_cmp(&distance(f, b)));
+    // For each mode the nearest of the frequencies that are nearest to it, and its distance.
+    let mut best: Vec<Option<(usize, f64)>> = vec![None; predicted.len()];
+    for (index, frequency) in measured.iter().enumerate() {
+        let distances = predicted.iter().map(|f| ((frequency - f) / f).abs());
+        let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((mode, distance)) = nearest.filter(|(_, distance)| *distance <= tolerance) {
+            if best[mode].is_none_or(|(_, known)| distance < known) {
+                best[mode] = Some((index, distance));
+            }
+        }
+    }
     let mut numbers = vec![None; measured.len()];
-    for mode in 0..predicted.len() {
-        let best = (0..measured.len())
-            .filter(|&i| nearest_mode(measured[i]) == Some(mode))
-            .filter(|&i| distance(measured[i], mode) <= tolerance)
-            .min_by(|&a, &b| distance(measured[a], mode).total_cmp(&distance(measured[b], mode)));
-        if let Some(best) = best {
-            numbers[best] = Some(mode + 1);
+    for (mode, best) in best.into_iter().enumerate() {
+        if let Some((index, _)) = best {
+            numbers[index] = Some(mode + 1);
         }
     }
     numbers
@@ -208,30 +212,29 @@ pub struct WeightedPeak {
 pub fn pair_by_ratio(
     peaks: &[WeightedPeak],
     predicted: &[f64],
-    (range, tolerance): (f64, f64),
+    range: f64,
+    tolerance: f64,
 ) -> Vec<Option<usize>> {
     let measured: Vec<f64> = peaks.iter().map(|peak| peak.frequency).collect();
-    let pairing = |factor: f64| {
-        let scaled: Vec<f64> = predicted.iter().map(|f| factor * f).collect();
-        pair_by_frequency(&measured, &scaled, tolerance)
-    };
-    let weight = |numbers: &[Option<usize>]| -> f64 {
-        peaks
-            .iter()
-            .zip(numbers)
-            .filter(|(_, n)| n.is_some())
-            .map(|(peak, _)| peak.weight)
-            .sum()
-    };
-    let factors = measured
-        .iter()
-        .flat_map(|f| predicted.iter().map(move |p| f / p));
-    factors
-        .filter(|factor| (factor - 1.0).abs() <= range)
-        .map(|factor| (factor, pairing(factor)))
-        .max_by(|a, b| {
-            let nearer = (b.0 - 1.0).abs().total_cmp(&(a.0 - 1.0).abs());
-            weight(&a.1).total_cmp(&weight(&b.1)).then(nearer)
-        })
-        .map_or(vec![None; peaks.len()], |(_, numbers)| numbers)
+    let mut best = (f64::NEG_INFINITY, f64::INFINITY, vec![None; peaks.len()]);
+    for frequency in &measured {
+        for nominal in predicted {
+            let factor = frequency / nominal;
+            let off = (factor - 1.0).abs();
+            if off > range {
+                continue;
+            }
+            let scaled: Vec<f64> = predicted.iter().map(|f| factor * f).collect();
+            let numbers = pair_by_frequency(&measured, &scaled, tolerance);
+            let numbered = peaks
+                .iter()
+                .zip(&numbers)
+                .filter(|(_, number)| number.is_some());
+            let weight: f64 = numbered.map(|(peak, _)| peak.weight).sum();
+            if weight > best.0 || weight == best.0 && off <= best.1 {
+                best = (weight, off, numbers);
+            }
+        }
+    }
+    best.2
 }

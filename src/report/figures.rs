@@ -2,8 +2,7 @@
 
 use num_complex::Complex64;
 use tapjoint_analysis::{
-    AmplitudeChange, Analysis, CloseUp, Frf, FrfSettings, MeasuredSpectra, RecordingResult,
-    Response, frfs_of,
+    Analysis, CloseUp, Frf, FrfSettings, MeasuredSpectra, RecordingResult, Response, frfs_of,
 };
 use tapjoint_description::SensorKind;
 use tapjoint_signal::modal::amplitude::AmplitudeCurve;
@@ -291,9 +290,8 @@ fn stabilisation_figure(searches: &[BandSearch]) -> Option<StabilisationFigure> 
 fn amplitude_figure(recording: &RecordingResult, name: &str) -> Option<AmplitudeFigure> {
     let spectra = recording.measurement.spectra.as_ref()?;
     let numbered = || spectra.readings.iter().zip(&recording.mode_numbers);
-    numbered().find(|(reading, mode)| {
-        mode.is_some() && AmplitudeChange::of(reading, recording).is_some()
-    })?;
+    numbered()
+        .find(|(reading, mode)| mode.is_some() && recording.amplitude_change(reading).is_some())?;
     let modes: Vec<(usize, AmplitudeCurve)> = numbered()
         .filter_map(|(reading, &mode)| {
             Some((mode?, reading.fit.as_ref()?.amplitude.as_ref()?.clone()))

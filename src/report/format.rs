@@ -298,3 +298,15 @@ pub fn with_minus_signs(text: &str) -> String {
     }
     written
 }
+
+/// A sentence that begins with a capital letter.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+/// What there is, or the sign of what is missing.
+pub fn or_missing(value: Option<impl ToString>) -> String {
+    value.map_or_else(|| MISSING.to_owned(), |value| value.to_string())
+}

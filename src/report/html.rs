@@ -5,8 +5,10 @@ use askama::Template;
 use super::ReportError;
 use super::document::{Document, RecordingSection, TestSection, WarningSection};
 use super::format::{significant, trimmed};
-use super::summary::sentences;
 use super::tables::{self, Table};
+use super::words::findings::sentences;
+use tapjoint_beam::{Assembly, BeamTheory};
+use tapjoint_description::JointModel;
 
 /// A picture inside the page.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,20 +151,18 @@ fn test_facts(test: &TestSection) -> Vec<(&'static str, Option<String>)> {
     let quantity = |value: Option<f64>, unit: &str| {
         value.map(|value| format!("{} {unit}", significant(value, 4)))
     };
-    let kind = test.kind.as_deref().map(|kind| match kind {
-        "lap" => "lap joint",
-        "free" => "none: free beam",
-        other => other,
+    let kind = test.kind.map(|kind| match kind {
+        Assembly::Cantilever => "cantilever",
+        Assembly::Lap => "lap joint",
+        Assembly::Free => "none: free beam",
     });
-    let model = test.model.as_deref().map(|model| match model {
-        "2p" => "two stiffnesses (2p)",
-        "3p" => "three stiffnesses (3p)",
-        other => other,
+    let model = test.model.map(|model| match model {
+        JointModel::TwoParameter => "two stiffnesses (2p)",
+        JointModel::ThreeParameter => "three stiffnesses (3p)",
     });
-    let theory = test.beam_theory.as_deref().map(|theory| match theory {
-        "timoshenko" => "Timoshenko",
-        "euler" => "Euler",
-        other => other,
+    let theory = test.beam_theory.map(|theory| match theory {
+        BeamTheory::Timoshenko => "Timoshenko",
+        BeamTheory::Euler => "Euler",
     });
     vec![
         ("Joint", kind.map(str::to_owned)),
@@ -220,13 +220,12 @@ fn joint_section<'a>(document: &Document, figures: &'a PageFigures) -> Option<Se
     if document.estimate.is_none() && document.prediction.is_none() {
         return None;
     }
-    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
     Some(Section {
         id: "joint",
-        title: if kind == Some("free") {
-            "The beam"
-        } else {
+        title: if document.has_joint() {
             "The joint"
+        } else {
+            "The beam"
         },
         missing: no_estimate(document),
         story: Vec::new(),

@@ -3,45 +3,37 @@
 //! Everything is returned as bytes with a name; the command line writes the files.
 
 pub mod blind_check;
-pub mod brief;
 pub mod chart;
 pub mod charts;
+mod data_files;
 pub mod deck;
 pub mod document;
-mod earlier;
 pub mod figures;
 pub mod format;
-mod gap_text;
 pub mod html;
-pub mod summary;
 pub mod tables;
 pub mod text;
+pub mod words;
 
-mod csv;
-mod frf_uff;
-mod json;
+mod report_json;
 mod resolution;
 mod run;
-mod schema;
 mod short_names;
-mod stages;
 mod text_table;
 
-pub use csv::{render_frf_csv, render_modes_csv, render_parameters_csv, render_perturbation_csv};
+pub use data_files::{
+    render_frf_csv, render_frf_uff, render_modes_csv, render_parameters_csv,
+    render_perturbation_csv,
+};
 pub use document::{
     datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
 };
-pub use earlier::{MODEL_FILE, earlier_files};
 pub use figures::{figures as figures_of, frf_figure};
-pub use frf_uff::render_frf_uff;
-pub use gap_text::render_gap_text;
 pub use html::render_html;
-pub use json::render_json;
+pub use report_json::{MODEL_FILE, earlier_files, render_json, render_schema};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{render_cloud_picture, render_frf_picture, render_run, render_spectrum_picture};
-pub use schema::render_schema;
-pub use stages::{render_readings, render_stages};
-pub use text::render_text;
+pub use text::{render_gap_text, render_readings, render_stages, render_text};
 
 /// A finished file.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -85,7 +85,7 @@ fn conditions(study: &ResolutionStudy) -> String {
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.
 pub fn render_resolution_csv(study: &ResolutionStudy) -> Result<String, ReportError> {
-    super::csv::write(&COLUMNS, rows(study))
+    super::data_files::write(&COLUMNS, rows(study))
 }
 
 fn rows(study: &ResolutionStudy) -> Vec<Vec<String>> {

@@ -1,14 +1,14 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
-use super::brief::brief;
-use super::document::{Document, ModeSection, ReadBy};
-use super::format::signed_percent;
+use super::document::{
+    Document, EstimateSection, ModeSection, ReadBy, RecordingSection, TapSection,
+};
+use super::format::{signed_percent, significant, trimmed};
 use super::tables::{self, Table};
-use super::text_table::cut;
-pub use super::text_table::render_table;
+pub use super::text_table::{render_table, wrapped};
+use super::words::findings::brief;
+use super::words::gap::gap_story;
 
-/// Width of the terminal (characters).
-pub const WIDTH: usize = 80;
 /// Most taps listed one by one.
 const MOST_TAPS: usize = 10;
 
@@ -22,7 +22,7 @@ pub fn render_text(document: &Document) -> String {
         frfs(document),
         estimate(document),
         prediction(document),
-        super::gap_text::gap(document),
+        gap(document),
         perturbation(document),
         quality(document),
         warnings(document),
@@ -105,11 +105,7 @@ pub fn frfs(document: &Document) -> String {
 pub fn estimate(document: &Document) -> String {
     match &document.estimate {
         None => String::new(),
-        Some(None) => {
-            let reason = document.estimate_reason.as_deref();
-            let reason = reason.unwrap_or("no reason was recorded");
-            wrapped(&format!("No estimate: {reason}."), 0)
-        }
+        Some(None) => wrapped(&format!("No estimate: {}.", document.no_estimate()), 0),
         Some(Some(found)) => {
             let mut text = table_or_nothing(tables::parameters(document));
             if let Some(methods) = tables::methods(document) {
@@ -183,7 +179,7 @@ pub fn ending(document: &Document) -> String {
 }
 
 /// A table with what its columns mean.
-pub(super) fn noted(table: Option<Table>) -> String {
+fn noted(table: Option<Table>) -> String {
     table.map_or(String::new(), |table| {
         render_table(&table) + &wrapped(&table.note, 0)
     })
@@ -198,26 +194,117 @@ fn joined(tables: &[Option<Table>]) -> String {
     texts.join("\n")
 }
 
-/// Whether a line may be broken here.
-fn is_gap(c: char) -> bool {
-    c.is_whitespace() && c != '\u{a0}'
+/// The errors of the nominal model, the story of the gap, and the hypotheses.
+pub fn render_gap_text(document: &Document) -> String {
+    let sections = [prediction(document), gap(document), warnings(document)];
+    let said: Vec<String> = sections.into_iter().filter(|s| !s.is_empty()).collect();
+    said.join("\n")
 }
 
-/// A text broken into lines of at most 80 characters; lines after the first are indented.
-pub fn wrapped(text: &str, indent: usize) -> String {
-    let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split(is_gap).filter(|word| !word.is_empty()) {
-        let word = cut(word, WIDTH - indent);
-        let length = |line: &str| line.chars().count();
-        match lines.last_mut() {
-            Some(line) if line.is_empty() => line.push_str(&word),
-            Some(line) if length(line) + 1 + length(&word) <= WIDTH => {
-                line.push(' ');
-                line.push_str(&word);
-            }
-            _ => lines.push(" ".repeat(indent) + &word),
-        }
+/// The story of the gap and the hypotheses; empty without a diagnosis.
+fn gap(document: &Document) -> String {
+    let story: String = gap_story(document)
+        .iter()
+        .map(|sentence| wrapped(sentence, 2) + "\n")
+        .collect();
+    let tables = [tables::hypotheses(document), tables::next_tests(document)];
+    let tables: Vec<String> = tables
+        .into_iter()
+        .map(noted)
+        .filter(|table| !table.is_empty())
+        .collect();
+    let tables = tables.join("\n");
+    if story.is_empty() || tables.is_empty() {
+        return story + &tables;
     }
-    // No-break spaces have kept words together; a terminal, and who searches it, wants plain ones.
-    lines.join("\n").replace('\u{a0}', " ") + "\n"
+    format!("{story}\n{tables}")
+}
+
+/// A line for each recording, the peaks and the estimate; empty where nothing was computed.
+pub fn render_stages(document: &Document) -> String {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let mut lines: Vec<String> = recordings.iter().map(recording_stage).collect();
+    lines.extend(document.modes.as_deref().map(modes_stage));
+    lines.extend(document.estimate.iter().flatten().flat_map(estimate_stage));
+    ended(&lines)
+}
+
+/// Every tap and every peak of every recording; empty without recordings.
+pub fn render_readings(document: &Document) -> String {
+    let recordings = document.recordings.as_deref().unwrap_or_default();
+    let lines = recordings.iter().flat_map(|recording| {
+        let file = &recording.file;
+        let taps = recording.taps.iter().map(tap_stage);
+        let peaks = recording.modes.iter().map(peak_stage);
+        taps.chain(peaks)
+            .map(move |words| format!("{file}: {words}"))
+            .collect::<Vec<String>>()
+    });
+    ended(&lines.collect::<Vec<String>>())
+}
+
+fn ended(lines: &[String]) -> String {
+    lines.iter().map(|line| format!("{line}\n")).collect()
+}
+
+fn recording_stage(found: &RecordingSection) -> String {
+    let accepted = found.taps.iter().filter(|tap| tap.accepted).count();
+    let mut parts = vec![format!("{} channels", found.channels)];
+    if let Some((rate, seconds)) = found.sample_rate.zip(found.seconds) {
+        parts.push(format!("{} Hz, {seconds:.2} s", trimmed(rate, 6)));
+        parts.push(format!("{accepted} of {} taps accepted", found.taps.len()));
+    }
+    if let Some([low, high]) = found.band {
+        parts.push(format!("{} to {} Hz", trimmed(low, 6), trimmed(high, 6)));
+    }
+    if let Some((block, spacing)) = found.block.zip(found.line_spacing) {
+        let spacing = significant(spacing, 4);
+        parts.push(format!(
+            "blocks of {block} samples, lines {spacing} Hz apart"
+        ));
+    }
+    if let Some(window) = &found.window {
+        parts.push(format!("{window} window"));
+    }
+    format!("{}: {}", found.file, parts.join("; "))
+}
+
+fn modes_stage(modes: &[ModeSection]) -> String {
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some()).count();
+    format!("modes: {} peaks, {numbered} with a number", modes.len())
+}
+
+fn estimate_stage(found: &EstimateSection) -> Vec<String> {
+    let modes: Vec<String> = found.modes_used.iter().map(usize::to_string).collect();
+    let misfit = found.misfit.as_ref();
+    let verdict = misfit.map_or(String::new(), |misfit| format!("; {}", misfit.verdict));
+    let head = format!(
+        "{} from modes {}{verdict}",
+        found.method.name(),
+        modes.join(", ")
+    );
+    let more = found.identifiability.iter().flat_map(|can| &can.statements);
+    std::iter::once(&head)
+        .chain(more)
+        .map(|words| format!("estimate: {words}"))
+        .collect()
+}
+
+fn tap_stage(tap: &TapSection) -> String {
+    let fate = match (&tap.reason, tap.accepted) {
+        (Some(reason), _) => reason.as_str(),
+        (None, true) => "accepted",
+        (None, false) => "rejected",
+    };
+    format!("tap at {:.3} s, {fate}", tap.time)
+}
+
+fn peak_stage(mode: &ModeSection) -> String {
+    let what = match (mode.mode, &mode.label) {
+        (Some(number), _) => format!("mode {number}"),
+        (None, Some(label)) => label.clone(),
+        (None, None) => "no number".to_owned(),
+    };
+    let frequency = significant(mode.frequency, 7);
+    format!("peak at {frequency} Hz ({}), {what}", mode.method.name())
 }

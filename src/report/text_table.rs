@@ -1,11 +1,13 @@
-//! Tables for a terminal of 80 columns.
+//! Tables and sentences for a terminal of 80 columns.
 
 use std::collections::BTreeSet;
 
 use super::format::MISSING;
 use super::short_names::ways;
 use super::tables::{Column, Kind, Place, Table};
-use super::text::{WIDTH, wrapped};
+
+/// Width of the terminal (characters).
+pub const WIDTH: usize = 80;
 
 /// Space between columns (characters).
 const GAP: usize = 2;
@@ -324,6 +326,30 @@ pub(super) fn cut(text: &str, width: usize) -> String {
     }
     let kept: String = text.chars().take(width.saturating_sub(1)).collect();
     kept + "\u{2026}"
+}
+
+/// Whether a line may be broken here.
+fn is_gap(c: char) -> bool {
+    c.is_whitespace() && c != '\u{a0}'
+}
+
+/// A text broken into lines of at most 80 characters; lines after the first are indented.
+pub fn wrapped(text: &str, indent: usize) -> String {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split(is_gap).filter(|word| !word.is_empty()) {
+        let word = cut(word, WIDTH - indent);
+        let length = |line: &str| line.chars().count();
+        match lines.last_mut() {
+            Some(line) if line.is_empty() => line.push_str(&word),
+            Some(line) if length(line) + 1 + length(&word) <= WIDTH => {
+                line.push(' ');
+                line.push_str(&word);
+            }
+            _ => lines.push(" ".repeat(indent) + &word),
+        }
+    }
+    // No-break spaces have kept words together; a terminal, and who searches it, wants plain ones.
+    lines.join("\n").replace('\u{a0}', " ") + "\n"
 }
 
 #[cfg(test)]

@@ -546,7 +546,7 @@ fn prop_a_common_factor_and_strangers_do_not_confuse_the_numbers() {
             peak(420.0 * factor, 60.0),
             peak(545.0 * factor, 40.0),
         ];
-        let numbers = pair_by_ratio(&peaks, &nominal, (0.2, 0.04));
+        let numbers = pair_by_ratio(&peaks, &nominal, 0.2, 0.04);
         assert_eq!(
             numbers,
             [None, Some(1), Some(2), None, Some(3)],

@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-use tapjoint::description::{ChannelRef, ReadingMethod, TestDescription};
-use tapjoint::modal::{FrequencySource, ModeReading};
+use tapjoint::description::{ChannelRef, ReadBy, TestDescription};
+use tapjoint::modal::ModeReading;
 use tapjoint::pipeline::{IdentifySettings, MeasureSettings, measure_bare, run_test};
 use tapjoint::recording::{
     Channel, FrequencyResponse, FrequencyResponses, Point, Recording, ResponseForm, UffFormat,
@@ -89,7 +89,7 @@ fn recover_modes_by_fits_at_three_noise_levels() {
                 let reading = nearest(&found, mode.frequency);
                 assert_eq!(
                     reading.source,
-                    FrequencySource::Fit,
+                    ReadBy::Fit,
                     "{noise_db} dB {}",
                     mode.frequency
                 );
@@ -210,11 +210,11 @@ fn prop_a_reading_on_the_line_is_there_when_asked_for() {
     let modes = five_modes(0.0);
     let found = readings(&modes, &blocks_of_2048(60.0), 3, |s| {
         s.block = Some(2048);
-        s.reading = ReadingMethod::Line;
+        s.reading = ReadBy::Line;
     });
     for mode in &modes {
         let reading = nearest(&found, mode.frequency);
-        assert_eq!(reading.source, FrequencySource::Line);
+        assert_eq!(reading.source, ReadBy::Line);
         assert_eq!(reading.frequency, reading.line_frequency);
         assert!(
             (reading.frequency - mode.frequency).abs() <= 0.5 + 1e-9,

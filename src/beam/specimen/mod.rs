@@ -273,6 +273,23 @@ impl Specimen {
         BeamModes::new(self, count, mesh)
     }
 
+    /// A lap joint's overlap as masses: two points in either half, where Gauss's rule puts them, carry
+    /// the uniform mass as a cubic shape feels it.
+    pub fn overlap_masses(&self) -> Vec<PointMass> {
+        let (Some(overlap), Body::Joined([left, _])) = (&self.overlap, &self.body) else {
+            return Vec::new();
+        };
+        // Half of the overlap reaches from 0 to 1/2: its points are 1/4 -+ 1/(4 sqrt 3).
+        let gauss = 0.25 / 3f64.sqrt();
+        let points = [-0.25 + gauss, -0.25 - gauss, 0.25 - gauss, 0.25 + gauss];
+        let masses = points.map(|point| PointMass {
+            position: left.length + point * overlap.length,
+            mass: 0.25 * overlap.mass,
+            inertia: 0.0,
+        });
+        masses.to_vec()
+    }
+
     /// Checks that every part can exist and lies on the beam.
     ///
     /// # Errors

@@ -271,22 +271,16 @@ impl Model {
             self.add_mass(self.place(item.position), item.mass, item.inertia);
         }
         let (mass, inertia) = (specimen.joint_mass.mass, specimen.joint_mass.inertia);
-        match &specimen.body {
+        match specimen.body {
             Body::One(_) => self.add_mass(self.place_in(0, 0, 0.0), mass, inertia),
-            Body::Joined([left, _]) => {
+            Body::Joined(_) => {
                 let last = self.runs[0].elements - 1;
                 self.add_mass(self.place_in(0, last, 1.0), 0.5 * mass, 0.5 * inertia);
                 self.add_mass(self.place_in(1, 0, 0.0), 0.5 * mass, 0.5 * inertia);
-                // Two points in either half, where Gauss's rule puts them, carry the overlap's
-                // uniform mass as a cubic shape feels it.
-                let gauss = 0.25 / 3f64.sqrt();
-                if let Some(overlap) = &specimen.overlap {
-                    for point in [-0.25 + gauss, -0.25 - gauss, 0.25 - gauss, 0.25 + gauss] {
-                        let place = self.place(left.length + point * overlap.length);
-                        self.add_mass(place, 0.25 * overlap.mass, 0.0);
-                    }
-                }
             }
+        }
+        for item in specimen.overlap_masses() {
+            self.add_mass(self.place(item.position), item.mass, item.inertia);
         }
         for item in specimen.springs.iter().filter(|item| item.stiffness > 0.0) {
             self.springs.push(AttachedSpring {

@@ -189,17 +189,12 @@ fn separated(probabilities: &[f64], names: &[String], apart: &DMatrix<f64>) -> V
     separated
 }
 
-/// Predictions of one hypothesis for all planned frequencies.
-struct Predictions {
-    whole: Option<Prediction>,
-    unbiased: Option<Prediction>,
-    bare: Option<Prediction>,
-}
+/// Predictions of one hypothesis for all planned frequencies, by tested structure.
+struct Predictions([Option<Prediction>; 3]);
 
 impl Predictions {
     fn new(posterior: &Posterior, planned: &PlannedTests) -> Self {
-        use TestedStructure::{Bare, Unbiased, Whole};
-        let [whole, unbiased, bare] = [Whole, Unbiased, Bare].map(|wanted| {
+        Predictions(TestedStructure::ALL.map(|wanted| {
             let tests = planned.all.iter();
             let all = tests.flat_map(|test| test.frequencies_of(wanted));
             let observables: Vec<_> = all.map(|(observable, _)| *observable).collect();
@@ -207,12 +202,7 @@ impl Predictions {
                 return None;
             }
             posterior.predict(planned, wanted, &observables)
-        });
-        Predictions {
-            whole,
-            unbiased,
-            bare,
-        }
+        }))
     }
 
     /// Returns the predicted data of the k-th test.
@@ -220,17 +210,13 @@ impl Predictions {
         let PlannedData::Frequencies(structure, own) = &planned.all[k].data else {
             return None;
         };
-        let prediction = match structure {
-            TestedStructure::Whole => &self.whole,
-            TestedStructure::Unbiased => &self.unbiased,
-            TestedStructure::Bare => &self.bare,
-        };
         let before = planned.all[..k].iter();
         let from = before
             .map(|test| test.frequencies_of(*structure).len())
             .sum();
         let stds: Vec<f64> = own.iter().map(|(_, std)| *std).collect();
-        Some(prediction.as_ref()?.in_units_of(from, &stds))
+        let prediction = self.0[*structure as usize].as_ref()?;
+        Some(prediction.in_units_of(from, &stds))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Predicted data of each hypothesis in a planned test, and the information that they would bring.
 
-use super::proposals::{AddedSpread, PlannedTests, TestedStructure};
+use super::proposals::{PlannedTests, TestedStructure};
 use crate::dataset::{Dataset, Observable};
 use crate::forward::Forward;
 use crate::least_squares::{Model, Optimum, covariance, log_determinant};
@@ -122,15 +122,17 @@ impl Posterior {
 
     /// Returns the posterior with the nuisance parameters of the planned tests.
     fn extended(&self, planned: &PlannedTests) -> (Vec<f64>, Vec<Prior>, DMatrix<f64>) {
-        let (old, new) = (self.parameters.len(), planned.added.len());
+        let added = &planned.whole.nuisances[planned.first_added..];
+        let (old, count) = (self.parameters.len(), self.parameters.len() + added.len());
         let mut parameters = self.parameters.clone();
-        parameters.resize(old + new, 0.0);
+        parameters.resize(count, 0.0);
         let mut priors = self.priors.clone();
-        let mut covariance = self.covariance.clone().resize(old + new, old + new, 0.0);
-        for (k, added) in planned.added.iter().enumerate() {
-            let std = match *added {
-                AddedSpread::Drift(least) => self.drift.max(least),
-                AddedSpread::Stated(std) => std,
+        let mut covariance = self.covariance.clone().resize(count, count, 0.0);
+        for (k, nuisance) in added.iter().enumerate() {
+            let std = if nuisance.parameter.is_drift() {
+                self.drift.max(nuisance.std)
+            } else {
+                nuisance.std
             };
             priors.push(Prior::normal(0.0, std));
             covariance[(old + k, old + k)] = std * std;
@@ -145,7 +147,7 @@ impl Posterior {
             _ => planned.whole.clone(),
         };
         // Those of the planned tests come last.
-        let at = planned.whole.nuisances.len() - planned.added.len();
+        let at = planned.first_added;
         let discrepancies = (1..=self.discrepancies).map(|mode| Nuisance {
             parameter: NuisanceParameter::Discrepancy { mode },
             centre: 0.0,

@@ -42,6 +42,9 @@ pub enum TestedStructure {
 }
 
 impl TestedStructure {
+    /// All of them, in their order.
+    pub const ALL: [Self; 3] = [Self::Whole, Self::Unbiased, Self::Bare];
+
     /// Returns whether an effect changes its frequencies.
     pub fn shows(self, effect: &CandidateEffect) -> bool {
         match self {
@@ -76,21 +79,12 @@ pub struct PlannedTests {
     pub all: Vec<PlannedTest>,
     /// Existing and planned configurations.
     pub whole: Dataset,
-    /// Spreads of the nuisance parameters that were added for planned tests.
-    pub added: Vec<AddedSpread>,
+    /// Index of the first nuisance parameter that was added for a planned test. The spread of a drift is its least one.
+    pub first_added: usize,
     /// The beam alone.
     pub bare: Option<Dataset>,
     /// Configuration in which gravity is turned over.
     pub turned: Option<usize>,
-}
-
-/// Spread of a nuisance parameter of a planned test.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum AddedSpread {
-    /// Drift of the joint as between the existing set-ups, with this standard deviation at least (1).
-    Drift(f64),
-    /// Stated standard deviation, of a scale or a ruler (unit of the parameter).
-    Stated(f64),
 }
 
 /// Existing configurations that are kept to be read again.
@@ -120,7 +114,7 @@ impl PlannedTests {
         let mut planned = PlannedTests {
             all: Vec::new(),
             whole,
-            added: Vec::new(),
+            first_added: dataset.nuisances.len(),
             bare: None,
             turned: None,
         };
@@ -230,10 +224,8 @@ impl PlannedTests {
             let used = self.highest(dataset, |one| one.positions.iter().copied().max());
             let index = used.map_or(0, |most| most + 1);
             let parameter = NuisanceParameter::SensorPosition { position: index };
-            self.add(
-                parameter,
-                AddedSpread::Stated(dataset.settings.position_std),
-            );
+            self.whole
+                .add_nuisance(parameter, 0.0, dataset.settings.position_std);
             let mut moved = dataset.arrangements[0].clone();
             moved.move_sensor(position, index);
             let planned = self.new_setup(dataset, moved, 0.0);
@@ -250,10 +242,14 @@ impl PlannedTests {
         for position in [length, 0.5 * length] {
             let used = self.highest(dataset, |one| one.fastened.iter().map(|one| one.0).max());
             let fastened = used.map_or(0, |most| most + 1);
-            let scale = AddedSpread::Stated(dataset.settings.fastened_mass_std);
-            self.add(NuisanceParameter::FastenedMass { fastened }, scale);
-            let ruler = AddedSpread::Stated(dataset.settings.position_std);
-            self.add(NuisanceParameter::FastenedPosition { fastened }, ruler);
+            let (mass_std, position_std) = (
+                dataset.settings.fastened_mass_std,
+                dataset.settings.position_std,
+            );
+            let parameter = NuisanceParameter::FastenedMass { fastened };
+            self.whole.add_nuisance(parameter, 0.0, mass_std);
+            let parameter = NuisanceParameter::FastenedPosition { fastened };
+            self.whole.add_nuisance(parameter, 0.0, position_std);
             let mut heavier = dataset.arrangements[0].clone();
             heavier.fasten(mass, position, fastened);
             let planned = self.new_setup(dataset, heavier, 0.0);
@@ -282,13 +278,6 @@ impl PlannedTests {
         self.bare = Some(bare);
     }
 
-    /// Adds a nuisance parameter of planned tests.
-    fn add(&mut self, parameter: NuisanceParameter, added: AddedSpread) {
-        let (AddedSpread::Drift(std) | AddedSpread::Stated(std)) = added;
-        self.whole.add_nuisance(parameter, 0.0, std);
-        self.added.push(added);
-    }
-
     /// Returns the highest index that an existing or planned configuration has.
     fn highest(
         &self,
@@ -305,10 +294,11 @@ impl PlannedTests {
         one.setup = setup;
         for direction in dataset.nominal.fitted_springs() {
             let parameter = NuisanceParameter::Drift { setup, direction };
-            self.add(parameter, AddedSpread::Drift(drift));
+            self.whole.add_nuisance(parameter, 0.0, drift);
         }
-        let temperature = AddedSpread::Stated(self.whole.settings.temperature_std);
-        self.add(NuisanceParameter::Temperature { setup }, temperature);
+        let temperature = NuisanceParameter::Temperature { setup };
+        let std = dataset.settings.temperature_std;
+        self.whole.add_nuisance(temperature, 0.0, std);
         self.whole.arrangements.push(one);
         planned_frequencies(dataset, self.whole.arrangements.len() - 1)
     }

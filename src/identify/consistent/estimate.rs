@@ -2,7 +2,7 @@
 
 use super::estimator::ConsistentEstimator;
 use super::least_squares::Covariance;
-use super::least_squares::{Accuracy, LOG_STIFFNESS, Minimum, descend};
+use super::least_squares::{Accuracy, LOG_STIFFNESS, Minimum, NOTHING_KNOWN, descend};
 use super::least_squares::{Evaluation, Problem, along};
 use super::model::JointedStructure;
 use super::model::{Parameter, Point, beam_at, log_nondimensional};
@@ -107,16 +107,12 @@ impl Finished<'_> {
     /// Parameters at the end of their range.
     pub(super) fn limits(&self) -> Vec<(Parameter, Limit)> {
         let point = &self.best.at.point;
-        let limit = |&parameter: &Parameter| {
+        let fit = self.estimator.settings.fit.iter();
+        fit.filter_map(|&parameter| {
             let quantity = Quantity::of(parameter).first()?;
             Some((parameter, limit_of(*quantity, point)?))
-        };
-        self.estimator
-            .settings
-            .fit
-            .iter()
-            .filter_map(limit)
-            .collect()
+        })
+        .collect()
     }
 
     pub(super) fn measured(&self) -> bool {
@@ -176,7 +172,7 @@ impl Finished<'_> {
             limit: limit_of(quantity, point),
         };
         if self.measured() {
-            self.add_interval(&mut result, (&gradient, unit));
+            self.add_interval(&mut result, &gradient, unit);
         }
         result
     }
@@ -192,29 +188,29 @@ impl Finished<'_> {
         let freedom = self.goodness.degrees_of_freedom;
         let half = student::quantile(0.05, freedom as f64) * unit * self.scale()?;
         let now = self.coordinate(gradient);
-        let back = |coordinate: f64| self.quantity_at(quantity, gradient, coordinate);
-        Some((back(now - half), back(now + half)))
+        let [low, high] = [now - half, now + half]
+            .map(|coordinate| self.quantity_at(quantity, gradient, coordinate));
+        Some((low, high))
     }
 
+    /// The quantity's value where its coordinate has this value.
     fn quantity_at(&self, quantity: Quantity, gradient: &Point, coordinate: f64) -> f64 {
         match quantity {
             Quantity::Coupling => coordinate.tanh(),
-            _ => self.value_at(quantity, gradient, coordinate),
+            _ => {
+                let now = self.coordinate(gradient);
+                let value = quantity.value(&self.best.at.point).unwrap_or(f64::INFINITY);
+                value * (coordinate - now).exp()
+            }
         }
     }
 
-    fn add_interval(
-        &self,
-        result: &mut EstimatedQuantity,
-        (gradient, unit): (&Point, Option<f64>),
-    ) {
+    fn add_interval(&self, result: &mut EstimatedQuantity, gradient: &Point, unit: Option<f64>) {
         let quantity = result.quantity;
-        let back = |coordinate: f64| self.quantity_at(quantity, gradient, coordinate);
-        match self.estimator.settings.intervals {
+        let ends = match self.estimator.settings.intervals {
             Intervals::Linear => {
                 let now = self.coordinate(gradient);
-                result.low = unit.map(|std| back(now - NORMAL_95 * std));
-                result.high = unit.map(|std| back(now + NORMAL_95 * std));
+                [-NORMAL_95, NORMAL_95].map(|factor| unit.map(|std| now + factor * std))
             }
             Intervals::Profile => {
                 let profile = Profile {
@@ -223,25 +219,20 @@ impl Finished<'_> {
                     directions: self.directions,
                     covariance: self.covariance,
                 };
-                let end = |end: End| profile.end(quantity, end, RISE_95).map(back);
-                (result.low, result.high) = (end(End::Low), end(End::High));
-                // Where one end is missing the other is all that is said.
-                result.at_least = result.low.filter(|_| result.high.is_none());
-                result.at_most = result.high.filter(|_| result.low.is_none());
+                [-1.0, 1.0].map(|sign| profile.end(quantity, sign, RISE_95))
             }
+        };
+        [result.low, result.high] =
+            ends.map(|end| end.map(|coordinate| self.quantity_at(quantity, gradient, coordinate)));
+        if self.estimator.settings.intervals == Intervals::Profile {
+            // Where one end is missing the other is all that is known.
+            result.at_least = result.low.filter(|_| result.high.is_none());
+            result.at_most = result.high.filter(|_| result.low.is_none());
         }
     }
 
     fn coordinate(&self, gradient: &Point) -> f64 {
-        let terms = gradient.iter().zip(&self.best.at.point);
-        terms.filter(|(g, _)| **g != 0.0).map(|(g, x)| g * x).sum()
-    }
-
-    /// The quantity's value where its coordinate has this value.
-    fn value_at(&self, quantity: Quantity, gradient: &Point, coordinate: f64) -> f64 {
-        let now = self.coordinate(gradient);
-        let value = quantity.value(&self.best.at.point).unwrap_or(f64::INFINITY);
-        value * (coordinate - now).exp()
+        coordinate(gradient, &self.best.at.point)
     }
 
     /// Kz and Ktr, whose sign is that of the coupling: with an interval, of the logarithm to first
@@ -263,18 +254,18 @@ impl Finished<'_> {
             .low
             .zip(coupling.high)
             .is_some_and(|(low, high)| low * high > 0.0);
-        let end = |sign: f64| {
+        let [low, high] = [-1.0, 1.0].map(|sign: f64| {
             let (value, unit) = value.zip(unit).filter(|_| one_sign)?;
             Some(value * (sign * value.signum() * NORMAL_95 * unit).exp())
-        };
+        });
         let std = value.zip(unit).map(|(value, unit)| value.abs() * unit);
         EstimatedQuantity {
             quantity,
             value,
             std: std.filter(|_| self.measured()),
             std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
-            low: end(-1.0),
-            high: end(1.0),
+            low,
+            high,
             scaled: None,
             at_least: None,
             at_most: None,
@@ -336,34 +327,29 @@ impl Finished<'_> {
         let both = [Quantity::Kx, Quantity::Ky];
         let fit = &self.estimator.settings.fit;
         let point = &self.best.at.point;
-        let open = |quantity: &Quantity| {
+        let is_open = both.iter().all(|quantity| {
             fit.contains(&quantity.lead())
                 && limit_of(*quantity, point).is_none()
                 && self.covariance.std(&quantity.gradient()).is_some()
-        };
-        if !both.iter().all(open) {
-            return None;
-        }
-        let factor = self.variance_unit()?;
-        let entry = |first: Quantity, second: Quantity| {
-            let between = self
-                .covariance
-                .between(&first.gradient(), &second.gradient());
-            factor * between
-        };
-        Some(both.map(|first| both.map(|second| entry(first, second))))
+        });
+        let factor = self.variance_unit().filter(|_| is_open)?;
+        let gradients = both.map(Quantity::gradient);
+        Some(
+            gradients.map(|first| {
+                gradients.map(|second| factor * self.covariance.between(&first, &second))
+            }),
+        )
     }
 
     pub(super) fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
         let factor = self.variance_unit()?;
         let fit = &self.estimator.settings.fit;
-        let row = |first: &Parameter| {
-            let entry = |second: &Parameter| {
-                factor * self.covariance.between(&along(*first), &along(*second))
-            };
-            fit.iter().map(entry).collect()
-        };
-        Some(fit.iter().map(row).collect())
+        let mut rows = Vec::with_capacity(fit.len());
+        for &first in fit {
+            let between = |second| self.covariance.between(&along(first), &along(second));
+            rows.push(fit.iter().map(|&second| factor * between(second)).collect());
+        }
+        Some(rows)
     }
 
     pub(super) fn correlations(&self) -> Vec<Correlation> {
@@ -407,11 +393,10 @@ pub(super) struct Profile<'a> {
     pub(super) covariance: &'a Covariance,
 }
 
-/// One end of an interval: below or above.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
-    Low,
-    High,
+/// The quantity's coordinate, a linear function of the point. A rigid joint has no part in others.
+fn coordinate(gradient: &Point, point: &Point) -> f64 {
+    let terms = gradient.iter().zip(point);
+    terms.filter(|(g, _)| **g != 0.0).map(|(g, x)| g * x).sum()
 }
 
 /// A place on a profile.
@@ -425,40 +410,26 @@ struct Place {
 impl Profile<'_> {
     /// Where the quantity's logarithm (of the coupling: its atanh) has raised chi-squared by so
     /// much; `None` where it never does.
-    pub(super) fn end(&self, quantity: Quantity, end: End, rise: f64) -> Option<f64> {
+    fn end(&self, quantity: Quantity, sign: f64, rise: f64) -> Option<f64> {
         let gradient = quantity.gradient();
         let lead = quantity.lead().index();
         let held = held_directions(self.directions, &gradient, lead);
-        let sign = match end {
-            End::Low => -1.0,
-            End::High => 1.0,
-        };
-        let value: f64 = gradient
-            .iter()
-            .zip(&self.best.at.point)
-            .filter(|(g, _)| **g != 0.0)
-            .map(|(g, x)| g * x)
-            .sum();
+        let value = coordinate(&gradient, &self.best.at.point);
         let wanted = rise.sqrt();
         let furthest = self.furthest(quantity, sign)?;
         let std = self.covariance.std(&gradient).unwrap_or(1.0);
         let first = (wanted * std).clamp(1e-9, 1.0).min(furthest);
         let place = |offset: f64, from: &Evaluation| {
             let mut point = from.point;
-            let now: f64 = gradient
-                .iter()
-                .zip(&point)
-                .filter(|(g, _)| **g != 0.0)
-                .map(|(g, x)| g * x)
-                .sum();
+            let now = coordinate(&gradient, &point);
             point[lead] += (value + sign * offset - now) / gradient[lead];
             let start = self.problem.evaluate(&point, &from.lambdas);
             let at = descend(self.problem, start, &held, Accuracy::MISFIT).at;
             let excess = (at.cost - self.best.at.cost).max(0.0).sqrt() - wanted;
             Place { offset, at, excess }
         };
-        let bracket = expand(first, furthest, (&self.best.at, wanted), &place)?;
-        Some(value + sign * close_in(bracket, &place))
+        let (near, far) = expand(first, furthest, &self.best.at, wanted, &place)?;
+        Some(value + sign * close_in(near, far, &place))
     }
 
     /// How far the quantity's coordinate may go; `None` where it is there already.
@@ -496,7 +467,8 @@ fn held_directions(directions: &[Point], gradient: &Point, lead: usize) -> Vec<P
 fn expand(
     first: f64,
     furthest: f64,
-    (best, wanted): (&Evaluation, f64),
+    best: &Evaluation,
+    wanted: f64,
     place: &impl Fn(f64, &Evaluation) -> Place,
 ) -> Option<(Place, Place)> {
     let mut near = Place {
@@ -523,10 +495,7 @@ fn expand(
 }
 
 /// Regula falsi with the Illinois rule between the two.
-fn close_in(
-    (mut near, mut far): (Place, Place),
-    place: &impl Fn(f64, &Evaluation) -> Place,
-) -> f64 {
+fn close_in(mut near: Place, mut far: Place, place: &impl Fn(f64, &Evaluation) -> Place) -> f64 {
     // A thousandth of a standard deviation in the root of the rise: no reader sees it.
     const ENOUGH: f64 = 1e-3;
     const STEPS: usize = 40;
@@ -621,12 +590,12 @@ fn decompose(jacobian: &[Point], fit: &[Parameter]) -> (Vec<f64>, Vec<Vec<f64>>)
 }
 
 fn dead(jacobian: &[Point], fit: &[Parameter]) -> Vec<Parameter> {
-    let alone = |parameter: &&Parameter| {
+    let dead = fit.iter().filter(|parameter| {
         let column = parameter.index();
         let squares: f64 = jacobian.iter().map(|row| row[column].powi(2)).sum();
         squares.sqrt() * DEAD < 1.0
-    };
-    fit.iter().filter(alone).copied().collect()
+    });
+    dead.copied().collect()
 }
 
 fn flat(values: &[f64], directions: &[Vec<f64>], fit: &[Parameter]) -> Vec<FlatDirection> {
@@ -642,7 +611,7 @@ fn flat(values: &[f64], directions: &[Vec<f64>], fit: &[Parameter]) -> Vec<FlatD
         };
         found.push(FlatDirection {
             direction: fit.iter().copied().zip(direction.iter().copied()).collect(),
-            std: Some(value.recip()).filter(|std| *std < super::least_squares::NOTHING_KNOWN),
+            std: Some(value.recip()).filter(|std| *std < NOTHING_KNOWN),
             words,
         });
     }
@@ -727,7 +696,6 @@ fn factor_words(std: f64) -> String {
 fn extra_modes(finished: &Finished<'_>, jacobian: &[Point], unit: f64) -> Vec<ExtraMode> {
     let data = &finished.problem.data;
     let highest = data.iter().map(|datum| datum.mode).max().unwrap_or(0);
-    let missing = |mode: &usize| !data.iter().any(|datum| datum.mode == *mode);
     let mut relative: Vec<f64> = data
         .iter()
         .map(|datum| datum.std / datum.frequency / unit)
@@ -735,22 +703,22 @@ fn extra_modes(finished: &Finished<'_>, jacobian: &[Point], unit: f64) -> Vec<Ex
     let relative_std = median(&mut relative);
     let covariance = Covariance::new(jacobian, finished.directions);
     (1..=highest + 1)
-        .filter(missing)
+        .filter(|mode| data.iter().all(|datum| datum.mode != *mode))
         .map(|mode| {
             let point = &finished.best.at.point;
             let guess = mode as f64 * std::f64::consts::PI;
             let response = finished.problem.model.response(point, mode, guess);
             let slopes = response.sensitivity.map(|slope| slope / relative_std);
-            let std = |parameter: &Parameter| {
+            let fit = finished.estimator.settings.fit.iter();
+            let stds = fit.map(|parameter| {
                 let variance = covariance.variance_with(&along(*parameter), &slopes);
-                Some(variance.max(0.0).sqrt())
-                    .filter(|std| *std < super::least_squares::NOTHING_KNOWN)
-            };
+                Some(variance.max(0.0).sqrt()).filter(|std| *std < NOTHING_KNOWN)
+            });
             ExtraMode {
                 mode,
                 frequency: response.frequency,
                 relative_std,
-                stds: finished.estimator.settings.fit.iter().map(std).collect(),
+                stds: stds.collect(),
             }
         })
         .collect()

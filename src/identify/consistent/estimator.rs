@@ -137,17 +137,18 @@ impl ConsistentEstimator {
         model: &'a FrequencyModel,
         frequencies: &[f64],
     ) -> Problem<'a> {
-        let datum = |(mode, &frequency): (&MeasuredMode, &f64)| Datum {
+        let data = self.modes.iter().zip(frequencies);
+        let data = data.map(|(mode, &frequency)| Datum {
             mode: mode.mode,
             frequency,
             std: match self.settings.weights {
                 ResidualWeights::Measured => mode.std.unwrap_or(frequency),
                 ResidualWeights::Relative => frequency,
             },
-        };
+        });
         Problem {
             model,
-            data: self.modes.iter().zip(frequencies).map(datum).collect(),
+            data: data.collect(),
             priors: self.priors(),
             loss: self.settings.loss,
             last_step: LAST_STEP,
@@ -248,8 +249,7 @@ impl ConsistentEstimator {
         near: &'a Neighbourhood,
     ) -> impl Fn(&[f64]) -> Option<Stiffnesses> + 'a {
         move |frequencies: &[f64]| {
-            let positive = |frequency: &f64| *frequency > 0.0 && frequency.is_finite();
-            if !frequencies.iter().all(positive) {
+            if !frequencies.iter().copied().all(is_positive) {
                 return None;
             }
             let fit = self.refit(frequencies, near);
@@ -261,14 +261,17 @@ impl ConsistentEstimator {
     /// Kx and Ky at a point, infinite where rigid, and Kz where the coupling is estimated.
     pub(super) fn stiffnesses_at(&self, point: &Point) -> Stiffnesses {
         let joint = super::result::joint_at(point);
-        let finite = |quantity: Quantity, value: f64| match limit_of(quantity, point) {
-            Some(Limit::Rigid) => f64::INFINITY,
-            _ => value,
-        };
+        let [kx, ky] =
+            [(Quantity::Kx, joint.kx), (Quantity::Ky, joint.ky)].map(|(quantity, value)| {
+                match limit_of(quantity, point) {
+                    Some(Limit::Rigid) => f64::INFINITY,
+                    _ => value,
+                }
+            });
         let coupled = self.settings.fit.contains(&Parameter::Coupling);
         Stiffnesses {
-            kx: finite(Quantity::Kx, joint.kx),
-            ky: finite(Quantity::Ky, joint.ky),
+            kx,
+            ky,
             kz: coupled.then(|| joint.cross_compliance.recip()),
         }
     }
@@ -319,15 +322,18 @@ fn nuisances(settings: &ConsistentSettings) -> Vec<(Parameter, f64)> {
         .collect()
 }
 
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && value.is_finite()
+}
+
 fn check(
     structure: &JointedStructure,
     modes: &[MeasuredMode],
     settings: &ConsistentSettings,
 ) -> Result<(), IdentifyError> {
-    let positive = |value: f64| value > 0.0 && value.is_finite();
     if let Some(mode) = modes
         .iter()
-        .find(|mode| !positive(mode.frequency) || mode.mode == 0)
+        .find(|mode| !is_positive(mode.frequency) || mode.mode == 0)
     {
         return Err(IdentifyError::Frequency {
             mode: mode.mode,
@@ -336,8 +342,8 @@ fn check(
     }
     let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
     let no_joint = structure.assembly == Assembly::Free;
-    let stray = |parameter: &&Parameter| no_joint && joint.contains(parameter);
-    if settings.fit.is_empty() || settings.fit.iter().any(|p| stray(&p)) {
+    let fit = &settings.fit;
+    if fit.is_empty() || no_joint && fit.iter().any(|parameter| joint.contains(parameter)) {
         return Err(IdentifyError::NothingToEstimate);
     }
     let known = modes.len() + usize::from(settings.weighed_mass.is_some());
@@ -348,8 +354,10 @@ fn check(
         });
     }
     let measured = settings.weights == ResidualWeights::Measured;
-    let unknown = |mode: &&MeasuredMode| !mode.std.is_some_and(positive);
-    if let Some(mode) = modes.iter().find(unknown).filter(|_| measured) {
+    let mut unknown = modes
+        .iter()
+        .filter(|mode| !mode.std.is_some_and(is_positive));
+    if let Some(mode) = unknown.next().filter(|_| measured) {
         return Err(IdentifyError::NoUncertainty { mode: mode.mode });
     }
     Ok(())
@@ -624,7 +632,7 @@ impl ConsistentEstimator {
             .into_par_iter()
             .map(|chunk| {
                 let count = CHUNK.min(samples - chunk * CHUNK);
-                self.repeat((seed, chunk as u64), count, (&errors, near))
+                self.repeat(seed, chunk as u64, count, &errors, near)
             })
             .collect();
         let found: Vec<Point> = chunks.into_iter().flatten().flatten().collect();
@@ -647,9 +655,11 @@ impl ConsistentEstimator {
 
     fn repeat(
         &self,
-        (seed, stream): (u64, u64),
+        seed: u64,
+        stream: u64,
         count: usize,
-        (errors, near): (&[(f64, f64)], &Neighbourhood),
+        errors: &[(f64, f64)],
+        near: &Neighbourhood,
     ) -> Vec<Option<Point>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(stream);

@@ -417,13 +417,12 @@ impl Problem<'_> {
 
     /// The measured frequencies as lambda of the beam at a point: where the roots are to be.
     pub(super) fn measured_lambdas(&self, point: &Point) -> Vec<f64> {
-        let at = |parameter: Parameter| point[parameter.index()].exp();
-        let length = at(Parameter::Length);
+        let [_, _, _, modulus, density, length, _, thickness] = point.map(f64::exp);
         // f = lambda^2 h/(2 pi L^2) sqrt(E/(12 rho)).
-        let unit = at(Parameter::Thickness) / (2.0 * std::f64::consts::PI * length * length)
-            * (at(Parameter::Modulus) / (12.0 * at(Parameter::Density))).sqrt();
-        let lambda = |datum: &Datum| (datum.frequency / unit).sqrt();
-        self.data.iter().map(lambda).collect()
+        let unit = thickness / (2.0 * std::f64::consts::PI * length * length)
+            * (modulus / (12.0 * density)).sqrt();
+        let data = self.data.iter();
+        data.map(|datum| (datum.frequency / unit).sqrt()).collect()
     }
 
     pub(super) fn within_bounds(&self, point: Point) -> Point {
@@ -467,11 +466,11 @@ impl Covariance {
         for slopes in jacobian {
             rows.extend(directions.iter().map(|direction| dot(slopes, direction)));
         }
-        let norm = |column: usize| -> f64 {
+        let mut norms = Vec::with_capacity(n);
+        for column in 0..n {
             let squares = rows.iter().skip(column).step_by(n);
-            squares.map(|x| x * x).sum::<f64>().sqrt()
-        };
-        let norms: Vec<f64> = (0..n).map(norm).collect();
+            norms.push(squares.map(|x| x * x).sum::<f64>().sqrt());
+        }
         let largest = norms.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
         let scales: Vec<f64> = norms.iter().map(|norm| norm.max(1e-9 * largest)).collect();
         for row in rows.chunks_mut(n.max(1)) {

@@ -95,21 +95,24 @@ fn grid_minima(problem: &Problem<'_>, at: &Point, fit: &[Parameter]) -> Vec<(f64
 fn axes(at: &Point, fit: &[Parameter]) -> [Vec<f64>; 3] {
     let [log_kx, log_ky] = log_nondimensional(at);
     let units = [at[0] - log_kx, at[1] - log_ky];
-    let decades = |decades: &[f64], unit: f64| -> Vec<f64> {
-        decades.iter().map(|d| d * LN_10 + unit).collect()
-    };
-    let values = |parameter: Parameter, grid: Vec<f64>| {
+    [
+        (
+            Parameter::Kt,
+            TRANSLATION_DECADES.map(|d| d * LN_10 + units[0]).to_vec(),
+        ),
+        (
+            Parameter::Kr,
+            ROTATION_DECADES.map(|d| d * LN_10 + units[1]).to_vec(),
+        ),
+        (Parameter::Coupling, COUPLINGS.to_vec()),
+    ]
+    .map(|(parameter, grid)| {
         if fit.contains(&parameter) {
             grid
         } else {
             vec![at[parameter.index()]]
         }
-    };
-    [
-        values(Parameter::Kt, decades(&TRANSLATION_DECADES, units[0])),
-        values(Parameter::Kr, decades(&ROTATION_DECADES, units[1])),
-        values(Parameter::Coupling, COUPLINGS.to_vec()),
-    ]
+    })
 }
 
 fn for_each(sizes: [usize; 3], mut visit: impl FnMut([usize; 3])) {

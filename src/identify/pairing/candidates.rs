@@ -8,8 +8,6 @@ use std::collections::BTreeMap;
 /// A number, or none, for each peak.
 pub(super) type Assignment = Vec<Option<usize>>;
 
-/// More modes than peaks that are looked for.
-pub(super) const MOST_MISSING: usize = 3;
 /// So many assignments are looked at closely.
 const FOLLOWED: usize = 16;
 /// Usual relative distances of a match on the grid. Its places may miss a frequency by 19 %: with the
@@ -47,30 +45,29 @@ pub(super) fn find(
         .map(|place| (place, search.predict(place)))
         .collect();
     let mut best: BTreeMap<Assignment, (f64, [f64; 3])> = BTreeMap::new();
-    let mut offer = |assignment: Assignment, cost: f64, place: [f64; 3]| {
-        let known = best.entry(assignment).or_insert((f64::INFINITY, place));
-        if cost < known.0 {
-            *known = (cost, place);
-        }
-    };
     for (place, modes) in &grid {
-        for (width, weak) in WIDTHS
-            .iter()
-            .flat_map(|w| prices.iter().map(move |p| (*w, p)))
-        {
-            let (assignment, cost) = align((&peaks, weak), modes, width, |f| search.in_band(f));
-            let paid: f64 = pairs(&assignment).iter().map(|pair| weak[pair.0]).sum();
-            let cost = cost - paid + neighbours.cost(&assignment);
-            offer(assignment, cost, *place);
+        let mut offers = Vec::with_capacity(2 * WIDTHS.len() + 1);
+        for width in WIDTHS {
+            for weak in &prices {
+                let (assignment, cost) = align(search, &peaks, weak, modes, width);
+                let paid: f64 = pairs(&assignment).iter().map(|pair| weak[pair.0]).sum();
+                let cost = cost - paid + neighbours.cost(&assignment);
+                offers.push((assignment, cost));
+            }
         }
         let misfit = peaks.iter().zip(modes).map(|(a, b)| (a - b).powi(2));
-        offer(plain.clone(), misfit.sum::<f64>(), *place);
+        offers.push((plain.clone(), misfit.sum()));
+        for (assignment, cost) in offers {
+            let known = best.entry(assignment).or_insert((f64::INFINITY, *place));
+            if cost < known.0 {
+                *known = (cost, *place);
+            }
+        }
     }
     let mut found: Vec<(Assignment, (f64, [f64; 3]))> = best.into_iter().collect();
     found.sort_by(|a, b| {
-        let first = |one: &Assignment| *one != plain;
         let by_cost = a.1.0.total_cmp(&b.1.0);
-        first(&a.0).cmp(&first(&b.0)).then(by_cost)
+        (a.0 != plain).cmp(&(b.0 != plain)).then(by_cost)
     });
     found.truncate(FOLLOWED);
     found
@@ -82,26 +79,36 @@ pub(super) fn find(
 /// The cheapest assignment that keeps the order, by dynamic programming over peaks and modes (both as
 /// logarithms of frequency), weak peaks at their price. Modes above the highest peak are free.
 fn align(
-    (peaks, weak): (&[f64], &[f64]),
+    search: &JointSearch<'_>,
+    peaks: &[f64],
+    weak: &[f64],
     modes: &[f64],
     width: f64,
-    in_band: impl Fn(f64) -> bool,
 ) -> (Assignment, f64) {
     let (n, m) = (peaks.len(), modes.len());
     // Least cost of the first i peaks with the first j modes.
     let mut cost = vec![vec![0.0; m + 1]; n + 1];
     let unseen: Vec<f64> = modes
         .iter()
-        .map(|f| if in_band(f.exp()) { MISSING_COST } else { 0.0 })
+        .map(|f| {
+            if search.in_band(f.exp()) {
+                MISSING_COST
+            } else {
+                0.0
+            }
+        })
         .collect();
-    let matched = |i: usize, j: usize| {
-        0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln() + weak[i]
-    };
+    let mut matched = vec![vec![0.0; m]; n];
+    for (i, row) in matched.iter_mut().enumerate() {
+        for (j, cost) in row.iter_mut().enumerate() {
+            *cost = 0.5 * ((peaks[i] - modes[j]) / width).powi(2) + (width / 0.4).ln() + weak[i];
+        }
+    }
     for i in 0..=n {
         for j in 0..=m {
             let extra = (i > 0).then(|| cost[i - 1][j] + EXTRA_COST);
             let missing = (j > 0).then(|| cost[i][j - 1] + unseen[j - 1]);
-            let both = (i > 0 && j > 0).then(|| cost[i - 1][j - 1] + matched(i - 1, j - 1));
+            let both = (i > 0 && j > 0).then(|| cost[i - 1][j - 1] + matched[i - 1][j - 1]);
             let ways = [extra, missing, both].into_iter().flatten();
             let least = ways.fold(f64::INFINITY, f64::min);
             cost[i][j] = if least.is_finite() { least } else { 0.0 };
@@ -114,7 +121,7 @@ fn align(
     let mut assignment = vec![None; n];
     let (mut i, mut j) = (n, end);
     while i > 0 {
-        if j > 0 && cost[i][j] == cost[i - 1][j - 1] + matched(i - 1, j - 1) {
+        if j > 0 && cost[i][j] == cost[i - 1][j - 1] + matched[i - 1][j - 1] {
             assignment[i - 1] = Some(j);
             (i, j) = (i - 1, j - 1);
         } else if j > 0 && cost[i][j] == cost[i][j - 1] + unseen[j - 1] {
@@ -160,19 +167,16 @@ pub(super) struct Neighbours {
 
 impl Neighbours {
     pub fn of(peaks: &[MeasuredPeak]) -> Self {
-        let of_one = |index: usize| {
-            let own = &peaks[index];
-            let near = |other: &usize| {
-                *other != index && (peaks[*other].frequency / own.frequency).ln().abs() <= NEAR
-            };
-            (0..peaks.len())
-                .filter(near)
-                .filter_map(|other| Some((other, price(own, &peaks[other])?)))
-                .collect()
-        };
-        Neighbours {
-            stronger: (0..peaks.len()).map(of_one).collect(),
+        let mut stronger = vec![Vec::new(); peaks.len()];
+        for (index, own) in peaks.iter().enumerate() {
+            for (other, peak) in peaks.iter().enumerate() {
+                let is_near = (peak.frequency / own.frequency).ln().abs() <= NEAR;
+                if let Some(price) = price(own, peak).filter(|_| is_near && other != index) {
+                    stronger[index].push((other, price));
+                }
+            }
         }
+        Neighbours { stronger }
     }
 
     /// Price of one peak as a mode if none of its neighbours is one.
@@ -183,13 +187,15 @@ impl Neighbours {
 
     /// Price of an assignment: of each numbered peak beside the strongest one left over.
     pub fn cost(&self, numbers: &[Option<usize>]) -> f64 {
-        let left_over = |one: &&(usize, f64)| numbers[one.0].is_none();
-        let of_peak = |(peak, _): (usize, &Option<usize>)| {
-            let prices = self.stronger[peak].iter().filter(left_over);
-            prices.map(|one| one.1).fold(0.0, f64::max)
-        };
-        let numbered = numbers.iter().enumerate().filter(|one| one.1.is_some());
-        numbered.map(of_peak).sum()
+        let numbered = numbers
+            .iter()
+            .zip(&self.stronger)
+            .filter(|one| one.0.is_some());
+        let prices = numbered.map(|(_, stronger)| {
+            let left_over = stronger.iter().filter(|one| numbers[one.0].is_none());
+            left_over.map(|one| one.1).fold(0.0, f64::max)
+        });
+        prices.sum()
     }
 }
 
@@ -198,14 +204,15 @@ impl Neighbours {
 pub(super) fn comparable(
     pairs: &[(usize, usize)],
     numbers: &[Option<usize>],
-    (peaks, neighbours): (&[MeasuredPeak], &Neighbours),
+    peaks: &[MeasuredPeak],
+    neighbours: &Neighbours,
 ) -> Vec<(usize, usize)> {
-    let is_faint = |other: usize| {
-        let shape = &peaks[other].shape;
-        numbers[other].is_none() && !shape.is_empty() && !shape::is_clear(shape)
-    };
-    let hidden = |peak: usize| neighbours.stronger[peak].iter().any(|one| is_faint(one.0));
-    let kept = pairs.iter().filter(|pair| !hidden(pair.0));
+    let kept = pairs.iter().filter(|pair| {
+        !neighbours.stronger[pair.0].iter().any(|&(other, _)| {
+            let shape = &peaks[other].shape;
+            numbers[other].is_none() && !shape.is_empty() && !shape::is_clear(shape)
+        })
+    });
     kept.copied().collect()
 }
 

@@ -63,7 +63,7 @@ impl<'a> JointSearch<'a> {
             settings,
             units,
             cross: ktr.filter(|_| coupled).map_or(0.0, |ktr| units.ktr / ktr),
-            highest: peaks.len() + super::candidates::MOST_MISSING,
+            highest: peaks.len() + super::MOST_MISSING,
         }
     }
 

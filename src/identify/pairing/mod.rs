@@ -137,7 +137,7 @@ pub fn pair_modes(
     peaks: &[MeasuredPeak],
     settings: &PairingSettings,
 ) -> Result<Pairing, StructureError> {
-    let highest = peaks.len() + candidates::MOST_MISSING;
+    let highest = peaks.len() + MOST_MISSING;
     let mut bare = structure.clone();
     bare.masses.clear();
     bare.springs.clear();
@@ -148,7 +148,7 @@ pub fn pair_modes(
     let search = JointSearch::new(&fine, peaks, settings);
     let mut numberings: Vec<Scored> = found
         .iter()
-        .map(|(assignment, start)| score(&search, (assignment, &neighbours), *start))
+        .map(|(assignment, start)| score(&search, assignment, &neighbours, *start))
         .collect();
     numberings.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     Ok(verdict(numberings, settings.odds))
@@ -162,13 +162,17 @@ struct Scored {
     numbering: Numbering,
 }
 
+/// Number of modes beyond that of peaks that are looked for.
+const MOST_MISSING: usize = 3;
+
 /// Price of a peak that is no mode: one in twenty is none, and it may lie anywhere over five e-folds of
 /// frequency.
 const EXTRA_COST: f64 = 3.0 + 1.6;
 
 fn score(
     search: &JointSearch<'_>,
-    (assignment, neighbours): (&Assignment, &Neighbours),
+    assignment: &Assignment,
+    neighbours: &Neighbours,
     start: [f64; 3],
 ) -> Scored {
     let pairs = candidates::pairs(assignment);
@@ -182,7 +186,7 @@ fn score(
     let extra = (assignment.len() - pairs.len()) as f64;
     let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
     let weak = neighbours.cost(assignment);
-    let shaped = comparable(&pairs, assignment, (search.peaks, neighbours));
+    let shaped = comparable(&pairs, assignment, search.peaks, neighbours);
     let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
     Scored {
         cost: by_data + unseen,
@@ -220,13 +224,14 @@ fn verdict(sorted: Vec<Scored>, odds: f64) -> Pairing {
         })
         .collect();
     let plain = kept.iter().position(|one| is_plain(&one.numbers));
-    let chosen = match kept.is_empty() {
-        true => Numbering {
+    let chosen = if kept.is_empty() {
+        Numbering {
             numbers: Vec::new(),
             missing: Vec::new(),
             odds: 1.0,
-        },
-        false => kept.remove(plain.unwrap_or(0)),
+        }
+    } else {
+        kept.remove(plain.unwrap_or(0))
     };
     Pairing {
         chosen,

@@ -38,7 +38,7 @@ impl View {
         let structure = search.model().structure();
         // The closed form has equal halves only.
         let known = structure.lap.position.is_none() && structure.lap.right.is_none();
-        let count = search.peaks.len() + super::candidates::MOST_MISSING;
+        let count = search.peaks.len() + super::MOST_MISSING;
         let joint = search.joint(fit.place);
         let shapes = match known && !places.is_empty() {
             true => mode_shapes(&structure.beam, structure.assembly, &joint, count),
@@ -189,11 +189,10 @@ fn sign(seen: &[&ShapeAt], predicted: &[f64], usual: f64) -> Option<bool> {
 
 /// Signs agree in all modes or, the sensor mounted the other way, in none.
 fn sign_gain(signs: [usize; 2]) -> f64 {
-    let of = |right: usize, wrong: usize| {
-        right as f64 * (2.0 * (1.0 - WRONG_SIGN)).ln() + wrong as f64 * (2.0 * WRONG_SIGN).ln()
-    };
     // Either polarity is as likely as the other.
-    let (a, b) = (of(signs[1], signs[0]), of(signs[0], signs[1]));
+    let [a, b] = [[signs[1], signs[0]], signs].map(|[right, wrong]| {
+        right as f64 * (2.0 * (1.0 - WRONG_SIGN)).ln() + wrong as f64 * (2.0 * WRONG_SIGN).ln()
+    });
     let most = a.max(b);
     most + (0.5 * ((a - most).exp() + (b - most).exp())).ln()
 }

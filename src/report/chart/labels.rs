@@ -1,6 +1,19 @@
-//! Room on a picture: labels that cover nothing, and curves with as many points as pixels can show.
+//! Words on a picture: the legend, and labels that cover nothing.
 
-use super::drawing::Point;
+use super::drawing::{Drawing, Point, Shape, Stroke, Text, Weight, text_width};
+use super::{Block, Color, Mark};
+
+/// Left edge of panels whose numbers need no more room (pixels).
+pub(super) const LEFT: f64 = 84.0;
+/// Size of tick labels, legends and all other words but titles (pixels per em).
+pub(super) const WORDS: f64 = 13.0;
+/// Distance of two lines of words (pixels).
+pub(super) const LINE: f64 = 20.0;
+
+/// Words in the colour of text.
+pub(super) fn ink(text: impl Into<String>, at: Point, size: f64) -> Text {
+    Text::new(text, at, size, Color::Ink.rgb())
+}
 
 /// Moves label centres as little as possible so that none overlaps and all stay between `low` and `high`.
 ///
@@ -97,29 +110,131 @@ impl Patch {
     }
 }
 
-/// Reduces a curve, ascending in x (pixels), to at most four points for each column of pixels: the
-/// first, the lowest, the highest and the last, in their order.
-///
-/// The picture is the same; a peak of one sample stays. Points that are not finite are left out.
-pub fn decimate(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
-    let finite = points
-        .into_iter()
-        .filter(|(x, y)| x.is_finite() && y.is_finite());
-    let finite: Vec<Point> = finite.collect();
-    let mut reduced = Vec::new();
-    for column in finite.chunk_by(|before, after| before.0.floor() == after.0.floor()) {
-        let (mut low, mut high) = (0, 0);
-        for (index, point) in column.iter().enumerate() {
-            if point.1 < column[low].1 {
-                low = index;
+/// Names in the legend so far: nothing is explained twice.
+#[derive(Default)]
+pub(super) struct Legend {
+    listed: Vec<String>,
+}
+
+impl Legend {
+    /// Draws what a block adds, in rows from `at` on; returns the middle of the last row.
+    pub(super) fn draw(
+        &mut self,
+        drawing: &mut Drawing,
+        block: &Block,
+        unnamed: usize,
+        at: Point,
+        right: f64,
+    ) -> f64 {
+        let (mut x, mut y) = at;
+        for (mark, color, words) in self.entries(block, unnamed) {
+            let wide = 30.0 + text_width(&words, WORDS, Weight::Regular);
+            if x + wide > right && x > LEFT {
+                (x, y) = (LEFT, y + LINE);
             }
-            if point.1 > column[high].1 {
-                high = index;
-            }
+            draw_sample(drawing, mark, color, (x, y));
+            drawing.text(ink(words, (x + 30.0, y), WORDS));
+            x += wide + 24.0;
         }
-        let mut kept = [0, low.min(high), low.max(high), column.len() - 1].to_vec();
-        kept.dedup();
-        reduced.extend(kept.into_iter().map(|index| column[index]));
+        y
     }
-    reduced
+
+    fn entries(&mut self, block: &Block, unnamed: usize) -> Vec<(Mark, Color, String)> {
+        let mut entries = Vec::new();
+        let panels = &block.panels[..block.drawn];
+        let dashes = Mark::Dashed(1.5);
+        for series in panels.iter().flat_map(|panel| &panel.series) {
+            let mark = match series.mark {
+                Mark::Line(_) | Mark::Curve(_) => Mark::Line(2.5),
+                Mark::Dashed(_) => dashes,
+                mark => mark,
+            };
+            entries.push((mark, series.color, series.name.clone()));
+        }
+        let rules = || panels.iter().flat_map(|panel| &panel.rules);
+        if rules().any(|rule| rule.mode) {
+            let shaded = rules().any(|rule| rule.half > 0.0);
+            let words = if shaded {
+                "mode, shaded: line \u{b1} half line"
+            } else {
+                "mode"
+            };
+            entries.push((dashes, Color::Blue, words.to_owned()));
+        }
+        if rules().any(|rule| !rule.mode && rule.half > 0.0) {
+            let words = "mains or other, no mode".to_owned();
+            entries.push((dashes, Color::Orange, words));
+        }
+        let events = || panels.iter().flat_map(|panel| &panel.events);
+        if events().any(|event| event.used) {
+            entries.push((Mark::Dot(5.0), Color::Blue, "tap used".to_owned()));
+        }
+        if events().any(|event| !event.used) {
+            entries.push((
+                Mark::Cross(6.0),
+                Color::Vermilion,
+                "tap rejected".to_owned(),
+            ));
+        }
+        if unnamed > 0 {
+            let words = format!("{} more without a label, see the table", unnamed);
+            entries.push((dashes, Color::Soft, words));
+        }
+        let mut looks: Vec<(Mark, Color)> = Vec::new();
+        entries.retain(|(mark, color, words)| {
+            let named = !words.is_empty() && !self.listed.contains(words);
+            let kept = named && !looks.contains(&(*mark, *color));
+            if kept {
+                self.listed.push(words.clone());
+                looks.push((*mark, *color));
+            }
+            kept
+        });
+        entries
+    }
+}
+
+fn draw_sample(drawing: &mut Drawing, mark: Mark, color: Color, (x, y): Point) {
+    let middle = (x + 11.0, y);
+    let rgb = color.rgb();
+    match mark {
+        Mark::Line(width) | Mark::Curve(width) => {
+            drawing.line(vec![(x, y), (x + 22.0, y)], Stroke::new(rgb, width));
+        }
+        Mark::Dashed(width) => {
+            let stroke = Stroke::new(rgb, width);
+            drawing.dashed((x, y), (x + 22.0, y), 5.0, 3.0, stroke);
+        }
+        Mark::Band => drawing.rectangle((x + 3.0, y - 7.0), (x + 19.0, y + 7.0), rgb, 0.25),
+        Mark::Bar(_) | Mark::Cell => {
+            drawing.rectangle((x + 3.0, y - 5.0), (x + 19.0, y + 5.0), rgb, 1.0);
+        }
+        Mark::Dot(_) => draw_mark(drawing, Mark::Dot(5.0), middle, Stroke::new(rgb, 2.0)),
+        Mark::Ring(_) => draw_mark(drawing, Mark::Ring(5.0), middle, Stroke::new(rgb, 2.0)),
+        Mark::Cross(_) => draw_mark(drawing, Mark::Cross(5.0), middle, Stroke::new(rgb, 2.2)),
+        Mark::Square(_) => draw_mark(drawing, Mark::Square(5.0), middle, Stroke::new(rgb, 2.0)),
+    }
+}
+
+/// One point of a series.
+pub(super) fn draw_mark(drawing: &mut Drawing, mark: Mark, at: Point, stroke: Stroke) {
+    match mark {
+        Mark::Dot(radius) => drawing.dot(at, radius, stroke.color),
+        Mark::Ring(radius) => drawing.shapes.push(Shape::Ring {
+            center: at,
+            radius,
+            color: stroke.color,
+        }),
+        Mark::Cross(radius) => drawing.cross(at, radius, stroke),
+        Mark::Square(half) => {
+            let (from, to) = ((at.0 - half, at.1 - half), (at.0 + half, at.1 + half));
+            drawing.rectangle(from, to, stroke.color, stroke.opacity);
+        }
+        Mark::Line(_)
+        | Mark::Dashed(_)
+        | Mark::Curve(_)
+        | Mark::Band
+        | Mark::Bar(_)
+        | Mark::Cell => {}
+    }
 }

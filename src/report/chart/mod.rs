@@ -10,6 +10,7 @@ mod page;
 mod picture;
 mod png;
 mod svg;
+pub mod thinning;
 
 use std::path::Path;
 

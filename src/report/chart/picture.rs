@@ -6,23 +6,20 @@ use super::axis::Tick;
 use super::drawing::{
     Align, Drawing, Note, Point, Shape, Stroke, Text, WHITE, Weight, fitted, text_width,
 };
-use super::labels::{Patch, decimate, spread};
+use super::labels::{LEFT, LINE, Legend, Patch, WORDS, draw_mark, ink, spread};
+use super::thinning::decimate;
 use super::{Block, Chart, Color, Event, Mark, Panel, Places, Rule, Series};
 use crate::format::trimmed;
 
 /// Width of a picture that fills a page (pixels).
 const WIDTH: u32 = 1200;
-/// Left edge of panels whose numbers need no more room (pixels).
-const LEFT: f64 = 84.0;
 /// Space right of the panels (pixels): the last tick label needs it.
 const RIGHT: f64 = 36.0;
-/// Sizes of the title, of headings and axis titles, and of all other words (pixels per em).
+/// Sizes of the title, and of headings and axis titles (pixels per em).
 const TITLE: f64 = 18.0;
 const HEADING: f64 = 14.0;
-const WORDS: f64 = 13.0;
-/// Middle of the first row of legend (pixels), and distance of two rows.
+/// Middle of the first row of legend (pixels).
 const LEGEND: f64 = 76.0;
-const LINE: f64 = 20.0;
 /// Space between panels that share an axis (pixels).
 const BETWEEN: f64 = 18.0;
 /// Height of the strip that names of rules and their leaders need (pixels).
@@ -59,7 +56,7 @@ impl Chart {
             let layout = Layout::of(block, left, right);
             let mut x = LEFT;
             if index == 0 {
-                y = legend.draw(&mut drawing, block, &layout, (x, y), right);
+                y = legend.draw(&mut drawing, block, layout.unnamed, (x, y), right);
             }
             if !block.name.is_empty() {
                 y += if index == 0 { 28.0 } else { 10.0 };
@@ -72,7 +69,7 @@ impl Chart {
                 drawing.text(aside);
             }
             if index > 0 {
-                y = legend.draw(&mut drawing, block, &layout, (x, y), right);
+                y = legend.draw(&mut drawing, block, layout.unnamed, (x, y), right);
             }
             y = layout.draw(&mut drawing, y + 14.0);
         }
@@ -87,10 +84,6 @@ impl Chart {
     }
 }
 
-fn ink(text: impl Into<String>, at: Point, size: f64) -> Text {
-    Text::new(text, at, size, Color::Ink.rgb())
-}
-
 fn soft(text: impl Into<String>, at: Point, size: f64) -> Text {
     Text::new(text, at, size, Color::Soft.rgb())
 }
@@ -98,135 +91,6 @@ fn soft(text: impl Into<String>, at: Point, size: f64) -> Text {
 /// The middle of the pixel, where a line of one pixel is sharp.
 fn crisp(position: f64) -> f64 {
     position.floor() + 0.5
-}
-
-/// Names in the legend so far: nothing is explained twice.
-#[derive(Default)]
-struct Legend {
-    listed: Vec<String>,
-}
-
-impl Legend {
-    /// Draws what a block adds, in rows from `at` on; returns the middle of the last row.
-    fn draw(
-        &mut self,
-        drawing: &mut Drawing,
-        block: &Block,
-        layout: &Layout<'_>,
-        at: Point,
-        right: f64,
-    ) -> f64 {
-        let (mut x, mut y) = at;
-        for (mark, color, words) in self.entries(block, layout) {
-            let wide = 30.0 + text_width(&words, WORDS, Weight::Regular);
-            if x + wide > right && x > LEFT {
-                (x, y) = (LEFT, y + LINE);
-            }
-            draw_sample(drawing, mark, color, (x, y));
-            drawing.text(ink(words, (x + 30.0, y), WORDS));
-            x += wide + 24.0;
-        }
-        y
-    }
-
-    fn entries(&mut self, block: &Block, layout: &Layout<'_>) -> Vec<(Mark, Color, String)> {
-        let mut entries = Vec::new();
-        let panels = &block.panels[..block.drawn];
-        let dashes = Mark::Dashed(1.5);
-        for series in panels.iter().flat_map(|panel| &panel.series) {
-            let mark = match series.mark {
-                Mark::Line(_) | Mark::Curve(_) => Mark::Line(2.5),
-                Mark::Dashed(_) => dashes,
-                mark => mark,
-            };
-            entries.push((mark, series.color, series.name.clone()));
-        }
-        let rules = || panels.iter().flat_map(|panel| &panel.rules);
-        if rules().any(|rule| rule.mode) {
-            let shaded = rules().any(|rule| rule.half > 0.0);
-            let words = if shaded {
-                "mode, shaded: line \u{b1} half line"
-            } else {
-                "mode"
-            };
-            entries.push((dashes, Color::Blue, words.to_owned()));
-        }
-        if rules().any(|rule| !rule.mode && rule.half > 0.0) {
-            let words = "mains or other, no mode".to_owned();
-            entries.push((dashes, Color::Orange, words));
-        }
-        let events = || panels.iter().flat_map(|panel| &panel.events);
-        if events().any(|event| event.used) {
-            entries.push((Mark::Dot(5.0), Color::Blue, "tap used".to_owned()));
-        }
-        if events().any(|event| !event.used) {
-            entries.push((
-                Mark::Cross(6.0),
-                Color::Vermilion,
-                "tap rejected".to_owned(),
-            ));
-        }
-        if layout.unnamed > 0 {
-            let words = format!("{} more without a label, see the table", layout.unnamed);
-            entries.push((dashes, Color::Soft, words));
-        }
-        let mut looks: Vec<(Mark, Color)> = Vec::new();
-        entries.retain(|(mark, color, words)| {
-            let named = !words.is_empty() && !self.listed.contains(words);
-            let kept = named && !looks.contains(&(*mark, *color));
-            if kept {
-                self.listed.push(words.clone());
-                looks.push((*mark, *color));
-            }
-            kept
-        });
-        entries
-    }
-}
-
-fn draw_sample(drawing: &mut Drawing, mark: Mark, color: Color, (x, y): Point) {
-    let middle = (x + 11.0, y);
-    let rgb = color.rgb();
-    match mark {
-        Mark::Line(width) | Mark::Curve(width) => {
-            drawing.line(vec![(x, y), (x + 22.0, y)], Stroke::new(rgb, width));
-        }
-        Mark::Dashed(width) => {
-            let stroke = Stroke::new(rgb, width);
-            drawing.dashed((x, y), (x + 22.0, y), 5.0, 3.0, stroke);
-        }
-        Mark::Band => drawing.rectangle((x + 3.0, y - 7.0), (x + 19.0, y + 7.0), rgb, 0.25),
-        Mark::Bar(_) | Mark::Cell => {
-            drawing.rectangle((x + 3.0, y - 5.0), (x + 19.0, y + 5.0), rgb, 1.0);
-        }
-        Mark::Dot(_) => draw_mark(drawing, Mark::Dot(5.0), middle, Stroke::new(rgb, 2.0)),
-        Mark::Ring(_) => draw_mark(drawing, Mark::Ring(5.0), middle, Stroke::new(rgb, 2.0)),
-        Mark::Cross(_) => draw_mark(drawing, Mark::Cross(5.0), middle, Stroke::new(rgb, 2.2)),
-        Mark::Square(_) => draw_mark(drawing, Mark::Square(5.0), middle, Stroke::new(rgb, 2.0)),
-    }
-}
-
-/// One point of a series.
-fn draw_mark(drawing: &mut Drawing, mark: Mark, at: Point, stroke: Stroke) {
-    match mark {
-        Mark::Dot(radius) => drawing.dot(at, radius, stroke.color),
-        Mark::Ring(radius) => drawing.shapes.push(Shape::Ring {
-            center: at,
-            radius,
-            color: stroke.color,
-        }),
-        Mark::Cross(radius) => drawing.cross(at, radius, stroke),
-        Mark::Square(half) => {
-            let (from, to) = ((at.0 - half, at.1 - half), (at.0 + half, at.1 + half));
-            drawing.rectangle(from, to, stroke.color, stroke.opacity);
-        }
-        Mark::Line(_)
-        | Mark::Dashed(_)
-        | Mark::Curve(_)
-        | Mark::Band
-        | Mark::Bar(_)
-        | Mark::Cell => {}
-    }
 }
 
 /// Columns of a block, and the names of its rules.

@@ -6,6 +6,7 @@ use super::super::chart::{Axis, Block, Chart, Color, Mark, Panel, Series};
 use super::super::document::Document;
 use super::super::format::significant;
 use tapjoint_analysis::SampledShape;
+use tapjoint_beam::Assembly;
 
 /// Panels in a row.
 const ACROSS: usize = 3;
@@ -25,7 +26,7 @@ pub fn shapes(document: &Document) -> Option<Chart> {
         }
         taps.extend(recording.tap.filter(|tap| !taps.contains(tap)));
     }
-    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
+    let kind = document.kind();
     let mut panels = Vec::new();
     for shape in shapes.iter().take(MOST) {
         panels.push(panel(shape, &sensors, &taps, kind));
@@ -46,7 +47,7 @@ fn panel(
     shape: &SampledShape,
     sensors: &BTreeMap<&str, Vec<f64>>,
     taps: &[f64],
-    kind: Option<&str>,
+    kind: Option<Assembly>,
 ) -> Panel {
     let end = 1e3 * shape.positions.last().copied().unwrap_or(1.0);
     let x = Axis::linear(0.0, end).of("position", "mm");
@@ -65,7 +66,7 @@ fn panel(
     let lap = points.windows(2).find(|pair| pair[0].0 == pair[1].0);
     let joint = match lap {
         Some(pair) => Some(pair[0].0),
-        None => (kind == Some("cantilever")).then_some(0.0),
+        None => (kind == Some(Assembly::Cantilever)).then_some(0.0),
     };
     let joint = joint.map(|at| (at, 0.0));
     series.push(Series::points(

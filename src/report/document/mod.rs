@@ -33,6 +33,7 @@ use tapjoint_analysis::{
     Analysis, RecordingResult, SampledShape, TestedStructure, Warning, sampled_shapes,
 };
 use tapjoint_beam::{Assembly, BeamTheory, NaturalMode};
+use tapjoint_description::JointModel;
 use tapjoint_identify::{PairsModel, PredictedMode};
 use tapjoint_signal::quality::Verdict;
 
@@ -100,11 +101,11 @@ pub struct TestSection {
     /// Name of the test.
     pub name: String,
     /// "cantilever", "lap" or "free"; null for a bare recording.
-    pub kind: Option<String>,
+    pub kind: Option<Assembly>,
     /// "2p" or "3p"; null where there is no joint.
-    pub model: Option<String>,
+    pub model: Option<JointModel>,
     /// "timoshenko" or "euler": the beam theory of the prediction.
-    pub beam_theory: Option<String>,
+    pub beam_theory: Option<BeamTheory>,
     /// Length (m).
     pub length: Option<f64>,
     /// Bending stiffness E I (N m2).
@@ -140,6 +141,22 @@ impl WarningSection {
 }
 
 impl Document {
+    /// What the joint joins; `None` for a bare recording.
+    pub fn kind(&self) -> Option<Assembly> {
+        self.test.as_ref()?.kind
+    }
+
+    /// Whether a joint is sought: a free beam has none.
+    pub fn has_joint(&self) -> bool {
+        self.kind() != Some(Assembly::Free)
+    }
+
+    /// Why there is no estimate.
+    pub fn no_estimate(&self) -> &str {
+        let reason = self.estimate_reason.as_deref();
+        reason.unwrap_or("no reason was recorded")
+    }
+
     /// The warnings that concern the result itself.
     pub fn main_warnings(&self) -> impl Iterator<Item = &WarningSection> {
         of_the_result(&self.warnings).into_iter()
@@ -234,21 +251,15 @@ fn test_section(name: &str, structure: Option<&TestedStructure>) -> TestSection 
             ..Default::default()
         };
     };
-    let (kind, model) = match (structure.assembly, structure.regression) {
-        (Assembly::Free, _) => ("free", None),
-        (Assembly::Lap, _) => ("lap", Some("2p")),
-        (Assembly::Cantilever, Some(PairsModel::ThreeParameter)) => ("cantilever", Some("3p")),
-        (Assembly::Cantilever, _) => ("cantilever", Some("2p")),
-    };
-    let theory = match structure.theory {
-        BeamTheory::Timoshenko => "timoshenko",
-        BeamTheory::Euler => "euler",
+    let model = match structure.regression {
+        Some(PairsModel::ThreeParameter) => JointModel::ThreeParameter,
+        _ => JointModel::TwoParameter,
     };
     TestSection {
         name: name.to_string(),
-        kind: Some(kind.to_string()),
-        model: model.map(str::to_string),
-        beam_theory: Some(theory.to_string()),
+        kind: Some(structure.assembly),
+        model: (structure.assembly != Assembly::Free).then_some(model),
+        beam_theory: Some(structure.theory),
         length: Some(structure.beam.length),
         bending_stiffness: Some(structure.beam.bending_stiffness()),
         mass_per_length: Some(structure.beam.mass_per_length()),

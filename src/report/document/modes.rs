@@ -6,7 +6,7 @@ use serde::Serialize;
 use tapjoint_analysis::{AmplitudeChange, ModeResult, RecordingResult};
 use tapjoint_signal::modal::amplitude::{AmplitudePoint, AmplitudeVerdict, Trend};
 use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
-use tapjoint_signal::modal::{FittedReading, FrequencySource, ModeReading};
+use tapjoint_signal::modal::{self, FittedReading, ModeReading};
 
 /// One resonance.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
@@ -155,15 +155,15 @@ impl ModeSection {
     pub(super) fn of_reading(reading: &ModeReading, recording: Option<&RecordingResult>) -> Self {
         let spectra = recording.and_then(|recording| recording.measurement.spectra.as_ref());
         let quality = spectra.map(|spectra| spectra.averages.best_quality(reading.frequency));
-        let change = recording.and_then(|recording| AmplitudeChange::of(reading, recording));
+        let change = recording.and_then(|recording| recording.amplitude_change(reading));
         let fit = reading.fit.as_deref();
         ModeSection {
             mode: None,
             frequency: reading.frequency,
             method: match reading.source {
-                FrequencySource::Fit => ReadBy::Fit,
-                FrequencySource::BetweenLines => ReadBy::Interpolated,
-                FrequencySource::Line => ReadBy::Line,
+                modal::ReadBy::Fit => ReadBy::Fit,
+                modal::ReadBy::Interpolated => ReadBy::Interpolated,
+                modal::ReadBy::Line => ReadBy::Line,
             },
             line_frequency: Some(reading.line_frequency),
             half_line: Some(reading.half_line),

@@ -2,9 +2,9 @@
 
 use super::super::document::{Document, EstimateSection, Method, ValueSection};
 use super::super::format::{
-    MISSING, RIGID, Rounded, last_place, optional, prefix, rounded_to, signed_percent, significant,
+    MISSING, RIGID, Rounded, capital, last_place, optional, or_missing, prefix, rounded_to,
+    signed_percent, significant,
 };
-use super::super::summary::capital;
 use super::{Table, number, words};
 
 /// Most significant digits of an estimate.
@@ -61,9 +61,8 @@ impl Parameter<'_> {
         let value = scaled(self.value.value);
         let finest = self.finest_place(value);
         let written = |number: f64| rounded_to(number, std.or(spread), finest);
-        let limit = |limit: Option<f64>| {
-            limit.map_or_else(|| MISSING.to_owned(), |limit| written(scaled(limit)).value)
-        };
+        let limit =
+            |limit: Option<f64>| or_missing(limit.map(|limit| written(scaled(limit)).value));
         let shown = if value.is_infinite() {
             RIGID.to_owned()
         } else {

@@ -1,46 +1,29 @@
 //! The report's tables as words, for the page and for the terminal.
 
-mod datasets;
-mod frfs;
 mod gap;
-mod hypotheses;
 mod joint;
-mod measured;
 mod modes;
-mod next_tests;
-mod prediction;
 mod quality;
+mod recordings;
 mod resolution;
-mod taps;
 mod uncertainty;
-mod verdict;
 
-pub use datasets::datasets;
-pub use frfs::frfs;
-pub(super) use gap::joint_with;
-pub use gap::{gap_in_short, gap_story, place_of};
-pub use hypotheses::hypotheses;
-pub(super) use hypotheses::together;
+pub use super::words::gap::{gap_in_short, gap_story, place_of};
+pub use gap::{hypotheses, next_tests};
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};
-pub use measured::{channels, conditions, recordings};
-pub use modes::{fitted_to, mode_details, modes, modes_from, reading_details, readings};
-pub use next_tests::next_tests;
-pub use prediction::prediction;
+pub use modes::{
+    fitted_to, frfs, mode_details, modes, modes_from, prediction, reading_details, readings,
+};
 pub use quality::{quality, quality_all, quality_count, quality_doubts};
+pub use recordings::{
+    channels, conditions, datasets, peak_unit, recordings, rejected_taps, taps, taps_used,
+};
 pub use resolution::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
-pub use taps::{peak_unit, rejected_taps, taps, taps_used};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
-pub(super) use verdict::shows_gap;
 
 use super::document::{Document, ModeSection, ReadBy};
 use super::format::MISSING;
 use tapjoint_identify::observation::UNPAIRED;
-
-/// Whether a joint is sought: a free beam has none.
-pub fn has_joint(document: &Document) -> bool {
-    let kind = document.test.as_ref().and_then(|test| test.kind.as_deref());
-    kind != Some("free")
-}
 
 /// A table of words.
 #[derive(Debug, Clone, PartialEq, Default)]

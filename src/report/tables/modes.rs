@@ -1,11 +1,15 @@
-//! Tables of resonances.
+//! Tables of resonances: as read, on frequency response functions, and beside their predictions.
 
-use super::super::document::{Document, ModeSection, ReadBy, RecordingSection};
-use super::super::format::{
-    MISSING, Rounded, frequency_reading, last_place, line_reading, optional, rounded_digits,
-    rounded_to, significant,
+use super::super::document::{
+    Document, FrfResonanceSection, FrfSection, ModeSection, PredictionSection, ReadBy,
+    RecordingSection,
 };
-use super::{Column, Table, bound_of, coherence, mode_name, number, words};
+use super::super::format::{
+    MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
+    or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
+    with_decimals_of,
+};
+use super::{Column, Table, bound_of, coherence, mode_name, mode_of, number, words};
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
@@ -240,7 +244,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
             UncertaintySource::TapScatter => "taps",
         })
         .to_owned(),
-        line.unwrap_or_else(|| MISSING.into()),
+        or_missing(line),
         damping(mode),
         optional(tap_deviation(mode), 2),
         optional(scatter, 2),
@@ -249,7 +253,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
         optional(mode.above_noise_db, 2),
         coherence(mode.coherence),
         optional(mode.random_error.map(|error| 100.0 * error), 2),
-        mode.recording.clone().unwrap_or_else(|| MISSING.into()),
+        or_missing(mode.recording.clone()),
     ]
 }
 
@@ -307,4 +311,193 @@ fn lambda(mode: &ModeSection) -> String {
         }
         _ => significant(lambda, 5),
     }
+}
+
+/// One row for each resonance on each function; `None` where no functions were asked for or none
+/// exist.
+pub fn frfs(document: &Document) -> Option<Table> {
+    let frfs = document.frfs.as_deref()?;
+    let first = frfs.first()?;
+    let one_unit = frfs.iter().all(|frf| frf.unit == first.unit);
+    let magnitude = if one_unit {
+        format!("|{}| ({})", first.estimator, unit_words(&first.unit))
+    } else {
+        format!("|{}|", first.estimator)
+    };
+    let rows = frfs
+        .iter()
+        .flat_map(|frf| {
+            let unit = if one_unit {
+                String::new()
+            } else {
+                unit_words(&frf.unit)
+            };
+            let named = (recording_name(document, frf), unit);
+            frf.resonances
+                .iter()
+                .map(move |found| function_row(frf, found, named.clone()))
+        })
+        .collect();
+    let taps = frfs.iter().map(|frf| frf.averages);
+    let (least, most) = (taps.clone().min().unwrap_or(0), taps.max().unwrap_or(0));
+    let table = Table {
+        caption: format!(
+            "Frequency response functions at the resonances, {}",
+            made_by(&first.estimator, least, most)
+        ),
+        columns: vec![
+            words("Recording"),
+            words("Response"),
+            words("Mode"),
+            number("Frequency (Hz)"),
+            number(&magnitude),
+            words("Unit"),
+            number("Phase (\u{b0})"),
+            number("Coherence"),
+            number("Error (%)"),
+        ],
+        rows,
+        note: function_note(frfs, least),
+    };
+    Some(table.without_empty_columns())
+}
+
+/// Estimator and taps; of what an analyser has made nobody says either.
+fn made_by(estimator: &str, least: usize, most: usize) -> String {
+    match (least, most) {
+        (0, 0) => "as the file holds them".to_owned(),
+        (1, 1) => format!("{estimator}, 1 tap"),
+        _ if least == most => format!("{estimator}, {least} taps averaged"),
+        _ => format!("{estimator}, {least} to {most} taps averaged"),
+    }
+}
+
+fn function_note(frfs: &[FrfSection], least: usize) -> String {
+    let mut text = "On the line nearest to each resonance.".to_owned();
+    if least >= 2 {
+        text.push_str(" Error: random error of the magnitude (standard deviation).");
+    } else {
+        text.push_str(
+            " One average: no coherence; it would be 1 whatever the noise, and mean nothing.",
+        );
+    }
+    if frfs.iter().any(|frf| frf.unit.contains("unit of the file")) {
+        text.push_str(
+            " The file states no unit for a channel: magnitudes are per unit of the file; give the \
+             scales (SI units per unit of the file) to have them in SI units.",
+        );
+    }
+    if let Some(decay) = frfs.iter().find_map(|frf| frf.window_decay) {
+        text.push_str(&format!(
+            " The exponential window adds a decay of {} 1/s to every pole, so peaks are lower than without.",
+            trimmed(decay, 3)
+        ));
+    }
+    text
+}
+
+/// The recording's name where there are several.
+fn recording_name(document: &Document, frf: &FrfSection) -> String {
+    let several = document.recordings.as_ref().is_some_and(|r| r.len() > 1);
+    if several {
+        frf.recording.clone()
+    } else {
+        String::new()
+    }
+}
+
+fn function_row(
+    frf: &FrfSection,
+    found: &FrfResonanceSection,
+    (recording, unit): (String, String),
+) -> Vec<String> {
+    let name = mode_name(found.mode, found.label.as_deref());
+    let phase = |value: f64| format!("{value:.1}").replace('-', "\u{2212}");
+    vec![
+        recording,
+        frf.response.clone(),
+        name,
+        trimmed(found.frequency, 6),
+        optional(found.magnitude, 4),
+        unit,
+        or_missing(found.phase.map(phase)),
+        coherence(found.coherence),
+        optional(found.random_error.map(|error| 100.0 * error), 2),
+    ]
+}
+
+/// Measured beside predicted frequencies; `None` where nothing was predicted.
+pub fn prediction(document: &Document) -> Option<Table> {
+    let rows = document.prediction.as_deref().filter(|p| !p.is_empty())?;
+    let compared = rows.iter().any(|row| row.measured.is_some());
+    let used = |used: bool| if used { "yes" } else { "no" }.to_owned();
+    let cells = rows
+        .iter()
+        .map(|row| {
+            let [measured, predicted, reading] = compared_frequencies(document, row);
+            vec![
+                row.mode.to_string(),
+                measured,
+                predicted,
+                signed_percent(row.error_percent),
+                reading,
+                optional(row.lambda, 6),
+                if compared {
+                    used(row.used)
+                } else {
+                    String::new()
+                },
+            ]
+        })
+        .collect();
+    let (caption, note) = if compared {
+        (
+            "Measured and predicted frequencies",
+            "Error = 100 (predicted \u{2212} measured)/measured. Reading: bound of the measured \
+             frequency. Used: the mode entered the estimate; the others are true predictions.",
+        )
+    } else {
+        (
+            "Predicted frequencies",
+            "\u{3bb}: non-dimensional frequency, \u{3bb}\u{2074} = (2\u{3c0}f)\u{b2} \u{3c1}A \
+             L\u{2074}/(EI).",
+        )
+    };
+    let table = Table {
+        caption: caption.to_owned(),
+        columns: vec![
+            number("Mode"),
+            number("Measured (Hz)"),
+            number("Predicted (Hz)"),
+            number("Error (%)"),
+            number("Reading (%)"),
+            number("\u{3bb} (1)"),
+            words("Used"),
+        ],
+        rows: cells,
+        note: note.to_owned(),
+    };
+    Some(table.without_empty_columns())
+}
+
+/// Measured and predicted frequency to the same digit, and the bound of the reading in percent.
+fn compared_frequencies(document: &Document, row: &PredictionSection) -> [String; 3] {
+    let mode = mode_of(document, row.mode);
+    let bound = mode.and_then(bound_of);
+    // The digits of the list of modes, so that the same frequency reads the same.
+    let listed = mode
+        .filter(|_| bound.is_some())
+        .map(|mode| reading(mode).value);
+    let hertz = |value: Option<f64>| match (value, &listed) {
+        (Some(value), Some(listed)) => with_decimals_of(value, listed),
+        _ => optional(value, 6),
+    };
+    let percent = bound
+        .zip(row.measured)
+        .map(|(bound, hz)| 100.0 * bound / hz);
+    [
+        hertz(row.measured),
+        hertz(row.predicted),
+        or_missing(percent.map(bound_percent)),
+    ]
 }

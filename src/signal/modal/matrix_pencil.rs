@@ -108,7 +108,7 @@ const OVERSAMPLING: f64 = 2.5;
 const REFINEMENTS: usize = 4;
 
 /// Records at the band's own rate, around its centre.
-struct Demodulated {
+pub(super) struct Demodulated {
     columns: Vec<Vec<Complex64>>,
     /// Time of each sample from the record's start (s).
     times: Vec<f64>,
@@ -355,7 +355,7 @@ const MOST_COLUMNS: usize = 80;
 ///
 /// Rows of the Hankel matrices of all records are sums of (1, z, ..., z^L); the leading eigenvectors of
 /// H^H H span their conjugates, and shifting them by one row turns them by conj(z).
-pub(super) fn subspace_poles(data: &Demodulated, most: usize) -> Vec<Complex64> {
+fn subspace_poles(data: &Demodulated, most: usize) -> Vec<Complex64> {
     let count = data.times.len();
     let size = (count / 3).min(MOST_COLUMNS) + 1;
     let gram = DMatrix::from_fn(size, size, |i, j| {

@@ -20,7 +20,7 @@ mod projection;
 mod reading;
 
 pub use mode::{
-    BandReadings, FittedReading, FrequencySource, MergedMode, ModeReading, PeakLabel, merge_modes,
+    BandReadings, FittedReading, MergedMode, ModeReading, PeakLabel, ReadBy, merge_modes,
 };
 pub use peaks::{
     CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,

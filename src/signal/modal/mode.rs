@@ -1,5 +1,6 @@
 //! One list of modes from several recordings and bands.
 
+use serde::Serialize;
 use std::fmt;
 
 use super::amplitude::AmplitudeCurve;
@@ -11,7 +12,7 @@ pub struct ModeReading {
     /// Best frequency (Hz).
     pub frequency: f64,
     /// Where that comes from.
-    pub source: FrequencySource,
+    pub source: ReadBy,
     /// Its interval (Hz): 95 % of a fit, the bounds of a reading between the lines or on one.
     pub interval: (f64, f64),
     /// Frequency of the peak's line, without a peak of the nearest one (Hz).
@@ -38,15 +39,32 @@ pub struct ModeReading {
     pub fit: Option<Box<FittedReading>>,
 }
 
-/// How a frequency was read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrequencySource {
-    /// By a fit.
+/// Way of reading a natural frequency, wanted or used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReadBy {
+    /// By a fit of decaying oscillations, with a standard deviation. Modes that cannot be fitted are read
+    /// between the lines or on their line.
+    #[default]
     Fit,
-    /// Between the lines about the peak.
-    BetweenLines,
-    /// On the spectral line.
+    /// Between the lines about the peak, or on its line where that fails.
+    Interpolated,
+    /// On the highest spectral line, as Ingole & Chatterjee read their frequencies.
     Line,
+}
+
+impl ReadBy {
+    /// All ways, from the coarsest to the finest.
+    pub const ALL: [Self; 3] = [Self::Line, Self::Interpolated, Self::Fit];
+
+    /// Name in descriptions and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Interpolated => "interpolated",
+            Self::Fit => "fit",
+        }
+    }
 }
 
 impl ModeReading {
@@ -54,7 +72,7 @@ impl ModeReading {
     pub fn on_line(frequency: f64, half_line: f64) -> Self {
         let mut reading = ModeReading {
             frequency,
-            source: FrequencySource::Line,
+            source: ReadBy::Line,
             interval: (frequency, frequency),
             line_frequency: frequency,
             half_line,
@@ -68,36 +86,31 @@ impl ModeReading {
             label: None,
             fit: None,
         };
-        reading.prefer(FrequencySource::Line);
+        reading.prefer(ReadBy::Line);
         reading
     }
 
     /// Takes as the best frequency what `wanted` gives, or the next best that there is: fit, between
     /// the lines, line. The damping stays that of the fit, or of the reading between the lines.
-    pub fn prefer(&mut self, wanted: FrequencySource) {
+    pub fn prefer(&mut self, wanted: ReadBy) {
         let fit = self.fit.as_deref().map(|fit| &fit.mode);
         if let Some(fit) = fit {
             self.damping_ratio = Some(fit.damping_ratio.value);
             self.damping_std = Some(fit.damping_ratio.std);
         }
         let fitted = fit
-            .filter(|_| wanted == FrequencySource::Fit)
+            .filter(|_| wanted == ReadBy::Fit)
             .map(|fit| fit.frequency);
         let between = self
             .interpolated
             .zip(self.bound)
-            .filter(|_| wanted != FrequencySource::Line);
+            .filter(|_| wanted != ReadBy::Line);
         let within = |value: f64, bound: f64| (value - bound, value + bound);
         (self.frequency, self.source, self.std, self.interval) = match (fitted, between) {
-            (Some(fit), _) => (
-                fit.value,
-                FrequencySource::Fit,
-                Some(fit.std),
-                (fit.low, fit.high),
-            ),
+            (Some(fit), _) => (fit.value, ReadBy::Fit, Some(fit.std), (fit.low, fit.high)),
             (None, Some((value, bound))) => (
                 value,
-                FrequencySource::BetweenLines,
+                ReadBy::Interpolated,
                 // The bound is two standard deviations.
                 Some(0.5 * bound),
                 within(value, bound),
@@ -105,7 +118,7 @@ impl ModeReading {
             // On a line the truth lies anywhere within the half line.
             (None, None) => (
                 self.line_frequency,
-                FrequencySource::Line,
+                ReadBy::Line,
                 Some(self.half_line / 3f64.sqrt()),
                 within(self.line_frequency, self.half_line),
             ),
@@ -280,7 +293,7 @@ fn resolves_better(a: &ModeReading, b: &ModeReading) -> bool {
     if a.label.is_some() != b.label.is_some() {
         return a.label.is_none();
     }
-    let fitted = |reading: &ModeReading| reading.source == FrequencySource::Fit;
+    let fitted = |reading: &ModeReading| reading.source == ReadBy::Fit;
     match (fitted(a), fitted(b)) {
         (true, true) => return a.std < b.std,
         (true, false) => return true,

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::mode::{FrequencySource, ModeReading, PeakLabel};
+use super::mode::{ModeReading, PeakLabel, ReadBy};
 use super::peaks::{CompositeLevel, Peak};
 use crate::spectral::{Lines, Window};
 
@@ -115,7 +115,7 @@ fn reading(
         label,
         ..ModeReading::on_line(lines.frequency(line), half_line)
     };
-    reading.prefer(FrequencySource::BetweenLines);
+    reading.prefer(ReadBy::Interpolated);
     reading
 }
 

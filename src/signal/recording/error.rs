@@ -1,10 +1,12 @@
-//! What can go wrong so badly that a recording cannot be used.
+//! Errors of this stage: each names the file, and the line where there is one; what was found, what
+//! is allowed, what to do.
 
-use super::responses::ResponseError;
-use super::text::short;
-use super::uff::UffError;
-use super::wav_error::WavError;
 use std::io;
+
+/// A number with the digits that mean something: nine, so that roundings do not show.
+pub(super) fn short(value: f64) -> f64 {
+    format!("{value:.8e}").parse().unwrap_or(value)
+}
 
 /// Why a recording cannot be opened, read or written: the file, and the line where there is one;
 /// what was found, what is allowed, what to do. Poor data are [`super::RecordingWarning`]s instead.
@@ -396,5 +398,286 @@ pub enum RecordingError {
         file: String,
         /// The system's reason.
         source: io::Error,
+    },
+}
+
+/// Why the header of a WAV file cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WavError {
+    /// A chunk without which the samples have no meaning.
+    #[error(
+        "{file}: no \"{chunk}\" chunk{place}: not a usable WAV file; record or export it again"
+    )]
+    MissingChunk {
+        /// The file.
+        file: String,
+        /// Its four-letter name.
+        chunk: &'static str,
+        /// Where it was expected, empty for "anywhere".
+        place: &'static str,
+    },
+    /// A header field that cannot be true.
+    #[error("{file}: the WAV header says {field} {value}; allowed: {allowed}; export it again")]
+    BadHeader {
+        /// The file.
+        file: String,
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        value: u64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Samples coded in a way that is not read.
+    #[error(
+        "{file}: WAV coding {name} (format tag 0x{tag:04x}, {bits} bits) is not read; allowed: integer of 8 to 32 bits, float of 32 or 64 bits; export as PCM or float"
+    )]
+    UnsupportedCoding {
+        /// The file.
+        file: String,
+        /// The format tag, of the subformat where the header is extensible.
+        tag: u16,
+        /// Its common name.
+        name: &'static str,
+        /// Bits per sample.
+        bits: u16,
+    },
+}
+
+/// Why a universal file cannot be read or written.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum UffError {
+    /// A header record that makes no sense.
+    #[error(
+        "{file}:{line}: record {record} of dataset {dataset} (type 58) has {field} \"{value}\"; allowed: {allowed}; export the file again"
+    )]
+    BadRecord {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// The record, 1-based as in the format's description; 0 for the line with the type.
+        record: usize,
+        /// What the field means.
+        field: &'static str,
+        /// What stands there.
+        value: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Numbers in a format of computers of the past.
+    #[error(
+        "{file}: dataset {dataset} (58b) has byte order {order} and floating-point format {format}; allowed: byte order 1 (little endian) or 2 (big endian) and format 2 (IEEE 754); export as ASCII or IEEE"
+    )]
+    FloatFormat {
+        /// The file.
+        file: String,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// Byte order as the header has it.
+        order: u32,
+        /// Floating-point format as the header has it: 1 DEC VMS, 2 IEEE 754, 3 IBM 5/370.
+        format: u32,
+    },
+    /// Text where a number is needed.
+    #[error(
+        "{file}:{line}: dataset {dataset} holds \"{value}\", which is not a number; allowed: numbers in the columns of dataset 58 or between blanks; export the file again"
+    )]
+    NotANumber {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// What stands there.
+        value: String,
+    },
+    /// A line too long to be a row of numbers.
+    #[error(
+        "{file}:{line}: this line of dataset {dataset} has more than {limit} bytes; allowed: one row of numbers per line; is it a binary dataset with a damaged header?"
+    )]
+    LineTooLong {
+        /// The file.
+        file: String,
+        /// Line, 1-based.
+        line: u64,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// The limit (bytes).
+        limit: usize,
+    },
+    /// No dataset 58 at all.
+    #[error(
+        "{file}: holds no function (dataset 58), only {found}; allowed: dataset 58 or 58b; export the time series or frequency response functions"
+    )]
+    NoFunctions {
+        /// The file.
+        file: String,
+        /// What there is.
+        found: String,
+    },
+    /// Functions, but no time series.
+    #[error("{file}: holds no time series (function type 1), only {found}; {remedy}")]
+    NoTimeSeries {
+        /// The file.
+        file: String,
+        /// What there is.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A time series whose header cannot be used as one.
+    #[error("{file}: dataset {dataset} ({name}): {problem}; {remedy}")]
+    BadTimeSeries {
+        /// The file.
+        file: String,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// Times or frequencies that are not evenly spaced.
+    #[error(
+        "{file}: dataset {dataset}, point {point}: uneven spacing: {} {unit} comes {} {unit} after the point before, the step elsewhere is {} {unit}; allowed: 0.1 % of the step, or what rounding of the printed value explains; export with even spacing",
+        short(*.value), short(*.step), short(*.expected)
+    )]
+    Uneven {
+        /// The file.
+        file: String,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// The point, 1-based.
+        point: u64,
+        /// Abscissa there (s or Hz).
+        value: f64,
+        /// Step to it (s or Hz).
+        step: f64,
+        /// Step elsewhere (s or Hz).
+        expected: f64,
+        /// "s" or "Hz".
+        unit: &'static str,
+    },
+    /// A dataset that is not there or is no function.
+    #[error("{file}: there is no function (dataset 58) at place {dataset}; list the datasets")]
+    NotAFunction {
+        /// The file.
+        file: String,
+        /// The place asked for, 1-based.
+        dataset: usize,
+    },
+    /// A value that is no number of physical size.
+    #[error(
+        "{file}: dataset {dataset}, point {point} is {value}; allowed: finite numbers of magnitude up to 1e100; export the file again"
+    )]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// The dataset, 1-based; when writing, the response.
+        dataset: usize,
+        /// The point, 1-based.
+        point: u64,
+        /// The value.
+        value: f64,
+    },
+    /// Fewer or more values than lines.
+    #[error(
+        "{file}: response {response} has {found} values, the lines are {expected}; give equal numbers"
+    )]
+    LengthMismatch {
+        /// The file.
+        file: String,
+        /// The response, 1-based.
+        response: usize,
+        /// Its values.
+        found: usize,
+        /// The lines.
+        expected: usize,
+    },
+}
+
+/// Why a file gives no frequency response functions.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ResponseError {
+    /// A recording where a response was expected.
+    #[error(
+        "{file}: is {what}; frequency response functions were expected because `form` is given; remove `form` (and `sensor`) from its [[recording]], or give the file with the responses"
+    )]
+    TimeSeries {
+        /// The file.
+        file: String,
+        /// What it is.
+        what: String,
+    },
+    /// Frequency response functions where a recording was expected.
+    #[error(
+        "{file}:{line}: the first column is a frequency (\"{column}\"): this is a frequency response function and no time series; in a test description give its [[recording]] form = \"accelerance\" (or \"mobility\", \"receptance\"); without one `tapjoint run FILE` and `tapjoint spectrum FILE` read it"
+    )]
+    NotTimeSeries {
+        /// The file.
+        file: String,
+        /// Line of the first row, 1-based.
+        line: u64,
+        /// The column's heading.
+        column: String,
+    },
+    /// No frequency response function.
+    #[error(
+        "{file}: holds no frequency response function (function type 4), only {found}; export complex responses over force"
+    )]
+    None {
+        /// The file.
+        file: String,
+        /// What there is.
+        found: String,
+    },
+    /// Frequency response functions that cannot be used.
+    #[error(
+        "{file}: dataset {dataset} ({name}): {problem}; export complex values on evenly spaced lines"
+    )]
+    Unusable {
+        /// The file.
+        file: String,
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// Its place and description.
+        name: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Columns that are not frequency, real part and imaginary part.
+    #[error(
+        "{file}:{line}: {problem}; allowed: three columns, frequency (Hz), real part and imaginary part, and coherence as a fourth; export it so"
+    )]
+    Columns {
+        /// The file.
+        file: String,
+        /// Line of the first row, 1-based.
+        line: u64,
+        /// What is there instead.
+        problem: String,
+    },
+    /// Frequencies that are not evenly spaced.
+    #[error(
+        "{file}:{line}: uneven lines: {} Hz comes {} Hz after the line before, the step elsewhere is {} Hz; allowed: 0.1 % of the step, or what rounding of the printed frequency explains; export evenly spaced lines",
+        short(*.frequency), short(*.step), short(*.expected)
+    )]
+    Uneven {
+        /// The file.
+        file: String,
+        /// Line, 1-based, empty lines not counted.
+        line: u64,
+        /// Frequency in that line (Hz).
+        frequency: f64,
+        /// Step to it (Hz).
+        step: f64,
+        /// Step elsewhere (Hz).
+        expected: f64,
     },
 }

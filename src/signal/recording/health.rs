@@ -1,4 +1,8 @@
-//! What a channel's samples say about the quality of the recording, gathered in one pass.
+//! Quality of a channel's samples, gathered in one pass, and the checks that samples and rates must pass.
+
+use super::error::RecordingError;
+use super::text::LARGEST;
+use super::warning::{ChannelLabel, RecordingWarning};
 
 /// Longest list of places kept for one channel and one fault; beyond it only the count grows.
 const PLACES_KEPT: usize = 32;
@@ -35,6 +39,85 @@ const ACTIVITY_WEIGHT: f64 = 1.0 / 16.0;
 /// Part of the recording that may stand still before standing still is taken for the channel's
 /// rest (a gated or noise-free channel) instead of lost samples.
 const MAX_STILL_PART: f64 = 0.5;
+
+/// A mean beyond this part of the peak is reported: a tenth shifts thresholds noticeably.
+const OFFSET_OF_PEAK: f64 = 0.1;
+
+/// Sample rates that are taken (Hz). Nothing that is tapped needs more or does with less; beyond lie
+/// damaged time columns, whose lengths in samples no longer fit a number.
+const RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
+
+/// Checks that a sample rate (Hz) is one that a recording can have.
+pub(super) fn check_rate(file: &str, value: f64) -> Result<(), RecordingError> {
+    match RATES.contains(&value) {
+        true => Ok(()),
+        false => Err(RecordingError::BadSampleRate {
+            file: file.to_owned(),
+            value,
+        }),
+    }
+}
+
+/// Returns the index of the first value that is not finite or absurdly large.
+pub(super) fn first_unusable(values: impl IntoIterator<Item = f64>) -> Option<usize> {
+    // NaN is in no range.
+    values
+        .into_iter()
+        .position(|value| !(-LARGEST..=LARGEST).contains(&value))
+}
+
+/// Checks that samples of a channel (0-based), the first of them at `start`, are finite and not absurd.
+pub(super) fn check_finite(
+    name: &str,
+    sample_rate: f64,
+    channel: usize,
+    start: u64,
+    samples: &[f64],
+) -> Result<(), RecordingError> {
+    let Some(at) = first_unusable(samples.iter().copied()) else {
+        return Ok(());
+    };
+    let frame = start + at as u64;
+    Err(RecordingError::NotFinite {
+        file: name.to_owned(),
+        channel: channel + 1,
+        frame,
+        time: frame as f64 / sample_rate,
+        value: samples.get(at).copied().unwrap_or(f64::NAN),
+    })
+}
+
+/// Checks channels in memory and returns their common length.
+pub(super) fn check_samples<'a>(
+    name: &str,
+    sample_rate: f64,
+    channels: impl IntoIterator<Item = &'a [f64]>,
+) -> Result<usize, RecordingError> {
+    let mut frames = 0;
+    for (at, samples) in channels.into_iter().enumerate() {
+        if at == 0 {
+            frames = samples.len();
+        }
+        if frames == 0 {
+            break;
+        }
+        if samples.len() != frames {
+            return Err(RecordingError::LengthMismatch {
+                file: name.to_owned(),
+                channel: at + 1,
+                found: samples.len(),
+                expected: frames,
+            });
+        }
+        check_finite(name, sample_rate, at, 0, samples)?;
+    }
+    match frames {
+        0 => Err(RecordingError::NoSamples {
+            file: name.to_owned(),
+        }),
+        frames => Ok(frames),
+    }
+}
 
 /// A run of equal samples at the channel's highest or lowest level.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,7 +174,7 @@ pub struct ChannelHealth {
 }
 
 impl ChannelHealth {
-    /// The same health in another unit: every value multiplied by `factor`.
+    /// Returns this health in another unit: every value multiplied by `factor`.
     pub(super) fn scaled(&self, factor: f64) -> Self {
         let (low, high) = (self.minimum * factor, self.maximum * factor);
         let mut scaled = self.clone();
@@ -107,31 +190,79 @@ impl ChannelHealth {
         }
         scaled
     }
+
+    /// Returns the doubts that this health gives rise to.
+    pub(super) fn warnings(
+        &self,
+        channel: &ChannelLabel,
+        sample_rate: f64,
+    ) -> Vec<RecordingWarning> {
+        let channel = channel.clone();
+        if self.constant {
+            let level = self.mean;
+            return vec![RecordingWarning::Constant { channel, level }];
+        }
+        let mut warnings = Vec::new();
+        if let Some(first) = self.first_full_scale {
+            warnings.push(RecordingWarning::FullScale {
+                channel: channel.clone(),
+                count: self.full_scale_samples,
+                time: first as f64 / sample_rate,
+            });
+        }
+        if let Some(first) = self.flat_tops.first() {
+            warnings.push(RecordingWarning::FlatTops {
+                channel: channel.clone(),
+                count: self.flat_top_count,
+                time: first.start as f64 / sample_rate,
+                len: first.len,
+                level: first.value,
+            });
+        }
+        if let Some(first) = self.dropped.first() {
+            warnings.push(RecordingWarning::Dropped {
+                channel: channel.clone(),
+                count: self.dropout_count,
+                samples: self.dropped_samples,
+                time: first.start as f64 / sample_rate,
+                len: first.len,
+                level: first.value,
+            });
+        }
+        if self.mean.abs() > OFFSET_OF_PEAK * self.peak {
+            warnings.push(RecordingWarning::Offset {
+                channel,
+                mean: self.mean,
+                peak: self.peak,
+            });
+        }
+        warnings
+    }
 }
 
 /// Gathers [`ChannelHealth`] sample by sample, in memory that does not grow with the recording.
 #[derive(Debug, Clone)]
 pub(super) struct HealthMeter {
     full_scale: Option<f64>,
-    count: u64,
-    mean: f64,
     sum_of_squares: f64,
-    full_scale_samples: u64,
-    first_full_scale: Option<u64>,
+    /// Samples so far.
+    count: u64,
     last: f64,
     run: Run,
+    /// Smallest step between two samples.
     quantum: f64,
+    /// Running mean of the steps.
     activity: f64,
     high: Side,
     low: Side,
-    dropped: Vec<Dropout>,
-    dropout_count: u64,
-    dropped_samples: u64,
+    /// Samples in all runs that are long enough for a dropout.
     still_samples: u64,
+    /// The result as far as it is known; its values at the extremes come at the end.
+    health: ChannelHealth,
 }
 
 /// The run of equal samples that is going on.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Run {
     start: u64,
     len: u64,
@@ -160,8 +291,8 @@ impl Side {
         }
     }
 
-    /// A higher level makes all runs at the old one ordinary.
-    fn see(&mut self, value: f64) {
+    /// Takes the next value; a higher level makes all runs at the old one ordinary.
+    fn raise(&mut self, value: f64) {
         if value * self.sign > self.level {
             self.level = value * self.sign;
             self.places.clear();
@@ -172,57 +303,33 @@ impl Side {
     fn holds(&self, value: f64) -> bool {
         value * self.sign == self.level
     }
-
-    fn note(&mut self, flat_top: FlatTop) {
-        self.count += 1;
-        if self.places.len() < PLACES_KEPT {
-            self.places.push(flat_top);
-        }
-    }
 }
 
 impl HealthMeter {
-    /// `full_scale` is the magnitude from which on a sample sits at the end of an integer format.
+    /// Begins; `full_scale` is the magnitude from which on a sample sits at the end of an integer format.
     pub(super) fn new(full_scale: Option<f64>) -> Self {
         Self {
             full_scale,
-            count: 0,
-            mean: 0.0,
             sum_of_squares: 0.0,
-            full_scale_samples: 0,
-            first_full_scale: None,
+            count: 0,
             last: 0.0,
-            run: Run {
-                start: 0,
-                len: 0,
-                entry: 0.0,
-                activity: 0.0,
-            },
+            run: Run::default(),
             quantum: f64::INFINITY,
             activity: 0.0,
             high: Side::new(1.0),
             low: Side::new(-1.0),
-            dropped: Vec::new(),
-            dropout_count: 0,
-            dropped_samples: 0,
             still_samples: 0,
+            health: ChannelHealth::default(),
         }
     }
 
     /// Adds the next samples.
-    pub(super) fn add(&mut self, samples: &[f64]) {
-        self.add_moments(samples);
-        for &value in samples {
-            self.add_sample(value);
-        }
-    }
-
-    /// Mean and sum of squares of a block, merged into those of all before.
     ///
-    /// With d = mean_b - mean_a and n = n_a + n_b: mean = mean_a + d n_b/n and
+    /// Mean and sum of squares of the block are merged into those of all before. With
+    /// d = mean_b - mean_a and n = n_a + n_b: mean = mean_a + d n_b/n and
     /// M = M_a + M_b + d^2 n_a n_b/n (the pairwise update), exact for any block size and
     /// free of the cancellation of sum(x^2) - n mean^2.
-    fn add_moments(&mut self, samples: &[f64]) {
+    pub(super) fn add(&mut self, samples: &[f64]) {
         if samples.is_empty() {
             return;
         }
@@ -230,18 +337,21 @@ impl HealthMeter {
         let before = self.count as f64;
         let mean = samples.iter().sum::<f64>() / added;
         let squares: f64 = samples.iter().map(|x| (x - mean) * (x - mean)).sum();
-        let difference = mean - self.mean;
+        let difference = mean - self.health.mean;
         let total = before + added;
-        self.mean += difference * added / total;
+        self.health.mean += difference * added / total;
         self.sum_of_squares += squares + difference * difference * before * added / total;
+        for value in samples {
+            self.add_sample(*value);
+        }
     }
 
     fn add_sample(&mut self, value: f64) {
         let at = self.count;
         self.count += 1;
         if self.full_scale.is_some_and(|level| value.abs() >= level) {
-            self.full_scale_samples += 1;
-            self.first_full_scale.get_or_insert(at);
+            self.health.full_scale_samples += 1;
+            self.health.first_full_scale.get_or_insert(at);
         }
         let step = (value - self.last).abs();
         if at > 0 && step == 0.0 {
@@ -251,8 +361,8 @@ impl HealthMeter {
                 self.quantum = self.quantum.min(step);
                 self.end_run(step);
             }
-            self.high.see(value);
-            self.low.see(value);
+            self.high.raise(value);
+            self.low.raise(value);
             self.run = Run {
                 start: at,
                 len: 1,
@@ -268,78 +378,66 @@ impl HealthMeter {
 
     /// Judges the run that ends with a step of magnitude `exit` (0 at the end of the recording).
     fn end_run(&mut self, exit: f64) {
-        let run = self.run;
-        if run.len < MIN_FLAT_TOP {
+        let Run {
+            start,
+            len,
+            entry,
+            activity,
+        } = self.run;
+        if len < MIN_FLAT_TOP {
             return;
         }
+        let value = self.last;
         let peak = self.high.level.abs().max(self.low.level.abs());
         let smallest_drop = (MIN_DROP_QUANTA * self.quantum).max(MIN_DROP_OF_PEAK * peak);
-        let extreme = self.high.holds(self.last) || self.low.holds(self.last);
-        if extreme && run.entry.max(exit) > smallest_drop {
-            let flat_top = FlatTop {
-                start: run.start,
-                len: run.len,
-                value: self.last,
-            };
+        let extreme = self.high.holds(value) || self.low.holds(value);
+        if extreme && entry.max(exit) > smallest_drop {
             for side in [&mut self.high, &mut self.low] {
-                if side.holds(self.last) {
-                    side.note(flat_top);
+                if side.holds(value) {
+                    side.count += 1;
+                    if side.places.len() < PLACES_KEPT {
+                        side.places.push(FlatTop { start, len, value });
+                    }
                 }
             }
         }
-        if run.len >= MIN_DROPOUT {
-            self.still_samples += run.len;
-            // A long run at a limit is a flat top, whatever else it looks like.
-            let at_limit = extreme && self.last.abs() >= MIN_LEVEL_OF_PEAK * peak;
-            if exit > 0.0 && !at_limit && run.activity > MIN_ACTIVITY_QUANTA * self.quantum {
-                self.note_dropout(Dropout {
-                    start: run.start,
-                    len: run.len,
-                    value: self.last,
-                });
+        if len < MIN_DROPOUT {
+            return;
+        }
+        self.still_samples += len;
+        // A long run at a limit is a flat top, whatever else it looks like.
+        let at_limit = extreme && value.abs() >= MIN_LEVEL_OF_PEAK * peak;
+        if exit > 0.0 && !at_limit && activity > MIN_ACTIVITY_QUANTA * self.quantum {
+            self.health.dropout_count += 1;
+            self.health.dropped_samples += len;
+            if self.health.dropped.len() < PLACES_KEPT {
+                self.health.dropped.push(Dropout { start, len, value });
             }
         }
     }
 
-    fn note_dropout(&mut self, dropout: Dropout) {
-        self.dropout_count += 1;
-        self.dropped_samples += dropout.len;
-        if self.dropped.len() < PLACES_KEPT {
-            self.dropped.push(dropout);
-        }
-    }
-
-    /// The result.
+    /// Returns the health of all samples that were added.
     pub(super) fn finish(mut self) -> ChannelHealth {
         if self.count == 0 {
             return ChannelHealth::default();
         }
         self.end_run(0.0);
-        let (maximum, minimum) = (self.high.level, -self.low.level);
-        let peak = maximum.abs().max(minimum.abs());
-        let constant = maximum == minimum;
-        let mut health = ChannelHealth {
-            mean: self.mean,
-            rms: (self.sum_of_squares / self.count as f64).sqrt(),
-            peak,
-            minimum,
-            maximum,
-            full_scale_samples: self.full_scale_samples,
-            first_full_scale: self.first_full_scale,
-            constant,
-            ..ChannelHealth::default()
-        };
+        let mut health = self.health;
+        (health.maximum, health.minimum) = (self.high.level, -self.low.level);
+        health.rms = (self.sum_of_squares / self.count as f64).sqrt();
+        health.peak = health.maximum.abs().max(health.minimum.abs());
+        health.constant = health.maximum == health.minimum;
         for side in [self.high, self.low] {
-            if !constant && side.level.abs() >= MIN_LEVEL_OF_PEAK * peak {
+            if !health.constant && side.level.abs() >= MIN_LEVEL_OF_PEAK * health.peak {
                 health.flat_top_count += side.count;
                 health.flat_tops.extend(side.places);
             }
         }
         health.flat_tops.sort_by_key(|flat_top| flat_top.start);
-        if self.still_samples as f64 <= MAX_STILL_PART * self.count as f64 {
-            health.dropped = self.dropped;
-            health.dropout_count = self.dropout_count;
-            health.dropped_samples = self.dropped_samples;
+        if self.still_samples as f64 > MAX_STILL_PART * self.count as f64 {
+            health.dropped.clear();
+            health.dropout_count = 0;
+            health.dropped_samples = 0;
         }
         health
     }

@@ -14,54 +14,48 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-mod blocks;
-mod channels;
-mod coding;
 mod csv;
 mod error;
-mod header;
+mod file_type;
 mod health;
-mod layout;
-mod open;
 mod responses;
-mod riff;
-mod rows;
-mod sniff;
-mod source;
+mod spacing;
 mod text;
-mod time;
-mod time_column;
 mod uff;
 mod units;
 mod warning;
 mod wav;
-mod wav_error;
-mod wav_stream;
 mod write;
 
-pub use blocks::Blocks;
-pub use error::RecordingError;
+pub use error::{RecordingError, ResponseError, UffError, WavError};
+pub use file_type::is_universal_file;
 pub use health::{ChannelHealth, Dropout, FlatTop};
-pub use responses::{
-    FrequencyResponse, FrequencyResponses, ResponseError, ResponseForm, ResponseWarning,
-    open_frequency_responses,
-};
+pub use responses::{FrequencyResponse, FrequencyResponses, open_frequency_responses};
 pub use text::Separator;
 pub use uff::{
     Abscissa, Axis, Dataset, Function, FunctionType, FunctionValues, Ordinate, Point, Precision,
-    UffCoding, UffError, UffFormat, UniversalFile, encode_frequency_responses_uff,
-    is_universal_file, list_datasets, read_function,
+    UffCoding, UniversalFile, list_datasets, read_function,
 };
-pub use units::{STANDARD_GRAVITY, channel_unit};
-pub use warning::{ChannelLabel, RecordingWarning};
-pub use wav_error::WavError;
-pub use wav_stream::{WavLayout, WavStream};
-pub use write::{WavFormat, encode_wav, write_wav};
+pub use units::{ResponseForm, STANDARD_GRAVITY, channel_unit};
+pub use warning::{ChannelLabel, RecordingWarning, ResponseWarning};
+pub use write::{
+    UffFormat, WavFormat, WavLayout, WavStream, encode_frequency_responses_uff, encode_wav,
+    write_wav,
+};
 
-use health::HealthMeter;
-use source::Source;
-use warning::health_warnings;
+use csv::{CsvCursor, CsvSource};
+use file_type::FileType;
+use health::{HealthMeter, check_rate, check_samples};
+use uff::{UffCursor, UffSource};
+use wav::{WavCursor, WavSource};
+
+/// More channels than this are taken for a damaged header; the largest front ends have hundreds.
+const MAX_CHANNELS: usize = 4096;
+
+/// Two sample rates nearer than this, relatively, are the same.
+const SAME_RATE: f64 = 1e-3;
 
 /// Relative difference to a header's factor below which a scale states the same unit: a rounded 9.81 is another.
 const SAME_SCALE: f64 = 1e-6;
@@ -72,6 +66,15 @@ pub struct ReadSettings {
     /// Sample rate (Hz) of a CSV file without a time column. A file's own rate wins, with a
     /// warning where they differ. Default: none, because a guessed rate scales every frequency.
     pub sample_rate: Option<f64>,
+}
+
+impl ReadSettings {
+    /// Returns the doubt about a given sample rate where the file has another one (Hz), which is used.
+    fn ignored_rate(&self, used: f64) -> Option<RecordingWarning> {
+        let given = self.sample_rate?;
+        let differs = (given - used).abs() > SAME_RATE * used;
+        differs.then_some(RecordingWarning::SampleRateIgnored { given, used })
+    }
 }
 
 /// Format of an opened recording.
@@ -172,7 +175,15 @@ impl Recording {
     /// Files that cannot be read or understood: see [`RecordingError`]; merely poor data are
     /// [`warnings`](Self::warnings).
     pub fn open(path: &Path, settings: &ReadSettings) -> Result<Self, RecordingError> {
-        open::open(path, settings)
+        let file = path.display().to_string();
+        if let Some(value) = settings.sample_rate {
+            check_rate(&file, value)?;
+        }
+        match file_type::recognise(path, &file)? {
+            FileType::Wav => wav::open_wav(path, file, settings),
+            FileType::Text => csv::open_csv(path, file, settings),
+            FileType::Universal => uff::open_uff(path, file, settings),
+        }
     }
 
     /// A recording in memory, for simulated signals and tests. `sample_rate` in Hz.
@@ -185,7 +196,34 @@ impl Recording {
         sample_rate: f64,
         channels: Vec<Channel>,
     ) -> Result<Self, RecordingError> {
-        open::from_samples(name.into(), sample_rate, channels)
+        let name = name.into();
+        check_rate(&name, sample_rate)?;
+        let slices = channels.iter().map(|channel| channel.samples.as_slice());
+        let frames = check_samples(&name, sample_rate, slices)? as u64;
+        let mut infos = Vec::with_capacity(channels.len());
+        let mut samples = Vec::with_capacity(channels.len());
+        for channel in channels {
+            let mut meter = HealthMeter::new(None);
+            meter.add(&channel.samples);
+            infos.push(ChannelInfo {
+                name: channel.name,
+                unit: channel.unit,
+                header_unit: None,
+                scale: 1.0,
+                health: meter.finish(),
+            });
+            samples.push(channel.samples);
+        }
+        Ok(Self {
+            name,
+            path: None,
+            format: Format::Memory,
+            sample_rate,
+            frames,
+            channels: infos,
+            warnings: Vec::new(),
+            source: Source::Memory(Arc::new(samples)),
+        })
     }
 
     /// The file as the caller named it, or the name of a recording in memory.
@@ -258,7 +296,7 @@ impl Recording {
         let mut warnings = self.warnings.clone();
         for (at, channel) in self.channels.iter().enumerate() {
             let label = channel_label(at, channel);
-            warnings.extend(health_warnings(&label, &channel.health, self.sample_rate));
+            warnings.extend(channel.health.warnings(&label, self.sample_rate));
         }
         warnings
     }
@@ -294,7 +332,13 @@ impl Recording {
     /// The whole recording in blocks of `block` samples (at least 1), the last one shorter. After
     /// an error the iteration ends.
     pub fn blocks(&self, channels: &[usize], block: usize) -> Blocks<'_> {
-        Blocks::new(self, channels, block)
+        Blocks {
+            recording: self,
+            channels: channels.to_vec(),
+            block: block.max(1) as u64,
+            at: 0,
+            cursor: None,
+        }
     }
 
     /// Sets what file units of a channel (0-based) are multiplied by: SI units per file unit,
@@ -367,11 +411,227 @@ impl Recording {
         }
         samples
     }
+
+    /// The index (0-based) of the channel with a 1-based number.
+    ///
+    /// # Errors
+    /// No such channel; the message lists what exists.
+    pub fn channel_by_number(&self, number: usize) -> Result<usize, RecordingError> {
+        match number.checked_sub(1) {
+            Some(index) if index < self.channels.len() => Ok(index),
+            _ => Err(RecordingError::UnknownChannelNumber {
+                file: self.name.clone(),
+                number,
+                existing: self.existing_channels(),
+            }),
+        }
+    }
+
+    /// The index (0-based) of the channel with a name, without or with its unit; upper and lower
+    /// case count only where both occur.
+    ///
+    /// # Errors
+    /// No channel or several channels of that name; the message lists what exists and the nearest.
+    pub fn channel_by_name(&self, name: &str) -> Result<usize, RecordingError> {
+        let wanted = name.trim();
+        let without_unit = units::split_unit(wanted).0;
+        let rules: [&dyn Fn(&str) -> bool; 4] = [
+            &|name| name == wanted,
+            &|name| name == without_unit,
+            &|name| name.eq_ignore_ascii_case(wanted),
+            &|name| units::split_unit(name).0.eq_ignore_ascii_case(without_unit),
+        ];
+        for rule in rules {
+            let named = |channel: &ChannelInfo| channel.name.as_deref().is_some_and(rule);
+            let mut found = (0..).zip(&self.channels).filter(|(_, c)| named(c));
+            if let Some((index, _)) = found.next() {
+                return match found.count() {
+                    0 => Ok(index),
+                    others => Err(RecordingError::AmbiguousChannelName {
+                        file: self.name.clone(),
+                        name: wanted.to_owned(),
+                        count: others + 1,
+                        existing: self.existing_channels(),
+                    }),
+                };
+            }
+        }
+        Err(self.unknown_name(wanted))
+    }
+
+    /// The index (0-based) of the channel that a user means by a text: a name, else a number.
+    ///
+    /// # Errors
+    /// Those of [`channel_by_name`](Self::channel_by_name) and
+    /// [`channel_by_number`](Self::channel_by_number).
+    pub fn channel_index(&self, text: &str) -> Result<usize, RecordingError> {
+        match (self.channel_by_name(text), text.trim().parse()) {
+            (Err(RecordingError::UnknownChannelName { .. }), Ok(number)) => {
+                self.channel_by_number(number)
+            }
+            (by_name, _) => by_name,
+        }
+    }
+
+    fn unknown_name(&self, wanted: &str) -> RecordingError {
+        // Beyond this similarity (Jaro-Winkler, 1 = equal) a name is worth proposing.
+        const NEAR: f64 = 0.7;
+        let names = self.channels.iter().filter_map(|c| c.name.as_deref());
+        let nearest = names
+            .map(|name| {
+                let (name_lower, wanted) = (name.to_lowercase(), wanted.to_lowercase());
+                // "force" means "ch1_force_V", however long that is.
+                let within = wanted.len() > 2 && name_lower.contains(&wanted);
+                let similarity = strsim::jaro_winkler(&name_lower, &wanted);
+                (similarity + f64::from(u8::from(within)), name)
+            })
+            .filter(|(similarity, _)| *similarity >= NEAR)
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        RecordingError::UnknownChannelName {
+            file: self.name.clone(),
+            name: wanted.to_owned(),
+            nearest: nearest.map_or(String::new(), |(_, name)| {
+                format!("; did you mean \"{name}\"?")
+            }),
+            existing: self.existing_channels(),
+        }
+    }
+
+    /// `1 ("force"), 2 ("response")`, for messages.
+    fn existing_channels(&self) -> String {
+        // More would hide the message.
+        const SHOWN: usize = 12;
+        let shown = self.channels.iter().enumerate().take(SHOWN);
+        let mut shown: Vec<String> = shown
+            .map(|(at, channel)| match &channel.name {
+                Some(name) => format!("{} (\"{name}\")", at + 1),
+                None => (at + 1).to_string(),
+            })
+            .collect();
+        if self.channels.len() > SHOWN {
+            shown.push(format!("... {}", self.channels.len()));
+        }
+        shown.join(", ")
+    }
 }
 
 fn channel_label(at: usize, channel: &ChannelInfo) -> ChannelLabel {
     ChannelLabel {
         number: at + 1,
         name: channel.name.clone(),
+    }
+}
+
+/// The blocks of a recording, see [`Recording::blocks`].
+#[derive(Debug)]
+pub struct Blocks<'a> {
+    recording: &'a Recording,
+    channels: Vec<usize>,
+    block: u64,
+    at: u64,
+    cursor: Option<Cursor<'a>>,
+}
+
+impl Blocks<'_> {
+    fn next_block(&mut self) -> Result<Block, RecordingError> {
+        let recording = self.recording;
+        let cursor = match &mut self.cursor {
+            Some(cursor) => cursor,
+            none => {
+                recording.check_channels(&self.channels)?;
+                none.insert(recording.source.cursor(self.at)?)
+            }
+        };
+        let start = self.at;
+        let frames = self.block.min(recording.frames - start);
+        let samples = cursor.read(&self.channels, frames)?;
+        self.at += frames;
+        Ok(Block {
+            start,
+            samples: recording.scaled(&self.channels, samples),
+        })
+    }
+}
+
+impl Iterator for Blocks<'_> {
+    type Item = Result<Block, RecordingError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.at >= self.recording.frames {
+            return None;
+        }
+        let block = self.next_block();
+        if block.is_err() {
+            self.at = self.recording.frames;
+        }
+        Some(block)
+    }
+}
+
+/// Where the samples of a recording are.
+#[derive(Debug, Clone)]
+enum Source {
+    Wav(Box<WavSource>),
+    Csv(Box<CsvSource>),
+    Uff(Box<UffSource>),
+    Memory(Arc<Vec<Vec<f64>>>),
+}
+
+impl Source {
+    /// Positions a reader at `frame`.
+    fn cursor(&self, frame: u64) -> Result<Cursor<'_>, RecordingError> {
+        Ok(match self {
+            Self::Wav(source) => Cursor::Wav(source.cursor(frame)?),
+            Self::Csv(source) => Cursor::Csv(source.cursor(frame)?),
+            Self::Uff(source) => Cursor::Uff(source.cursor(frame)),
+            Self::Memory(channels) => Cursor::Memory(MemoryCursor {
+                channels,
+                at: usize::try_from(frame).unwrap_or(usize::MAX),
+            }),
+        })
+    }
+}
+
+/// A reader somewhere in the samples; one per pass, since it moves.
+#[derive(Debug)]
+enum Cursor<'a> {
+    Wav(WavCursor<'a>),
+    Csv(CsvCursor<'a>),
+    Uff(UffCursor<'a>),
+    Memory(MemoryCursor<'a>),
+}
+
+impl Cursor<'_> {
+    /// Up to `limit` samples of the wanted channels, in file units; fewer only at the end.
+    fn read(&mut self, channels: &[usize], limit: u64) -> Result<Vec<Vec<f64>>, RecordingError> {
+        let mut samples = vec![Vec::new(); channels.len()];
+        match self {
+            Self::Wav(cursor) => cursor.read(channels, limit, &mut samples)?,
+            Self::Csv(cursor) => cursor.read(channels, limit, &mut samples)?,
+            Self::Uff(cursor) => cursor.read(channels, limit, &mut samples)?,
+            Self::Memory(cursor) => cursor.read(channels, limit, &mut samples),
+        }
+        Ok(samples)
+    }
+}
+
+/// A place in samples held in memory.
+#[derive(Debug)]
+struct MemoryCursor<'a> {
+    channels: &'a [Vec<f64>],
+    at: usize,
+}
+
+impl MemoryCursor<'_> {
+    fn read(&mut self, channels: &[usize], limit: u64, into: &mut [Vec<f64>]) {
+        let limit = usize::try_from(limit).unwrap_or(usize::MAX);
+        let frames = self.channels.first().map_or(0, Vec::len);
+        let end = self.at.saturating_add(limit).min(frames);
+        for (channel, samples) in channels.iter().zip(into.iter_mut()) {
+            let all = self.channels.get(*channel);
+            let part = all.and_then(|all| all.get(self.at.min(end)..end));
+            samples.extend_from_slice(part.unwrap_or_default());
+        }
+        self.at = end;
     }
 }

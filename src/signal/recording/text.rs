@@ -1,12 +1,10 @@
-//! Lines, cells and numbers of a text file.
+//! Cells and numbers of a line of text.
+//!
+//! Lines are split here and not by the crate `csv`, which reads other values from some files: a quote behind a
+//! blank (`1; "2"`) stays part of its cell, a quote that is never closed takes in the following lines, empty lines
+//! disappear, and runs of blanks are no separator. Speed is the same.
 
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Seek, SeekFrom};
 use std::ops::Range;
-use std::path::Path;
-
-/// A longer line is not a row of numbers; the limit keeps a file without line ends out of memory.
-pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
 
 /// What stands between the numbers of a CSV file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,25 +39,16 @@ pub(super) type Cell = Range<usize>;
 /// Splits a line into cells, quotes and surrounding blanks removed. `cells` is reused.
 pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cell>) {
     cells.clear();
-    let end = line.trim_ascii_end_keeping_tabs().len();
-    let line = line.get(..end).unwrap_or_default();
+    // Tabs at the end stay: they may be separators before an empty last cell.
+    let last = line
+        .iter()
+        .rposition(|byte| !matches!(byte, b'\r' | b'\n' | b' ' | 0x1a | 0x0c));
+    let line = line
+        .get(..last.map_or(0, |last| last + 1))
+        .unwrap_or_default();
     match separator.byte() {
         Some(byte) => split_at_byte(line, byte, cells),
         None => split_at_blanks(line, cells),
-    }
-}
-
-/// Trimming that leaves tabs, which may be separators before an empty last cell.
-trait TrimEnd {
-    fn trim_ascii_end_keeping_tabs(&self) -> &[u8];
-}
-
-impl TrimEnd for [u8] {
-    fn trim_ascii_end_keeping_tabs(&self) -> &[u8] {
-        let is_end = |byte: &u8| matches!(byte, b'\r' | b'\n' | b' ' | 0x1a | 0x0c);
-        let kept = self.iter().rposition(|byte| !is_end(byte));
-        self.get(..kept.map_or(0, |last| last + 1))
-            .unwrap_or_default()
     }
 }
 
@@ -95,18 +84,19 @@ fn split_at_blanks(line: &[u8], cells: &mut Vec<Cell>) {
     }
 }
 
-/// The cell without surrounding blanks and without one pair of quotes.
+/// Returns the cell without surrounding blanks and without one pair of quotes.
 fn trimmed(line: &[u8], cell: Cell) -> Cell {
-    let blanks_off = |cell: Cell| {
-        let bytes = line.get(cell.clone()).unwrap_or_default();
-        let front = bytes.len() - bytes.trim_ascii_start().len();
-        cell.start + front..cell.start + front + bytes.trim_ascii().len()
-    };
-    let cell = blanks_off(cell);
+    let cell = without_blanks(line, cell);
     match line.get(cell.clone()) {
-        Some([b'"', .., b'"']) => blanks_off(cell.start + 1..cell.end - 1),
+        Some([b'"', .., b'"']) => without_blanks(line, cell.start + 1..cell.end - 1),
         _ => cell,
     }
+}
+
+fn without_blanks(line: &[u8], cell: Cell) -> Cell {
+    let bytes = line.get(cell.clone()).unwrap_or_default();
+    let start = cell.start + bytes.len() - bytes.trim_ascii_start().len();
+    start..start + bytes.trim_ascii().len()
 }
 
 /// Why a cell is no usable number.
@@ -200,77 +190,8 @@ pub(super) fn shown(cell: &[u8]) -> String {
     short.replace(char::is_control, " ")
 }
 
-/// A number with the digits that mean something: nine, so that roundings do not show.
-pub(super) fn short(value: f64) -> f64 {
-    format!("{value:.8e}").parse().unwrap_or(value)
-}
-
 /// Whether a line is a comment, of a kind that recorders and numerical programs write.
 pub(super) fn is_comment(line: &[u8]) -> bool {
     let line = line.trim_ascii_start();
     line.starts_with(b"#") || line.starts_with(b"%") || line.starts_with(b"//")
-}
-
-/// Why the next line cannot be had.
-#[derive(Debug)]
-pub(super) enum LineProblem {
-    Io(io::Error),
-    TooLong,
-}
-
-/// Reads a file line by line, knowing where it is.
-#[derive(Debug)]
-pub(super) struct LineReader {
-    reader: BufReader<File>,
-    line: Vec<u8>,
-    end: u8,
-    /// Number of the line that was read last, 1-based.
-    pub number: u64,
-    /// Where the next line begins (bytes).
-    pub next_offset: u64,
-}
-
-impl LineReader {
-    /// Starts at byte `offset`, which begins the line after line `number`. `end` ends a line.
-    pub(super) fn open(path: &Path, end: u8, offset: u64, number: u64) -> io::Result<Self> {
-        let mut file = File::open(path)?;
-        file.seek(SeekFrom::Start(offset))?;
-        Ok(Self {
-            reader: BufReader::with_capacity(1 << 17, file),
-            line: Vec::new(),
-            end,
-            number,
-            next_offset: offset,
-        })
-    }
-
-    /// The next line with its end, `None` after the last one.
-    pub(super) fn next_line(&mut self) -> Result<Option<&[u8]>, LineProblem> {
-        self.line.clear();
-        loop {
-            let available = match self.reader.fill_buf() {
-                Ok(available) => available,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(LineProblem::Io(error)),
-            };
-            let end = available.iter().position(|byte| *byte == self.end);
-            let taken = end.map_or(available.len(), |at| at + 1);
-            self.line
-                .extend_from_slice(available.get(..taken).unwrap_or_default());
-            self.reader.consume(taken);
-            self.next_offset += taken as u64;
-            if self.line.len() > MAX_LINE_BYTES {
-                self.number += 1;
-                return Err(LineProblem::TooLong);
-            }
-            if end.is_some() || taken == 0 {
-                break;
-            }
-        }
-        if self.line.is_empty() {
-            return Ok(None);
-        }
-        self.number += 1;
-        Ok(Some(&self.line))
-    }
 }

@@ -1,8 +1,6 @@
-//! Doubts about a recording that do not keep it from being used.
+//! Doubts about a recording or about frequency responses that do not keep them from being used.
 
 use std::fmt;
-
-use super::health::ChannelHealth;
 
 /// A channel, as a warning names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -239,60 +237,74 @@ impl RecordingWarning {
     }
 }
 
-/// A mean beyond this part of the peak is worth a word: a tenth shifts thresholds noticeably.
-const OFFSET_OF_PEAK: f64 = 0.1;
+/// A doubt about frequency response functions that does not keep them from being used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ResponseWarning {
+    /// A dataset that is not among the responses.
+    #[error(
+        "dataset {dataset} ({name}) is left out: {reason}; export it to a file of its own if it is needed"
+    )]
+    LeftOut {
+        /// The dataset, 1-based.
+        dataset: usize,
+        /// Its place and description.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// The file ends before the header says.
+    #[error(
+        "the file is truncated: {present} of the promised {promised} lines are there; an export or a copy was probably interrupted; what is there is used"
+    )]
+    Truncated {
+        /// Lines in the file.
+        present: u64,
+        /// Lines by the header.
+        promised: u64,
+    },
+    /// A universal file that ends within a header.
+    #[error(
+        "the file ends within the header of dataset {dataset}, which is left out; a copy was probably interrupted; export or copy it again"
+    )]
+    HeaderCut {
+        /// The dataset, 1-based.
+        dataset: usize,
+    },
+    /// A unit that is not known.
+    #[error(
+        "{name}: the unit \"{unit}\" is not known; the numbers are taken as they stand, in SI units; check the level"
+    )]
+    UnknownUnit {
+        /// The response.
+        name: String,
+        /// The unit as written.
+        unit: String,
+    },
+    /// Axis types and unit that contradict each other.
+    #[error(
+        "{name}: the types of its axes make it {by_axes}, its unit \"{unit}\" makes it {by_unit}; it is taken as {by_axes}; say which it is with `form`"
+    )]
+    FormsDisagree {
+        /// The response.
+        name: String,
+        /// The unit as written.
+        unit: String,
+        /// Form by the axes' types.
+        by_axes: &'static str,
+        /// Form by the unit.
+        by_unit: &'static str,
+    },
+}
 
-/// The doubts that a channel's health gives rise to.
-pub(super) fn health_warnings(
-    channel: &ChannelLabel,
-    health: &ChannelHealth,
-    sample_rate: f64,
-) -> Vec<RecordingWarning> {
-    let channel = || channel.clone();
-    let seconds = |frame: u64| frame as f64 / sample_rate;
-    if health.constant {
-        let level = health.mean;
-        return vec![RecordingWarning::Constant {
-            channel: channel(),
-            level,
-        }];
+impl ResponseWarning {
+    /// Short name of the kind of doubt, for reports.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::LeftOut { .. } => "dataset-left-out",
+            Self::Truncated { .. } => "truncated",
+            Self::HeaderCut { .. } => "header-cut",
+            Self::UnknownUnit { .. } => "unknown-unit",
+            Self::FormsDisagree { .. } => "forms-disagree",
+        }
     }
-    let full_scale = health
-        .first_full_scale
-        .map(|first| RecordingWarning::FullScale {
-            channel: channel(),
-            count: health.full_scale_samples,
-            time: seconds(first),
-        });
-    let flat_tops = health
-        .flat_tops
-        .first()
-        .map(|first| RecordingWarning::FlatTops {
-            channel: channel(),
-            count: health.flat_top_count,
-            time: seconds(first.start),
-            len: first.len,
-            level: first.value,
-        });
-    let dropped = health
-        .dropped
-        .first()
-        .map(|first| RecordingWarning::Dropped {
-            channel: channel(),
-            count: health.dropout_count,
-            samples: health.dropped_samples,
-            time: seconds(first.start),
-            len: first.len,
-            level: first.value,
-        });
-    let shifted = health.mean.abs() > OFFSET_OF_PEAK * health.peak;
-    let offset = shifted.then(|| RecordingWarning::Offset {
-        channel: channel(),
-        mean: health.mean,
-        peak: health.peak,
-    });
-    [full_scale, flat_tops, dropped, offset]
-        .into_iter()
-        .flatten()
-        .collect()
 }

@@ -1,40 +1,114 @@
-//! Samples of a WAV file as numbers, full scale = 1 for integers, block by block.
+//! WAV files: the chunks, the coding of the samples, and the samples as numbers (full scale = 1 for integers).
 //!
-//! The chunks are walked by [`super::riff`]; the samples are then decoded by hound, which is given
-//! a plain header of our own in front of each block. What hound cannot decode (64-bit float,
-//! integers that do not fill their containers) is decoded here.
+//! The chunks are walked here, because files from recorders break rules that hound insists on: odd chunks
+//! without or with their pad byte, 64-bit sizes (RF64, BW64), sizes that a crash left at 0,
+//! 0xFFFFFFFF or beyond the end of the file. No size is believed without comparing it with the file.
+//! The samples are then decoded by hound, which is given a plain header of our own in front of each
+//! block. Codings that hound cannot decode (64-bit float, integers that do not fill their containers)
+//! are decoded here.
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::coding::{Coding, RightAligned};
-use super::error::RecordingError;
-use super::riff::{self, WavLayout, read_fully, unreadable};
+use super::error::{RecordingError, WavError};
+use super::file_type::{read_fully, unreadable};
+use super::health::{HealthMeter, check_finite};
 use super::warning::RecordingWarning;
+use super::{ChannelInfo, Format, MAX_CHANNELS, ReadSettings, Recording, Source};
 
+/// More chunks than this are taken for garbage: real files have a dozen.
+const MAX_CHUNKS: usize = 10_000;
+
+/// Chunk names that tell a real chunk from samples or from a missing pad byte.
+const KNOWN_CHUNKS: [&[u8; 4]; 16] = [
+    b"fmt ", b"data", b"fact", b"LIST", b"JUNK", b"junk", b"PAD ", b"bext", b"iXML", b"cue ",
+    b"smpl", b"inst", b"id3 ", b"axml", b"chna", b"ds64",
+];
 /// Bytes read at a time: large enough for speed, small against any memory.
 const BLOCK_BYTES: u64 = 1 << 19;
 
 /// Samples looked at to find out which end of a container is used: silence decides nothing.
 const ALIGNMENT_FRAMES: u64 = 1 << 20;
 
+/// Samples handled at a time when a WAV file is checked, over all channels.
+const PASS_SAMPLES: usize = 1 << 16;
+
+/// Opens a WAV file as a recording.
+pub(super) fn open_wav(
+    path: &Path,
+    file: String,
+    settings: &ReadSettings,
+) -> Result<Recording, RecordingError> {
+    let source = WavSource::open(path, &file)?;
+    let header = &source.header;
+    let (sample_rate, frames) = (f64::from(header.sample_rate), header.frames);
+    let mut warnings = header.warnings.clone();
+    warnings.extend(settings.ignored_rate(sample_rate));
+    let format = match header.coding {
+        Coding::Integer { bits } => Format::WavInteger { bits },
+        Coding::PaddedInteger { valid, .. } => Format::WavInteger { bits: valid },
+        Coding::Float32 => Format::WavFloat { bits: 32 },
+        Coding::Float64 => Format::WavFloat { bits: 64 },
+    };
+    let all: Vec<usize> = (0..header.channels).collect();
+    let mut meters = vec![HealthMeter::new(header.coding.full_scale()); header.channels];
+    let per_block = (PASS_SAMPLES / header.channels).max(1) as u64;
+    let mut cursor = source.cursor(0)?;
+    while cursor.at < frames {
+        let start = cursor.at;
+        let mut block = vec![Vec::new(); all.len()];
+        cursor.read(&all, per_block, &mut block)?;
+        for ((channel, samples), meter) in block.iter().enumerate().zip(&mut meters) {
+            check_finite(&file, sample_rate, channel, start, samples)?;
+            meter.add(samples);
+        }
+    }
+    drop(cursor);
+    let channels = meters.into_iter().map(|meter| ChannelInfo {
+        name: None,
+        unit: None,
+        header_unit: None,
+        scale: 1.0,
+        health: meter.finish(),
+    });
+    Ok(Recording {
+        name: file,
+        path: Some(path.to_owned()),
+        format,
+        sample_rate,
+        frames,
+        channels: channels.collect(),
+        warnings,
+        source: Source::Wav(Box::new(source)),
+    })
+}
+
 /// A WAV file whose header has been understood.
 #[derive(Debug, Clone)]
 pub(super) struct WavSource {
-    pub path: PathBuf,
-    pub file: String,
-    pub layout: WavLayout,
+    path: PathBuf,
+    file: String,
+    header: WavHeader,
 }
 
 impl WavSource {
-    pub(super) fn open(path: &Path, file: &str) -> Result<Self, RecordingError> {
+    fn open(path: &Path, file: &str) -> Result<Self, RecordingError> {
         let mut opened = File::open(path).map_err(|source| unreadable(file, source))?;
-        let layout = riff::walk(&mut opened, file)?;
+        let length = opened
+            .seek(SeekFrom::End(0))
+            .map_err(|source| unreadable(file, source))?;
+        let walker = ChunkWalker {
+            reader: &mut opened,
+            file,
+            length,
+            long_data_size: None,
+            format: None,
+        };
         let mut source = Self {
             path: path.to_owned(),
             file: file.to_owned(),
-            layout,
+            header: walker.run()?,
         };
         source.settle_alignment()?;
         Ok(source)
@@ -42,11 +116,11 @@ impl WavSource {
 
     /// Positions a reader at `frame`.
     pub(super) fn cursor(&self, frame: u64) -> Result<WavCursor<'_>, RecordingError> {
-        let layout = &self.layout;
-        let at = frame.min(layout.frames);
+        let header = &self.header;
+        let at = frame.min(header.frames);
         let mut reader = File::open(&self.path).map_err(|source| unreadable(&self.file, source))?;
         reader
-            .seek(SeekFrom::Start(layout.data_start + at * layout.frame_bytes))
+            .seek(SeekFrom::Start(header.data_start + at * header.frame_bytes))
             .map_err(|source| unreadable(&self.file, source))?;
         Ok(WavCursor {
             source: self,
@@ -62,20 +136,17 @@ impl WavSource {
     /// At the high end the low bits are all zero. When they are not, and every value fits into the
     /// valid bits, the writer used the low end; when neither holds, all bits are taken as valid.
     fn settle_alignment(&mut self) -> Result<(), RecordingError> {
-        let Coding::PaddedInteger { bits, valid, .. } = self.layout.coding else {
+        let Coding::PaddedInteger { bits, valid, .. } = self.header.coding else {
             return Ok(());
         };
-        let unused = i32::from(bits - valid);
-        let limit = 2_f64.powi(-unused);
+        let limit = 2_f64.powi(-i32::from(bits - valid));
         let (mut low_bits_zero, mut fits) = (true, true);
         let mut cursor = self.cursor(0)?;
-        let mut seen = 0;
-        while seen < ALIGNMENT_FRAMES {
-            let block = cursor.next_interleaved(ALIGNMENT_FRAMES - seen)?;
+        while cursor.at < ALIGNMENT_FRAMES {
+            let block = cursor.next_interleaved(ALIGNMENT_FRAMES - cursor.at)?;
             if block.is_empty() {
                 break;
             }
-            seen += (block.len() / self.layout.channels) as u64;
             for value in block {
                 let steps = value * 2_f64.powi(i32::from(valid) - 1);
                 low_bits_zero &= steps == steps.trunc();
@@ -83,12 +154,12 @@ impl WavSource {
             }
         }
         if !low_bits_zero && fits {
-            self.layout.coding = Coding::PaddedInteger {
+            self.header.coding = Coding::PaddedInteger {
                 bits,
                 valid,
                 right_aligned: RightAligned::Yes,
             };
-            self.layout.warnings.push(RecordingWarning::RightAligned {
+            self.header.warnings.push(RecordingWarning::RightAligned {
                 bits: valid,
                 container: bits,
             });
@@ -102,6 +173,7 @@ impl WavSource {
 pub(super) struct WavCursor<'a> {
     source: &'a WavSource,
     reader: File,
+    /// The next frame.
     at: u64,
     bytes: Vec<u8>,
     values: Vec<f64>,
@@ -115,14 +187,10 @@ impl WavCursor<'_> {
         limit: u64,
         into: &mut [Vec<f64>],
     ) -> Result<(), RecordingError> {
-        let count = self.source.layout.channels;
-        let mut left = limit;
-        while left > 0 {
-            let values = self.next_interleaved(left)?;
-            if values.is_empty() {
-                break;
-            }
-            left = left.saturating_sub((values.len() / count) as u64);
+        let count = self.source.header.channels;
+        let end = self.source.header.frames.min(self.at.saturating_add(limit));
+        while self.at < end {
+            let values = self.next_interleaved(end - self.at)?;
             for (channel, samples) in channels.iter().zip(into.iter_mut()) {
                 samples.extend(values.iter().skip(*channel).step_by(count));
             }
@@ -132,20 +200,20 @@ impl WavCursor<'_> {
 
     /// The next frames, at most `limit` and at most one block, channel after channel.
     fn next_interleaved(&mut self, limit: u64) -> Result<&[f64], RecordingError> {
-        let layout = &self.source.layout;
-        let per_block = (BLOCK_BYTES / layout.frame_bytes).max(1);
-        let frames = limit.min(per_block).min(layout.frames - self.at);
+        let header = &self.source.header;
+        let per_block = (BLOCK_BYTES / header.frame_bytes).max(1);
+        let frames = limit.min(per_block).min(header.frames - self.at);
         self.values.clear();
-        self.bytes.resize((frames * layout.frame_bytes) as usize, 0);
+        self.bytes.resize((frames * header.frame_bytes) as usize, 0);
         let got = read_fully(&mut self.reader, &mut self.bytes)
             .map_err(|source| unreadable(&self.source.file, source))?;
         if got < self.bytes.len() {
             return Err(RecordingError::Changed {
                 file: self.source.file.clone(),
-                frame: self.at + got as u64 / layout.frame_bytes,
+                frame: self.at + got as u64 / header.frame_bytes,
             });
         }
-        decode(layout.coding, &self.bytes, &mut self.values)
+        decode(header.coding, &self.bytes, &mut self.values)
             .map_err(|error| unreadable(&self.source.file, std::io::Error::other(error)))?;
         self.at += frames;
         Ok(&self.values)
@@ -223,4 +291,383 @@ fn hound_reader(
     header.extend(b"data");
     header.extend(length.to_le_bytes());
     hound::WavReader::new(Cursor::new(header).chain(bytes))
+}
+
+/// Everything the header says, checked against the file.
+#[derive(Debug, Clone, PartialEq)]
+struct WavHeader {
+    sample_rate: u32,
+    channels: usize,
+    coding: Coding,
+    /// Bytes of one sample of all channels.
+    frame_bytes: u64,
+    /// Where the samples begin in the file.
+    data_start: u64,
+    /// Complete samples per channel that are in the file.
+    frames: u64,
+    warnings: Vec<RecordingWarning>,
+}
+
+/// Walks the chunks of a file up to the samples.
+struct ChunkWalker<'a> {
+    reader: &'a mut File,
+    /// The file's name in errors.
+    file: &'a str,
+    length: u64,
+    long_data_size: Option<u64>,
+    format: Option<WaveFormat>,
+}
+
+/// The fields of a "fmt " chunk that are used.
+#[derive(Debug, Clone, Copy)]
+struct WaveFormat {
+    channels: u16,
+    sample_rate: u32,
+    coding: Coding,
+}
+
+impl ChunkWalker<'_> {
+    /// Walks from the first chunk, behind "RIFF", a size and "WAVE".
+    fn run(mut self) -> Result<WavHeader, RecordingError> {
+        let mut at = 12;
+        for _ in 0..MAX_CHUNKS {
+            let Some((name, size)) = self.chunk_header(at)? else {
+                break;
+            };
+            match &name {
+                b"fmt " => self.format = Some(self.read_format(at + 8, size)?),
+                b"ds64" => {
+                    // The data size stands after the 64-bit RIFF size.
+                    let mut bytes = [0_u8; 8];
+                    let got = self.read_at((at + 8).saturating_add(8), &mut bytes)?;
+                    self.long_data_size = (got == 8).then(|| u64::from_le_bytes(bytes));
+                }
+                b"data" => return self.finish(at + 8, size),
+                _ => {}
+            }
+            at = self.after_chunk(at + 8, u64::from(size))?;
+        }
+        let chunk = match self.format {
+            Some(_) => "data",
+            None => "fmt ",
+        };
+        Err(self.missing(chunk, ""))
+    }
+
+    /// Name and size of the chunk at `at`; `None` at the end of the file.
+    fn chunk_header(&mut self, at: u64) -> Result<Option<([u8; 4], u32)>, RecordingError> {
+        let mut header = [0_u8; 8];
+        let got = self.read_at(at, &mut header)?;
+        let [a, b, c, d, size @ ..] = header;
+        Ok((got == 8).then(|| ([a, b, c, d], u32::from_le_bytes(size))))
+    }
+
+    /// Where the next chunk begins. Chunks are padded to even length; where a writer forgot the
+    /// pad byte, a known name stands right behind the chunk.
+    fn after_chunk(&mut self, content: u64, size: u64) -> Result<u64, RecordingError> {
+        let end = content.saturating_add(size);
+        if size.is_multiple_of(2) {
+            return Ok(end);
+        }
+        let mut name = [0_u8; 4];
+        let got = self.read_at(end, &mut name)?;
+        let unpadded = got == 4 && KNOWN_CHUNKS.contains(&&name);
+        Ok(if unpadded { end } else { end.saturating_add(1) })
+    }
+
+    fn read_format(&mut self, at: u64, size: u32) -> Result<WaveFormat, RecordingError> {
+        let mut bytes = [0_u8; 40];
+        let wanted = bytes.len().min(size as usize);
+        let got = self.read_at(at, bytes.get_mut(..wanted).unwrap_or_default())?;
+        if got < 16 {
+            return Err(self.bad_header("bytes in the \"fmt \" chunk", got as u64, "16 or more"));
+        }
+        let mut words = [0_u16; 20];
+        for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<2>().0) {
+            *word = u16::from_le_bytes(*bytes);
+        }
+        let [
+            tag,
+            channels,
+            rate_low,
+            rate_high,
+            _,
+            _,
+            frame_bytes,
+            bits,
+            _,
+            valid,
+            _,
+            _,
+            subformat,
+            ..,
+        ] = words;
+        let sample_rate = u32::from(rate_low) | u32::from(rate_high) << 16;
+        if channels == 0 {
+            return Err(self.bad_header("channels", 0, "1 or more"));
+        }
+        if sample_rate == 0 {
+            return Err(self.bad_header("sample rate (Hz)", 0, "1 or more"));
+        }
+        // In the extensible header valid bits stand at 18 and the real tag begins the subformat.
+        let extensible = tag == 0xfffe && got >= 26;
+        let fields = FormatFields {
+            tag: if extensible { subformat } else { tag },
+            channels,
+            frame_bytes,
+            bits,
+            valid: if extensible { valid } else { bits },
+        };
+        Ok(WaveFormat {
+            channels,
+            sample_rate,
+            coding: self.coding(fields)?,
+        })
+    }
+
+    /// Returns the coding, or why it cannot be read.
+    fn coding(&self, fields: FormatFields) -> Result<Coding, RecordingError> {
+        let FormatFields { tag, bits, .. } = fields;
+        // Only of these two is it known how samples lie in a frame.
+        let bytes = match tag {
+            1 | 3 => self.sample_bytes(fields)?,
+            _ => 0,
+        };
+        // Writers that leave the valid bits at 0, or above the container, mean all of them.
+        let valid = match fields.valid {
+            0 => bits,
+            valid => valid.min(bits),
+        };
+        match (tag, bytes) {
+            (1, 1..=4) if valid == 8 * bytes => Ok(Coding::Integer { bits: valid }),
+            // One byte is unsigned and cannot be shifted about; fewer than 2 bits are no signal.
+            (1, 2..=4) if valid >= 2 => Ok(Coding::PaddedInteger {
+                bits: 8 * bytes,
+                valid,
+                right_aligned: RightAligned::No,
+            }),
+            (3, 4) if bits == 32 => Ok(Coding::Float32),
+            (3, 8) if bits == 64 => Ok(Coding::Float64),
+            _ => Err(WavError::UnsupportedCoding {
+                file: self.file.to_owned(),
+                tag,
+                name: coding_name(tag),
+                bits,
+            }
+            .into()),
+        }
+    }
+
+    /// Bytes of one sample of one channel: from the frame size, or from the bits where that is 0.
+    fn sample_bytes(&self, fields: FormatFields) -> Result<u16, RecordingError> {
+        let FormatFields {
+            channels,
+            frame_bytes,
+            ..
+        } = fields;
+        let needed = fields.bits.div_ceil(8);
+        if frame_bytes == 0 {
+            return Ok(needed);
+        }
+        let bytes = frame_bytes / channels.max(1);
+        if bytes < needed || !frame_bytes.is_multiple_of(channels.max(1)) {
+            let allowed = "channels times bytes per sample";
+            return Err(self.bad_header("bytes per frame", u64::from(frame_bytes), allowed));
+        }
+        Ok(bytes)
+    }
+
+    /// Returns the header of the samples that begin at `start`.
+    fn finish(mut self, start: u64, size: u32) -> Result<WavHeader, RecordingError> {
+        let Some(format) = self.format else {
+            return Err(self.missing("fmt ", " before the samples"));
+        };
+        let channels = usize::from(format.channels);
+        if channels > MAX_CHANNELS {
+            return Err(RecordingError::TooManyChannels {
+                file: self.file.to_owned(),
+                channels,
+                limit: MAX_CHANNELS,
+            });
+        }
+        let frame_bytes = u64::from(format.channels) * format.coding.bytes();
+        let (frames, warning) = self.count_frames(start, size, frame_bytes)?;
+        Ok(WavHeader {
+            sample_rate: format.sample_rate,
+            channels,
+            coding: format.coding,
+            frame_bytes,
+            data_start: start,
+            frames,
+            warnings: warning.into_iter().collect(),
+        })
+    }
+
+    /// Counts the complete frames that the file holds from `start`, whatever `size` promises.
+    fn count_frames(
+        &mut self,
+        start: u64,
+        size: u32,
+        frame_bytes: u64,
+    ) -> Result<(u64, Option<RecordingWarning>), RecordingError> {
+        let available = self.length.saturating_sub(start);
+        let promised = match (size, self.long_data_size) {
+            (u32::MAX, Some(long)) => long,
+            _ => u64::from(size),
+        };
+        // Sizes that writers put in before they know the size.
+        let unset = promised == 0 || promised == u64::from(u32::MAX) || promised == u64::MAX;
+        let closed_and_empty = promised == 0 && self.only_chunks_follow(start)?;
+        let bytes = match unset {
+            _ if closed_and_empty => 0,
+            true => available,
+            false => promised.min(available),
+        };
+        let frames = bytes / frame_bytes;
+        if frames == 0 {
+            return Err(RecordingError::NoSamples {
+                file: self.file.to_owned(),
+            });
+        }
+        let warning = if unset {
+            Some(RecordingWarning::UnknownLength {
+                size: promised,
+                present: frames,
+            })
+        } else if promised / frame_bytes > frames {
+            Some(RecordingWarning::Truncated {
+                present: frames,
+                promised: promised / frame_bytes,
+            })
+        } else {
+            None
+        };
+        Ok((frames, warning))
+    }
+
+    /// Returns `true` where well-formed, known chunks fill the file from `at` to its end: then a data size of 0
+    /// is the truth and not the mark of a crash.
+    fn only_chunks_follow(&mut self, mut at: u64) -> Result<bool, RecordingError> {
+        for _ in 0..MAX_CHUNKS {
+            if at >= self.length {
+                return Ok(true);
+            }
+            match self.chunk_header(at)? {
+                Some((name, size)) if KNOWN_CHUNKS.contains(&&name) => {
+                    at = self.after_chunk(at + 8, u64::from(size))?;
+                }
+                _ => return Ok(false),
+            }
+        }
+        Ok(false)
+    }
+
+    /// Reads as much of `into` as the file has at `at`.
+    fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, RecordingError> {
+        if at >= self.length {
+            return Ok(0);
+        }
+        let read = self
+            .reader
+            .seek(SeekFrom::Start(at))
+            .and_then(|_| read_fully(self.reader, into));
+        read.map_err(|source| unreadable(self.file, source))
+    }
+
+    fn missing(&self, chunk: &'static str, place: &'static str) -> RecordingError {
+        WavError::MissingChunk {
+            file: self.file.to_owned(),
+            chunk,
+            place,
+        }
+        .into()
+    }
+
+    fn bad_header(&self, field: &'static str, value: u64, allowed: &'static str) -> RecordingError {
+        WavError::BadHeader {
+            file: self.file.to_owned(),
+            field,
+            value,
+            allowed,
+        }
+        .into()
+    }
+}
+
+/// Coding of the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Coding {
+    /// Integers that fill their containers of `bits` bits; 8 bits are unsigned.
+    Integer { bits: u16 },
+    /// Integers of `valid` bits in wider containers of `bits` bits.
+    PaddedInteger {
+        bits: u16,
+        valid: u16,
+        right_aligned: RightAligned,
+    },
+    /// 32-bit float.
+    Float32,
+    /// 64-bit float.
+    Float64,
+}
+
+/// The end of the container at which the valid bits sit. The format demands the high end; some writers
+/// use the low one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum RightAligned {
+    /// At the high end, as the format demands.
+    No,
+    /// At the low end, with the sign extended.
+    Yes,
+}
+
+impl Coding {
+    /// Bytes per sample.
+    fn bytes(self) -> u64 {
+        match self {
+            Self::Integer { bits } | Self::PaddedInteger { bits, .. } => u64::from(bits / 8),
+            Self::Float32 => 4,
+            Self::Float64 => 8,
+        }
+    }
+
+    /// Magnitude from which on a sample sits at the end of the integer range (full scale = 1).
+    fn full_scale(self) -> Option<f64> {
+        let bits = match self {
+            Self::Integer { bits } => bits,
+            Self::PaddedInteger { valid, .. } => valid,
+            Self::Float32 | Self::Float64 => return None,
+        };
+        // The largest positive integer is 2^(bits-1) - 1.
+        Some(1.0 - 0.5_f64.powi(i32::from(bits) - 1))
+    }
+}
+
+/// The numbers of a "fmt " chunk that decide the coding.
+#[derive(Debug, Clone, Copy)]
+struct FormatFields {
+    tag: u16,
+    channels: u16,
+    frame_bytes: u16,
+    bits: u16,
+    valid: u16,
+}
+
+/// Names of the codings that occur in WAV files (mmreg.h).
+fn coding_name(tag: u16) -> &'static str {
+    match tag {
+        0x0001 => "integer PCM",
+        0x0002 => "Microsoft ADPCM",
+        0x0003 => "IEEE float",
+        0x0006 => "A-law",
+        0x0007 => "mu-law",
+        0x0011 => "IMA ADPCM",
+        0x0031 => "GSM 6.10",
+        0x0050 => "MPEG",
+        0x0055 => "MP3",
+        0x00ff => "AAC",
+        0x0161 => "Windows Media Audio",
+        0xfffe => "extensible without a subformat",
+        _ => "of an unknown kind",
+    }
 }

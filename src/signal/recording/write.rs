@@ -1,11 +1,15 @@
-//! Writing WAV files, through hound.
+//! Writing recordings as WAV files, through hound, and frequency response functions as universal files.
 
+use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 
-use super::error::RecordingError;
-use super::wav_stream::{WavLayout, WavStream};
+use super::error::{RecordingError, UffError};
+use super::health::{check_finite, check_samples};
+use super::responses::{FrequencyResponse, FrequencyResponses};
+use super::uff::Point;
+use super::units::ResponseForm;
 
 /// Number format of a WAV file that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,12 +23,72 @@ pub enum WavFormat {
 }
 
 impl WavFormat {
-    pub(super) fn bits(self) -> u16 {
+    fn bits(self) -> u16 {
         match self {
             Self::Pcm16 => 16,
             Self::Pcm24 => 24,
             Self::Float32 => 32,
         }
+    }
+}
+
+/// Extent and coding of a WAV file to be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WavLayout {
+    /// Sample rate (Hz).
+    pub sample_rate: u32,
+    /// Channels.
+    pub channels: usize,
+    /// Most samples per channel.
+    pub frames: u64,
+    /// Number format.
+    pub format: WavFormat,
+}
+
+impl WavLayout {
+    /// The layout of channels of equal length, which are checked.
+    fn of_channels(
+        name: &str,
+        sample_rate: u32,
+        channels: &[Vec<f64>],
+        format: WavFormat,
+    ) -> Result<Self, RecordingError> {
+        check_sample_rate(name, sample_rate)?;
+        let slices = channels.iter().map(Vec::as_slice);
+        let frames = check_samples(name, f64::from(sample_rate), slices)?;
+        Ok(Self {
+            sample_rate,
+            channels: channels.len(),
+            frames: frames as u64,
+            format,
+        })
+    }
+
+    /// Checks that a WAV file can hold so many frames.
+    fn check_size(&self, name: &str, frames: u64) -> Result<(), RecordingError> {
+        let bytes = frames
+            .saturating_mul(self.channels as u64)
+            .saturating_mul(u64::from(self.format.bits() / 8));
+        // 128 bytes are more than the header takes.
+        if self.channels > usize::from(u16::MAX) || bytes > u64::from(u32::MAX) - 128 {
+            return Err(RecordingError::TooLarge {
+                file: name.to_owned(),
+                channels: self.channels,
+                frames: usize::try_from(frames).unwrap_or(usize::MAX),
+                bits: self.format.bits(),
+            });
+        }
+        Ok(())
+    }
+}
+
+fn check_sample_rate(name: &str, sample_rate: u32) -> Result<(), RecordingError> {
+    match sample_rate {
+        0 => Err(RecordingError::BadSampleRate {
+            file: name.to_owned(),
+            value: 0.0,
+        }),
+        _ => Ok(()),
     }
 }
 
@@ -43,33 +107,10 @@ pub fn write_wav(
     format: WavFormat,
 ) -> Result<u64, RecordingError> {
     let name = path.display().to_string();
-    let frames = check(&name, sample_rate, channels, format)?;
-    let layout = WavLayout {
-        sample_rate,
-        channels: channels.len(),
-        frames: frames as u64,
-        format,
-    };
+    let layout = WavLayout::of_channels(&name, sample_rate, channels, format)?;
     let mut stream = WavStream::create(path, layout)?;
-    let mut frame = Vec::with_capacity(channels.len());
-    for index in 0..frames {
-        frame.clear();
-        frame.extend(channels.iter().filter_map(|channel| channel.get(index)));
-        stream.write(&frame)?;
-    }
+    stream.encoder.write_all(channels)?;
     stream.finish()
-}
-
-/// Temporary files are private to their owner; a recording is an ordinary file.
-#[cfg(unix)]
-pub(super) fn allow_others_to_read(file: &File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-pub(super) fn allow_others_to_read(_file: &File) -> std::io::Result<()> {
-    Ok(())
 }
 
 /// Like [`write_wav`], to any writer; `name` stands for the file in errors.
@@ -83,115 +124,169 @@ pub fn encode_wav<W: Write + Seek>(
     channels: &[Vec<f64>],
     format: WavFormat,
 ) -> Result<u64, RecordingError> {
-    let frames = check(name, sample_rate, channels, format)?;
-    let unwritable = |error| RecordingError::Unwritable {
-        file: name.to_owned(),
-        source: match error {
-            hound::Error::IoError(source) => source,
-            other => std::io::Error::other(other),
-        },
-    };
-    let written = encode(&mut writer, sample_rate, channels, format);
-    let clipped = written.map_err(unwritable)?;
-    let sample_bytes = u64::from(format.bits() / 8);
-    let bytes = frames as u64 * channels.len() as u64 * sample_bytes;
-    pad_to_even(&mut writer, bytes)
+    let layout = WavLayout::of_channels(name, sample_rate, channels, format)?;
+    let mut encoder = WavEncoder::new(name, &mut writer, layout)?;
+    encoder.write_all(channels)?;
+    let (data_bytes, clipped) = encoder.finish()?;
+    pad_to_even(&mut writer, data_bytes)
         .and_then(|()| writer.flush())
-        .map_err(|source| unwritable(hound::Error::IoError(source)))?;
+        .map_err(|error| unwritable(name, error))?;
     Ok(clipped)
 }
 
-fn check(
-    name: &str,
-    sample_rate: u32,
-    channels: &[Vec<f64>],
-    format: WavFormat,
-) -> Result<usize, RecordingError> {
-    if sample_rate == 0 {
-        return Err(RecordingError::BadSampleRate {
-            file: name.to_owned(),
-            value: 0.0,
-        });
-    }
-    let slices: Vec<&[f64]> = channels.iter().map(Vec::as_slice).collect();
-    let frames = super::open::check_samples(name, f64::from(sample_rate), &slices)?;
-    check_size(name, channels.len(), frames as u64, format)?;
-    Ok(frames)
+/// A WAV file that is written sample by sample, so that nothing is kept that grows with its length. It appears under
+/// its name when it is finished.
+pub struct WavStream {
+    path: PathBuf,
+    aside: tempfile::NamedTempFile,
+    encoder: WavEncoder<BufWriter<File>>,
 }
 
-/// Whether a WAV file can hold so much.
-pub(super) fn check_size(
-    name: &str,
-    channels: usize,
-    frames: u64,
-    format: WavFormat,
-) -> Result<(), RecordingError> {
-    let bytes = frames
-        .saturating_mul(channels as u64)
-        .saturating_mul(u64::from(format.bits() / 8));
-    // 128 bytes are more than the header takes.
-    if channels > usize::from(u16::MAX) || bytes > u64::from(u32::MAX) - 128 {
-        return Err(RecordingError::TooLarge {
-            file: name.to_owned(),
-            channels,
-            frames: usize::try_from(frames).unwrap_or(usize::MAX),
-            bits: format.bits(),
-        });
+impl WavStream {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// More than the format can hold, a sample rate of 0, a folder that cannot be written.
+    pub fn create(path: &Path, layout: WavLayout) -> Result<Self, RecordingError> {
+        let name = path.display().to_string();
+        check_sample_rate(&name, layout.sample_rate)?;
+        layout.check_size(&name, layout.frames)?;
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let aside = tempfile::NamedTempFile::new_in(folder);
+        let aside = aside.map_err(|error| unwritable(&name, error))?;
+        let file = aside.reopen().map_err(|error| unwritable(&name, error))?;
+        Ok(Self {
+            path: path.to_owned(),
+            aside,
+            encoder: WavEncoder::new(&name, BufWriter::new(file), layout)?,
+        })
     }
-    Ok(())
+
+    /// Writes one sample of every channel, in file units: full scale of the integer formats is 1,
+    /// values beyond it are clipped and counted.
+    ///
+    /// # Errors
+    /// Not one number for each channel, numbers that are not finite, more samples than announced, a
+    /// disk that is full.
+    pub fn write(&mut self, frame: &[f64]) -> Result<(), RecordingError> {
+        self.encoder.write(frame)
+    }
+
+    /// Completes the file, puts it in its place, and returns how many samples were clipped.
+    ///
+    /// # Errors
+    /// No samples; the disk refuses.
+    pub fn finish(mut self) -> Result<u64, RecordingError> {
+        let name = self.encoder.name.clone();
+        let (data_bytes, clipped) = self.encoder.finish()?;
+        let file = self.aside.as_file_mut();
+        pad_to_even(file, data_bytes)
+            .and_then(|()| file.flush())
+            .and_then(|()| allow_others_to_read(file))
+            .map_err(|error| unwritable(&name, error))?;
+        let moved = self.aside.persist(&self.path);
+        moved.map_err(|error| unwritable(&name, error.error))?;
+        Ok(clipped)
+    }
 }
 
-fn encode(
-    writer: &mut (impl Write + Seek),
-    sample_rate: u32,
-    channels: &[Vec<f64>],
-    format: WavFormat,
-) -> Result<u64, hound::Error> {
-    let mut wav = hound::WavWriter::new(writer, spec(sample_rate, channels.len(), format))?;
-    let mut clipped = 0;
-    for frame in 0..channels.first().map_or(0, Vec::len) {
-        for value in channels.iter().filter_map(|channel| channel.get(frame)) {
-            clipped += u64::from(write_value(&mut wav, *value, format)?);
+/// Encodes frames, checks them and counts those that are clipped.
+struct WavEncoder<W: Write + Seek> {
+    name: String,
+    layout: WavLayout,
+    wav: hound::WavWriter<W>,
+    written: u64,
+    clipped: u64,
+}
+
+impl<W: Write + Seek> WavEncoder<W> {
+    fn new(name: &str, writer: W, layout: WavLayout) -> Result<Self, RecordingError> {
+        layout.check_size(name, layout.frames)?;
+        let spec = hound::WavSpec {
+            channels: layout.channels as u16,
+            sample_rate: layout.sample_rate,
+            bits_per_sample: layout.format.bits(),
+            sample_format: match layout.format {
+                WavFormat::Float32 => hound::SampleFormat::Float,
+                WavFormat::Pcm16 | WavFormat::Pcm24 => hound::SampleFormat::Int,
+            },
+        };
+        let wav = hound::WavWriter::new(writer, spec);
+        Ok(Self {
+            name: name.to_owned(),
+            layout,
+            wav: wav.map_err(|error| unwritable(name, error))?,
+            written: 0,
+            clipped: 0,
+        })
+    }
+
+    /// Writes channels of equal length.
+    fn write_all(&mut self, channels: &[Vec<f64>]) -> Result<(), RecordingError> {
+        let mut frame = Vec::with_capacity(channels.len());
+        for index in 0..channels.first().map_or(0, Vec::len) {
+            frame.clear();
+            frame.extend(channels.iter().filter_map(|channel| channel.get(index)));
+            self.write(&frame)?;
         }
+        Ok(())
     }
-    wav.finalize()?;
-    Ok(clipped)
+
+    fn write(&mut self, frame: &[f64]) -> Result<(), RecordingError> {
+        if frame.len() != self.layout.channels {
+            return Err(RecordingError::LengthMismatch {
+                file: self.name.clone(),
+                channel: 1,
+                found: frame.len(),
+                expected: self.layout.channels,
+            });
+        }
+        let rate = f64::from(self.layout.sample_rate);
+        for (channel, value) in frame.iter().enumerate() {
+            check_finite(
+                &self.name,
+                rate,
+                channel,
+                self.written,
+                std::slice::from_ref(value),
+            )?;
+            self.write_value(*value)
+                .map_err(|error| unwritable(&self.name, error))?;
+        }
+        self.written += 1;
+        self.layout.check_size(&self.name, self.written)
+    }
+
+    fn write_value(&mut self, value: f64) -> Result<(), hound::Error> {
+        if self.layout.format == WavFormat::Float32 {
+            return self.wav.write_sample(value as f32);
+        }
+        let full_scale = 2_f64.powi(i32::from(self.layout.format.bits()) - 1);
+        let wanted = (value * full_scale).round();
+        let stored = wanted.clamp(-full_scale, full_scale - 1.0);
+        self.clipped += u64::from(stored != wanted);
+        self.wav.write_sample(stored as i32)
+    }
+
+    /// Completes the header. Returns the bytes of all samples, and how many samples were clipped.
+    fn finish(self) -> Result<(u64, u64), RecordingError> {
+        if self.written == 0 {
+            return Err(RecordingError::NoSamples { file: self.name });
+        }
+        self.wav
+            .finalize()
+            .map_err(|error| unwritable(&self.name, error))?;
+        let sample_bytes = u64::from(self.layout.format.bits() / 8);
+        let bytes = self.written * self.layout.channels as u64 * sample_bytes;
+        Ok((bytes, self.clipped))
+    }
 }
 
-pub(super) fn spec(sample_rate: u32, channels: usize, format: WavFormat) -> hound::WavSpec {
-    hound::WavSpec {
-        channels: channels as u16,
-        sample_rate,
-        bits_per_sample: format.bits(),
-        sample_format: match format {
-            WavFormat::Float32 => hound::SampleFormat::Float,
-            WavFormat::Pcm16 | WavFormat::Pcm24 => hound::SampleFormat::Int,
-        },
-    }
-}
-
-/// Writes one value, and says whether it was clipped.
-pub(super) fn write_value(
-    wav: &mut hound::WavWriter<impl Write + Seek>,
-    value: f64,
-    format: WavFormat,
-) -> Result<bool, hound::Error> {
-    if format == WavFormat::Float32 {
-        wav.write_sample(value as f32)?;
-        return Ok(false);
-    }
-    let full_scale = 2_f64.powi(i32::from(format.bits()) - 1);
-    let wanted = (value * full_scale).round();
-    let stored = wanted.clamp(-full_scale, full_scale - 1.0);
-    wav.write_sample(stored as i32)?;
-    Ok(stored != wanted)
-}
-
-/// Chunks have even length: an odd one is followed by a pad byte that counts for the whole only.
-pub(super) fn pad_to_even(
-    writer: &mut (impl Write + Seek),
-    data_bytes: u64,
-) -> std::io::Result<()> {
+/// Adds the pad byte of an odd chunk: chunks have even length, and the byte counts for the whole only.
+fn pad_to_even(writer: &mut (impl Write + Seek), data_bytes: u64) -> io::Result<()> {
     if data_bytes.is_multiple_of(2) {
         return Ok(());
     }
@@ -203,4 +298,227 @@ pub(super) fn pad_to_even(
     writer.write_all(&size.to_le_bytes())?;
     writer.seek(SeekFrom::End(0))?;
     Ok(())
+}
+
+/// Temporary files are private to their owner; a recording is an ordinary file.
+#[cfg(unix)]
+fn allow_others_to_read(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn allow_others_to_read(_file: &File) -> io::Result<()> {
+    Ok(())
+}
+
+fn unwritable(name: &str, error: impl Into<hound::Error>) -> RecordingError {
+    RecordingError::Unwritable {
+        file: name.to_owned(),
+        source: match error.into() {
+            hound::Error::IoError(source) => source,
+            other => io::Error::other(other),
+        },
+    }
+}
+
+/// How datasets are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UffFormat {
+    /// Dataset 58: text with thirteen digits.
+    Ascii,
+    /// Dataset 58b: IEEE double precision, little endian; every bit is kept.
+    Binary,
+}
+
+/// Factors to SI are 1: dataset 164 for SI units.
+const SI_UNITS: &str = "    -1\n   164\n         1SI: Meter (newton)           2\n  \
+     1.00000000000000000D+00  1.00000000000000000D+00  1.00000000000000000D+00\n  \
+     2.73149999999999977D+02\n    -1\n";
+
+/// Encodes frequency response functions and their coherences as a universal file: units (dataset 164), then
+/// for each response a dataset 58 or 58b of function type 4 and, where there is a coherence, one of
+/// function type 6. Complex and real double precision, evenly spaced.
+///
+/// The header has room for seven digits of first frequency and spacing.
+///
+/// # Errors
+/// Values that are not finite; responses or coherences whose length is not the number of lines.
+pub fn encode_frequency_responses_uff(
+    responses: &FrequencyResponses,
+    format: UffFormat,
+) -> Result<Vec<u8>, UffError> {
+    let mut bytes = SI_UNITS.as_bytes().to_vec();
+    for (number, response) in (1..).zip(&responses.responses) {
+        let parts = response
+            .values
+            .iter()
+            .flat_map(|value| [value.re, value.im]);
+        let values: Vec<f64> = parts.collect();
+        check_values(responses, number, 2, &values)?;
+        let header = response_header(responses, response);
+        write_dataset(&mut bytes, &header, &values, format);
+        if let Some(coherence) = &response.coherence {
+            check_values(responses, number, 1, coherence)?;
+            let header = coherence_header(responses, response);
+            write_dataset(&mut bytes, &header, coherence, format);
+        }
+    }
+    Ok(bytes)
+}
+
+/// Checks the values of a response (1-based) with `width` numbers a line.
+fn check_values(
+    responses: &FrequencyResponses,
+    response: usize,
+    width: usize,
+    values: &[f64],
+) -> Result<(), UffError> {
+    let file = responses.file.clone();
+    if values.len() != responses.lines.saturating_mul(width) {
+        return Err(UffError::LengthMismatch {
+            file,
+            response,
+            found: values.len() / width,
+            expected: responses.lines,
+        });
+    }
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(UffError::NotFinite {
+            file,
+            dataset: response,
+            point: (at / width) as u64 + 1,
+            value: values.get(at).copied().unwrap_or(f64::NAN),
+        }),
+    }
+}
+
+/// The header of a response. Values are in SI units where the form is known; else the unit is the file's.
+fn response_header(responses: &FrequencyResponses, response: &FrequencyResponse) -> String {
+    let numerator = match response.form {
+        Some(ResponseForm::Accelerance) => axis(12, "Acceleration", "m/s2"),
+        Some(ResponseForm::Mobility) => axis(11, "Velocity", "m/s"),
+        Some(ResponseForm::Receptance) => axis(8, "Displacement", "m"),
+        None => axis(0, "Response", response.unit.as_deref().unwrap_or("NONE")),
+    };
+    let denominator = match response.form {
+        Some(_) => axis(13, "Force", "N"),
+        None => axis(0, "NONE", "NONE"),
+    };
+    header(responses, response, 4, 6, numerator + &denominator)
+}
+
+fn coherence_header(responses: &FrequencyResponses, response: &FrequencyResponse) -> String {
+    let axes = axis(0, "Coherence", "NONE") + &axis(0, "NONE", "NONE");
+    header(responses, response, 6, 4, axes)
+}
+
+/// The eleven header records, `ordinate_axes` being records 9 and 10.
+fn header(
+    responses: &FrequencyResponses,
+    response: &FrequencyResponse,
+    function_type: u32,
+    data_type: u32,
+    ordinate_axes: String,
+) -> String {
+    let mut text = field(&response.name, 80) + "\nNONE\nNONE\nNONE\nNONE\n";
+    let _ = writeln!(
+        text,
+        "{function_type:5}{:10}{:5}{:10}{}{}",
+        0,
+        0,
+        0,
+        point(&response.response),
+        point(&response.reference)
+    );
+    let _ = writeln!(
+        text,
+        "{data_type:10}{:10}{:10}{:>13}{:>13}{:>13}",
+        responses.lines,
+        1,
+        exponential(responses.first_frequency, 6),
+        exponential(responses.spacing, 6),
+        exponential(0.0, 6)
+    );
+    text + &axis(18, "Frequency", "Hz") + &ordinate_axes + &axis(0, "NONE", "NONE")
+}
+
+/// Records 8 to 11: Format(I10,3I5,2(1X,20A1)).
+fn axis(quantity: u32, label: &str, unit: &str) -> String {
+    format!(
+        "{quantity:10}{:5}{:5}{:5} {:<20} {:<20}\n",
+        0,
+        0,
+        0,
+        field(label, 20),
+        field(unit, 20)
+    )
+}
+
+/// Half of record 6: 1X,10A1,I10,I4.
+fn point(point: &Point) -> String {
+    let name = point.name.as_deref().unwrap_or("NONE");
+    format!(
+        " {:<10}{:>10}{:>4}",
+        field(name, 10),
+        point.node,
+        point.direction
+    )
+}
+
+/// Text cut to its field, without what would break the line; "NONE" where nothing is left.
+fn field(text: &str, width: usize) -> String {
+    let kept: String = text
+        .replace(char::is_control, " ")
+        .chars()
+        .take(width)
+        .collect();
+    match kept.trim() {
+        "" => "NONE".to_owned(),
+        _ => kept,
+    }
+}
+
+/// A number as Fortran's E format prints it: two digits of exponent at least.
+fn exponential(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$E}");
+    let Some((mantissa, exponent)) = text.split_once('E') else {
+        return text;
+    };
+    let (sign, digits) = match exponent.strip_prefix('-') {
+        Some(digits) => ('-', digits),
+        None => ('+', exponent),
+    };
+    format!("{mantissa}E{sign}{digits:0>2}")
+}
+
+fn write_dataset(into: &mut Vec<u8>, header: &str, values: &[f64], format: UffFormat) {
+    match format {
+        UffFormat::Ascii => {
+            into.extend_from_slice(b"    -1\n    58\n");
+            into.extend_from_slice(header.as_bytes());
+            for row in values.chunks(4) {
+                let row: String = row
+                    .iter()
+                    .map(|x| format!("{:>20}", exponential(*x, 12)))
+                    .collect();
+                into.extend_from_slice(row.as_bytes());
+                into.push(b'\n');
+            }
+        }
+        UffFormat::Binary => {
+            // Little endian, IEEE 754, eleven lines of header, then this many bytes.
+            let bytes = 8 * values.len();
+            let line = format!(
+                "    -1\n    58b{:6}{:6}{:12}{bytes:12}{:6}{:6}{:12}{:12}\n",
+                1, 2, 11, 0, 0, 0, 0
+            );
+            into.extend_from_slice(line.as_bytes());
+            into.extend_from_slice(header.as_bytes());
+            into.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+        }
+    }
+    // Behind binary data the mark follows at once, as readers expect that count bytes.
+    into.extend_from_slice(b"    -1\n");
 }

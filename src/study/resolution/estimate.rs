@@ -7,7 +7,7 @@ use super::{ResolutionError, StudiedTest};
 use tapjoint_analysis::EstimateMethod;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};
-use tapjoint_description::ReadingMethod;
+use tapjoint_description::ReadBy;
 use tapjoint_identify::consistent::{
     ConsistentEstimator, ConsistentSettings, HeldJoint, JointedStructure, Neighbourhood, Parameter,
 };
@@ -99,7 +99,7 @@ impl Estimators {
         &self,
         truth: &Truth,
         (plan, bands): (&BlockPlan, &[Vec<[Option<Read>; 3]>]),
-        reading: ReadingMethod,
+        reading: ReadBy,
     ) -> [ParameterErrors; 2] {
         let modes: Option<Vec<MeasuredMode>> = self
             .used

@@ -18,7 +18,7 @@ pub use result::{
 };
 pub use statistics::formula_percent;
 pub use tapjoint_analysis::EstimateMethod;
-pub use tapjoint_description::ReadingMethod;
+pub use tapjoint_description::ReadBy;
 
 use rayon::prelude::*;
 
@@ -60,7 +60,7 @@ pub struct ResolutionSettings {
     /// Windows. Chosen by the decay, as in a test that asks for none.
     pub windows: Vec<WindowName>,
     /// Readings. All three.
-    pub readings: Vec<ReadingMethod>,
+    pub readings: Vec<ReadBy>,
     /// Virtual tests for each block size. 1000: an rms error then has a standard error of 1 to 2 %.
     pub draws: usize,
     /// Of these, so many are fitted too. 100: a fit takes longer than all else, and its errors of some
@@ -81,7 +81,7 @@ impl Default for ResolutionSettings {
         ResolutionSettings {
             blocks: (9..=16).map(|power| 1 << power).collect(),
             windows: vec![WindowName::Automatic],
-            readings: ReadingMethod::ALL.to_vec(),
+            readings: ReadBy::ALL.to_vec(),
             draws: 1000,
             fit_draws: 100,
             damping_ratio: 0.003,

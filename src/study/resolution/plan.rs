@@ -7,7 +7,7 @@ use super::virtual_test::{Truths, sample_draw, window_of};
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
 use tapjoint_analysis::{TestedStructure, structure_details};
 use tapjoint_beam::{Assembly, JointStiffness};
-use tapjoint_description::ReadingMethod;
+use tapjoint_description::ReadBy;
 use tapjoint_description::TestDescription;
 use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
 
@@ -245,9 +245,8 @@ impl BandPlan {
 }
 
 /// What a draw reads: fits are made of the first draws only.
-pub(super) fn readings_of(settings: &ResolutionSettings, draw: usize) -> Vec<ReadingMethod> {
-    let fitted =
-        |reading: &ReadingMethod| *reading != ReadingMethod::Fit || draw < settings.fit_draws;
+pub(super) fn readings_of(settings: &ResolutionSettings, draw: usize) -> Vec<ReadBy> {
+    let fitted = |reading: &ReadBy| *reading != ReadBy::Fit || draw < settings.fit_draws;
     settings.readings.iter().copied().filter(fitted).collect()
 }
 

@@ -7,7 +7,7 @@ use super::plan::{BlockPlan, Layout};
 use super::statistics::formula_percent;
 use super::{ResolutionSettings, StudiedTest};
 use tapjoint_analysis::EstimateMethod;
-use tapjoint_description::{ReadingMethod, WindowKind};
+use tapjoint_description::{ReadBy, WindowKind};
 
 /// A window of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -154,7 +154,7 @@ pub struct FrequencyError {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// Mode.
     pub mode: usize,
     /// Band (Hz).
@@ -192,7 +192,7 @@ pub struct StiffnessError {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// Estimator.
     pub method: EstimateMethod,
     /// "kx", "ky", "kz" or "modulus".
@@ -221,7 +221,7 @@ pub struct Answer {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingMethod,
+    pub reading: ReadBy,
     /// Estimator.
     pub method: EstimateMethod,
     /// Block (samples); `None` where none in the range does.

@@ -6,9 +6,9 @@ use super::plan::{BlockPlan, Layout};
 use super::result::{
     Answer, FrequencyError, ResolutionStudy, StiffnessError, StudiedMode, WindowName,
 };
-use super::virtual_test::{Outcome, source_of};
+use super::virtual_test::Outcome;
 use tapjoint_analysis::EstimateMethod;
-use tapjoint_description::ReadingMethod;
+use tapjoint_description::ReadBy;
 use tapjoint_numerics::stats::root_mean_square;
 
 /// rms, mean, 95 % point and largest of some errors; `None` without any.
@@ -36,10 +36,10 @@ impl Summary {
 }
 
 /// Draws that a reading has.
-fn draws(settings: &ResolutionSettings, reading: ReadingMethod) -> usize {
+fn draws(settings: &ResolutionSettings, reading: ReadBy) -> usize {
     match reading {
-        ReadingMethod::Fit => settings.draws.min(settings.fit_draws),
-        ReadingMethod::Line | ReadingMethod::Interpolated => settings.draws,
+        ReadBy::Fit => settings.draws.min(settings.fit_draws),
+        ReadBy::Line | ReadBy::Interpolated => settings.draws,
     }
 }
 
@@ -75,7 +75,7 @@ fn frequency_error(
     (plan, layout): (&BlockPlan, &Layout),
     outcomes: &[Outcome],
     (window, band, position): (usize, usize, usize),
-    (settings, reading): (&ResolutionSettings, ReadingMethod),
+    (settings, reading): (&ResolutionSettings, ReadBy),
 ) -> FrequencyError {
     let lines = &plan.bands[band].lines;
     let mode = &layout.modes[plan.bands[band].modes[position]];
@@ -103,7 +103,7 @@ fn frequency_error(
         found: reads.len(),
         own: reads
             .iter()
-            .filter(|(read, _)| read.source == source_of(reading))
+            .filter(|(read, _)| read.source == reading)
             .count(),
         draws: outcomes.len(),
         rms: summary.map(|summary| summary.rms),
@@ -182,7 +182,7 @@ pub(super) fn conclude(study: &mut ResolutionStudy, settings: &ResolutionSetting
 
 fn answer(
     study: &ResolutionStudy,
-    (window, reading, method): (WindowName, ReadingMethod, EstimateMethod),
+    (window, reading, method): (WindowName, ReadBy, EstimateMethod),
 ) -> Answer {
     let good = |row: &&StiffnessError| {
         let accurate = row
@@ -262,9 +262,9 @@ fn needs(study: &ResolutionStudy, method: EstimateMethod) -> String {
     let parts: Vec<String> = rows
         .map(|answer| {
             let how = match answer.reading {
-                ReadingMethod::Line => "read on the line",
-                ReadingMethod::Interpolated => "read between the lines",
-                ReadingMethod::Fit => "fitted",
+                ReadBy::Line => "read on the line",
+                ReadBy::Interpolated => "read between the lines",
+                ReadBy::Fit => "fitted",
             };
             let window = if several {
                 format!(" (window {})", answer.window.name())
@@ -357,7 +357,7 @@ impl ResolutionStudy {
     fn wide_peak(&self, mode: &StudiedMode) -> Option<(&'static str, String)> {
         let width = 2.0 * self.damping * mode.frequency;
         let rows = self.frequency_errors.iter().filter(|row| {
-            let of_line = (row.mode, row.reading) == (mode.mode, ReadingMethod::Line);
+            let of_line = (row.mode, row.reading) == (mode.mode, ReadBy::Line);
             of_line && row.band == mode.band && row.spacing < width
         });
         // Errors uniform over a line have this rms; a tenth more is beyond the draws' chance.

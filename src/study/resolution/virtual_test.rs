@@ -11,12 +11,10 @@ use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
-use tapjoint_description::ReadingMethod;
 use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
 use tapjoint_signal::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
 use tapjoint_signal::modal::{
-    CompositeLevel, FittedReading, FrequencySource, ModeReading, PeakSettings, find_peaks,
-    read_peaks,
+    CompositeLevel, FittedReading, ModeReading, PeakSettings, ReadBy, find_peaks, read_peaks,
 };
 use tapjoint_signal::spectral::{
     AveragedSpectra, DecayCheck, Lines, SpectralAverager, Window, band_limited, choose_window,
@@ -264,7 +262,7 @@ pub(super) struct Outcome {
     /// What is true.
     pub truth: Truth,
     /// For each window, for each band, for each of its modes: what each reading of
-    /// [`super::ReadingMethod::ALL`] says.
+    /// [`super::ReadBy::ALL`] says.
     pub readings: Vec<Vec<Vec<[Option<Read>; 3]>>>,
     /// For each window, for each of the study's readings, for each estimator: errors of the
     /// stiffnesses; `None` where the draw was not read that way.
@@ -320,15 +318,7 @@ pub(super) struct Read {
     /// Its stated standard uncertainty (Hz).
     pub std: f64,
     /// How it was read: what was wanted, or the next best.
-    pub source: FrequencySource,
-}
-
-pub(super) fn source_of(reading: ReadingMethod) -> FrequencySource {
-    match reading {
-        ReadingMethod::Line => FrequencySource::Line,
-        ReadingMethod::Interpolated => FrequencySource::BetweenLines,
-        ReadingMethod::Fit => FrequencySource::Fit,
-    }
+    pub source: ReadBy,
 }
 
 /// The window as applied over a block of these lines.
@@ -373,7 +363,7 @@ fn read_band(
     band: &BandPlan,
     window: usize,
     record: &VirtualRecord,
-    (truth, numbers, wanted): (&Truth, &[usize], &[ReadingMethod]),
+    (truth, numbers, wanted): (&Truth, &[usize], &[ReadBy]),
 ) -> Vec<[Option<Read>; 3]> {
     let window = band
         .windows
@@ -389,11 +379,11 @@ fn read_band(
             place_of(truth.frequencies[number - 1], &readings, &band.lines)
         })
         .collect();
-    if wanted.contains(&ReadingMethod::Fit) {
+    if wanted.contains(&ReadBy::Fit) {
         fit(band, record, &mut readings, &places);
     }
     let read = |place: &Option<usize>| {
-        ReadingMethod::ALL.map(|name| {
+        ReadBy::ALL.map(|name| {
             let reading = readings.get((*place)?).filter(|_| wanted.contains(&name))?;
             Some(read_as(reading, name))
         })
@@ -401,9 +391,9 @@ fn read_band(
     places.iter().map(read).collect()
 }
 
-fn read_as(reading: &ModeReading, name: ReadingMethod) -> Read {
+fn read_as(reading: &ModeReading, name: ReadBy) -> Read {
     let mut reading = reading.clone();
-    reading.prefer(source_of(name));
+    reading.prefer(name);
     Read {
         frequency: reading.frequency,
         std: reading.std.unwrap_or(reading.half_line),

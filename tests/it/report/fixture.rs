@@ -3,11 +3,13 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
+use tapjoint::description::JointModel;
 use tapjoint::modal::polyreference::PoleStability;
 use tapjoint::quality::{Check, Outcome, Subject, Verdict};
 use tapjoint::report::document::*;
 use tapjoint::report::figures::*;
 use tapjoint::spectral::Lines;
+use tapjoint::structure::{Assembly, BeamTheory};
 
 /// Frequencies of the five modes (Hz).
 pub const FREQUENCIES: [f64; 5] = [17.003, 118.04, 335.71, 628.9, 994.2];
@@ -86,9 +88,9 @@ fn quality() -> Vec<Verdict> {
 fn test() -> TestSection {
     TestSection {
         name: "Cantilever, one-bolt clamp".into(),
-        kind: Some("cantilever".into()),
-        model: Some("2p".into()),
-        beam_theory: Some("timoshenko".into()),
+        kind: Some(Assembly::Cantilever),
+        model: Some(JointModel::TwoParameter),
+        beam_theory: Some(BeamTheory::Timoshenko),
         length: Some(0.423),
         bending_stiffness: Some(107.8),
         mass_per_length: Some(1.9625),

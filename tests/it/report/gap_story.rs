@@ -10,6 +10,7 @@ use tapjoint::report::document::{
 };
 use tapjoint::report::render_text;
 use tapjoint::report::tables::{gap_in_short, gap_story, hypotheses, next_tests};
+use tapjoint::structure::Assembly;
 
 #[test]
 fn val_the_odds_of_a_group_are_those_of_its_members_together() {
@@ -225,7 +226,7 @@ fn regress_of_a_free_beam_no_joint_is_said_to_be_refitted() {
     let refitted = "with its joint refitted";
     assert!(gap_story(&document)[0].contains(refitted));
     document.test = Some(TestSection {
-        kind: Some("free".into()),
+        kind: Some(Assembly::Free),
         ..TestSection::default()
     });
     assert!(!gap_story(&document)[0].contains("joint"));
@@ -266,7 +267,7 @@ fn regress_what_drift_explains_is_said_beside_what_an_effect_does() {
     assert!(told(&document).contains("Where, if something is missing: "));
     let mut free = document.clone();
     free.test = Some(TestSection {
-        kind: Some("free".into()),
+        kind: Some(Assembly::Free),
         ..TestSection::default()
     });
     assert!(

@@ -6,9 +6,8 @@ use tapjoint::report::document::{
     PredictionSection, ReadBy, TapSection, ValueSection, WarningSection,
 };
 use tapjoint::report::tables::parameters;
-use tapjoint::report::{
-    render_json, render_modes_csv, render_parameters_csv, render_text, summary,
-};
+use tapjoint::report::words::findings as summary;
+use tapjoint::report::{render_json, render_modes_csv, render_parameters_csv, render_text};
 
 use super::{broken, fixture, incomplete, rendered, text_of};
 
@@ -846,7 +845,7 @@ fn regress_a_free_beam_has_no_joint_line() {
     let mut document = fixture::document();
     assert!(render_text(&document).contains("\nJoint   "));
     let test = document.test.as_mut().expect("a test");
-    test.kind = Some("free".to_owned());
+    test.kind = Some(tapjoint::structure::Assembly::Free);
     let text = render_text(&document);
     assert!(
         text.contains("\nBeam    ") && !text.contains("\nJoint   "),

@@ -1,13 +1,11 @@
-//! What is fitted: columns of complex lines on a common axis, and the functions they are made of.
-//!
-//! From tap records to the lines of a fit, one tap after the other.
+//! Data of a fit: columns of complex lines on a common axis, and their collector.
 
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
 
 use super::FitError;
 
-/// What kind of lines the columns hold, and with it the function of one pole.
+/// Kind of the lines, which determines the function of one pole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Basis {
     /// Discrete Fourier transforms of free decays that all have the same number of samples, without
@@ -20,24 +18,24 @@ pub enum Basis {
     },
     /// Frequency response functions.
     FrequencyResponse {
-        /// Resolution 1/T of what they were computed from (Hz). Lines denser than that are not
-        /// independent of each other.
+        /// Resolution 1/T of the records behind them (Hz). Denser lines are not independent of each
+        /// other.
         resolution: f64,
     },
 }
 
-/// The lines of one sensor for one tap.
+/// Lines of one sensor for one tap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// Number of the tap (from 0); of frequency response functions: of the place or the group of taps.
+    /// Number of the tap (from 0). For frequency response functions it is that of the tap's place.
     pub tap: usize,
     /// Number of the sensor (from 0). Columns of one sensor share one noise level.
     pub sensor: usize,
-    /// Value on each line (any unit).
+    /// Values on all lines (any unit).
     pub values: Vec<Complex64>,
 }
 
-/// Columns on a common axis.
+/// Columns of complex lines on a common axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalData {
     basis: Basis,
@@ -48,7 +46,7 @@ pub struct ModalData {
 
 impl ModalData {
     /// Checks and takes the data: `frequencies` (Hz) ascending and positive, one for each value of every
-    /// column. Stretches may be left out of the axis.
+    /// column. The axis may have gaps.
     ///
     /// # Errors
     /// [`FitError`] where lines and values do not belong together, or a value is no number.
@@ -64,7 +62,19 @@ impl ModalData {
             });
         }
         for (index, column) in columns.iter().enumerate() {
-            check_column(column, index, frequencies.len())?;
+            if column.values.len() != frequencies.len() {
+                return Err(FitError::Length {
+                    column: index,
+                    values: column.values.len(),
+                    lines: frequencies.len(),
+                });
+            }
+            if let Some(line) = column.values.iter().position(|value| !value.is_finite()) {
+                return Err(FitError::NotFinite {
+                    column: index,
+                    line,
+                });
+            }
         }
         let ascending = frequencies.windows(2).all(|pair| pair[0] < pair[1]);
         if !ascending || frequencies[0] <= 0.0 || frequencies.iter().any(|f| !f.is_finite()) {
@@ -79,7 +89,7 @@ impl ModalData {
         })
     }
 
-    /// What the lines are.
+    /// Kind of the lines.
     pub fn basis(&self) -> Basis {
         self.basis
     }
@@ -89,7 +99,7 @@ impl ModalData {
         &self.frequencies
     }
 
-    /// The columns.
+    /// Columns of all taps and sensors.
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
@@ -107,7 +117,7 @@ impl ModalData {
         }
     }
 
-    /// Highest frequency a pole can have (Hz).
+    /// Highest frequency that a pole can have (Hz).
     pub(super) fn highest(&self) -> f64 {
         match self.basis {
             Basis::FreeDecay { sample_rate, .. } => 0.5 * sample_rate,
@@ -116,25 +126,9 @@ impl ModalData {
     }
 }
 
-fn check_column(column: &Column, index: usize, lines: usize) -> Result<(), FitError> {
-    if column.values.len() != lines {
-        return Err(FitError::Length {
-            column: index,
-            values: column.values.len(),
-            lines,
-        });
-    }
-    match column.values.iter().position(|value| !value.is_finite()) {
-        Some(line) => Err(FitError::NotFinite {
-            column: index,
-            line,
-        }),
-        None => Ok(()),
-    }
-}
-
-/// Distance of the lines (Hz). Those of a decay must be multiples of it, or the truncation factor
-/// differs from line to line.
+/// Distance of neighbouring lines (Hz).
+///
+/// The lines of a decay must be multiples of it, or the truncation factor differs from line to line.
 fn line_spacing(basis: Basis, frequencies: &[f64]) -> Result<f64, FitError> {
     match basis {
         Basis::FreeDecay {
@@ -142,34 +136,33 @@ fn line_spacing(basis: Basis, frequencies: &[f64]) -> Result<f64, FitError> {
             samples,
         } => {
             let spacing = sample_rate / samples as f64;
-            let off = |f: &&f64| {
-                let line = *f / spacing;
-                // The largest transform has some 10^6 lines; rounding moves none by 10^-6.
-                (line - line.round()).abs() > 1e-6 || **f >= 0.5 * sample_rate
-            };
-            match frequencies.iter().find(off) {
-                _ if !(spacing > 0.0 && spacing.is_finite()) => Err(FitError::Axis),
-                Some(&frequency) => Err(FitError::OffGrid { frequency, spacing }),
-                None => Ok(spacing),
+            if !(spacing > 0.0 && spacing.is_finite()) {
+                return Err(FitError::Axis);
             }
+            for &frequency in frequencies {
+                let line = frequency / spacing;
+                // The largest transform has some 10^6 lines; rounding moves none by 10^-6.
+                if (line - line.round()).abs() > 1e-6 || frequency >= 0.5 * sample_rate {
+                    return Err(FitError::OffGrid { frequency, spacing });
+                }
+            }
+            Ok(spacing)
         }
         Basis::FrequencyResponse { resolution } => {
-            let steps = frequencies.windows(2).map(|pair| pair[1] - pair[0]);
-            let spacing = steps.fold(f64::INFINITY, f64::min);
-            if resolution > 0.0 && resolution.is_finite() {
-                Ok(spacing)
-            } else {
-                Err(FitError::Axis)
+            if !(resolution > 0.0 && resolution.is_finite()) {
+                return Err(FitError::Axis);
             }
+            let steps = frequencies.windows(2).map(|pair| pair[1] - pair[0]);
+            Ok(steps.fold(f64::INFINITY, f64::min))
         }
     }
 }
 
-/// Collects the free decays after each tap, and keeps of their transforms the lines in given bands.
+/// Collects the free decays after each tap, and keeps the lines of their transforms in given bands.
 ///
 /// A decay begins after the force pulse has ended (without a hammer: where the response no longer
-/// shows the pulse) and must not be windowed. All decays have the same number of samples, best one that
-/// [`largest_smooth_block`](crate::spectral::largest_smooth_block) gives.
+/// shows the pulse) and must not be windowed. All decays have the same number of samples, at best one from
+/// [`largest_smooth_block`](crate::spectral::largest_smooth_block).
 #[derive(Debug, Clone)]
 pub struct FreeDecayCollector {
     sample_rate: f64,
@@ -180,7 +173,7 @@ pub struct FreeDecayCollector {
 }
 
 impl FreeDecayCollector {
-    /// `samples` of each decay are used; `bands` (Hz) may overlap.
+    /// Begins a collection: `samples` of each decay are used, and `bands` (Hz) may overlap.
     ///
     /// # Errors
     /// [`FitError::Empty`] where no line lies within the bands.
@@ -211,7 +204,7 @@ impl FreeDecayCollector {
         })
     }
 
-    /// Adds one tap: `responses` of all sensors, of each its first `samples` samples.
+    /// Adds one tap with the responses of all sensors, of which the first `samples` samples are used.
     ///
     /// # Errors
     /// [`FitError::Short`] where a response has fewer.
@@ -234,22 +227,17 @@ impl FreeDecayCollector {
             self.columns.push(Column {
                 tap: self.taps,
                 sensor,
-                values: self.pick(&spectrum),
+                // X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate}.
+                values: (self.lines.iter())
+                    .map(|&line| spectrum[line] / self.sample_rate)
+                    .collect(),
             });
         }
         self.taps += 1;
         Ok(())
     }
 
-    /// X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate} on the lines that are kept.
-    fn pick(&self, spectrum: &[Complex64]) -> Vec<Complex64> {
-        self.lines
-            .iter()
-            .map(|&line| spectrum[line] / self.sample_rate)
-            .collect()
-    }
-
-    /// What was collected.
+    /// Returns the collected data.
     ///
     /// # Errors
     /// [`FitError`] without any tap, or with a sample that is no number.

@@ -1,7 +1,8 @@
-//! Whether the data ask for one more mode.
+//! Test for one more mode.
 
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use tapjoint_numerics::stats::root_mean_square;
 
 use super::data::{Basis, ModalData};
 use super::group::{BandData, GroupFit};
@@ -9,51 +10,52 @@ use super::mode_fit::{ModeFit, mode_fits};
 use super::sweep::{Group, Sweeper};
 use super::{FitSettings, PoleStart, Unfit};
 
-/// What speaks for one more mode, and what against it.
+/// Test result for one more mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtraMode {
-    /// Whether the data ask for it: all of what follows speaks for it.
+    /// Outcome of the test; every figure below must support the mode.
     pub verdict: ExtraVerdict,
     /// Fall of the residual per unknown over the residual per degree of freedom.
     pub f_statistic: f64,
     /// Probability of a larger fall by noise alone at one given place.
     pub probability: f64,
-    /// Fall of Schwarz's criterion; positive speaks for the mode.
+    /// Fall of Schwarz's criterion; a positive value supports the mode.
     pub information_gain: f64,
-    /// Size of its amplitudes over their standard deviation, root of the mean square over the columns.
+    /// Root mean square over the columns of amplitude over standard deviation.
     pub amplitude_over_std: f64,
-    /// Likeness of its shape to that of the nearest other mode of its group: the modal assurance criterion over the
-    /// sensors of a decay, mean of all taps weighted by their power, of functions over all columns; `None` without such a mode, or with one
-    /// sensor. Near 1 the second pole may only mend a line that is no straight decay: one mode whose frequency
-    /// changes while it rings. How the two share a tap depends then on the tap's strength, and is no sign of another
-    /// shape.
+    /// Modal assurance criterion between its shape and that of the nearest other mode of its group.
+    ///
+    /// For free decays it is taken over the sensors, as the mean of all taps weighted by their power; for
+    /// frequency response functions over all columns. `None` without such a mode, or with one sensor. Near 1
+    /// the second pole may only correct a decay that is not straight: one mode whose frequency changes while
+    /// it rings. The two poles' shares of a tap then depend on the tap's strength, which is no other shape.
     pub likeness: Option<f64>,
-    /// Its fit together with the others, where there is one.
+    /// Fit of the mode together with the others.
     pub fit: Result<ModeFit, Unfit>,
 }
 
 /// Outcome of the test for one more mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExtraVerdict {
-    /// The data ask for it.
+    /// The data need the mode.
     Needed,
-    /// Noise alone would do as well.
+    /// Noise alone explains it as well.
     NotSignificant,
     /// It has no pole of its own near its start, or one that does not decay by two standard deviations.
     NoMode,
 }
 
-/// The fall of the residual by chance must be less probable than this. 10^-4: the place of the pole was
-/// chosen to suit the data, out of some tens of lines.
+/// Largest probability of the residual's fall by chance. 10^-4: the place of the pole was chosen to suit
+/// the data, out of some tens of lines.
 const LEVEL: f64 = 1e-4;
 /// Least amplitude in standard deviations.
 const LEAST_AMPLITUDE: f64 = 4.0;
 /// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
-/// thousand of them, and to fit them all for every proposal of chance takes too long. The price: of one line in s an
-/// amplitude has sqrt(s) times its standard deviation, so that a mode that only all lines together show is not found.
+/// thousand of them, too many to fit for every chance proposal. On one line in s an amplitude has sqrt(s)
+/// times its standard deviation, so that a mode that only all lines together show is not found.
 const SCREENED: usize = 1000;
 
-/// Modes that are fitted, beside which others are tested.
+/// Fitted modes, beside which other modes are tested.
 #[derive(Debug, Clone)]
 pub struct Accepted<'a> {
     sweeper: Sweeper<'a>,
@@ -61,10 +63,8 @@ pub struct Accepted<'a> {
 }
 
 impl<'a> Accepted<'a> {
-    /// The modes that begin at `starts`, and for each start its mode or why there is none, as [`fit_modes`] has
-    /// them.
-    ///
-    /// [`fit_modes`]: super::fit_modes
+    /// Fits the modes that begin at `starts`. Returns also for each start its mode or the reason why there is
+    /// none, as [`fit_modes`](super::fit_modes) does.
     pub fn new(
         data: &'a ModalData,
         starts: &[PoleStart],
@@ -77,12 +77,12 @@ impl<'a> Accepted<'a> {
         (Accepted { sweeper, settings }, fits)
     }
 
-    /// Tests whether the data ask for a mode that begins at `extra` beside these; and all of them together.
+    /// Tests whether the data ask for a mode that begins at `extra`. Returns the test, and all modes together.
     ///
-    /// Both models are fitted to the same lines with the same background; the one more pole must lower the
-    /// residual by far more than its unknowns explain, decay, and stand out of its own uncertainty. Modes that
-    /// are not fitted jointly with it stay as they are. What fails on the lines of a thinned band is not tried on
-    /// all of them.
+    /// The models with and without it are fitted to the same lines with the same background. The extra pole
+    /// must lower the residual by far more than its unknowns explain, decay, and exceed its own uncertainty.
+    /// Modes that are not fitted jointly with it do not change. A start that fails on thinned lines is not
+    /// tried on all lines.
     pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
         let (test, together, stride) = self.test_on(extra, SCREENED);
         if test.verdict != ExtraVerdict::Needed || stride == 1 {
@@ -97,123 +97,128 @@ impl<'a> Accepted<'a> {
         self
     }
 
-    /// The test on so many lines of its band at most, and of how many lines one was taken.
+    /// Tests on at most so many lines of the band. Returns also the step between the lines taken.
     fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
         let mut beside = self.clone();
         beside.sweeper.most_lines = most_lines;
-        let group = beside.sweeper.add(extra);
-        let stride = group.as_ref().map_or(1, |group| group.fit.lines.stride);
-        let test = match group {
-            Some(group) => beside.judge(&group),
-            None => {
-                let last = beside.sweeper.modes.last();
-                let failed = last.and_then(|mode| mode.failed.clone());
-                without_mode(Err(failed.unwrap_or(Unfit::NotIndependent)))
-            }
+        let Some(group) = beside.sweeper.add(extra) else {
+            let last = beside.sweeper.modes.last();
+            let failed = last.and_then(|mode| mode.failed.clone());
+            let reason = failed.unwrap_or(Unfit::NotIndependent);
+            return (ExtraMode::none(Err(reason)), beside, 1);
         };
-        (test, beside, stride)
+        let test = beside.judge(&group);
+        (test, beside, group.fit.lines.stride)
     }
 
-    /// What speaks for the last mode, one of this group.
+    /// Judges the last mode, which belongs to this group.
     fn judge(&mut self, group: &Group) -> ExtraMode {
         let last = self.sweeper.modes.len() - 1;
         let groups = std::slice::from_ref(group);
         let fit = mode_fits(&mut self.sweeper, groups, &self.settings)
             .pop()
             .unwrap_or(Err(Unfit::NotIndependent));
-        let inside = group.members.iter().position(|&index| index == last);
-        let (Some(inside), Ok(mode)) = (inside, &fit) else {
-            return without_mode(fit);
+        let place = group.members.iter().position(|&index| index == last);
+        let (Some(place), Ok(mode)) = (place, &fit) else {
+            return ExtraMode::none(fit);
         };
-        let local = self.sweeper.band(&group.members).ok();
-        let compared = local.and_then(|local| compare(&local, &group.fit, inside));
-        let Some((f_statistic, probability, information_gain)) = compared else {
-            return without_mode(fit);
+        let band = self.sweeper.band(&group.members).ok();
+        let compared = band.and_then(|band| Comparison::new(&band, &group.fit, place));
+        let Some(compared) = compared else {
+            return ExtraMode::none(fit);
         };
-        let amplitude_over_std = over_std(mode);
+        let amplitudes = mode.amplitudes.iter();
+        let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
+        let amplitude_over_std = root_mean_square(&ratios);
         let decays = mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
-        let needed =
-            probability < LEVEL && information_gain > 0.0 && amplitude_over_std > LEAST_AMPLITUDE;
+        let needed = compared.probability < LEVEL
+            && compared.information_gain > 0.0
+            && amplitude_over_std > LEAST_AMPLITUDE;
         ExtraMode {
             verdict: match (needed, decays) {
                 (true, true) => ExtraVerdict::Needed,
                 (true, false) => ExtraVerdict::NoMode,
                 (false, _) => ExtraVerdict::NotSignificant,
             },
-            f_statistic,
-            probability,
-            information_gain,
+            f_statistic: compared.f_statistic,
+            probability: compared.probability,
+            information_gain: compared.information_gain,
             amplitude_over_std,
-            likeness: likeness(self.sweeper.data, &group.fit, inside),
+            likeness: likeness(self.sweeper.data, &group.fit, place),
             fit,
         }
     }
 }
 
-fn without_mode(fit: Result<ModeFit, Unfit>) -> ExtraMode {
-    ExtraMode {
-        verdict: ExtraVerdict::NoMode,
-        f_statistic: 0.0,
-        probability: 1.0,
-        information_gain: f64::NEG_INFINITY,
-        amplitude_over_std: 0.0,
-        likeness: None,
-        fit,
+impl ExtraMode {
+    /// Result where the start has no mode.
+    fn none(fit: Result<ModeFit, Unfit>) -> Self {
+        ExtraMode {
+            verdict: ExtraVerdict::NoMode,
+            f_statistic: 0.0,
+            probability: 1.0,
+            information_gain: f64::NEG_INFINITY,
+            amplitude_over_std: 0.0,
+            likeness: None,
+            fit,
+        }
     }
 }
 
-/// F statistic, its probability by chance, and the fall of Schwarz's criterion for the pole at `place`.
+/// Comparison of the models with and without one pole.
+struct Comparison {
+    f_statistic: f64,
+    /// Probability of a larger statistic by chance.
+    probability: f64,
+    /// Fall of Schwarz's criterion.
+    information_gain: f64,
+}
+
+impl Comparison {
+    /// Compares the fits with and without the pole at `place`.
+    ///
+    /// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
+    /// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
+    /// n ln S + k ln n.
+    fn new(band: &BandData, fit: &GroupFit, place: usize) -> Option<Self> {
+        let mut fewer: Vec<Complex64> = fit.at.poles.clone();
+        fewer.remove(place);
+        let columns = fit.used.len() as f64;
+        let unknowns = 2.0 + 2.0 * columns;
+        let values = 2.0 * band.lines.count() as f64 * columns;
+        // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
+        let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
+        let without = if fewer.is_empty() {
+            band.square_sum_without(fit.terms, &fit.noise)
+        } else {
+            band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum
+        };
+        let f_statistic = (without - with.at.square_sum) / unknowns / with.variance;
+        let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
+        let significant = f_statistic > 0.0;
+        Some(Comparison {
+            f_statistic,
+            probability: if significant {
+                chance.sf(f_statistic)
+            } else {
+                1.0
+            },
+            information_gain: values * (without / with.at.square_sum).ln() - unknowns * values.ln(),
+        })
+    }
+}
+
+/// Likeness of the shapes of a pole and of the nearest pole of its group, in units of noise.
 ///
-/// With residuals S0 and S1 of the models without and with it, k unknowns more (two of the pole, two
-/// amplitudes a column) and n real values: F = (S0 - S1)/k/(S1/freedom); criterion n ln S + k ln n.
-fn compare(local: &BandData, fit: &GroupFit, place: usize) -> Option<(f64, f64, f64)> {
-    let mut fewer: Vec<Complex64> = fit.at.poles.clone();
-    fewer.remove(place);
-    let columns = fit.used.len() as f64;
-    let unknowns = 2.0 + 2.0 * columns;
-    let values = 2.0 * local.lines.count() as f64 * columns;
-    // Both anew over the same lines: those of the last sweep followed from the poles before it.
-    let with = local.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
-    let without = if fewer.is_empty() {
-        local.square_sum_without(fit.terms, &fit.noise)
-    } else {
-        local.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum
-    };
-    let statistic = (without - with.at.square_sum) / unknowns / with.variance;
-    let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
-    let probability = if statistic > 0.0 {
-        chance.sf(statistic)
-    } else {
-        1.0
-    };
-    let gain = values * (without / with.at.square_sum).ln() - unknowns * values.ln();
-    Some((statistic, probability, gain))
-}
-
-/// Root of the mean square of amplitude over standard deviation.
-fn over_std(mode: &ModeFit) -> f64 {
-    let squares = mode
-        .amplitudes
-        .iter()
-        .map(|a| (a.value.norm() / a.std).powi(2));
-    (squares.sum::<f64>() / mode.amplitudes.len().max(1) as f64).sqrt()
-}
-
-/// sum_t |sum_s conj(b) c|^2/(sum_t sum_s |b|^2 sum_s |c|^2) over taps t and sensors s with the nearest pole of the
-/// group, in units of noise. Functions of places or groups of taps count together: their places are part of a shape.
+/// It is sum_t |sum_s conj(b) c|^2/(sum_t sum_s |b|^2 sum_s |c|^2) over taps t and sensors s. Frequency
+/// response functions count together: the places of their taps are part of a shape.
 fn likeness(data: &ModalData, fit: &GroupFit, place: usize) -> Option<f64> {
     let poles = &fit.at.poles;
-    let distance = |other: &usize| (poles[*other] - poles[place]).norm();
-    let nearest = (0..poles.len())
-        .filter(|&other| other != place)
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    let of = |pole: usize, column: usize| {
-        let amplitudes = &fit.at.amplitudes;
-        Complex64::new(
-            amplitudes[(2 * pole, column)],
-            amplitudes[(2 * pole + 1, column)],
-        )
-    };
+    let distances = poles.iter().map(|pole| (pole - poles[place]).norm());
+    let (nearest, _) = distances
+        .enumerate()
+        .filter(|(other, _)| *other != place)
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let tap = |column: usize| match data.basis() {
         Basis::FreeDecay { .. } => data.columns()[fit.used[column]].tap,
         Basis::FrequencyResponse { .. } => 0,
@@ -224,13 +229,16 @@ fn likeness(data: &ModalData, fit: &GroupFit, place: usize) -> Option<f64> {
         if shape.len() < 2 {
             continue;
         }
-        let product: Complex64 = shape
-            .iter()
-            .map(|&c| of(place, c).conj() * of(nearest, c))
-            .sum();
-        let power = |pole: usize| shape.iter().map(|&c| of(pole, c).norm_sqr()).sum::<f64>();
+        let (mut product, mut own_power, mut other_power) = (Complex64::ZERO, 0.0, 0.0);
+        for &column in shape {
+            let own = fit.amplitude(place, column);
+            let other = fit.amplitude(nearest, column);
+            product += own.conj() * other;
+            own_power += own.norm_sqr();
+            other_power += other.norm_sqr();
+        }
         alike += product.norm_sqr();
-        whole += power(place) * power(nearest);
+        whole += own_power * other_power;
     }
     (whole > 0.0).then(|| alike / whole)
 }

@@ -1,14 +1,13 @@
 //! Fit of poles to free decays or frequency response functions, all taps and sensors together.
 //!
-//! After the force pulse each response is a sum of decaying oscillations, and its transform over any
-//! number of samples is exactly rational on its own lines, the record cut off or not. White noise is
-//! independent between those lines. Poles common to all taps and sensors with a free amplitude in each
-//! are therefore fitted by plain least squares, which is the maximum of the likelihood: neither the
-//! force's noise nor what still rings from the tap before can bias it.
+//! After the force pulse each response is a sum of decaying oscillations. Its transform over any number of
+//! samples is exactly rational on its own lines, even of a truncated record. White noise is independent
+//! between those lines. Poles common to all taps and sensors, with a free amplitude in each, are therefore
+//! fitted by plain least squares, the maximum of the likelihood. Neither noise of the force nor the ringing
+//! from the tap before can bias it.
 //!
-//! [`fit_modes`] fits mode by mode over a band about each (modes near each other jointly), and states a
-//! standard deviation from the noise that remains, or from the scatter of the taps where that is
-//! larger. Columns come from a [`FreeDecayCollector`], or are frequency response functions.
+//! [`fit_modes`] fits mode by mode over a band about each (modes near each other jointly). The standard
+//! deviation comes from the noise that remains, or from the scatter of the taps where that is larger. Columns come from a [`FreeDecayCollector`], or are frequency response functions.
 
 mod data;
 mod extra_mode;
@@ -28,16 +27,16 @@ pub use mode_fit::{
 };
 pub use variable_projection::StopReason;
 
-/// Where the search for a mode begins.
+/// Start of the search for a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoleStart {
-    /// Natural frequency (Hz), good to a line or half a half-power width.
+    /// Natural frequency (Hz), within a line or half a half-power width.
     pub frequency: f64,
-    /// Damping ratio, a window's own decay taken out; `None` where nothing is known.
+    /// Damping ratio without a window's own decay; `None` where it is not known.
     pub damping_ratio: Option<f64>,
 }
 
-/// What a fit must know beside data and starts.
+/// Settings of a fit.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FitSettings {
     /// Decay that an exponential window added to what is fitted (1/s). 0: free decays are fitted
@@ -47,7 +46,7 @@ pub struct FitSettings {
     pub steady_lines: Vec<f64>,
 }
 
-/// Why data cannot be fitted at all.
+/// Reason why data cannot be fitted at all.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// Nothing to fit.
@@ -109,7 +108,7 @@ pub enum FitError {
     },
 }
 
-/// Why a start did not become a mode.
+/// Reason why a start did not become a mode.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unfit {
     /// The start is no possible natural frequency.

@@ -1,18 +1,18 @@
-//! Modal constants: how strongly a mode answers, from its amplitudes and the hammer's force.
+//! Modal constants: the strength of a mode's response, from its amplitudes and the hammer's force.
 
-use super::super::from_one;
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::super::from_one;
 use super::mode_fit::{ColumnAmplitude, ModeFit};
 use crate::recording::ResponseForm;
 
 /// The force of one tap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TapForce {
-    /// Number of the tap, as in the columns.
+    /// Number of the tap in the columns.
     pub tap: usize,
     /// Force (N), windowed to the pulse, without its offset.
     pub samples: Vec<f64>,
@@ -31,108 +31,111 @@ pub struct ModalConstant {
     /// A (1/kg for a sensor in SI units) in the receptance A/(omega_n^2 - omega^2 + 2 j zeta omega_n
     /// omega): product of the mass-normalised shapes at sensor and tap, with its sign.
     pub value: f64,
-    /// Its standard deviation: noise and pole, or the scatter of the taps where that is larger.
+    /// Standard deviation: from noise and pole, or from the scatter of the taps where that is larger.
     pub std: f64,
     /// Phase of A away from the real axis (degrees, -90 to 90): 0 for a real mode.
     pub phase_deviation: f64,
-    /// Taps that took part.
+    /// Number of taps used.
     #[serde(skip)]
     pub taps: usize,
 }
 
-/// An estimate with its slopes to the pole's angular frequency and decay.
+/// Residue, or modal constant, of one tap.
 #[derive(Debug, Clone, Copy)]
-struct Uncertain {
+struct TapEstimate {
     value: Complex64,
     variance: f64,
+    /// Derivatives to the pole's angular frequency and decay.
     slopes: [Complex64; 2],
+    /// Weight in the mean over the taps.
+    weight: f64,
 }
 
-/// Modal constants of every sensor from free decays and the force of each tap.
+/// Returns the modal constants of every sensor from free decays and the force of each tap.
 ///
-/// A force f(t) leaves behind it x(t) = 2 Re(r F(p) e^{p t}) with F(p) = integral f(t) e^{-p t} dt, so the
-/// amplitude of the decay is a = 2 r F(p) when both count time from its first sample, and over the taps
-/// r = sum conj(F_i) a_i/(2 sum |F_i|^2). `kinds` are the sensors' quantities, by their number. A tap
-/// without force, a sensor without kind or without amplitude is left out.
+/// A force f(t) is followed by x(t) = 2 Re(r F(p) e^{p t}) with F(p) = integral f(t) e^{-p t} dt. The
+/// amplitude of the decay is therefore a = 2 r F(p), where both count time from its first sample. Over the
+/// taps r = sum conj(F_i) a_i/(2 sum |F_i|^2). `kinds` are the sensors' quantities, by their number. Taps
+/// without force, and sensors without kind or amplitude, are left out.
 pub fn modal_constants(
     mode: &ModeFit,
     forces: &[TapForce],
     kinds: &[Option<ResponseForm>],
 ) -> Vec<ModalConstant> {
-    (0..kinds.len())
-        .filter_map(|sensor| {
-            let kind = kinds[sensor]?;
-            let seen: Vec<(&ColumnAmplitude, Complex64, Complex64)> = mode
-                .amplitudes
-                .iter()
-                .filter(|amplitude| amplitude.sensor == sensor)
-                .filter_map(|amplitude| {
-                    let force = forces.iter().find(|force| force.tap == amplitude.tap)?;
-                    let (value, slope) = laplace(force, mode.pole);
-                    (value.norm_sqr() > 0.0 && value.is_finite())
-                        .then_some((amplitude, value, slope))
-                })
-                .collect();
-            let residues: Vec<(Uncertain, f64)> = seen.iter().map(residue_of_tap).collect();
-            constant(mode, sensor, kind, &residues)
-        })
-        .collect()
+    let mut constants = Vec::new();
+    for (sensor, kind) in kinds.iter().enumerate() {
+        let Some(kind) = *kind else { continue };
+        let amplitudes = mode.amplitudes.iter();
+        let residues: Vec<TapEstimate> = amplitudes
+            .filter(|amplitude| amplitude.sensor == sensor)
+            .filter_map(|amplitude| {
+                let force = forces.iter().find(|force| force.tap == amplitude.tap)?;
+                TapEstimate::residue(amplitude, force, mode.pole)
+            })
+            .collect();
+        constants.extend(constant(mode, sensor, kind, residues));
+    }
+    constants
 }
 
-/// Modal constants of every column where the columns are frequency response functions: those of one
-/// sensor for the same `tap` place. `kinds` are the functions' quantities over force, by sensor.
+/// Returns the modal constants of every column, where the columns are frequency response functions.
+///
+/// Their `tap` is the place of the tap. `kinds` are the functions' quantities over force, by sensor.
 pub fn modal_constants_of_frf(mode: &ModeFit, kinds: &[ResponseForm]) -> Vec<ModalConstant> {
-    mode.amplitudes
-        .iter()
+    let amplitudes = mode.amplitudes.iter();
+    amplitudes
         .filter_map(|amplitude| {
-            let residue = Uncertain {
+            let residue = TapEstimate {
                 value: amplitude.value,
                 variance: amplitude.std.powi(2),
                 slopes: [amplitude.by_omega, amplitude.by_decay],
+                weight: 1.0,
             };
             let kind = kinds.get(amplitude.sensor)?;
-            constant(mode, amplitude.sensor, *kind, &[(residue, 1.0)])
+            constant(mode, amplitude.sensor, *kind, vec![residue])
         })
         .collect()
 }
 
-/// F(p) = sum f(n) e^{-p t(n)}/rate, and its derivative to p.
-fn laplace(force: &TapForce, pole: Complex64) -> (Complex64, Complex64) {
-    let mut sums = (Complex64::ZERO, Complex64::ZERO);
-    for (n, f) in force.samples.iter().enumerate() {
-        let time = force.start + n as f64 / force.sample_rate;
-        let term = (-pole * time).exp() * (f / force.sample_rate);
-        sums.0 += term;
-        sums.1 -= term * time;
+impl TapEstimate {
+    /// Residue r = a/(2 F(p)) of one tap; `None` without force at the pole.
+    ///
+    /// The weight |F|^2 makes the mean over the taps the least-squares residue.
+    fn residue(amplitude: &ColumnAmplitude, force: &TapForce, pole: Complex64) -> Option<Self> {
+        // F(p) = sum f(n) e^{-p t(n)}/rate, and its derivative to p.
+        let (mut laplace, mut slope) = (Complex64::ZERO, Complex64::ZERO);
+        for (n, f) in force.samples.iter().enumerate() {
+            let time = force.start + n as f64 / force.sample_rate;
+            let term = (-pole * time).exp() * (f / force.sample_rate);
+            laplace += term;
+            slope -= term * time;
+        }
+        if laplace.norm_sqr() <= 0.0 || !laplace.is_finite() {
+            return None;
+        }
+        let value = amplitude.value / (2.0 * laplace);
+        // dr/dp of the force; the pole moves by j with omega and by -1 with the decay.
+        let by_force = -value * slope / laplace;
+        Some(TapEstimate {
+            value,
+            variance: amplitude.std.powi(2) / (4.0 * laplace.norm_sqr()),
+            slopes: [
+                amplitude.by_omega / (2.0 * laplace) + Complex64::i() * by_force,
+                amplitude.by_decay / (2.0 * laplace) - by_force,
+            ],
+            weight: laplace.norm_sqr(),
+        })
     }
-    sums
 }
 
-/// r = a/(2 F(p)) of one tap, and its weight |F|^2: with it the mean over the taps is the least-squares
-/// residue.
-fn residue_of_tap(
-    (amplitude, force, force_slope): &(&ColumnAmplitude, Complex64, Complex64),
-) -> (Uncertain, f64) {
-    let value = amplitude.value / (2.0 * force);
-    // dr/dp of the force; the pole moves by j with omega and by -1 with the decay.
-    let by_force = -value * force_slope / force;
-    let residue = Uncertain {
-        value,
-        variance: amplitude.std.powi(2) / (4.0 * force.norm_sqr()),
-        slopes: [
-            amplitude.by_omega / (2.0 * force) + Complex64::i() * by_force,
-            amplitude.by_decay / (2.0 * force) - by_force,
-        ],
-    };
-    (residue, force.norm_sqr())
-}
-
-/// A = 2 j omega_d r/p^k with k time derivatives; its real part counts, the rest shows in the phase.
+/// Modal constant A = 2 j omega_d r/p^k with k time derivatives, from the residues of the taps.
+///
+/// Its value is the real part; the imaginary part shows in the phase deviation.
 fn constant(
     mode: &ModeFit,
     sensor: usize,
     kind: ResponseForm,
-    residues: &[(Uncertain, f64)],
+    mut taps: Vec<TapEstimate>,
 ) -> Option<ModalConstant> {
     let derivatives = match kind {
         ResponseForm::Receptance => 0,
@@ -144,60 +147,43 @@ fn constant(
     let order = f64::from(derivatives);
     // d factor/factor with omega: 1/omega_d - k j/p; with the decay: k/p.
     let relative = [1.0 / pole.im - order * Complex64::i() / pole, order / pole];
-    let constants: Vec<(Uncertain, f64)> = residues
-        .iter()
-        .map(|(residue, weight)| {
-            let value = residue.value * factor;
-            let slope = |i: usize| residue.slopes[i] * factor + value * relative[i];
-            let scaled = Uncertain {
-                value,
-                variance: residue.variance * factor.norm_sqr(),
-                slopes: [slope(0), slope(1)],
-            };
-            (scaled, *weight)
-        })
-        .collect();
-    let mean = weighted(&constants)?;
-    let slopes = Vector2::new(mean.slopes[0].re, mean.slopes[1].re);
-    let covariance = nalgebra::Matrix2::from(mode.pole_covariance);
-    let from_noise = mean.variance + slopes.dot(&(covariance * slopes));
-    let variance = from_noise.max(scatter(&constants, mean.value.re).unwrap_or(0.0));
-    let phase = (mean.value.im / mean.value.re).atan().to_degrees();
-    (mean.value.is_finite() && variance.is_finite()).then_some(ModalConstant {
+    for tap in &mut taps {
+        tap.value *= factor;
+        tap.variance *= factor.norm_sqr();
+        for (slope, relative) in tap.slopes.iter_mut().zip(relative) {
+            *slope = *slope * factor + tap.value * relative;
+        }
+    }
+    let total: f64 = taps.iter().map(|tap| tap.weight).sum();
+    if total.is_nan() || total <= 0.0 {
+        return None;
+    }
+    let (mut mean, mut variance, mut slopes) = (Complex64::ZERO, 0.0, Vector2::zeros());
+    for tap in &taps {
+        let share = tap.weight / total;
+        mean += tap.value * share;
+        variance += tap.variance * share * share;
+        slopes += Vector2::new(tap.slopes[0].re * share, tap.slopes[1].re * share);
+    }
+    let from_noise = variance + slopes.dot(&(Matrix2::from(mode.pole_covariance) * slopes));
+    let variance = from_noise.max(scatter(&taps, total, mean.re).unwrap_or(0.0));
+    (mean.is_finite() && variance.is_finite()).then_some(ModalConstant {
         sensor,
-        value: mean.value.re,
+        value: mean.re,
         std: variance.sqrt(),
-        phase_deviation: phase,
-        taps: constants.len(),
+        phase_deviation: (mean.im / mean.re).atan().to_degrees(),
+        taps: taps.len(),
     })
 }
 
-fn weighted(values: &[(Uncertain, f64)]) -> Option<Uncertain> {
-    let total: f64 = values.iter().map(|(_, weight)| weight).sum();
-    let start = Uncertain {
-        value: Complex64::ZERO,
-        variance: 0.0,
-        slopes: [Complex64::ZERO; 2],
-    };
-    let mean = values.iter().fold(start, |mean, (one, weight)| {
-        let share = weight / total;
-        Uncertain {
-            value: mean.value + one.value * share,
-            variance: mean.variance + one.variance * share * share,
-            slopes: [0, 1].map(|i| mean.slopes[i] + one.slopes[i] * share),
-        }
-    });
-    (total > 0.0).then_some(mean)
-}
-
-/// Variance of the weighted mean from the scatter of the taps, sum w_i^2 (x_i - mean)^2/(1 - sum w_i^2)
-/// with weights that add up to one.
-fn scatter(values: &[(Uncertain, f64)], mean: f64) -> Option<f64> {
-    let total: f64 = values.iter().map(|(_, weight)| weight).sum();
-    let squares: f64 = values.iter().map(|(_, w)| (w / total).powi(2)).sum();
-    let sum: f64 = values
+/// Variance of the weighted mean from the scatter of the taps; `None` for a single tap.
+///
+/// It is sum w_i^2 (x_i - mean)^2/(1 - sum w_i^2) with weights that add up to one.
+fn scatter(taps: &[TapEstimate], total: f64, mean: f64) -> Option<f64> {
+    let squares: f64 = taps.iter().map(|tap| (tap.weight / total).powi(2)).sum();
+    let sum: f64 = taps
         .iter()
-        .map(|(one, w)| (w / total * (one.value.re - mean)).powi(2))
+        .map(|tap| (tap.weight / total * (tap.value.re - mean)).powi(2))
         .sum();
-    (values.len() > 1).then(|| sum / (1.0 - squares))
+    (taps.len() > 1).then(|| sum / (1.0 - squares))
 }

@@ -26,13 +26,13 @@ const CORRELATED: f64 = 3.0;
 /// Steps of the fit of one tap; it starts from the joint poles.
 const TAP_STEPS: usize = 6;
 
-/// What a standard deviation rests on.
+/// Origin of a standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum UncertaintySource {
     /// The noise that the fit leaves on the lines.
     Residual,
-    /// The scatter of the taps, which is more than that noise explains.
+    /// The scatter of the taps, where it exceeds that noise.
     #[serde(rename = "taps")]
     TapScatter,
 }
@@ -40,20 +40,19 @@ pub enum UncertaintySource {
 /// A value with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedValue {
-    /// The value (Hz, or a ratio).
+    /// Value (Hz, or a ratio).
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation.
     pub std: f64,
     /// Lower end of the 95 % interval.
     pub low: f64,
     /// Upper end of the 95 % interval.
     pub high: f64,
-    /// What the standard deviation rests on.
+    /// Origin of the standard deviation.
     pub source: UncertaintySource,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of the standard deviation.
     pub freedom: f64,
-    /// Probability that noise alone makes the taps scatter as much as they do; `None` with fewer
-    /// than two taps that could be fitted alone.
+    /// Probability that noise alone scatters the taps as much; `None` with fewer than two fitted taps.
     pub scatter_probability: Option<f64>,
 }
 
@@ -65,12 +64,12 @@ pub struct TapFit {
     pub tap: usize,
     /// Natural frequency (Hz).
     pub frequency: f64,
-    /// Its standard deviation from the noise (Hz).
+    /// Standard deviation of the frequency from the noise (Hz).
     pub frequency_std: f64,
     /// Damping ratio.
     #[serde(rename = "damping")]
     pub damping_ratio: f64,
-    /// Its standard deviation from the noise.
+    /// Standard deviation of the damping ratio from the noise.
     pub damping_std: f64,
 }
 
@@ -118,33 +117,40 @@ fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
 
 /// Chi-squared of values with their standard deviations about their weighted mean.
 pub fn scatter_about_mean(taps: &[(f64, f64)]) -> f64 {
-    let weight = |std: f64| 1.0 / (std * std);
-    let total: f64 = taps.iter().map(|tap| weight(tap.1)).sum();
-    let mean = taps.iter().map(|tap| weight(tap.1) * tap.0).sum::<f64>() / total;
-    taps.iter()
-        .map(|tap| weight(tap.1) * (tap.0 - mean).powi(2))
-        .sum()
+    let (_, _, scatter) = weighted_moments(taps, 0.0);
+    scatter
 }
 
-/// Mean of values that scatter between taps by tau beside their own std_i, and its standard deviation.
+/// Mean of values that scatter between taps beside their own standard deviations, and its standard deviation.
 ///
-/// Weights v_i = 1/(std_i^2 + tau^2), tau^2 after DerSimonian & Laird 1986; standard deviation
-/// sqrt(sum v_i (x_i - mean)^2/((n - 1) sum v_i)), which goes with Student's t of n - 1 (Hartung & Knapp
-/// 2001).
+/// The weights are v_i = 1/(std_i^2 + tau^2) with the variance tau^2 between taps after DerSimonian & Laird
+/// 1986. The standard deviation sqrt(sum v_i (x_i - mean)^2/((n - 1) sum v_i)) goes with Student's t of
+/// n - 1 (Hartung & Knapp 2001).
 pub fn weighted_mean(taps: &[(f64, f64)]) -> (f64, f64) {
-    let sum = |of: &dyn Fn(&(f64, f64)) -> f64| taps.iter().map(of).sum::<f64>();
     let degrees = taps.len() as f64 - 1.0;
-    let weight = |std: f64| 1.0 / (std * std);
-    let total = sum(&|tap| weight(tap.1));
-    let mean = sum(&|tap| weight(tap.1) * tap.0) / total;
-    let scatter = sum(&|tap| weight(tap.1) * (tap.0 - mean).powi(2));
-    let squares = sum(&|tap| weight(tap.1).powi(2));
+    let (total, _, scatter) = weighted_moments(taps, 0.0);
+    let squares: f64 = taps
+        .iter()
+        .map(|(_, std)| (1.0 / (std * std)).powi(2))
+        .sum();
     let between = ((scatter - degrees) / (total - squares / total)).max(0.0);
-    let share = |std: f64| 1.0 / (std * std + between);
-    let total = sum(&|tap| share(tap.1));
-    let mean = sum(&|tap| share(tap.1) * tap.0) / total;
-    let scatter = sum(&|tap| share(tap.1) * (tap.0 - mean).powi(2));
+    let (total, mean, scatter) = weighted_moments(taps, between);
     (mean, (scatter / (degrees * total)).sqrt())
+}
+
+/// Sum of the weights 1/(std^2 + `between`), weighted mean, and weighted sum of squares about it.
+fn weighted_moments(taps: &[(f64, f64)], between: f64) -> (f64, f64, f64) {
+    let weights: Vec<f64> = taps
+        .iter()
+        .map(|(_, std)| 1.0 / (std * std + between))
+        .collect();
+    let pairs = || weights.iter().zip(taps);
+    let total: f64 = weights.iter().sum();
+    let mean = pairs().map(|(weight, tap)| weight * tap.0).sum::<f64>() / total;
+    let scatter = pairs()
+        .map(|(weight, tap)| weight * (tap.0 - mean).powi(2))
+        .sum();
+    (total, mean, scatter)
 }
 
 /// Complex amplitude of a mode in one column.
@@ -157,7 +163,7 @@ pub struct ColumnAmplitude {
     /// Free decay: a in x(t) = Re(a e^{p t}), t from the decay's first sample (unit of the samples).
     /// Frequency response function: its residue R (unit of the function times rad/s).
     pub value: Complex64,
-    /// Standard deviation of its real and of its imaginary part from noise, the pole held fixed.
+    /// Standard deviation of real and imaginary part from noise, at a fixed pole.
     pub std: f64,
     /// Change with the pole's angular frequency (unit of the amplitude times s).
     pub by_omega: Complex64,
@@ -172,30 +178,29 @@ pub struct ModeFit {
     pub frequency: FittedValue,
     /// Damping ratio, a window's decay taken out.
     pub damping_ratio: FittedValue,
-    /// Pole (rad/s), negative decay + j angular frequency, a window's decay still in it.
+    /// Pole (rad/s), negative decay + j angular frequency; a window's decay is included.
     pub pole: Complex64,
     /// Covariance of the pole's angular frequency and decay from the residual ((rad/s)^2).
     pub pole_covariance: [[f64; 2]; 2],
     /// Correlation of the errors of frequency and damping ratio.
     pub correlation: f64,
-    /// Each tap alone; taps that could not be fitted are missing.
+    /// Fits of single taps; taps that could not be fitted are missing.
     pub taps: Vec<TapFit>,
-    /// Correlation of the residual between neighbouring lines: near 0 for a good fit, near 1 where the
-    /// model misses something.
+    /// Correlation of the residual between neighbouring lines: near 0 for a good fit, near 1 for a misfit.
     pub residual_correlation: f64,
-    /// Factor that correlation puts on the standard deviations (1: it may be chance).
+    /// Factor of the residual correlation on the standard deviations; 1 where it may be chance.
     pub inflation: f64,
     /// Band of the fit (Hz).
     pub band: (f64, f64),
-    /// Lines in it.
+    /// Number of lines in the band.
     pub lines: usize,
-    /// Complex terms of the background polynomial that the data asked for.
+    /// Complex terms of the background polynomial.
     pub background_terms: usize,
-    /// Indices of the starts that were fitted jointly, this one among them.
+    /// Indices of the starts that were fitted jointly, including this one.
     pub joint_with: Vec<usize>,
-    /// Why the search ended.
+    /// Reason why the search ended.
     pub stop: StopReason,
-    /// Amplitude in every column of the data that holds anything.
+    /// Amplitude in every column of the data that is not zero.
     pub amplitudes: Vec<ColumnAmplitude>,
 }
 

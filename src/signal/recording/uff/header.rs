@@ -1,8 +1,9 @@
-//! What the header of a dataset 58 or 58b says.
+//! Header of a dataset 58 or 58b: eleven records of fields in fixed columns.
 
 use std::fmt;
 
-use super::axis::{Axis, TIME};
+use super::numbers::parse_number;
+use crate::recording::text::{decode_text, shown};
 
 /// What a function is (record 6, field 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,10 +121,9 @@ pub struct Point {
 impl Point {
     /// Node and direction such as "12:+Z"; `None` without a node.
     pub fn degree_of_freedom(&self) -> Option<String> {
-        (self.node != 0).then(|| format!("{}{}", self.node, self.direction_words()))
-    }
-
-    fn direction_words(&self) -> String {
+        if self.node == 0 {
+            return None;
+        }
         let axis = match self.direction.unsigned_abs() {
             1 => "X",
             2 => "Y",
@@ -131,13 +131,13 @@ impl Point {
             4 => "RX",
             5 => "RY",
             6 => "RZ",
-            _ => return String::new(),
+            _ => return Some(self.node.to_string()),
         };
         let sign = if self.direction < 0 { '-' } else { '+' };
-        format!(":{sign}{axis}")
+        Some(format!("{}:{sign}{axis}", self.node))
     }
 
-    /// Whether the direction is one of rotation.
+    /// Returns `true` for a direction of rotation.
     pub fn is_rotational(&self) -> bool {
         (4..=6).contains(&self.direction.unsigned_abs())
     }
@@ -151,6 +151,97 @@ impl fmt::Display for Point {
             (None, Some(place)) => write!(f, "{place}"),
             (None, None) => write!(f, "-"),
         }
+    }
+}
+
+/// One axis of a function (records 8 to 11).
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Axis {
+    /// Specific data type: 8 displacement, 11 velocity, 12 acceleration, 13 excitation force, 15
+    /// pressure, 17 time, 18 frequency, 0 unknown.
+    pub quantity: u32,
+    /// Exponents of length, force and temperature in the unit; meant for quantity 1 (general) only.
+    pub exponents: [i32; 3],
+    /// Label, where there is one.
+    pub label: Option<String>,
+    /// Unit as written, where there is one.
+    pub unit: Option<String>,
+}
+
+/// Specific data types, in words.
+const QUANTITIES: [(u32, &str); 16] = [
+    (1, "general"),
+    (2, "stress"),
+    (3, "strain"),
+    (5, "temperature"),
+    (6, "heat flux"),
+    (8, "displacement"),
+    (9, "reaction force"),
+    (11, "velocity"),
+    (12, "acceleration"),
+    (13, "excitation force"),
+    (15, "pressure"),
+    (16, "mass"),
+    (17, "time"),
+    (18, "frequency"),
+    (19, "rpm"),
+    (20, "order"),
+];
+
+/// Type numbers of quantities that are used here.
+pub(in crate::recording) const DISPLACEMENT: u32 = 8;
+
+pub(in crate::recording) const REACTION_FORCE: u32 = 9;
+
+pub(in crate::recording) const VELOCITY: u32 = 11;
+
+pub(in crate::recording) const ACCELERATION: u32 = 12;
+
+pub(in crate::recording) const EXCITATION_FORCE: u32 = 13;
+
+pub(in crate::recording) const PRESSURE: u32 = 15;
+
+pub(in crate::recording) const TIME: u32 = 17;
+
+impl Axis {
+    /// What the axis measures, in words; `None` where the file does not say.
+    pub fn quantity_name(&self) -> Option<&'static str> {
+        let known = QUANTITIES
+            .iter()
+            .find(|(number, _)| *number == self.quantity);
+        known.map(|(_, name)| *name)
+    }
+}
+
+/// The unit system of a file (dataset 164): file units divided by these are SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::recording) struct UnitSystem {
+    pub length: f64,
+    pub force: f64,
+}
+
+impl UnitSystem {
+    /// From the second record's numbers; `None` where they cannot be factors.
+    pub(in crate::recording) fn new(length: f64, force: f64) -> Option<Self> {
+        let usable = |factor: f64| factor.is_finite() && (1e-12..1e12).contains(&factor);
+        (usable(length) && usable(force)).then_some(Self { length, force })
+    }
+
+    /// Factor to SI and the SI unit of a quantity along a direction of translation; `None` for
+    /// quantities that no sensor here measures.
+    pub(in crate::recording) fn si(&self, quantity: u32) -> Option<(f64, &'static str)> {
+        // Addendum A of dataset 58: the exponents of length and force of each quantity.
+        let (length, force, unit) = match quantity {
+            DISPLACEMENT => (1, 0, "m"),
+            VELOCITY => (1, 0, "m/s"),
+            ACCELERATION => (1, 0, "m/s2"),
+            EXCITATION_FORCE | REACTION_FORCE => (0, 1, "N"),
+            PRESSURE => (-2, 1, "Pa"),
+            _ => return None,
+        };
+        // SI = value / (length^l force^f), since file units are SI units times the factor.
+        let factor = self.length.powi(-length) * self.force.powi(-force);
+        Some((factor, unit))
     }
 }
 
@@ -184,7 +275,7 @@ pub struct Function {
 }
 
 impl Function {
-    /// Whether it is a signal over time: a time response, or a general function over time.
+    /// Returns `true` for a signal over time: a time response, or a general function over time.
     pub fn is_time_series(&self) -> bool {
         let general = self.function_type == FunctionType(0);
         self.function_type == FunctionType::TIME_RESPONSE
@@ -205,6 +296,249 @@ impl Function {
         match self.abscissa {
             Abscissa::Even { .. } => 0,
             Abscissa::Uneven => 1,
+        }
+    }
+
+    /// Bytes of one number of the ordinate in binary data.
+    pub(super) fn ordinate_bytes(&self) -> usize {
+        match self.precision {
+            Precision::Single => 4,
+            Precision::Double => 8,
+        }
+    }
+
+    /// Bytes of one point of binary data.
+    pub(super) fn point_bytes(&self, abscissa_bytes: u64) -> u64 {
+        let ordinates = (self.numbers() - self.abscissa_numbers()) as u64;
+        ordinates * self.ordinate_bytes() as u64 + self.abscissa_numbers() as u64 * abscissa_bytes
+    }
+}
+
+/// Header records of a dataset 58.
+pub(super) const HEADER_LINES: usize = 11;
+
+/// A field of a record that makes no sense.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct BadField {
+    /// 1-based; 0 for the line with the dataset's type.
+    pub record: usize,
+    pub field: &'static str,
+    pub value: String,
+    pub allowed: &'static str,
+}
+
+/// The line with a dataset's type, such as "    58" or "    58b     1     2          11        6408".
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct TypeLine {
+    pub number: u32,
+    pub coding: UffCoding,
+    /// Bytes of binary data by the header.
+    pub bytes: Option<u64>,
+}
+
+/// Reads the line that follows the opening -1.
+pub(super) fn parse_type_line(line: &[u8]) -> Option<TypeLine> {
+    let text = decode_text(line.get(..line.len().min(200)).unwrap_or_default());
+    let mut words = text.split_ascii_whitespace();
+    let first = words.next()?;
+    let digits = first.trim_end_matches(['b', 'B']);
+    let number = digits.parse().ok()?;
+    if digits.len() == first.len() {
+        return Some(TypeLine {
+            number,
+            coding: UffCoding::Ascii,
+            bytes: None,
+        });
+    }
+    // Format(I6,1A1,I6,I6,I12,I12,..): byte order, floating-point format, header lines, bytes.
+    let mut fields = words.map(|word| word.parse::<u64>().ok());
+    let mut small = || fields.next().flatten().and_then(|n| u32::try_from(n).ok());
+    let (order, format) = (small().unwrap_or(0), small().unwrap_or(0));
+    let _header_lines = small();
+    Some(TypeLine {
+        number,
+        coding: UffCoding::Binary { order, format },
+        bytes: fields.next().flatten(),
+    })
+}
+
+/// Reads the eleven records behind the type line.
+pub(super) fn parse_header(
+    lines: &[Vec<u8>; HEADER_LINES],
+    coding: UffCoding,
+) -> Result<Function, BadField> {
+    let records = lines.each_ref().map(|line| Record::new(line));
+    let [
+        id @ ..,
+        degrees,
+        form,
+        abscissa_axis,
+        numerator,
+        denominator,
+        _,
+    ] = &records;
+    // Record 6: Format(2(I5,I10),2(1X,10A1,I10,I4)).
+    let function_type = degrees
+        .integer(0, 5)
+        .or_else(|| degrees.word(0)?.parse().ok())
+        .and_then(|number| u32::try_from(number).ok())
+        .ok_or_else(|| degrees.bad(6, 0, 5, "the function type", "a number such as 1 or 4"))?;
+    let (ordinate, precision) = form.data_type()?;
+    Ok(Function {
+        function_type: FunctionType(function_type),
+        id_lines: id.each_ref().map(|line| line.text(0, 80)),
+        response: degrees.point(31),
+        reference: degrees.point(56),
+        coding,
+        ordinate,
+        precision,
+        points: form.points()?,
+        abscissa: form.abscissa()?,
+        abscissa_axis: abscissa_axis.axis(),
+        numerator: numerator.axis(),
+        denominator: denominator.axis(),
+    })
+}
+
+/// One unit of the last digit of a printed number.
+fn last_digit(text: &str) -> f64 {
+    let (mantissa, exponent) = match text.trim().split_once(['e', 'E', 'd', 'D']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse().unwrap_or(0)),
+        None => (text.trim(), 0_i32),
+    };
+    let decimals = mantissa
+        .split_once('.')
+        .map_or(0, |(_, digits)| digits.len());
+    let decimals = i32::try_from(decimals).unwrap_or(0);
+    10_f64.powi(exponent.saturating_sub(decimals))
+}
+
+/// A header line as characters: columns count characters, whatever bytes they take.
+#[derive(Debug, Clone, Default)]
+struct Record {
+    characters: Vec<char>,
+}
+
+impl Record {
+    fn new(line: &[u8]) -> Self {
+        Self {
+            characters: decode_text(line).trim_end().chars().collect(),
+        }
+    }
+
+    fn slice(&self, at: usize, width: usize) -> String {
+        self.characters.iter().skip(at).take(width).collect()
+    }
+
+    /// Text of a field; `None` where it is blank or "NONE".
+    fn text(&self, at: usize, width: usize) -> Option<String> {
+        let text = self.slice(at, width).replace(char::is_control, " ");
+        let text = text.trim();
+        (!text.is_empty() && text != "NONE").then(|| text.to_owned())
+    }
+
+    /// The field as an integer; a blank field is none.
+    fn integer(&self, at: usize, width: usize) -> Option<i64> {
+        self.text(at, width)?.parse().ok()
+    }
+
+    /// The word of a number, 0-based.
+    fn word(&self, number: usize) -> Option<String> {
+        let text: String = self.characters.iter().collect();
+        text.split_ascii_whitespace().nth(number).map(str::to_owned)
+    }
+
+    /// Name, node and direction from a column on.
+    fn point(&self, at: usize) -> Point {
+        let direction = self.integer(at + 20, 4).unwrap_or(0);
+        Point {
+            name: self.text(at, 10),
+            node: self.integer(at + 10, 10).unwrap_or(0),
+            direction: i32::try_from(direction).unwrap_or(0),
+        }
+    }
+
+    /// Records 8 to 11: Format(I10,3I5,2(1X,20A1)).
+    fn axis(&self) -> Axis {
+        let numbers = [(0, 10), (10, 5), (15, 5), (20, 5)]
+            .map(|(at, width)| i32::try_from(self.integer(at, width).unwrap_or(0)).unwrap_or(0));
+        let [quantity, exponents @ ..] = numbers;
+        Axis {
+            quantity: u32::try_from(quantity).unwrap_or(0),
+            exponents,
+            label: self.text(26, 20),
+            unit: self.text(47, 20),
+        }
+    }
+
+    /// A field of record 7, Format(3I10,3E13.5): the number of the field, its first column, its width.
+    fn form_field(&self, number: usize, at: usize, width: usize) -> Option<String> {
+        // Writers that do not keep the columns at least separate the numbers.
+        let in_columns = (0..3).all(|field| self.integer(10 * field, 10).is_some());
+        match in_columns {
+            true => self.text(at, width),
+            false => self.word(number),
+        }
+    }
+
+    fn form_integer(&self, number: usize) -> Option<i64> {
+        self.form_field(number, 10 * number, 10)?.parse().ok()
+    }
+
+    /// Ordinate and precision by record 7.
+    fn data_type(&self) -> Result<(Ordinate, Precision), BadField> {
+        match self.form_integer(0) {
+            Some(2) => Ok((Ordinate::Real, Precision::Single)),
+            Some(4) => Ok((Ordinate::Real, Precision::Double)),
+            Some(5) => Ok((Ordinate::Complex, Precision::Single)),
+            Some(6) => Ok((Ordinate::Complex, Precision::Double)),
+            _ => Err(self.bad(7, 0, 10, "the ordinate data type", "2, 4, 5 or 6")),
+        }
+    }
+
+    /// Number of points by record 7.
+    fn points(&self) -> Result<u64, BadField> {
+        self.form_integer(1)
+            .and_then(|points| u64::try_from(points).ok())
+            .ok_or_else(|| self.bad(7, 10, 10, "the number of points", "a whole number from 0"))
+    }
+
+    /// Abscissa by record 7.
+    fn abscissa(&self) -> Result<Abscissa, BadField> {
+        match self.form_integer(2) {
+            Some(0) => Ok(Abscissa::Uneven),
+            Some(1) => {
+                let step = self.form_field(4, 43, 13).unwrap_or_default();
+                let start = self.form_field(3, 30, 13).unwrap_or_default();
+                Ok(Abscissa::Even {
+                    start: self.finite(&start, 30, "the first abscissa")?,
+                    step: self.finite(&step, 43, "the abscissa step")?,
+                    step_digit: last_digit(&step),
+                })
+            }
+            _ => Err(self.bad(7, 20, 10, "the abscissa spacing", "0 (uneven) or 1 (even)")),
+        }
+    }
+
+    fn finite(&self, text: &str, at: usize, field: &'static str) -> Result<f64, BadField> {
+        parse_number(text.as_bytes())
+            .filter(|number| number.is_finite())
+            .ok_or_else(|| self.bad(7, at, 13, field, "a finite number"))
+    }
+
+    fn bad(
+        &self,
+        record: usize,
+        at: usize,
+        width: usize,
+        field: &'static str,
+        allowed: &'static str,
+    ) -> BadField {
+        BadField {
+            record,
+            field,
+            value: shown(self.slice(at, width).trim().as_bytes()),
+            allowed,
         }
     }
 }

@@ -1,19 +1,33 @@
-//! The datasets of a universal file, found without reading their values.
+//! Datasets of a universal file, found without reading their values.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::error::UffError;
-use super::header::{Abscissa, Function, Precision, UffCoding};
-use super::records::{BadField, HEADER_LINES, TypeLine, parse_header, parse_type_line};
-use super::scan::{MARK, Scanner};
-use super::{UnitSystem, ascii};
-use crate::recording::RecordingError;
-use crate::recording::riff::unreadable;
+use memchr::memchr;
+use memchr::memmem::Finder;
+
+use super::header::{
+    Abscissa, BadField, Function, HEADER_LINES, Precision, TypeLine, UffCoding, UnitSystem,
+    parse_header, parse_type_line,
+};
+use super::numbers;
+use crate::recording::error::{RecordingError, UffError};
+use crate::recording::file_type::{read_fully, unreadable};
 
 /// More datasets than any file has; the limit keeps a file of nothing but marks out of memory.
 const MAX_DATASETS: usize = 1_000_000;
+/// What stands in columns 1 to 6 of the line that opens and the line that closes a dataset.
+pub(super) const MARK: &[u8] = b"    -1";
+
+/// A longer line is none; the limit keeps a file without line ends out of memory.
+pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
+
+/// Bytes read at a time when values are jumped over: large, since nothing else is done.
+const SCAN_BYTES: usize = 1 << 20;
+
+/// Bytes behind a mark that tell whether its line is blank otherwise: to column 80 and the line's end.
+const TAIL_BYTES: usize = 76;
 
 /// One dataset of a universal file.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +69,9 @@ pub struct UniversalFile {
     pub(super) path: PathBuf,
     pub(in crate::recording) units: Option<UnitSystem>,
 }
+
+/// A function and the dataset that holds it.
+pub(in crate::recording) type Entry<'a> = (&'a Dataset, &'a Function);
 
 impl UniversalFile {
     /// The functions with their datasets.
@@ -143,25 +160,25 @@ struct Listing {
     found: UniversalFile,
 }
 
-/// What follows an opening mark.
-enum Next {
-    Dataset(TypeLine, u64),
-    /// The mark closed a dataset, or the line is no dataset's type.
-    Nothing,
-    End,
-}
-
 impl Listing {
     fn run(&mut self) -> Result<(), RecordingError> {
-        while self.found.datasets.len() < MAX_DATASETS && self.pass_mark()? {
-            match self.type_line()? {
-                Next::End => return Ok(()),
-                Next::Nothing => {}
-                Next::Dataset(kind, line_start) => {
-                    if !self.dataset(kind, line_start)? {
-                        return Ok(());
-                    }
+        while self.found.datasets.len() < MAX_DATASETS {
+            // Up to the next mark, and past marks that follow it directly.
+            let mut behind_mark = false;
+            let (line_start, line) = loop {
+                let start = self.scanner.position();
+                match self.line()? {
+                    None => return Ok(()),
+                    Some(line) if is_mark(&line) => behind_mark = true,
+                    Some(line) if behind_mark => break (start, line),
+                    Some(_) => {}
                 }
+            };
+            // A mark that closed a dataset has no type behind it.
+            if let Some(kind) = parse_type_line(&line)
+                && !self.dataset(kind, line_start)?
+            {
+                return Ok(());
             }
         }
         Ok(())
@@ -176,77 +193,45 @@ impl Listing {
         self.io(line)
     }
 
-    /// Reads lines up to and with the next one that is a mark.
-    fn pass_mark(&mut self) -> Result<bool, RecordingError> {
-        while let Some(line) = self.line()? {
-            if is_mark(&line) {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
-    /// Reads the line behind a mark; another mark there opens a dataset in its place.
-    fn type_line(&mut self) -> Result<Next, RecordingError> {
-        loop {
-            let start = self.scanner.position();
-            match self.line()? {
-                None => return Ok(Next::End),
-                Some(line) if is_mark(&line) => {}
-                Some(line) => {
-                    let kind = parse_type_line(&line);
-                    return Ok(kind.map_or(Next::Nothing, |kind| Next::Dataset(kind, start)));
-                }
-            }
-        }
-    }
-
     /// Reads one dataset up to and with its closing mark; false at the end of the file.
     fn dataset(&mut self, kind: TypeLine, line_start: u64) -> Result<bool, RecordingError> {
         let number = self.found.datasets.len() + 1;
-        let mut dataset = Dataset {
-            number,
-            kind: kind.number,
-            function: None,
-            bytes: 0,
-            place: DataPlace::default(),
-        };
+        let mut function = None;
         if kind.number == 58 {
-            match self.header(kind, number, line_start)? {
-                Some(function) => dataset.function = Some(function),
-                None => {
-                    self.found.cut_header = Some(number);
-                    return Ok(false);
-                }
+            function = self.header(kind, number, line_start)?;
+            if function.is_none() {
+                self.found.cut_header = Some(number);
+                return Ok(false);
             }
         }
         let start = self.scanner.position();
         if kind.number == 164 {
             self.units()?;
         }
-        dataset.place = match (&dataset.function, kind.coding) {
+        let place = match (&function, kind.coding) {
             (Some(function), UffCoding::Binary { .. }) => {
-                let place = binary_place(&mut self.scanner, function, start, kind.bytes);
-                self.io(place)?
+                binary_place(&mut self.scanner, function, start, kind.bytes)
             }
-            _ => {
-                let mark = self.scanner.find_mark();
-                let mark = self.io(mark)?;
-                DataPlace {
-                    start,
-                    end: mark.unwrap_or(self.scanner.length),
-                    abscissa_bytes: 0,
-                    cut: mark.is_none(),
-                }
-            }
+            _ => self.scanner.find_mark().map(|mark| DataPlace {
+                start,
+                end: mark.unwrap_or(self.scanner.length),
+                abscissa_bytes: 0,
+                cut: mark.is_none(),
+            }),
         };
-        dataset.bytes = dataset.place.end.saturating_sub(dataset.place.start);
-        self.found.datasets.push(dataset);
+        let place = self.io(place)?;
+        self.found.datasets.push(Dataset {
+            number,
+            kind: kind.number,
+            function,
+            bytes: place.end.saturating_sub(place.start),
+            place,
+        });
         // The closing mark.
         self.line().map(|line| line.is_some())
     }
 
-    /// The header of a function; `None` where the file ends within it.
+    /// Reads the header of a function; `None` where the file ends within it.
     fn header(
         &mut self,
         kind: TypeLine,
@@ -262,32 +247,31 @@ impl Listing {
         }
         match parse_header(&lines, kind.coding) {
             Ok(function) => Ok(Some(function)),
-            Err(bad) => Err(self.bad_record(bad, number, line_start)),
+            Err(bad) => Err(self.bad_record(bad, number, line_start).into()),
         }
     }
 
-    fn bad_record(&self, bad: BadField, dataset: usize, line_start: u64) -> RecordingError {
-        let counted = File::open(&self.found.path);
-        let counted = counted.and_then(|mut file| super::scan::lines_before(&mut file, line_start));
+    fn bad_record(&self, bad: BadField, dataset: usize, line_start: u64) -> UffError {
         UffError::BadRecord {
             file: self.found.name.clone(),
-            line: counted.unwrap_or(0) + 1 + bad.record as u64,
+            line: line_number(&self.found.path, line_start) + bad.record as u64,
             dataset,
             record: bad.record,
             field: bad.field,
             value: bad.value,
             allowed: bad.allowed,
         }
-        .into()
     }
 
     /// Reads dataset 164: a line of words, then factors of length and force in columns of 25.
     fn units(&mut self) -> Result<(), RecordingError> {
         let place = self.scanner.position();
         let (words, factors) = (self.line()?, self.line()?);
-        if let Some(factors) = factors.filter(|_| words.is_some_and(|line| !is_mark(&line))) {
+        if let (Some(words), Some(factors)) = (words, factors)
+            && !is_mark(&words)
+        {
             let mut numbers = Vec::new();
-            let read = ascii::parse_line(&factors, &[25; 3], 3, &mut numbers);
+            let read = numbers::parse_line(&factors, &[25; 3], 3, &mut numbers);
             if let (Ok(()), [length, force, ..]) = (read, numbers.as_slice()) {
                 self.found.units = UnitSystem::new(*length, *force);
             }
@@ -303,7 +287,7 @@ fn is_mark(line: &[u8]) -> bool {
     line.trim_ascii_end() == MARK
 }
 
-/// Where binary values are. The promised number of points decides where it fits; else the promised
+/// Finds binary values. The promised number of points decides where it fits; else the promised
 /// number of bytes; else the place of the next mark. Writers have got each of the first two wrong,
 /// and some store the uneven abscissa of double precision values in double precision.
 fn binary_place(
@@ -312,49 +296,199 @@ fn binary_place(
     start: u64,
     bytes: Option<u64>,
 ) -> io::Result<DataPlace> {
-    let place = |end, abscissa_bytes| DataPlace {
-        start,
-        end,
-        abscissa_bytes,
-        cut: false,
-    };
-    let end_of = |abscissa| {
-        let bytes = function
-            .points
-            .checked_mul(point_bytes(function, abscissa))?;
-        start.checked_add(bytes)
-    };
-    for abscissa_bytes in abscissa_widths(function) {
-        if let Some(end) = end_of(*abscissa_bytes)
-            && scanner.ends_at(end)?
-        {
-            return Ok(place(end, *abscissa_bytes));
-        }
-    }
-    if let Some(end) = bytes.and_then(|bytes| start.checked_add(bytes))
-        && scanner.ends_at(end)?
-    {
-        return Ok(place(end, 4));
-    }
-    scanner.jump(start)?;
-    let end = scanner.find_mark_behind_data()?.unwrap_or(scanner.length);
-    Ok(place(end, 4))
-}
-
-/// Widths that a stored abscissa may have (bytes), the standard one first.
-fn abscissa_widths(function: &Function) -> &'static [u64] {
-    match (function.abscissa, function.precision) {
+    // The standard width of a stored abscissa (bytes) first.
+    let abscissa_widths: &[u64] = match (function.abscissa, function.precision) {
         (Abscissa::Uneven, Precision::Double) => &[4, 8],
         _ => &[4],
+    };
+    let mut proposals = Vec::new();
+    for width in abscissa_widths {
+        let bytes = function.points.checked_mul(function.point_bytes(*width));
+        proposals.push((bytes, *width));
+    }
+    proposals.push((bytes, 4));
+    let mut place = DataPlace {
+        start,
+        end: scanner.length,
+        abscissa_bytes: 4,
+        cut: false,
+    };
+    for (bytes, abscissa_bytes) in proposals {
+        if let Some(end) = bytes.and_then(|bytes| start.checked_add(bytes))
+            && scanner.ends_at(end)?
+        {
+            (place.end, place.abscissa_bytes) = (end, abscissa_bytes);
+            return Ok(place);
+        }
+    }
+    scanner.jump(start)?;
+    if let Some(end) = scanner.find_mark_behind_data()? {
+        place.end = end;
+    }
+    Ok(place)
+}
+
+/// A file with a place in it; lines are read through a buffer, which a jump throws away.
+#[derive(Debug)]
+pub(super) struct Scanner {
+    file: File,
+    pub length: u64,
+    buffer: Vec<u8>,
+    /// Where the buffer begins in the file.
+    base: u64,
+    /// Place in the buffer.
+    at: usize,
+}
+
+impl Scanner {
+    pub(super) fn new(file: File) -> io::Result<Self> {
+        Ok(Self {
+            length: file.metadata()?.len(),
+            file,
+            buffer: Vec::new(),
+            base: 0,
+            at: 0,
+        })
+    }
+
+    /// Where the next line begins (bytes).
+    pub(super) fn position(&self) -> u64 {
+        self.base + self.at as u64
+    }
+
+    /// Goes on at byte `place`.
+    pub(super) fn jump(&mut self, place: u64) -> io::Result<()> {
+        self.buffer.clear();
+        self.at = 0;
+        self.base = self.file.seek(SeekFrom::Start(place))?;
+        Ok(())
+    }
+
+    /// The next line without its end, or the first [`MAX_LINE_BYTES`] of it; `None` at the end of
+    /// the file.
+    pub(super) fn line(&mut self) -> io::Result<Option<Vec<u8>>> {
+        loop {
+            let rest = self.buffer.get(self.at..).unwrap_or_default();
+            let end = memchr(b'\n', rest);
+            if let Some(end) = end.or((rest.len() >= MAX_LINE_BYTES).then_some(rest.len())) {
+                let line = rest.get(..end).unwrap_or_default();
+                let line = line.strip_suffix(b"\r").unwrap_or(line).to_vec();
+                self.at = (self.at + end + 1).min(self.buffer.len());
+                return Ok(Some(line));
+            }
+            if self.fill(1 << 13)? == 0 {
+                let last = self.buffer.get(self.at..).unwrap_or_default().to_vec();
+                self.at = self.buffer.len();
+                return Ok((!last.is_empty()).then_some(last));
+            }
+        }
+    }
+
+    /// Goes to the line of the next mark that stands at the beginning of a line and returns the
+    /// mark's place; `None` at the end of the file.
+    pub(super) fn find_mark(&mut self) -> io::Result<Option<u64>> {
+        self.find(&Finder::new(b"\n    -1"), 1)
+    }
+
+    /// Like [`find_mark`](Self::find_mark) for a mark that binary data may precede directly.
+    pub(super) fn find_mark_behind_data(&mut self) -> io::Result<Option<u64>> {
+        self.find(&Finder::new(MARK), 0)
+    }
+
+    fn find(&mut self, finder: &Finder<'_>, skipped: usize) -> io::Result<Option<u64>> {
+        // The line end before a mark may be the byte just read; what was read before it can go.
+        let kept = self.at.saturating_sub(skipped);
+        self.buffer.drain(..kept);
+        self.base += kept as u64;
+        self.at -= kept;
+        let mut from = 0;
+        loop {
+            let rest = self.buffer.get(from..).unwrap_or_default();
+            match finder.find(rest) {
+                Some(found) => {
+                    let mark = from + found + skipped;
+                    let behind = mark + MARK.len();
+                    while self.buffer.len() < behind + TAIL_BYTES && self.fill(1 << 13)? > 0 {}
+                    if is_blank_to_line_end(self.buffer.get(behind..).unwrap_or_default()) {
+                        self.at = mark;
+                        return Ok(Some(self.position()));
+                    }
+                    from = behind;
+                }
+                None => {
+                    // What may be the beginning of a mark stays.
+                    from = from.max(self.buffer.len().saturating_sub(MARK.len()));
+                    self.buffer.drain(..from);
+                    self.base += from as u64;
+                    (from, self.at) = (0, 0);
+                    if self.fill(SCAN_BYTES)? == 0 {
+                        self.at = self.buffer.len();
+                        return Ok(None);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a dataset ends at `place`: at the end of the file, or at a mark with at most one line
+    /// end before it. The scanner then stands at the mark.
+    pub(super) fn ends_at(&mut self, place: u64) -> io::Result<bool> {
+        if place >= self.length {
+            self.jump(self.length)?;
+            return Ok(place == self.length);
+        }
+        self.jump(place)?;
+        while self.buffer.len() < MARK.len() + TAIL_BYTES + 2 && self.fill(1 << 13)? > 0 {}
+        let line_ends = self.buffer.iter().take(2);
+        let line_ends = line_ends
+            .take_while(|byte| matches!(byte, b'\r' | b'\n'))
+            .count();
+        let rest = self.buffer.get(line_ends..).unwrap_or_default();
+        let ended = match rest.strip_prefix(MARK) {
+            Some(behind) => is_blank_to_line_end(behind),
+            None => {
+                rest.trim_ascii().is_empty() && self.base + self.buffer.len() as u64 == self.length
+            }
+        };
+        self.at = line_ends;
+        Ok(ended)
+    }
+
+    /// Reads more into the buffer; how many bytes is the result.
+    fn fill(&mut self, bytes: usize) -> io::Result<usize> {
+        if self.at > SCAN_BYTES {
+            self.buffer.drain(..self.at);
+            self.base += self.at as u64;
+            self.at = 0;
+        }
+        let before = self.buffer.len();
+        self.buffer.resize(before + bytes, 0);
+        let got = read_fully(
+            &mut self.file,
+            self.buffer.get_mut(before..).unwrap_or_default(),
+        )?;
+        self.buffer.truncate(before + got);
+        Ok(got)
     }
 }
 
-/// Bytes of one point of binary data.
-pub(super) fn point_bytes(function: &Function, abscissa_bytes: u64) -> u64 {
-    let number = match function.precision {
-        Precision::Single => 4,
-        Precision::Double => 8,
+/// Whether only blanks stand before the end of the line or of the file.
+fn is_blank_to_line_end(behind: &[u8]) -> bool {
+    let first = behind.iter().find(|byte| **byte != b' ');
+    matches!(first, None | Some(b'\r' | b'\n'))
+}
+
+/// Number (1-based) of the line that holds byte `place` of a file, counted for a message; 1 where the file cannot be read.
+pub(super) fn line_number(path: &Path, place: u64) -> u64 {
+    let Ok(file) = File::open(path) else {
+        return 1;
     };
-    let ordinates = (function.numbers() - function.abscissa_numbers()) as u64;
-    ordinates * number + function.abscissa_numbers() as u64 * abscissa_bytes
+    let mut lines = 1;
+    let mut block = vec![0_u8; 1 << 16];
+    let mut before = file.take(place);
+    while let Ok(got @ 1..) = before.read(&mut block) {
+        let newlines = block.iter().take(got).filter(|byte| **byte == b'\n');
+        lines += newlines.count() as u64;
+    }
+    lines
 }

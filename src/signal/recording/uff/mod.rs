@@ -17,60 +17,19 @@
 //! the first 16 million samples are kept in memory; beyond, it is parsed again whenever it is asked
 //! for, from places remembered every 64 kB. No file has to fit into memory.
 
-use std::fs::File;
-use std::path::Path;
-
-use super::RecordingError;
-use super::riff::{read_fully, unreadable};
-
-mod ascii;
-mod axis;
-mod error;
+mod abscissa;
 mod header;
 mod list;
-mod read;
-mod records;
-mod scan;
-mod source;
-mod time;
-mod timing;
+mod numbers;
+mod time_series;
 mod values;
-mod write;
 
-pub use axis::Axis;
-pub use error::UffError;
-pub use header::{Abscissa, Function, FunctionType, Ordinate, Point, Precision, UffCoding};
+pub use header::{Abscissa, Axis, Function, FunctionType, Ordinate, Point, Precision, UffCoding};
 pub use list::{Dataset, UniversalFile, list_datasets};
-pub use read::{FunctionValues, read_function};
-pub use write::{UffFormat, encode_frequency_responses_uff};
+pub use values::{FunctionValues, read_function};
 
-pub(super) use axis::{
-    ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, UnitSystem, VELOCITY, label_unit,
-};
-pub(super) use list::describe;
-pub(super) use read::read_values;
-pub(super) use source::{UffCursor, UffSource};
-pub(super) use time::open_uff;
-pub(super) use timing::{AbscissaUnit, EvenPoints, even_points, largest_group};
-
-/// Whether a file is a universal file, by its first bytes.
-///
-/// # Errors
-/// A file that cannot be read.
-pub fn is_universal_file(path: &Path) -> Result<bool, RecordingError> {
-    let file = path.display().to_string();
-    let mut head = vec![0_u8; 4096];
-    let got = File::open(path)
-        .and_then(|mut opened| read_fully(&mut opened, &mut head))
-        .map_err(|source| unreadable(&file, source))?;
-    head.truncate(got);
-    Ok(is_universal(&head))
-}
-
-/// Whether a file begins like a universal file: -1 in columns 5 and 6 of a line of its own.
-pub(super) fn is_universal(head: &[u8]) -> bool {
-    let mut lines = head
-        .split(|byte| *byte == b'\n')
-        .map(<[u8]>::trim_ascii_end);
-    lines.find(|line| !line.is_empty()) == Some(b"    -1")
-}
+pub(super) use abscissa::{AbscissaUnit, EvenPoints, FunctionGroup, even_points};
+pub(super) use header::{ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, VELOCITY};
+pub(super) use list::{Entry, describe};
+pub(super) use time_series::{UffCursor, UffSource, open_uff};
+pub(super) use values::read_values;

@@ -1,0 +1,258 @@
+//! Modes whose frequency or damping changes with the amplitude.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::cmp::Ordering;
+use std::fmt;
+use tapjoint_numerics::stats::median;
+use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
+
+/// A change of the frequency below this share is not worth a word: 0.01 %, a fifth of the smallest
+/// change that Ingole & Chatterjee perturb frequencies by.
+const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
+/// The same of the damping: 5 %, about what one repeats of a joint's damping.
+const LEAST_DAMPING_CHANGE: f64 = 0.05;
+/// Bounds of a curve up to this many times their median count as well known.
+const USUAL: f64 = 3.0;
+/// Most modes named in one warning; the findings of the report name them all.
+const MOST_NAMED: usize = 1;
+
+/// What a mode does along its decays: values at the largest and at the smallest amplitude at which its
+/// curve is well known.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct AmplitudeChange {
+    /// Peak amplitude of the strongest sensor (`unit`).
+    pub amplitude: [f64; 2],
+    /// Unit of the amplitude; `None` where nobody said.
+    pub unit: Option<String>,
+    /// Frequency (Hz).
+    pub frequency: [f64; 2],
+    /// Its 95 % bounds (Hz).
+    pub frequency_bound: [f64; 2],
+    /// Damping ratio.
+    #[serde(rename = "damping")]
+    pub damping_ratio: [f64; 2],
+    /// Its 95 % bounds.
+    pub damping_bound: [f64; 2],
+}
+
+impl AmplitudeChange {
+    /// The change of a mode's curve where it is beyond its uncertainty and large enough to matter, its amplitude
+    /// without a unit.
+    pub(super) fn of(curve: &AmplitudeCurve) -> Option<AmplitudeChange> {
+        if curve.verdict != AmplitudeVerdict::Changes {
+            return None;
+        }
+        let known = well_known(curve);
+        let ends = [known.first()?, known.last()?];
+        let change = AmplitudeChange {
+            amplitude: ends.map(|end| end.amplitude),
+            unit: None,
+            frequency: ends.map(|end| end.frequency),
+            frequency_bound: ends.map(|end| end.frequency_bound),
+            damping_ratio: ends.map(|end| end.damping_ratio),
+            damping_bound: ends.map(|end| end.damping_bound),
+        };
+        change.matters().then_some(change)
+    }
+
+    fn matters(&self) -> bool {
+        let beyond = |values: [f64; 2], bounds: [f64; 2], least: f64| {
+            let share = ((values[1] - values[0]) / values[0]).abs();
+            differs(values, bounds) && share > least
+        };
+        beyond(self.frequency, self.frequency_bound, LEAST_FREQUENCY_CHANGE)
+            || beyond(self.damping_ratio, self.damping_bound, LEAST_DAMPING_CHANGE)
+    }
+}
+
+/// The curve at its points, the largest amplitude first, without those at which its bounds are far
+/// beyond the usual ones: at a curve's ends a polynomial says little.
+fn well_known(curve: &AmplitudeCurve) -> Vec<AmplitudeReading> {
+    let points = curve.points.iter();
+    let mut all: Vec<AmplitudeReading> = points
+        .filter_map(|point| curve.at_amplitude(point.amplitude))
+        .collect();
+    all.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+    if all.is_empty() {
+        return all;
+    }
+    let usual = |of: fn(&AmplitudeReading) -> f64| {
+        let mut bounds: Vec<f64> = all.iter().map(of).collect();
+        USUAL * median(&mut bounds)
+    };
+    let frequency = usual(|reading| reading.frequency_bound);
+    let damping = usual(|reading| reading.damping_bound);
+    all.retain(|r| r.frequency_bound <= frequency && r.damping_bound <= damping);
+    all
+}
+
+/// Whether two values differ by more than both their bounds.
+fn differs(values: [f64; 2], bounds: [f64; 2]) -> bool {
+    (values[1] - values[0]).abs() > bounds[0] + bounds[1]
+}
+
+impl fmt::Display for AmplitudeChange {
+    /// "rises from 80.28 to 80.54 Hz and its damping falls from 0.28 to 0.15 % as the amplitude falls from
+    /// 33 to 2.3 m/s\u{b2}".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = self.unit.as_deref().unwrap_or("of the file's unit");
+        let percent = |ratios: [f64; 2]| ratios.map(|ratio| 100.0 * ratio);
+        write!(
+            f,
+            "{} Hz and its damping {} % as the amplitude falls from {} to {} {}",
+            moves(self.frequency, self.frequency_bound),
+            damping_moves(percent(self.damping_ratio), percent(self.damping_bound)),
+            two_digits(self.amplitude[0]),
+            two_digits(self.amplitude[1]),
+            unit.replace("m/s2", "m/s\u{b2}")
+        )
+    }
+}
+
+/// "rises from 80.28 to 80.54", with the decimals that show the change's two leading digits, or "stays
+/// near 80.4".
+fn moves([first, last]: [f64; 2], bounds: [f64; 2]) -> String {
+    if !differs([first, last], bounds) {
+        let decimals = decimals(bounds[0] + bounds[1]).saturating_sub(1);
+        return format!("stays near {:.decimals$}", 0.5 * (first + last));
+    }
+    let decimals = decimals(last - first);
+    let verb = if last > first { "rises" } else { "falls" };
+    format!("{verb} from {first:.decimals$} to {last:.decimals$}")
+}
+
+/// The same of a damping, which is never negative, whatever noise makes of it: "stays below 0.02".
+fn damping_moves(values: [f64; 2], bounds: [f64; 2]) -> String {
+    if differs(values, bounds) {
+        return moves(values.map(|value| value.max(0.0)), bounds);
+    }
+    let (mean, bound) = (0.5 * (values[0] + values[1]), bounds[0].max(bounds[1]));
+    if mean > bound {
+        moves(values, bounds)
+    } else {
+        format!("stays below {}", two_digits(mean.max(0.0) + bound))
+    }
+}
+
+/// Which way a mode goes with the amplitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// Softer, or more damped, the harder it is driven.
+    Slips,
+    /// Stiffer the harder it is driven.
+    Stiffens,
+    /// Less damped the harder it is driven.
+    Rubs,
+    /// Softer and less damped: no single one of these.
+    Mixed,
+}
+
+impl AmplitudeChange {
+    /// Change of the frequency and of the damping ratio as shares of them, 0 within their bounds; compared in this order.
+    pub(super) fn size(&self) -> (f64, f64) {
+        let share = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
+            true => ((values[1] - values[0]) / values[0]).abs(),
+            false => 0.0,
+        };
+        (
+            share(self.frequency, self.frequency_bound),
+            share(self.damping_ratio, self.damping_bound),
+        )
+    }
+
+    /// By the signs of what changes beyond its bounds.
+    pub(super) fn way(&self) -> Way {
+        let sign = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
+            true => values[0].total_cmp(&values[1]),
+            false => Ordering::Equal,
+        };
+        let frequency = sign(self.frequency, self.frequency_bound);
+        let damping = sign(self.damping_ratio, self.damping_bound);
+        match (frequency, damping) {
+            (Ordering::Greater, _) => Way::Stiffens,
+            (Ordering::Less, Ordering::Less) => Way::Mixed,
+            (Ordering::Equal, Ordering::Less) => Way::Rubs,
+            _ => Way::Slips,
+        }
+    }
+}
+
+impl Way {
+    /// What makes a mode go so.
+    fn cause(self) -> &'static str {
+        match self {
+            Way::Slips => {
+                "a joint or support that slips softens and damps more the harder it is driven, and so may a \
+                 sensor or cable that sits loose"
+            }
+            Way::Stiffens => {
+                "it stiffens the harder it is driven, which slip does not do: a contact that closes, a \
+                 support that tightens, or a beam held at both ends does"
+            }
+            Way::Rubs => {
+                "it is damped less the harder it is driven, which slip that only begins does not do: dry friction of a \
+                 constant force (a cable or support that rubs) does, and a decay that ends in noise or in another \
+                 mode looks like it"
+            }
+            Way::Mixed => {
+                "it softens but is damped less the harder it is driven, which slip that only begins does not do: a \
+                 contact that slides all the way, or another mode nearby, may"
+            }
+        }
+    }
+}
+
+fn two_digits(value: f64) -> String {
+    format!("{value:.0$}", decimals(value))
+}
+
+/// Decimals that show the two leading digits of a value.
+fn decimals(value: f64) -> usize {
+    (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
+}
+
+pub(super) fn write_dependence(
+    f: &mut fmt::Formatter<'_>,
+    (file, changes): (&str, &[(usize, AmplitudeChange)]),
+    others: &[(String, Vec<usize>)],
+) -> fmt::Result {
+    let named: Vec<String> = changes
+        .iter()
+        .take(MOST_NAMED)
+        .map(|(mode, change)| format!("mode {mode} {change}"))
+        .collect();
+    write!(f, "{file}: {}", named.join("; "))?;
+    let more = changes.len().saturating_sub(MOST_NAMED);
+    if more > 0 {
+        let modes = if more == 1 {
+            "mode changes"
+        } else {
+            "modes change"
+        };
+        write!(f, "; {more} more {modes} with it")?;
+    }
+    write_cause(f, changes)?;
+    f.write_str(
+        "; a recording at a second tap level would confirm it, and frequencies should be stated with their amplitude, \
+         or taken from softer taps",
+    )?;
+    let other = |(file, modes): &(String, Vec<usize>)| {
+        let numbers: Vec<String> = modes.iter().map(usize::to_string).collect();
+        let plural = if modes.len() == 1 { "" } else { "s" };
+        format!("{file}: mode{plural} {}", numbers.join(", "))
+    };
+    if others.is_empty() {
+        return Ok(());
+    }
+    let listed: Vec<String> = others.iter().map(other).collect();
+    write!(f, "; the same in {}", listed.join("; "))
+}
+
+/// What makes the modes go as they go.
+fn write_cause(f: &mut fmt::Formatter<'_>, changes: &[(usize, AmplitudeChange)]) -> fmt::Result {
+    match changes.first() {
+        Some((_, first)) => write!(f, "; {}", first.way().cause()),
+        None => Ok(()),
+    }
+}

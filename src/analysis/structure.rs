@@ -1,0 +1,345 @@
+//! The tested structure: from its description, for the consistent estimate and for predictions.
+
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
+use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
+use tapjoint_description::described::{
+    assembly_of, described_beam, fastened_masses, lap_layout, stiffness_of,
+};
+use tapjoint_description::{
+    FitParameter, JointKind, JointModel, KnownStiffness, RecordingDescription, SensorKind,
+    TestDescription, Weights,
+};
+use tapjoint_identify::consistent::{
+    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
+    JointedStructure, LapLayout, Parameter, ResidualWeights,
+};
+use tapjoint_identify::predict::compare;
+use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
+
+/// The described structure in the theory's terms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestedStructure {
+    /// The beam.
+    pub beam: Beam,
+    /// How it is held.
+    pub assembly: Assembly,
+    /// Beam theory of the prediction.
+    pub theory: BeamTheory,
+    /// Form of the pair regression; `None` for a free beam.
+    pub regression: Option<PairsModel>,
+    /// Known stiffnesses (1), which are compared instead of fitted.
+    pub known: KnownJoint,
+}
+
+/// Stiffnesses that the description gives, non-dimensional; infinite = rigid.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct KnownJoint {
+    /// Kx (1).
+    pub kx: Option<f64>,
+    /// Ky (1).
+    pub ky: Option<f64>,
+    /// 1/Kz (1).
+    pub cross_compliance: Option<f64>,
+}
+
+impl KnownJoint {
+    /// Whether anything is known.
+    pub fn any(&self) -> bool {
+        self.kx.is_some() || self.ky.is_some() || self.cross_compliance.is_some()
+    }
+
+    /// `joint`, with what is known in the place of its stiffnesses.
+    pub fn over(&self, joint: Option<JointStiffness>) -> Option<JointStiffness> {
+        Some(JointStiffness {
+            kx: self.kx.or(joint.map(|joint| joint.kx))?,
+            ky: self.ky.or(joint.map(|joint| joint.ky))?,
+            cross_compliance: self
+                .cross_compliance
+                .or(joint.map(|joint| joint.cross_compliance))
+                .unwrap_or(0.0),
+        })
+    }
+}
+
+/// The structure that a test description describes.
+pub fn tested_structure(test: &TestDescription) -> TestedStructure {
+    let beam = described_beam(test);
+    TestedStructure {
+        beam,
+        assembly: assembly_of(test.joint.kind),
+        theory: test.joint.beam,
+        regression: match (test.joint.kind, test.joint.model) {
+            (JointKind::Free, _) => None,
+            (JointKind::Lap, _) => Some(PairsModel::Lap),
+            (JointKind::Cantilever, JointModel::TwoParameter) => Some(PairsModel::TwoParameter),
+            (JointKind::Cantilever, JointModel::ThreeParameter) => Some(PairsModel::ThreeParameter),
+        },
+        known: known_joint(test, &beam),
+    }
+}
+
+fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
+    let units = StiffnessUnits::of(beam);
+    let in_units =
+        |known: Option<KnownStiffness>, unit: f64| known.map(|known| stiffness_of(known) / unit);
+    KnownJoint {
+        kx: in_units(test.joint.kt, units.kt),
+        ky: in_units(test.joint.kr, units.kr),
+        cross_compliance: in_units(test.joint.ktr, units.ktr).map(f64::recip),
+    }
+}
+
+/// A spring stated as absent (1): below every stiffness that a frequency feels, and with a logarithm.
+pub(super) const NO_SPRING: f64 = 1e-9;
+
+/// What the consistent estimate knows beyond the plain beam with its joint.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StructureDetails {
+    /// Where a lap joint's halves differ from two equal pieces.
+    pub lap: LapLayout,
+    /// Masses (kg) of the sensors, where they sit in the reference configuration, and what is fastened there.
+    pub masses: Vec<PointMass>,
+    /// Relative standard uncertainties of the beam's properties.
+    pub tolerances: BeamTolerances,
+    /// What is estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
+    pub fit: Option<Vec<FitParameter>>,
+    /// Weights; `None` = measured where every uncertainty is known.
+    pub weights: Option<Weights>,
+}
+
+/// The details of a described test.
+pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetails {
+    let tolerance = &test.beam.tolerance;
+    let relative = |std: Option<f64>, value: f64| std.map(|std| std / value);
+    StructureDetails {
+        lap: lap_layout(test),
+        masses: masses_in(test, test.recordings.first()),
+        tolerances: BeamTolerances {
+            length: relative(tolerance.length, beam.length),
+            width: relative(tolerance.width, beam.width),
+            thickness: relative(tolerance.thickness, beam.thickness),
+            modulus: relative(tolerance.modulus, beam.modulus),
+            density: relative(tolerance.density, beam.density),
+        },
+        fit: test.analysis.fit.clone(),
+        weights: test.analysis.weights,
+    }
+}
+
+/// What is known to sit on the beam in a recording: sensors whose mass and place are known, and what is
+/// fastened. A microphone loads nothing.
+pub(super) fn masses_in(
+    test: &TestDescription,
+    recording: Option<&RecordingDescription>,
+) -> Vec<PointMass> {
+    let sensors = test.sensors.iter().filter(|sensor| {
+        test.analysis.sensor_mass && sensor.kind != SensorKind::Sound && sensor.mass > Some(0.0)
+    });
+    let sensors = sensors.filter_map(|sensor| {
+        Some(PointMass {
+            position: recording.map_or(sensor.position, |one| one.place_of(sensor))?,
+            mass: sensor.mass?,
+            inertia: 0.0,
+        })
+    });
+    let fastened = recording.map(fastened_masses).unwrap_or_default();
+    sensors.chain(fastened).collect()
+}
+
+/// The structure that the estimator takes.
+pub fn jointed(structure: &TestedStructure, details: &StructureDetails) -> JointedStructure {
+    let mut jointed = JointedStructure::new(structure.theory, structure.beam, structure.assembly);
+    if structure.assembly == Assembly::Lap {
+        jointed.lap = details.lap;
+    }
+    jointed.masses = details.masses.clone();
+    jointed
+}
+
+/// What of the joint is estimated where the description names nothing: all that is not known.
+fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
+    let known = &structure.known;
+    let joint = match structure.regression {
+        None => return vec![Parameter::Modulus],
+        Some(PairsModel::ThreeParameter) => 3,
+        Some(PairsModel::TwoParameter | PairsModel::Lap) => 2,
+    };
+    [
+        (Parameter::Kt, known.kx),
+        (Parameter::Kr, known.ky),
+        (Parameter::Coupling, known.cross_compliance),
+    ]
+    .into_iter()
+    .take(joint)
+    .filter(|(_, known)| known.is_none())
+    .map(|(parameter, _)| parameter)
+    .collect()
+}
+
+/// What is estimated: what the description names, else all of the joint that is not known.
+pub(super) fn fitted(structure: &TestedStructure, details: &StructureDetails) -> Vec<Parameter> {
+    let parameter = |fit: &FitParameter| match fit {
+        FitParameter::Kt => Parameter::Kt,
+        FitParameter::Kr => Parameter::Kr,
+        FitParameter::Ktr => Parameter::Coupling,
+        FitParameter::Modulus => Parameter::Modulus,
+        FitParameter::Density => Parameter::Density,
+    };
+    match &details.fit {
+        Some(fit) => fit.iter().map(parameter).collect(),
+        None => usual_fit(structure),
+    }
+}
+
+fn settings(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+) -> ConsistentSettings {
+    let fit = fitted(structure, details);
+    let units = StiffnessUnits::of(&structure.beam);
+    let known = &structure.known;
+    let all_known = used
+        .iter()
+        .all(|mode| mode.std.is_some_and(|std| std > 0.0));
+    ConsistentSettings {
+        held: HeldJoint {
+            kt: known.kx.map(|kx| kx.max(NO_SPRING) * units.kt),
+            kr: known.ky.map(|ky| ky.max(NO_SPRING) * units.kr),
+            coupling: known
+                .over(None)
+                .map(|joint| joint.coupling())
+                .filter(|coupling| coupling.is_finite()),
+        },
+        weights: match details.weights {
+            Some(Weights::Relative) => ResidualWeights::Relative,
+            _ if !all_known => ResidualWeights::Relative,
+            _ => ResidualWeights::Measured,
+        },
+        tolerances: details.tolerances,
+        ..ConsistentSettings::fitting(&fit)
+    }
+}
+
+/// The estimator by least squares on the frequencies of these modes.
+pub(super) fn estimator(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    used: &[MeasuredMode],
+) -> Result<ConsistentEstimator, IdentifyError> {
+    let jointed = jointed(structure, details);
+    let mut settings = settings(structure, details, used);
+    hold_cross_stiffness(structure, &jointed, used, &mut settings)?;
+    ConsistentEstimator::new(&jointed, used, &settings)
+}
+
+/// A known Ktr beside a fitted Kt or Kr: the estimator holds couplings, sqrt(Kt Kr)/Ktr, so that
+/// this one follows the fit until it stands still.
+fn hold_cross_stiffness(
+    structure: &TestedStructure,
+    jointed: &JointedStructure,
+    used: &[MeasuredMode],
+    settings: &mut ConsistentSettings,
+) -> Result<(), IdentifyError> {
+    // Each round reduces the error by the coupling's small share in the frequencies.
+    const ROUNDS: usize = 50;
+    const STILL: f64 = 1e-10;
+    // No joint has a coupling of 1 or more.
+    const LARGEST: f64 = 0.999_999;
+    let known = &structure.known;
+    let fitted = known.kx.is_none() || known.ky.is_none();
+    let Some(cross) = known.cross_compliance.filter(|c| fitted && *c != 0.0) else {
+        return Ok(());
+    };
+    let units = StiffnessUnits::of(&structure.beam);
+    let mut held = 0.0f64;
+    for _ in 0..ROUNDS {
+        settings.held.coupling = Some(held);
+        let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
+        // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
+        let spring = |parameter: Parameter, unit: f64| fit.point[parameter as usize].exp() / unit;
+        let product = spring(Parameter::Kt, units.kt) * spring(Parameter::Kr, units.kr);
+        let next = (cross * product.sqrt()).clamp(-LARGEST, LARGEST);
+        let moved = (next - held).abs();
+        held = next;
+        if moved.is_nan() || moved <= STILL {
+            break;
+        }
+    }
+    settings.held.coupling = Some(held);
+    Ok(())
+}
+
+/// Frequencies of this beam on this joint with everything that is fastened to it, beside the
+/// measured ones.
+pub(super) fn predict(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    (beam, joint): (&Beam, &JointStiffness),
+    measured: (&[MeasuredMode], &[usize]),
+    count: usize,
+) -> Result<Vec<PredictedMode>, IdentifyError> {
+    let there = jointed(structure, details).with_beam(beam);
+    let frequencies = frequencies_of(&there, joint, count)?;
+    Ok(compare(beam, &frequencies, measured))
+}
+
+/// Frequencies of the described structure on this joint (non-dimensional), with everything that is
+/// fastened to it.
+///
+/// # Errors
+/// [`IdentifyError::Structure`] where structure or joint cannot exist.
+pub fn predict_described(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    joint: &JointStiffness,
+    count: usize,
+) -> Result<Vec<PredictedMode>, IdentifyError> {
+    joint.check()?;
+    let held = (&structure.beam, joint);
+    predict(structure, details, held, (&[], &[]), count)
+}
+
+/// The first natural frequencies (Hz) of a structure on this joint, non-dimensional by its beam.
+///
+/// # Errors
+/// [`IdentifyError::Structure`] where the structure cannot exist.
+pub fn frequencies_of(
+    there: &JointedStructure,
+    joint: &JointStiffness,
+    count: usize,
+) -> Result<Vec<f64>, IdentifyError> {
+    let model = FrequencyModel::new(there, count)?;
+    let units = StiffnessUnits::of(&there.beam);
+    let mut point = model.nominal();
+    if there.assembly != Assembly::Free {
+        point[Parameter::Kt as usize] = (joint.kx.max(NO_SPRING) * units.kt).ln();
+        point[Parameter::Kr as usize] = (joint.ky.max(NO_SPRING) * units.kr).ln();
+        let coupling = joint.coupling();
+        let coupling = if coupling.is_finite() { coupling } else { 0.0 };
+        point[Parameter::Coupling as usize] = coupling.atanh();
+    }
+    Ok((1..=count)
+        .map(|mode| model.response(&point, mode, mode as f64).frequency)
+        .collect())
+}
+
+/// The structure of a prediction with this beam on this joint; `details` as for the prediction.
+pub(super) fn predicted_specimen(
+    structure: &TestedStructure,
+    details: &StructureDetails,
+    (beam, joint): (&Beam, &JointStiffness),
+) -> Specimen {
+    let there = jointed(structure, details).with_beam(beam);
+    let units = StiffnessUnits::of(beam);
+    let held = match structure.assembly {
+        Assembly::Free => SpecimenJoint::Free,
+        Assembly::Cantilever | Assembly::Lap => SpecimenJoint::Springs {
+            kt: joint.kx * units.kt,
+            kr: joint.ky * units.kr,
+            coupling: joint.coupling(),
+        },
+    };
+    there.specimen(held)
+}

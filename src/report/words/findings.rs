@@ -1,0 +1,469 @@
+//! What was found: in five lines for a terminal, and in a few plain sentences for the page.
+
+use super::super::document::{
+    Document, EstimateSection, ModeSection, PredictionSection, ReadBy, RecordingSection,
+};
+use super::super::format::{bound_percent, capital, signed_or_below, significant, trimmed};
+use super::super::tables::{Parameter, estimated, quality_count, reading_bound};
+use super::gap::{gap_in_short, gap_story, joint_with, missing, shows_gap};
+use tapjoint_diagnosis::Verdict;
+use tapjoint_identify::observation::UNPAIRED;
+
+/// At most five lines, each with what it is about; what was not computed has none.
+pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
+    let lines = [
+        ("Taps", taps_in_short(document)),
+        ("Modes", modes_in_short(document)),
+        (
+            if document.has_joint() {
+                "Joint"
+            } else {
+                "Beam"
+            },
+            joint(document),
+        ),
+        ("Model", model(document)),
+        ("Doubts", doubts(document)),
+        ("Next", described(document)),
+    ];
+    lines
+        .into_iter()
+        .filter_map(|(about, words)| Some((about, words?)))
+        .collect()
+}
+
+fn taps_in_short(document: &Document) -> Option<String> {
+    let found = TapCount::of(document)?;
+    if found.of_functions {
+        return Some(format!(
+            "none: {} of frequency response functions",
+            found.files
+        ));
+    }
+    let could = match document.modes {
+        Some(_) => "used",
+        None => "can be used",
+    };
+    // Without a hammer it matters on what taps were looked for.
+    let channels = channels(document).map_or(String::new(), |words| format!(". {words}"));
+    Some(format!(
+        "{} of {} taps {could}, in {}{channels}",
+        found.used, found.total, found.files
+    ))
+}
+
+/// Taps of all recordings.
+struct TapCount {
+    /// "2 recordings".
+    files: String,
+    /// Whether the files hold nothing but frequency response functions, which have no taps to judge.
+    of_functions: bool,
+    total: usize,
+    used: usize,
+}
+
+impl TapCount {
+    fn of(document: &Document) -> Option<TapCount> {
+        let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+        let taps = recordings.iter().flat_map(|recording| &recording.taps);
+        Some(TapCount {
+            files: match recordings.len() {
+                1 => "1 recording".to_owned(),
+                count => format!("{count} recordings"),
+            },
+            of_functions: recordings.iter().all(|one| one.sample_rate.is_none()),
+            total: taps.clone().count(),
+            used: taps.filter(|tap| tap.accepted).count(),
+        })
+    }
+}
+
+fn modes_in_short(document: &Document) -> Option<String> {
+    let (count, range) = numbered(document.modes.as_deref()?);
+    Some(match count {
+        0 => "none".to_owned(),
+        1 => format!("1 mode {range}"),
+        count => format!("{count} modes {range}"),
+    })
+}
+
+/// The number of modes, and where they are: "from 17.00 to 994.2 Hz".
+fn numbered(modes: &[ModeSection]) -> (usize, String) {
+    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
+    let frequencies = || numbered.clone().map(|mode| mode.frequency);
+    let low = significant(frequencies().fold(f64::INFINITY, f64::min), 4);
+    let range = match frequencies().count() {
+        1 => format!("at {low} Hz"),
+        _ => {
+            let high = significant(frequencies().fold(0.0, f64::max), 4);
+            format!("from {low} to {high} Hz")
+        }
+    };
+    (frequencies().count(), range)
+}
+
+fn joint(document: &Document) -> Option<String> {
+    let Some(estimate) = document.estimate.as_ref()? else {
+        return Some(format!("no estimate: {}", document.no_estimate()));
+    };
+    let physical = physical(estimate, with_bounds);
+    (!physical.is_empty()).then(|| physical.join(", "))
+}
+
+/// The parameters that have a unit, in words.
+fn physical(estimate: &EstimateSection, words: fn(&Parameter<'_>) -> String) -> Vec<String> {
+    let all = estimated(estimate);
+    let physical = all.iter().filter(|parameter| parameter.unit != "1");
+    physical.map(words).collect()
+}
+
+/// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
+/// gives limits these are said, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
+fn with_bounds(parameter: &Parameter<'_>) -> String {
+    let [value, _, _, _, unit] = parameter.written();
+    let rounded = parameter.written_together();
+    if let Some([low, high]) = parameter.written_scaled_limits() {
+        let own = format!("{} = {} {unit}", parameter.symbol, rounded.value);
+        let limits = format!("(95 %: {low} to {high})");
+        return [own, limits]
+            .map(|part| part.replace(' ', "\u{a0}"))
+            .join(" ");
+    }
+    let shown = if rounded.uncertainty.is_some() {
+        rounded.joined()
+    } else {
+        value
+    };
+    // A number stays on the line of its unit.
+    format!("{} = {shown} {unit}", parameter.symbol).replace(' ', "\u{a0}")
+}
+
+fn model(document: &Document) -> Option<String> {
+    let worst = most_missed(document)?;
+    let gap = document.gap.as_ref().map_or_else(String::new, |gap| {
+        let with = joint_with(gap).filter(|_| matches!(gap.verdict, Verdict::Named(_)));
+        let with = with.map_or_else(String::new, |joint| format!("; with it {joint}"));
+        format!("; {}{with}", missing(&gap.verdict, shows_gap(gap)))
+    });
+    Some(format!(
+        "largest frequency error of the model {} % (mode {}){gap}",
+        signed_or_below(worst.error_percent?),
+        worst.mode
+    ))
+}
+
+fn doubts(document: &Document) -> Option<String> {
+    let warnings = match document.main_warnings().count() {
+        0 => "no warnings".to_owned(),
+        1 => "1 warning, see above".to_owned(),
+        count => format!("{count} warnings, see above"),
+    };
+    let checks = quality_count(document).map_or(String::new(), |count| format!("; {count}"));
+    // Where nothing was computed there is nothing to doubt.
+    let computed = document.modes.is_some() || document.recordings.is_some();
+    computed.then_some(warnings + &checks)
+}
+
+/// The findings, one sentence or two in each string; what was not computed is not mentioned.
+pub fn sentences(document: &Document) -> Vec<String> {
+    let first = [taps(document), channels(document), modes(document)];
+    let rest = [
+        quality_count(document).map(|count| capital(&count) + "."),
+        estimate(document),
+        misfit(document),
+        gap_story(document).into_iter().next(),
+    ];
+    let last = [resolution(document), described(document)];
+    let first = first.into_iter().flatten();
+    first
+        .chain(amplitudes(document))
+        .chain(rest.into_iter().flatten())
+        .chain(gap_in_short(document))
+        .chain(last.into_iter().flatten())
+        .collect()
+}
+
+/// What a description would add to a bare recording; `None` where there is one, and of what was not analysed.
+fn described(document: &Document) -> Option<String> {
+    let bare = document
+        .test
+        .as_ref()
+        .is_some_and(|test| test.kind.is_none());
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let analysed = document.recordings.is_some() && !modes.is_empty();
+    (bare && analysed && document.frfs.is_none()).then(|| {
+        "A description of the beam (tapjoint\u{a0}init\u{a0}>\u{a0}test.toml) would add mode numbers, measured \
+         beside predicted frequencies, the joint's stiffness and the diagnosis of the gap."
+            .to_owned()
+    })
+}
+
+/// One sentence for each mode that changes with the amplitude.
+fn amplitudes(document: &Document) -> Vec<String> {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let sentence = |mode: &ModeSection| {
+        let change = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
+        let change = change.to_string();
+        // A number stays on the line of its unit.
+        let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
+        Some(format!("Caution: mode {} {change}.", mode.mode?))
+    };
+    modes.iter().filter_map(sentence).collect()
+}
+
+fn taps(document: &Document) -> Option<String> {
+    let TapCount {
+        files,
+        of_functions,
+        total,
+        used,
+    } = TapCount::of(document)?;
+    let found = match total {
+        1 => format!("1 tap was found in {files}"),
+        count => format!("{count} taps were found in {files}"),
+    };
+    // Of recordings that were only looked at, nothing was used yet.
+    let [was_used, were_used] = match document.modes {
+        None => ["can be used"; 2],
+        Some(_) => ["was used", "were used"],
+    };
+    Some(match (total, used) {
+        (0, _) if of_functions => {
+            format!("{files} of frequency response functions: there are no taps to judge.")
+        }
+        (0, _) => format!("No taps were found in {files}."),
+        (1, 1) => format!("{found}, and it {was_used}."),
+        (1, _) => format!("{found}, and it was rejected."),
+        (_, 0) => format!("{found}, and all were rejected."),
+        _ if used == total => format!("{found}, and all {were_used}."),
+        _ => {
+            let rejected = total - used;
+            let were = if rejected == 1 { "was" } else { "were" };
+            format!("{used} of {total} taps in {files} {were_used}, {rejected} {were} rejected.")
+        }
+    })
+}
+
+/// On what taps were looked for where there is no hammer.
+fn channels(document: &Document) -> Option<String> {
+    let recordings = document.recordings.as_deref()?;
+    let mut names: Vec<&str> = Vec::new();
+    for recording in recordings.iter().filter(|recording| !recording.has_hammer) {
+        for name in &recording.responses {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+    }
+    let names = match names.as_slice() {
+        [] => return None,
+        [one] => (*one).to_owned(),
+        [all @ .., last] => format!("{} and {last}", all.join(", ")),
+    };
+    Some(format!(
+        "There is no hammer channel: taps were looked for on {names}, and without the force there is \
+         no frequency response function."
+    ))
+}
+
+fn modes(document: &Document) -> Option<String> {
+    let modes = document.modes.as_deref()?;
+    let (count, range) = numbered(modes);
+    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == ReadBy::Given);
+    let found = if given { "given" } else { "found" };
+    let described = document.test.iter().any(|test| test.kind.is_some());
+    let word = if described { "mode" } else { "resonance" };
+    let mut sentence = match count {
+        0 => format!("No {word}s were {found}"),
+        1 => format!("1 {word} was {found}, {range}"),
+        count => format!("{count} {word}s were {found}, {range}"),
+    };
+    let finest = finest(document.recordings.as_deref().unwrap_or_default());
+    if let Some(half_line) = finest.filter(|_| count > 0) {
+        let half_line = trimmed(half_line, 3);
+        sentence.push_str(&format!(
+            "; a reading on a spectral line is good to \u{b1}{half_line} Hz at best"
+        ));
+    }
+    sentence.push_str(&others(modes));
+    Some(sentence + ".")
+}
+
+/// How many peaks were left out, and as what: "; 3 more peaks are not counted (2 no clear
+/// resonance, 1 mains 50 Hz)".
+fn others(modes: &[ModeSection]) -> String {
+    let mut kinds: Vec<(&str, usize)> = Vec::new();
+    for mode in modes.iter().filter(|mode| mode.mode.is_none()) {
+        let name = mode.label.as_deref().unwrap_or(UNPAIRED);
+        match kinds.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((name, 1)),
+        }
+    }
+    let total: usize = kinds.iter().map(|(_, count)| count).sum();
+    let list: Vec<String> = kinds
+        .iter()
+        .map(|(name, count)| match kinds.len() {
+            1 => (*name).to_owned(),
+            _ => format!("{count} {name}"),
+        })
+        .collect();
+    match total {
+        0 => String::new(),
+        1 => format!("; 1 more peak is not counted ({})", list.join(", ")),
+        count => format!("; {count} more peaks are not counted ({})", list.join(", ")),
+    }
+}
+
+/// The smallest half-line bound of all recordings (Hz).
+fn finest(recordings: &[RecordingSection]) -> Option<f64> {
+    let bounds = recordings
+        .iter()
+        .filter_map(|recording| recording.half_line);
+    bounds.min_by(f64::total_cmp)
+}
+
+fn estimate(document: &Document) -> Option<String> {
+    let Some(estimate) = document.estimate.as_ref()? else {
+        return Some(format!(
+            "No stiffness was estimated: {}.",
+            document.no_estimate()
+        ));
+    };
+    let physical = physical(estimate, stiffness);
+    if physical.is_empty() {
+        return None;
+    }
+    let doubt = estimate.reason.as_ref();
+    let doubt = doubt.map_or(String::new(), |reason| format!(" Doubtful: {reason}."));
+    Some(format!("{}.{doubt}", capital(&physical.join("; "))))
+}
+
+/// "translational stiffness Kt = 1.79 MN/m (95 %: 1.60 to 2.01, scaled by the misfit; from the frequencies' uncertainty
+/// alone 1.7890 to 1.7908)": what may be trusted first.
+fn stiffness(parameter: &Parameter<'_>) -> String {
+    let [exact, _, low, high, unit] = parameter.written();
+    let unit = unit.replace(' ', "\u{a0}");
+    let own = match (parameter.value.low, parameter.value.high) {
+        // More digits of a stiffness than that say nothing; how narrow the interval is does.
+        (Some(from), Some(to)) if low == high && to > from && parameter.value.value != 0.0 => {
+            format!(
+                "\u{b1}{} %",
+                significant(50.0 * (to - from) / parameter.value.value.abs(), 2)
+            )
+        }
+        (Some(_), Some(_)) => format!("{low} to {high}"),
+        (Some(_), None) => format!("above {low}"),
+        (None, Some(_)) => format!("below {high}"),
+        (None, None) => String::new(),
+    };
+    let alone = match own.is_empty() {
+        true => String::new(),
+        false => format!("; from the frequencies' uncertainty alone {own}"),
+    };
+    let (value, interval) = match (
+        parameter.value.std_scaled,
+        parameter.written_scaled_limits(),
+    ) {
+        (Some(_), Some([low, high])) => (
+            parameter.written_together().value,
+            format!(" (95 %: {low} to {high}, scaled by the misfit{alone})"),
+        ),
+        (Some(_), None) => (
+            parameter.written_together().value,
+            format!(
+                " (standard deviation scaled by the misfit {}\u{a0}{unit}{alone})",
+                parameter.written_scaled()
+            ),
+        ),
+        (None, _) if own.is_empty() => (exact, String::new()),
+        (None, _) => (exact, format!(" (95 %: {own})")),
+    };
+    format!(
+        "{} {}\u{a0}=\u{a0}{value}\u{a0}{unit}{interval}",
+        parameter.meaning, parameter.symbol
+    )
+}
+
+/// The mode that the model misses most.
+fn most_missed(document: &Document) -> Option<&PredictionSection> {
+    let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
+    let rows = document.prediction.as_deref()?.iter();
+    rows.filter(|row| row.error_percent.is_some_and(f64::is_finite))
+        .max_by(|a, b| size(a).total_cmp(&size(b)))
+}
+
+/// The largest misfit among the modes, with what the reading alone explains.
+fn misfit(document: &Document) -> Option<String> {
+    let largest = most_missed(document)?;
+    let used = if largest.used { "used" } else { "not used" };
+    let bound = reading_bound(document, largest.mode)
+        .zip(largest.measured)
+        .map(|(bound, hz)| 100.0 * bound / hz);
+    let reading = bound.map_or(String::new(), |percent| {
+        format!(
+            "; the reading itself is good to {} %",
+            bound_percent(percent)
+        )
+    });
+    Some(format!(
+        "The largest difference between predicted and measured frequency is {} % (mode {}, {used} in the estimate{reading}).",
+        signed_or_below(largest.error_percent?),
+        largest.mode
+    ))
+}
+
+/// What reading on lines alone would leave open; nothing beside a misfit that is larger than what the readings leave
+/// open, for the spans would look like what is known of the joint.
+fn resolution(document: &Document) -> Option<String> {
+    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
+    let misses = |estimate: &EstimateSection| {
+        let all = estimated(estimate);
+        all.iter().any(|one| one.value.std_scaled.is_some())
+    };
+    if estimate.is_some_and(misses) {
+        return None;
+    }
+    let main = estimate.map(|estimate| estimate.method);
+    let spans = document.resolution_span.as_deref()?;
+    // Of the method that the estimate is by; else of the one that there is.
+    let span = spans.iter().find(|span| Some(span.method) == main);
+    let span = span.or(spans.first())?;
+    let ranges: Vec<String> = [("Kx", span.kx), ("Ky", span.ky), ("Kz", span.kz)]
+        .into_iter()
+        .filter_map(|(name, range)| {
+            let [low, high] = range?;
+            Some(format!(
+                "{name} from {} to {}",
+                significant(low, 4),
+                significant(high, 4)
+            ))
+        })
+        .collect();
+    let failed = match span.failed {
+        0 => String::new(),
+        failed => format!(", and {failed} of {} leave no estimate", span.patterns),
+    };
+    if ranges.is_empty() {
+        return None;
+    }
+    Some(format!(
+        "With every frequency anywhere within its {}, the non-dimensional stiffness is {}{failed}.",
+        bound_name(document),
+        ranges.join(", ")
+    ))
+}
+
+/// What the spans were computed from: beside a frequency read between the lines, "bound" alone would
+/// be taken for that one's.
+fn bound_name(document: &Document) -> &'static str {
+    let modes = document.modes.as_deref().unwrap_or_default();
+    let between = modes
+        .iter()
+        .any(|mode| matches!(mode.method, ReadBy::Fit | ReadBy::Interpolated));
+    if between {
+        "half line (as if it had been read on a line only)"
+    } else {
+        "bound"
+    }
+}

@@ -1,0 +1,4 @@
+//! Every sentence about a result, once.
+
+pub mod findings;
+pub mod gap;

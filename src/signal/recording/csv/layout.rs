@@ -1,0 +1,546 @@
+//! Layout of a text file: separator, columns, header, time column, first row.
+//!
+//! Decided from the head of the file. Of the four separators the one wins under which most lines
+//! are rows of equally many numbers; the header is the text above the first row.
+
+use std::collections::BTreeMap;
+
+use crate::recording::error::RecordingError;
+use crate::recording::text::{
+    Cell, CellProblem, Separator, decode_text, is_comment, parse_number, shown, split_cells,
+};
+use crate::recording::units::{channel_unit, split_unit};
+
+/// Bytes from which the layout is decided: thousands of ordinary rows.
+pub(super) const HEAD_BYTES: usize = 1 << 18;
+
+/// Units of temperature, which no channel has here and the names t and T often mean.
+const TEMPERATURES: [&str; 9] = [
+    "k", "\u{b0}c", "c", "degc", "\u{b0}f", "f", "degf", "celsius", "\u{2103}",
+];
+
+/// Layout of a text file.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::recording) struct CsvLayout {
+    pub separator: Separator,
+    /// Decimal mark, once a number has shown it.
+    pub decimal: Option<u8>,
+    /// Columns that hold numbers, those of the header included; an always empty last one (from a
+    /// separator at the end of each line) does not count.
+    pub columns: Vec<Column>,
+    /// The time column, 0-based.
+    pub time: Option<usize>,
+    /// Byte at which the first row begins.
+    pub start: u64,
+    /// Number of the line before the first row.
+    pub lines_before: u64,
+    /// Line end: `\n`, or `\r` in files of old.
+    pub line_end: u8,
+}
+
+impl CsvLayout {
+    /// Columns that are channels, in order.
+    pub(super) fn channel_columns(&self) -> Vec<usize> {
+        let all = 0..self.columns.len();
+        all.filter(|column| Some(*column) != self.time).collect()
+    }
+
+    /// ` ("name")` for messages.
+    pub(super) fn shown_name(&self, column: usize) -> String {
+        let name = self.columns.get(column).and_then(|c| c.name.as_deref());
+        name.map_or(String::new(), |name| format!(" (\"{name}\")"))
+    }
+}
+
+/// One column as the header has it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::recording) struct Column {
+    /// Name without the unit.
+    pub name: Option<String>,
+    /// Unit as written.
+    pub unit: Option<String>,
+}
+
+impl Column {
+    /// Reads a header cell. Brackets that hold no known unit stay in the name as well,
+    /// since "sensor (1)" and "sensor (2)" are two names.
+    fn from_cell(cell: &str) -> Self {
+        let (name, unit) = split_unit(cell);
+        match unit {
+            Some(unit) if channel_unit(unit).is_none() => Self::new(cell, unit),
+            unit => Self::new(name, unit.unwrap_or_default()),
+        }
+    }
+
+    /// Joins a name and a cell of the line of units below it.
+    fn from_cells(name: &str, unit: &str) -> Self {
+        match split_unit(unit) {
+            ("", Some(inner)) => Self::new(name, inner),
+            _ => Self::new(name, unit),
+        }
+    }
+
+    fn new(name: &str, unit: &str) -> Self {
+        let [name, unit] = [name, unit].map(|text| Some(text.trim().to_owned()));
+        Self {
+            name: name.filter(|name| !name.is_empty()),
+            unit: unit.filter(|unit| !unit.is_empty()),
+        }
+    }
+}
+
+/// A number in the head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HeadNumber<'a> {
+    /// Line, 1-based.
+    pub line: u64,
+    pub value: f64,
+    pub text: &'a [u8],
+}
+
+/// A column named as time whose values do not rise throughout.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FlatTime {
+    /// Column, 0-based.
+    pub column: usize,
+    /// First line in which it does not rise, 1-based.
+    pub line: u64,
+    /// Value there and the one before.
+    pub values: [f64; 2],
+}
+
+/// The complete lines at the beginning of a text file.
+pub(super) struct Head<'a> {
+    /// Byte at which each line begins, and the line.
+    lines: Vec<(u64, &'a [u8])>,
+    line_end: u8,
+}
+
+impl<'a> Head<'a> {
+    /// Cuts the first [`HEAD_BYTES`] of a file, or all of them, into lines. A line that is cut off by the end of the
+    /// head is left out.
+    pub(super) fn new(head: &'a [u8]) -> Self {
+        let line_end = match head.contains(&b'\n') {
+            false if head.contains(&b'\r') => b'\r',
+            _ => b'\n',
+        };
+        let is_whole_file = head.len() < HEAD_BYTES;
+        let mut offset = 0;
+        let mut lines = Vec::new();
+        for line in head.split_inclusive(|byte| *byte == line_end) {
+            if is_whole_file || line.ends_with(&[line_end]) {
+                let byte_order_mark: &[u8] = if offset == 0 { b"\xef\xbb\xbf" } else { b"" };
+                let text = line.strip_prefix(byte_order_mark).unwrap_or(line);
+                lines.push((offset + (line.len() - text.len()) as u64, text));
+            }
+            offset += line.len() as u64;
+        }
+        Self { lines, line_end }
+    }
+
+    /// Finds the layout of the file; `file` names it in errors.
+    pub(super) fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
+        let candidates = Separator::ALL.map(|separator| Candidate::new(self, separator));
+        // Most rows first, then a header that fits, then most columns, then the order of preference.
+        let best = candidates
+            .iter()
+            .rev()
+            .max_by_key(|candidate| (candidate.rows, candidate.header_fits(), candidate.cells));
+        match best {
+            Some(best) if best.rows > 0 => best.layout(file),
+            _ => Err(self.no_numbers(file)),
+        }
+    }
+
+    /// Returns the error of a text without rows, with the line that has most digits.
+    fn no_numbers(&self, file: &str) -> RecordingError {
+        let mut nearest = (1, &b""[..]);
+        let mut most = None;
+        for ((_, text), line) in self.lines.iter().zip(1..) {
+            let digits = text.iter().filter(|byte| byte.is_ascii_digit()).count();
+            if most < Some(digits) {
+                nearest = (line, text);
+                most = Some(digits);
+            }
+        }
+        RecordingError::NoNumbers {
+            file: file.to_owned(),
+            line: nearest.0,
+            value: shown(nearest.1.trim_ascii()),
+        }
+    }
+
+    /// Returns the readable numbers of one column, rows of any kind included.
+    pub(super) fn numbers(&self, layout: &CsvLayout, column: usize) -> Vec<HeadNumber<'a>> {
+        let mut cells = Vec::new();
+        let mut numbers = Vec::new();
+        for ((offset, line), number) in self.lines.iter().zip(1..) {
+            if *offset < layout.start {
+                continue;
+            }
+            split_cells(line, layout.separator, &mut cells);
+            let text = cells.get(column).and_then(|cell| line.get(cell.clone()));
+            let value = text.and_then(|text| parse_number(text, &mut None).ok());
+            if let (Some(text), Some(value)) = (text, value) {
+                numbers.push(HeadNumber {
+                    line: number,
+                    value,
+                    text,
+                });
+            }
+        }
+        numbers
+    }
+
+    /// Returns the channel whose values rise in equal steps though it is not named as time: probably the time.
+    pub(super) fn evenly_rising_column(&self, layout: &CsvLayout) -> Option<usize> {
+        layout.channel_columns().into_iter().find(|column| {
+            let numbers = self.numbers(layout, *column);
+            let steps = numbers.windows(2).map(|pair| pair[1].value - pair[0].value);
+            let shortest = steps.clone().fold(f64::INFINITY, f64::min);
+            let longest = steps.clone().fold(0.0, f64::max);
+            // A tenth: only a hint is made of it, and printed times are rounded.
+            steps.len() >= 2 && shortest > 0.0 && longest - shortest <= 0.1 * longest
+        })
+    }
+
+    /// Returns the column that is named as time without being one, and where that shows first; `None` of one that
+    /// stands still, a temperature perhaps.
+    pub(super) fn flat_time(&self, layout: &CsvLayout) -> Option<FlatTime> {
+        let column = *named_as_time(&layout.columns).first()?;
+        let numbers = self.numbers(layout, column);
+        let mut steps = numbers.windows(2);
+        let flat = steps.clone().find(|step| step[1].value <= step[0].value)?;
+        let rises = steps.any(|step| step[1].value > step[0].value);
+        rises.then_some(FlatTime {
+            column,
+            line: flat[1].line,
+            values: [flat[1].value, flat[0].value],
+        })
+    }
+}
+
+/// Returns the columns named t, time (or that in German, French, Spanish), then those named t_* or time_*, but for
+/// those whose unit says otherwise. Those with an unknown unit come after all others.
+fn named_as_time(columns: &[Column]) -> Vec<usize> {
+    let mut ranked = Vec::new();
+    for (at, column) in columns.iter().enumerate() {
+        // An unknown unit stays in the name; it is refused later, with its own message.
+        let name = split_unit(column.name.as_deref().unwrap_or_default()).0;
+        let name = name.to_ascii_lowercase();
+        let exact = ["t", "time", "zeit", "temps", "tiempo"].contains(&name.as_str());
+        if !exact && !name.starts_with("t_") && !name.starts_with("time_") {
+            continue;
+        }
+        let unit = column.unit.as_deref().unwrap_or("s");
+        let plain = unit.to_lowercase().replace([' ', '.'], "");
+        let known = match channel_unit(unit) {
+            Some((_, si)) if si != "s" => continue,
+            None if TEMPERATURES.contains(&plain.as_str()) => continue,
+            unit => unit.is_some(),
+        };
+        ranked.push((!known, !exact, at));
+    }
+    ranked.sort_unstable();
+    ranked.into_iter().map(|(.., at)| at).collect()
+}
+
+/// A line of the head under one separator.
+#[derive(Debug, Clone, Copy)]
+struct HeadLine<'a> {
+    text: &'a [u8],
+    offset: u64,
+    kind: LineKind,
+}
+
+/// Kind of a line under one separator, with its number of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum LineKind {
+    Blank,
+    Comment,
+    /// Numbers only (empty cells allowed).
+    Row(usize),
+    /// No number at all.
+    Text(usize),
+    /// Both; a number stands first.
+    MixedNumberFirst(usize),
+    /// Both; something else stands first.
+    Mixed(usize),
+}
+
+impl LineKind {
+    fn of(text: &[u8], separator: Separator, cells: &mut Vec<Cell>) -> Self {
+        if text.trim_ascii().is_empty() {
+            return Self::Blank;
+        }
+        if is_comment(text) {
+            return Self::Comment;
+        }
+        split_cells(text, separator, cells);
+        let (mut numbers, mut others, mut number_first) = (0, 0, false);
+        for (at, cell) in cells.iter().enumerate() {
+            // Each cell may use either mark here; mixtures are found when the rows are read.
+            match parse_number(text.get(cell.clone()).unwrap_or_default(), &mut None) {
+                Ok(_) | Err(CellProblem::NotFinite) => {
+                    numbers += 1;
+                    number_first |= at == 0;
+                }
+                Err(CellProblem::Missing) => {}
+                Err(CellProblem::Text | CellProblem::MixedDecimal(_)) => others += 1,
+            }
+        }
+        match (numbers, others) {
+            // Nothing but separators is text as well.
+            (0, _) => Self::Text(cells.len()),
+            (_, 0) => Self::Row(cells.len()),
+            _ if number_first => Self::MixedNumberFirst(cells.len()),
+            _ => Self::Mixed(cells.len()),
+        }
+    }
+
+    /// Returns `true` for a line with text that has this many cells.
+    fn is_header_of(self, columns: usize) -> bool {
+        match self {
+            Self::Text(cells) | Self::Mixed(cells) | Self::MixedNumberFirst(cells) => {
+                cells == columns
+            }
+            Self::Blank | Self::Comment | Self::Row(_) => false,
+        }
+    }
+}
+
+/// The head under one separator.
+struct Candidate<'a> {
+    separator: Separator,
+    line_end: u8,
+    lines: Vec<HeadLine<'a>>,
+    /// Cells of the commonest kind of row.
+    cells: usize,
+    /// Lines of that kind.
+    rows: usize,
+    /// The first of them.
+    first: usize,
+}
+
+impl<'a> Candidate<'a> {
+    fn new(head: &Head<'a>, separator: Separator) -> Self {
+        let mut cells = Vec::new();
+        let mut lines = Vec::with_capacity(head.lines.len());
+        let mut counts = BTreeMap::new();
+        for &(offset, text) in &head.lines {
+            let kind = LineKind::of(text, separator, &mut cells);
+            lines.push(HeadLine { text, offset, kind });
+            if let LineKind::Row(cells) = kind {
+                *counts.entry(cells).or_insert(0_usize) += 1;
+            }
+        }
+        let commonest = counts.into_iter().max_by_key(|(_, rows)| *rows);
+        let (cells, rows) = commonest.unwrap_or((0, 0));
+        let first = lines.iter().position(|l| l.kind == LineKind::Row(cells));
+        Self {
+            separator,
+            line_end: head.line_end,
+            lines,
+            cells,
+            rows,
+            first: first.unwrap_or(0),
+        }
+    }
+
+    /// Index of the nearest line above `below` that is neither blank nor a comment.
+    fn line_above(&self, below: usize) -> Option<usize> {
+        let above = self.lines.get(..below).unwrap_or_default();
+        above
+            .iter()
+            .rposition(|line| !matches!(line.kind, LineKind::Blank | LineKind::Comment))
+    }
+
+    /// Kind of a line; blank beyond the last one.
+    fn kind(&self, at: usize) -> LineKind {
+        self.lines.get(at).map_or(LineKind::Blank, |line| line.kind)
+    }
+
+    /// Returns `true` where text with as many cells as the row stands above the first row.
+    fn header_fits(&self) -> bool {
+        self.line_above(self.first)
+            .is_some_and(|at| self.kind(at) == LineKind::Text(self.cells))
+    }
+
+    fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
+        let first = self.first_row();
+        let mut columns = self.header_above(first, file)?.unwrap_or_default();
+        columns.resize(self.cells, Column::default());
+        columns.truncate(self.used_columns(&columns));
+        Ok(CsvLayout {
+            separator: self.separator,
+            decimal: None,
+            time: self.time_column(&columns, first),
+            columns,
+            start: self.lines.get(first).map_or(0, |line| line.offset),
+            lines_before: first as u64,
+            line_end: self.line_end,
+        })
+    }
+
+    /// Index of the first row.
+    ///
+    /// A line that mixes numbers and text right below a header, or that starts with a number, is a
+    /// damaged row and not a title: it becomes the first row, so that reading it names what is
+    /// wrong. The same holds for a row of another length right below a header.
+    fn first_row(&self) -> usize {
+        let mut first = self.first;
+        while let Some(at) = self.line_above(first) {
+            let next = self.line_above(at);
+            let below_header = next.is_some_and(|n| self.kind(n) == LineKind::Text(self.cells));
+            match self.kind(at) {
+                LineKind::MixedNumberFirst(_) => {}
+                LineKind::Mixed(_) | LineKind::Row(_) if below_header => {}
+                _ => break,
+            }
+            first = at;
+        }
+        first
+    }
+
+    /// Reads the header above the first row; `None` where there is none.
+    fn header_above(
+        &self,
+        first: usize,
+        file: &str,
+    ) -> Result<Option<Vec<Column>>, RecordingError> {
+        let Some(at) = self.line_above(first) else {
+            return Ok(self.header_in_comment(first));
+        };
+        let kind = self.kind(at);
+        if kind.is_header_of(self.cells) {
+            return Ok(Some(self.header(at)));
+        }
+        Ok(match (kind, self.separator) {
+            // Twice as many columns as names under the comma: it is the decimal mark as well.
+            (LineKind::Text(names), Separator::Comma) if names > 1 && self.cells == 2 * names => {
+                return Err(RecordingError::AmbiguousComma {
+                    file: file.to_owned(),
+                    line: at as u64 + 1,
+                    names,
+                    columns: self.cells,
+                });
+            }
+            (LineKind::Text(_), Separator::Blanks) => {
+                self.columns_of(joined_brackets(self.texts(at)))
+            }
+            _ => self.header_in_comment(first),
+        })
+    }
+
+    /// Names and units from the line at `at`, which may itself be a line of units below the names.
+    fn header(&self, at: usize) -> Vec<Column> {
+        let here = self.texts(at);
+        let above = self
+            .line_above(at)
+            .filter(|above| self.kind(*above).is_header_of(self.cells));
+        match above {
+            Some(above) if here.iter().all(|cell| is_unit_cell(cell)) => {
+                let names = self.texts(above);
+                let cells = names.iter().zip(&here);
+                cells
+                    .map(|(name, unit)| Column::from_cells(name, unit))
+                    .collect()
+            }
+            _ => here.iter().map(|cell| Column::from_cell(cell)).collect(),
+        }
+    }
+
+    /// Some programs write the names into the last comment above the rows.
+    fn header_in_comment(&self, first: usize) -> Option<Vec<Column>> {
+        let above = self.lines.get(..first)?;
+        let comment = above.iter().rfind(|line| line.kind == LineKind::Comment)?;
+        let text = decode_text(comment.text.trim_ascii());
+        let text = text.trim_start_matches(['#', '%', '/']);
+        let mut names = split_texts(text.as_bytes(), self.separator);
+        if self.separator == Separator::Blanks {
+            names = joined_brackets(names);
+        }
+        let numbers = names
+            .iter()
+            .any(|name| parse_number(name.as_bytes(), &mut None) != Err(CellProblem::Text));
+        self.columns_of(names).filter(|_| !numbers)
+    }
+
+    /// Columns of header cells, where they are as many as those of the rows.
+    fn columns_of(&self, names: Vec<String>) -> Option<Vec<Column>> {
+        let fits = names.len() == self.cells;
+        fits.then(|| names.iter().map(|name| Column::from_cell(name)).collect())
+    }
+
+    fn texts(&self, at: usize) -> Vec<String> {
+        let text = self.lines.get(at).map_or(&b""[..], |line| line.text);
+        split_texts(text, self.separator)
+    }
+
+    /// Number of columns without those at the end that are empty in every row and in the header.
+    fn used_columns(&self, columns: &[Column]) -> usize {
+        let mut cells = Vec::new();
+        let mut last = columns
+            .iter()
+            .rposition(|c| c.name.is_some() || c.unit.is_some());
+        for line in &self.lines {
+            if line.kind == LineKind::Row(self.cells) {
+                split_cells(line.text, self.separator, &mut cells);
+                last = last.max(cells.iter().rposition(|cell| !cell.is_empty()));
+            }
+        }
+        last.map_or(0, |last| last + 1)
+    }
+
+    /// Finds the time column: one that is named as time and rises in at least half of the steps of the head. (That
+    /// it rises in all of them is checked when the rows are read, and is an error there.)
+    fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
+        named_as_time(columns).into_iter().find(|column| {
+            let values = self.column_values(*column, first);
+            let rising = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
+            2 * rising >= values.len().saturating_sub(1)
+        })
+    }
+
+    /// The readable numbers of one column in the rows of the commonest kind.
+    fn column_values(&self, column: usize, first: usize) -> Vec<f64> {
+        let mut cells = Vec::new();
+        let rows = self.lines.iter().skip(first);
+        rows.filter(|line| line.kind == LineKind::Row(self.cells))
+            .filter_map(|line| {
+                split_cells(line.text, self.separator, &mut cells);
+                let cell = line.text.get(cells.get(column)?.clone())?;
+                parse_number(cell, &mut None).ok()
+            })
+            .collect()
+    }
+}
+
+/// Splits a line into the texts of its cells.
+pub(in crate::recording) fn split_texts(line: &[u8], separator: Separator) -> Vec<String> {
+    let mut cells = Vec::new();
+    split_cells(line, separator, &mut cells);
+    let cells = cells.into_iter().filter_map(|cell| line.get(cell));
+    cells.map(decode_text).collect()
+}
+
+/// Returns `true` for a cell of a line of units: empty, in brackets, or a known unit.
+fn is_unit_cell(cell: &str) -> bool {
+    let (name, unit) = split_unit(cell);
+    cell.is_empty() || (name.is_empty() && unit.is_some()) || channel_unit(cell).is_some()
+}
+
+/// Joins cells that begin with a bracket to the cell before: under blanks a name such as "force (N)" falls into two.
+fn joined_brackets(cells: Vec<String>) -> Vec<String> {
+    let mut joined: Vec<String> = Vec::new();
+    for cell in cells {
+        match joined.last_mut() {
+            Some(last) if cell.starts_with(['(', '[']) => {
+                last.push(' ');
+                last.push_str(&cell);
+            }
+            _ => joined.push(cell),
+        }
+    }
+    joined
+}

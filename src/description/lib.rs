@@ -8,6 +8,7 @@ mod analysis;
 pub mod described;
 mod error;
 mod keys;
+mod parse;
 mod reader;
 mod recordings;
 mod sensors;
@@ -16,7 +17,7 @@ mod template;
 
 pub use analysis::{AnalysisDescription, FitParameter, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
-pub use keys::ChannelRefError;
+pub use parse::ChannelRefError;
 use schemars::JsonSchema;
 use serde::Serialize;
 pub use tapjoint_beam::BeamTheory;

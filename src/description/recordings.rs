@@ -2,8 +2,8 @@
 //!
 //! `[measured]`: natural frequencies that were read elsewhere.
 
-use super::analysis::Limits;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
+use super::reader::Limits;
 use super::reader::{Entry, Table, quantities_by_name};
 use super::structure::along;
 use super::{

@@ -1,7 +1,7 @@
 //! `[hammer]` and `[[sensor]]`: which channel carries what.
 
-use super::analysis::Limits;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
+use super::reader::Limits;
 use super::reader::{Entry, Table};
 use super::structure::along;
 use super::{

@@ -1,7 +1,7 @@
 //! Beam, joint and effects of the model.
 
-use super::analysis::Limits;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
+use super::reader::Limits;
 use super::reader::{Entry, Table};
 use super::{
     BeamDescription, BeamTheory, BeamTolerance, EffectDescription, JointDescription, JointKind,

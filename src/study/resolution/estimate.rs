@@ -2,7 +2,7 @@
 
 use super::plan::{BlockPlan, Layout};
 use super::result::StudiedStiffness;
-use super::virtual_test::{Read, Truth, Truths};
+use super::virtual_test::{Read, Truth, Truths, index_of};
 use super::{ResolutionError, StudiedTest};
 use tapjoint_analysis::EstimateMethod;
 use tapjoint_beam::joint::StiffnessUnits;
@@ -105,7 +105,7 @@ impl Estimators {
             .used
             .iter()
             .map(|&mode| {
-                let read = read_of(plan, bands, mode)?[reading as usize]?;
+                let read = read_of(plan, bands, mode)?[index_of(reading)]?;
                 Some(MeasuredMode {
                     mode: self.numbers[mode],
                     // The draw's beam is the nominal one but for a factor on its modulus, which is

@@ -6,7 +6,7 @@ use super::plan::{BlockPlan, Layout};
 use super::result::{
     Answer, FrequencyError, ResolutionStudy, StiffnessError, StudiedMode, WindowName,
 };
-use super::virtual_test::Outcome;
+use super::virtual_test::{Outcome, index_of};
 use tapjoint_analysis::EstimateMethod;
 use tapjoint_description::ReadBy;
 use tapjoint_numerics::stats::root_mean_square;
@@ -83,7 +83,7 @@ fn frequency_error(
     let reads: Vec<_> = outcomes
         .iter()
         .filter_map(|outcome| {
-            let read = outcome.readings[window][band][position][reading as usize]?;
+            let read = outcome.readings[window][band][position][index_of(reading)]?;
             Some((read, read.frequency - truth(outcome)))
         })
         .collect();

@@ -256,13 +256,22 @@ pub(super) fn sample_draw(
     virtual_record((truths, &truth), length, test, settings, &mut random)
 }
 
+/// Index of a way of reading in [`ReadBy::ALL`].
+pub(super) fn index_of(reading: ReadBy) -> usize {
+    match reading {
+        ReadBy::Line => 0,
+        ReadBy::Interpolated => 1,
+        ReadBy::Fit => 2,
+    }
+}
+
 /// What one virtual test gave.
 #[derive(Debug)]
 pub(super) struct Outcome {
     /// What is true.
     pub truth: Truth,
     /// For each window, for each band, for each of its modes: what each reading of
-    /// [`super::ReadBy::ALL`] says.
+    /// [`ReadBy::ALL`] says.
     pub readings: Vec<Vec<Vec<[Option<Read>; 3]>>>,
     /// For each window, for each of the study's readings, for each estimator: errors of the
     /// stiffnesses; `None` where the draw was not read that way.

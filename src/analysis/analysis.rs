@@ -4,6 +4,7 @@ use super::amplitude::AmplitudeChange;
 use super::measure::{MeasureError, Measurement};
 use super::structure::TestedStructure;
 use super::warning::Warning;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_beam::{Beam, JointStiffness};
@@ -39,13 +40,27 @@ pub struct Analysis {
 }
 
 /// Which estimate is the main one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum EstimateMethod {
     /// Least squares on the frequencies themselves, the closed form beside it.
     #[default]
     Consistent,
     /// The closed form alone: the pair regression, or of a free beam its modulus.
     Pairs,
+}
+
+impl EstimateMethod {
+    /// Both methods.
+    pub const ALL: [Self; 2] = [Self::Consistent, Self::Pairs];
+
+    /// Name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Consistent => "consistent",
+            Self::Pairs => "pairs",
+        }
+    }
 }
 
 /// One recording.

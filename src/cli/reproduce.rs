@@ -4,7 +4,7 @@ use super::Outcome;
 use super::terminal::Terminal;
 use clap::Args;
 use tapjoint::report::document::VERSION;
-use tapjoint::study::paper::{render, reproduce};
+use tapjoint::study::publication::{render, reproduce};
 
 /// Print every table of the paper (Ingole & Chatterjee) beside our numbers, and mark what does
 /// not reproduce and why.

@@ -18,9 +18,7 @@ use tapjoint::report::{
     prediction_of, render_resolution, render_resolution_csv, render_resolution_picture,
 };
 use tapjoint::structure::{Assembly, JointStiffness};
-use tapjoint::study::resolution::{
-    ReadingName, ResolutionSettings, StudiedTest, WindowName, study_resolution,
-};
+use tapjoint::study::resolution::{ResolutionSettings, StudiedTest, WindowName, study_resolution};
 
 /// Show what spectral resolution does to frequencies and joint stiffness, on virtual tests.
 ///
@@ -154,11 +152,11 @@ fn settings(arguments: &ResolutionArguments, seed: u64) -> ResolutionSettings {
     blocks.dedup();
     let windows = arguments.windows.iter();
     let windows: Vec<WindowName> = windows.map(|&w| WindowKind::from(w).into()).collect();
-    let asked = |name: &ReadingName| {
+    let asked = |name: &ReadBy| {
         let mut readings = arguments.readings.iter();
-        readings.any(|&reading| ReadingName::from(ReadBy::from(reading)) == *name)
+        readings.any(|&reading| ReadBy::from(reading) == *name)
     };
-    let readings: Vec<ReadingName> = ReadingName::ALL.into_iter().filter(asked).collect();
+    let readings: Vec<ReadBy> = ReadBy::ALL.into_iter().filter(asked).collect();
     let or = |own: Vec<usize>, usual: Vec<usize>| if own.is_empty() { usual } else { own };
     ResolutionSettings {
         blocks: or(blocks, default.blocks),

@@ -1,11 +1,9 @@
 //! `[analysis]`: how to analyse.
 
-use tapjoint_signal::modal::ReadBy;
-
 use super::error::{DescriptionError, DescriptionProblem};
-use super::limits::Limits;
-use super::reader::{Entry, Table};
+use super::reader::{Entry, Limits, Table};
 use super::{JointDescription, JointKind, JointModel};
+use tapjoint_signal::modal::ReadBy;
 
 const WINDOWS: [(&str, WindowKind); 3] = [
     ("rectangular", WindowKind::Rectangular),

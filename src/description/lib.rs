@@ -5,18 +5,14 @@
 //! nearest known key. It opens no files.
 
 mod analysis;
-mod beam;
 pub mod described;
-mod effects;
 mod error;
-mod joint;
 mod keys;
-mod limits;
-mod measured;
 mod parse;
 mod reader;
 mod recordings;
 mod sensors;
+mod structure;
 mod template;
 
 pub use analysis::{AnalysisDescription, FitParameter, Weights, WindowKind};

@@ -1,17 +1,16 @@
 //! From text to [`TestDescription`]: the tables in their order.
 
 use super::analysis::read_analysis;
-use super::beam::read_beam;
-use super::effects::read_effect;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning};
-use super::joint::read_joint;
-use super::keys;
-use super::measured::read_measured;
 use super::reader::{Entry, Source, Table};
+use super::recordings::read_measured;
 use super::recordings::{Surroundings, read_recording};
 use super::sensors::{check_places, read_hammer, read_sensors};
+use super::structure::read_beam;
+use super::structure::read_effect;
+use super::structure::read_joint;
 use super::{
-    ChannelRef, HammerDescription, RecordingDescription, SensorDescription, TestDescription,
+    ChannelRef, HammerDescription, RecordingDescription, SensorDescription, TestDescription, keys,
 };
 use std::fmt;
 use std::path::Path;

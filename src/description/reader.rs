@@ -1,10 +1,12 @@
 //! Typed access to the tables of a TOML text: every value knows its line and its key path, so
 //! that whatever is wrong with it can say where.
 
-use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
+use super::error::{
+    DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, number, with_unit,
+};
 use super::keys::{self, KnownTable};
-use super::limits::Limits;
 use std::collections::BTreeMap;
+use std::ops::{Bound, RangeBounds};
 use tapjoint_numerics::quantity::{Dimension, parse_quantity};
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
@@ -375,4 +377,59 @@ pub(super) fn quantities_by_name<'t>(
         .all()
         .map(|(name, entry)| Ok((name.to_owned(), read(name, &entry)?)))
         .collect()
+}
+
+/// The values a quantity may take, and what to do when it does not.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    pub(super) low: Bound<f64>,
+    pub(super) high: Bound<f64>,
+    pub(super) remedy: &'static str,
+}
+
+impl Limits {
+    /// From `low` to `high`, both included.
+    pub(super) const fn between(low: f64, high: f64, remedy: &'static str) -> Self {
+        Self {
+            low: Bound::Included(low),
+            high: Bound::Included(high),
+            remedy,
+        }
+    }
+
+    /// Greater than zero, up to `high`.
+    pub(super) const fn positive(high: f64, remedy: &'static str) -> Self {
+        Self {
+            low: Bound::Excluded(0.0),
+            high: Bound::Included(high),
+            remedy,
+        }
+    }
+
+    /// Whether a value is within them.
+    pub(super) fn contain(&self, value: f64) -> bool {
+        (self.low, self.high).contains(&value)
+    }
+
+    /// The range as messages name it.
+    pub(super) fn in_words(&self, unit: &str) -> String {
+        if let (Bound::Included(low), Bound::Included(high)) = (self.low, self.high) {
+            return format!("{} to {}", number(low), with_unit(high, unit));
+        }
+        let low = match self.low {
+            Bound::Included(low) => format!("from {}", with_unit(low, unit)),
+            Bound::Excluded(low) => format!("more than {}", with_unit(low, unit)),
+            Bound::Unbounded => String::new(),
+        };
+        let high = match self.high {
+            Bound::Included(high) => format!("up to {}", with_unit(high, unit)),
+            Bound::Excluded(high) => format!("less than {}", with_unit(high, unit)),
+            Bound::Unbounded => String::new(),
+        };
+        [low, high]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
 }

@@ -1,13 +1,12 @@
 //! `[hammer]` and `[[sensor]]`: which channel carries what.
 
-use super::beam::along;
 use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
-use super::keys;
-use super::limits::Limits;
+use super::reader::Limits;
 use super::reader::{Entry, Table};
+use super::structure::along;
 use super::{
     BeamDescription, ChannelPlace, ChannelRef, HammerDescription, RecordingDescription, Scale,
-    SensorDescription, SensorKind,
+    SensorDescription, SensorKind, keys,
 };
 use tapjoint_numerics::quantity::Dimension;
 
@@ -199,7 +198,7 @@ fn check_mass(
     if mass > beam_mass {
         let usual = format!(
             "less than the beam's {}",
-            super::error::with_unit(beam_mass, "kg")
+            crate::error::with_unit(beam_mass, "kg")
         );
         let question = "did you mean g? Write \"24 g\"";
         let doubt = Doubt::Implausible {

@@ -1,9 +1,12 @@
 //! How a laboratory carries out a test. The defaults are those of a decent one: calibrated sensors
 //! glued or screwed on, a 24-bit recorder with an anti-alias filter, a practised hand.
+//!
+//! Why a described test cannot be simulated.
 
+use super::hammer::HammerSettings;
 use serde::Serialize;
-
-use super::pulse::PulseShape;
+use tapjoint_beam::StructureError;
+use tapjoint_signal::recording::RecordingError;
 
 /// Everything about the laboratory.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -43,84 +46,6 @@ impl Laboratory {
                 ..RecorderSettings::default()
             },
             specimen: SpecimenSettings::default(),
-        }
-    }
-}
-
-/// Tip of the hammer, which makes the pulse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Tip {
-    /// 0.3 ms, excites to 3.3 kHz.
-    Steel,
-    /// 1.4 ms, excites to 1 kHz.
-    Nylon,
-    /// 5 ms, excites to 290 Hz.
-    Rubber,
-}
-
-impl Tip {
-    /// From the softest to the hardest.
-    pub const ALL: [Self; 3] = [Self::Rubber, Self::Nylon, Self::Steel];
-
-    /// Length (s) and shape of its pulse on a beam of some hundred grams.
-    pub fn pulse(self) -> (f64, PulseShape) {
-        match self {
-            Self::Steel => (0.3e-3, PulseShape::SineSquared),
-            Self::Nylon => (1.4e-3, PulseShape::SineFourth),
-            Self::Rubber => (5e-3, PulseShape::SineFourth),
-        }
-    }
-
-    /// The softest that excites to this frequency (Hz): what good practice takes.
-    pub fn softest_for(frequency: f64) -> Self {
-        let reaches = |tip: &Self| {
-            let (length, shape) = tip.pulse();
-            shape.half_amplitude_frequency(length) >= frequency
-        };
-        Self::ALL.into_iter().find(reaches).unwrap_or(Self::Steel)
-    }
-}
-
-/// The hammer and the hand that swings it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HammerSettings {
-    /// Tip; `None` = the softest that excites the whole band.
-    pub tip: Option<Tip>,
-    /// Peak force at level 1 (N). 20: a light tap, so that recorders do not clip.
-    pub peak_force: f64,
-    /// Number of taps in each recording. 5, what good practice asks for.
-    pub taps: usize,
-    /// Time from tap to tap (s); `None` = until the slowest mode has rung down to 0.1 % and a described
-    /// block fits, at least 1 s and at most 10 s.
-    pub interval: Option<f64>,
-    /// Quiet time before the first tap (s). 0.5: room for the pre-trigger.
-    pub lead: f64,
-    /// How much the taps' peaks differ (1, standard deviation). 0.1: a practised hand.
-    pub level_scatter: f64,
-    /// How much the pulses' lengths differ (1, standard deviation). 0.03.
-    pub length_scatter: f64,
-    /// How far from the marked place the taps strike (m, standard deviation). 0.5 mm: a marked place.
-    pub place_scatter: f64,
-    /// Part of the taps that strike twice (1). 0.
-    pub double_hits: f64,
-    /// Part of the taps that are far too weak (1). 0.
-    pub weak_hits: f64,
-}
-
-impl Default for HammerSettings {
-    fn default() -> Self {
-        Self {
-            tip: None,
-            peak_force: 20.0,
-            taps: 5,
-            interval: None,
-            lead: 0.5,
-            level_scatter: 0.1,
-            length_scatter: 0.03,
-            place_scatter: 0.5e-3,
-            double_hits: 0.0,
-            weak_hits: 0.0,
         }
     }
 }
@@ -246,4 +171,133 @@ impl Damping {
             }
         }
     }
+}
+
+/// Why a described test cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulateError {
+    /// Nothing is to be recorded.
+    #[error(
+        "there is no recording to simulate; add [[recording]] with `file` and `tap` in place of [measured]"
+    )]
+    NoRecordings,
+    /// No sensor to record with.
+    #[error("there is no sensor to record with; add [[sensor]] with `name` and `position`")]
+    NoSensors,
+    /// The hammer's place is missing.
+    #[error(
+        "line {line}: {file}: where the hammer strikes is missing; add `tap` (m along the beam)"
+    )]
+    NoTap {
+        /// The recording.
+        file: String,
+        /// Its line in the description.
+        line: usize,
+    },
+    /// Frequency response functions are not recorded.
+    #[error(
+        "line {line}: {file} is a file of frequency response functions, and time series are simulated; remove `form`"
+    )]
+    Responses {
+        /// The recording.
+        file: String,
+        /// Its line in the description.
+        line: usize,
+    },
+    /// Two recordings have one file and are not the same.
+    #[error(
+        "line {line}: {file} was described before with another `tap`, `level`, `at` or `mass`; give each recording a file of its own"
+    )]
+    SameFile {
+        /// The file.
+        file: String,
+        /// The second one's line in the description.
+        line: usize,
+    },
+    /// A sensor without a place.
+    #[error("sensor {name}: its place is missing; add `position` (m along the beam)")]
+    NoPosition {
+        /// The sensor.
+        name: String,
+    },
+    /// A microphone.
+    #[error("sensor {name}: sound is not simulated; leave the sensor out")]
+    Sound {
+        /// The sensor.
+        name: String,
+    },
+    /// The joint's stiffness is not given.
+    #[error(
+        "the joint's stiffness is not given: {missing} missing; add {keys} to [joint], or give --kx and --ky"
+    )]
+    NoJoint {
+        /// What is missing.
+        missing: &'static str,
+        /// What to add.
+        keys: &'static str,
+    },
+    /// A reading bias needs no simulator.
+    #[error(
+        "`resolution` is a bias of reading frequencies, which no recording contains; plant it in [measured]"
+    )]
+    Resolution,
+    /// An effect that acts on sensors of unknown mass alone.
+    #[error(
+        "`sensor-mass` is the mass of sensors that the description does not state, and it states that of every sensor; \
+         remove `mass` from the [[sensor]] that shall weigh more than is known"
+    )]
+    NothingToWeigh,
+    /// A non-linear joint without a rotational spring.
+    #[error(
+        "`joint-nonlinearity` needs a joint that turns: its rotational stiffness is {stiffness} N m/rad, and must be positive and finite"
+    )]
+    NoRotation {
+        /// The stiffness given.
+        stiffness: f64,
+    },
+    /// The sample rate is too low for the band.
+    #[error(
+        "{file}: a sample rate of {rate} Hz reaches to {reach} Hz, and the band ends at {band} Hz; give at least {needed} Hz"
+    )]
+    RateTooLow {
+        /// The recording.
+        file: String,
+        /// The rate (Hz).
+        rate: u32,
+        /// What it reaches to (Hz).
+        reach: f64,
+        /// Where the band ends (Hz).
+        band: f64,
+        /// What is needed (Hz).
+        needed: f64,
+    },
+    /// A number of the laboratory that cannot be.
+    #[error("{quantity} is {value}, but must be {allowed}")]
+    Setting {
+        /// Which.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// The structure cannot exist.
+    #[error("the structure cannot be simulated: {0}")]
+    Structure(#[from] StructureError),
+    /// A joint whose moment has its crest below the hardest tap's rotation.
+    #[error(
+        "joint-nonlinearity: ratio {ratio} with exponent {exponent} is past the crest of the joint's moment, \
+         beyond which it would let go of the beam; allowed: {least:.3} and above"
+    )]
+    SoftensTooFar {
+        /// Relative change of the secant at the hardest tap (1).
+        ratio: f64,
+        /// Power of the amplitude.
+        exponent: f64,
+        /// The least ratio that can be simulated (1).
+        least: f64,
+    },
+    /// The recording cannot be written.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }

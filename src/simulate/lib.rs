@@ -9,42 +9,30 @@
 //! What the diagnosis must not see stays here: the truth is an argument and an output of its own,
 //! never a part of the recording.
 
-mod believed;
 mod chain;
-mod check;
-mod collocation;
-mod error;
-mod filters;
 mod hammer;
 mod joint_moment;
-mod joint_motion;
 mod laboratory;
 mod motion;
-mod nominal;
+mod observed_structure;
 mod plan;
-mod pulse;
-mod reduced;
-mod seen;
-mod take;
-mod tap_test;
-mod trial;
+mod recording_run;
 mod truth;
 
-pub use believed::believed_description;
 pub use chain::Signal;
-pub use error::SimulateError;
-pub use hammer::{Tap, TapKind, TapPlan};
+pub use hammer::{HammerSettings, Tap, TapKind, TapPlan, Tip};
+pub use hammer::{Pulse, PulseShape};
 pub use joint_moment::{JointMoment, Slider};
+pub use laboratory::SimulateError;
 pub use laboratory::{
-    AntiAlias, Damping, HammerSettings, Laboratory, RecorderSettings, SensorSettings,
-    SpecimenSettings, Tip,
+    AntiAlias, Damping, Laboratory, RecorderSettings, SensorSettings, SpecimenSettings,
 };
 pub use motion::{Motion, Strike};
-pub use nominal::GivenJoint;
+pub use observed_structure::GivenJoint;
+pub use observed_structure::SeenStructure;
+pub use observed_structure::{ReducedMode, ReducedStructure, Sensed, StruckPlace};
 pub use plan::{TestPlan, VirtualRecording, VirtualTest, plan_test, wav_name};
-pub use pulse::{Pulse, PulseShape};
-pub use reduced::{ReducedMode, ReducedStructure, Sensed, StruckPlace};
-pub use seen::SeenStructure;
-pub use take::{Take, TakePlan};
-pub use tap_test::{SimulatedMode, TapTest, TapTestSettings, seen_modes, simulate_tap_test};
+pub use recording_run::{SimulatedMode, TapTest, TapTestSettings, seen_modes, simulate_tap_test};
+pub use recording_run::{Take, TakePlan};
+pub use truth::believed_description;
 pub use truth::{JointTruth, LawTruth, ModeTruth, PlantedEffect, RecordingTruth, Truth, truth_of};

@@ -3,7 +3,8 @@
 //! stiffness estimated from it.
 
 pub mod blind_check;
-pub mod paper;
+
 pub mod plan;
+pub mod publication;
 pub mod resolution;
 pub mod updated_model;

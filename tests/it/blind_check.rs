@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use tapjoint::effects::{EffectId, Place};
+use tapjoint::gap::Verdict;
 use tapjoint::study::blind_check::{
-    Answer, Case, Class, Extent, Planted, Rate, Row, Target, Truth, Verdict, always_scale,
-    parse_truths, render_rows, rows, score, shuffled,
+    Answer, Case, Class, Extent, Planted, Rate, Row, Target, Truth, always_scale, parse_truths,
+    render_rows, rows, score, shuffled,
 };
 
 fn planted(name: &str, effects: &[EffectId], size: f64) -> Truth {
@@ -36,8 +37,8 @@ fn answer(verdict: Verdict, class: Class, p: f64) -> Answer {
     } else {
         Class::None
     };
-    let effects = match (verdict, class) {
-        (Verdict::Named, Class::Group(group)) => EffectId::ALL
+    let effects: Vec<EffectId> = match (&verdict, class) {
+        (Verdict::Named(_), Class::Group(group)) => EffectId::ALL
             .iter()
             .copied()
             .filter(|id| id.group() == group)
@@ -47,7 +48,10 @@ fn answer(verdict: Verdict, class: Class, p: f64) -> Answer {
     };
     let place = effects.first().map(|id: &EffectId| id.place());
     Answer {
-        verdict,
+        verdict: Some(match verdict {
+            Verdict::Named(_) => Verdict::Named(effects.clone()),
+            other => other,
+        }),
         parameters: effects
             .iter()
             .map(|id| (*id, id.size_parameters()[0].to_owned(), 1.1))
@@ -70,11 +74,11 @@ fn cases() -> Vec<Case> {
     vec![
         (
             planted("right", &[SensorMass], 1.0),
-            answer(Verdict::Named, group(SensorMass), 0.95),
+            answer(Verdict::Named(Vec::new()), group(SensorMass), 0.95),
         ),
         (
             planted("wrong", &[AddedMass], 1.0),
-            answer(Verdict::Named, group(JointMass), 0.85),
+            answer(Verdict::Named(Vec::new()), group(JointMass), 0.85),
         ),
         (
             planted("missed", &[CrossCoupling], 1.0),
@@ -82,7 +86,7 @@ fn cases() -> Vec<Case> {
         ),
         (
             planted("called", &[], 1.0),
-            answer(Verdict::Named, group(JointMass), 0.85),
+            answer(Verdict::Named(Vec::new()), group(JointMass), 0.85),
         ),
         (
             planted("clean", &[], 1.0),
@@ -94,7 +98,7 @@ fn cases() -> Vec<Case> {
         ),
         (
             planted("two", &[SensorMass, CrossCoupling], 1.0),
-            answer(Verdict::Named, group(SensorMass), 0.95),
+            answer(Verdict::Named(Vec::new()), group(SensorMass), 0.95),
         ),
     ]
 }
@@ -157,7 +161,7 @@ fn prop_mutations_lose() {
             let class = group(*id);
             (
                 planted(id.name(), &[*id], 1.0),
-                answer(Verdict::Named, class, 0.95),
+                answer(Verdict::Named(Vec::new()), class, 0.95),
             )
         })
         .collect();
@@ -192,7 +196,7 @@ fn prop_rates_do_not_depend_on_the_order_of_cases() {
 
 #[test]
 fn limit_one_recording_is_held_against_an_ideal_observer_and_no_target_of_five() {
-    let wrong = answer(Verdict::Named, group(EffectId::LocalCrack), 0.9);
+    let wrong = answer(Verdict::Named(Vec::new()), group(EffectId::LocalCrack), 0.9);
     let missed: Vec<Case> = vec![(planted("a", &[EffectId::SensorMass], 1.0), wrong)];
     let with = |extent| rows(&score(&missed), extent);
     let of = |rows: &[Row], key: &str| rows.iter().find(|row| row.key == key).unwrap().clone();

@@ -9,7 +9,7 @@ use tapjoint::description::TestDescription;
 use tapjoint::pipeline::tested_structure;
 use tapjoint::structure::JointStiffness;
 use tapjoint::study::resolution::{
-    EstimateMethod, ReadingName, ResolutionSettings, ResolutionStudy, StudiedTest, WindowName,
+    EstimateMethod, ReadBy, ResolutionSettings, ResolutionStudy, StudiedTest, WindowName,
     formula_percent, study_resolution,
 };
 
@@ -36,7 +36,7 @@ fn studied(text: &str, joint: JointStiffness, bands: &[(f64, f64)]) -> StudiedTe
     StudiedTest::of_description(&test, &tested_structure(&test), joint, bands)
 }
 
-fn settings(blocks: &[usize], readings: &[ReadingName], draws: usize) -> ResolutionSettings {
+fn settings(blocks: &[usize], readings: &[ReadBy], draws: usize) -> ResolutionSettings {
     ResolutionSettings {
         blocks: blocks.to_vec(),
         readings: readings.to_vec(),
@@ -59,7 +59,7 @@ fn val_half_lines_of_the_paper() {
     );
     let found = study(
         &cantilever(""),
-        &settings(&[2048, 4096], &[ReadingName::Line], 2),
+        &settings(&[2048, 4096], &[ReadBy::Line], 2),
     );
     let lines: Vec<_> = found
         .blocks
@@ -85,7 +85,7 @@ fn val_line_readings_err_by_the_spacing_over_root_twelve() {
     // Truths uniform over a line leave errors uniform over it, of rms spacing/sqrt 12.
     let found = study(
         &cantilever(""),
-        &settings(&[512, 1024], &[ReadingName::Line], 1000),
+        &settings(&[512, 1024], &[ReadBy::Line], 1000),
     );
     let rows: Vec<_> = found
         .frequency_errors
@@ -110,10 +110,7 @@ fn val_line_readings_err_by_the_spacing_over_root_twelve() {
 
 #[test]
 fn limit_small_errors_reach_the_stiffness_to_first_order() {
-    let found = study(
-        &cantilever(""),
-        &settings(&[4096], &[ReadingName::Line], 400),
-    );
+    let found = study(&cantilever(""), &settings(&[4096], &[ReadBy::Line], 400));
     assert_eq!(found.stiffness_errors.len(), 4);
     for row in &found.stiffness_errors {
         let ratio = row.rms_percent.unwrap() / row.line_rms_percent.unwrap();
@@ -130,14 +127,14 @@ fn limit_small_errors_reach_the_stiffness_to_first_order() {
 fn limit_without_noise_fits_leave_nothing() {
     let quiet = ResolutionSettings {
         noise_db: 200.0,
-        ..settings(&[2048], &[ReadingName::Fit, ReadingName::Line], 6)
+        ..settings(&[2048], &[ReadBy::Fit, ReadBy::Line], 6)
     };
     let found = study(&cantilever(""), &quiet);
     let fits = || {
         found
             .frequency_errors
             .iter()
-            .filter(|row| row.reading == ReadingName::Fit)
+            .filter(|row| row.reading == ReadBy::Fit)
     };
     for row in fits() {
         assert_eq!(row.own, row.draws, "{row:?}");
@@ -147,7 +144,7 @@ fn limit_without_noise_fits_leave_nothing() {
     let fitted = found
         .stiffness_errors
         .iter()
-        .filter(|row| row.reading == ReadingName::Fit);
+        .filter(|row| row.reading == ReadBy::Fit);
     for row in fitted {
         assert!(row.rms_percent.unwrap() < 1e-3, "{row:?}");
     }
@@ -156,7 +153,7 @@ fn limit_without_noise_fits_leave_nothing() {
 #[test]
 fn prop_the_same_study_on_any_number_of_threads() {
     let test = cantilever("");
-    let settings = settings(&[512, 2048], &ReadingName::ALL, 12);
+    let settings = settings(&[512, 2048], &ReadBy::ALL, 12);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -204,7 +201,7 @@ fn limit_every_kind_of_structure_and_window_has_a_study() {
                 WindowName::Exponential,
                 WindowName::Hann,
             ],
-            ..settings(&[8192], &[ReadingName::Interpolated], 10)
+            ..settings(&[8192], &[ReadBy::Interpolated], 10)
         };
         let found = study(&test, &settings);
         let names: Vec<_> = found.stiffnesses.iter().map(|s| s.parameter).collect();

@@ -10,7 +10,7 @@ use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies, natural_lambdas,
     natural_lambdas_of_any_joint,
 };
-use tapjoint::study::paper::{Printed, Reproduction, Table, Verdict, render, reproduce};
+use tapjoint::study::publication::{Printed, Reproduction, Table, Verdict, render, reproduce};
 
 /// A printed table as (header, rows of text).
 fn read(text: &'static str) -> (Vec<&'static str>, Vec<Vec<&'static str>>) {

@@ -175,7 +175,7 @@ fn cases_csv(cases: &[Case]) -> String {
             quoted(&planted.join("+")),
             yes_or_no(truth.detectable),
             yes_or_no(truth.refutable),
-            answer.verdict.name(),
+            answer.verdict_name(),
             named.join("+"),
         ));
     }

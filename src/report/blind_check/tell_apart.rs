@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::super::charts::blind_check::classes;
-use tapjoint_study::blind_check::{
-    Case, Class, Row, Scores, Target, Verdict, render_rows, rows, score,
-};
+use tapjoint_diagnosis::Verdict;
+use tapjoint_study::blind_check::{Case, Class, Row, Scores, Target, render_rows, rows, score};
 
 /// What the columns say.
 const EXPLAINED: &str = "first: the diagnosis puts its kind first; named: the verdict gives it as the\n\
@@ -33,11 +32,11 @@ pub fn tell_apart(cases: &[Case]) -> String {
         let named = own
             .iter()
             .filter(|(_, answer)| match answer.verdict {
-                Verdict::Named => answer
+                Some(Verdict::Named(_)) => answer
                     .named_groups()
                     .iter()
                     .any(|g| Class::Group(*g) == class),
-                Verdict::NoGap => class == Class::None,
+                Some(Verdict::NoGap) => class == Class::None,
                 _ => false,
             })
             .count();

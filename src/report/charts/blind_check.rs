@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 
 use tapjoint_beam::effects::EffectId;
-use tapjoint_study::blind_check::{Calibration, Case, CaseKind, Class, Verdict};
+use tapjoint_diagnosis::Verdict;
+use tapjoint_study::blind_check::{Calibration, Case, CaseKind, Class};
 
 use super::super::chart::{Axis, Block, Chart, Color, Mark, Panel, Series};
 
@@ -146,7 +147,7 @@ fn closures(cases: &[Case], right: bool) -> Vec<f64> {
         let CaseKind::Single(id) = truth.kind() else {
             return None;
         };
-        let named = answer.verdict == Verdict::Named;
+        let named = matches!(answer.verdict, Some(Verdict::Named(_)));
         let is_right = answer.named_groups() == [id.group()];
         answer.closure.filter(|_| named && is_right == right)
     });

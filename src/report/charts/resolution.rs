@@ -1,6 +1,6 @@
 //! The study of resolution: rms errors over block size, a panel for each reading.
 
-use tapjoint_study::resolution::{EstimateMethod, ReadingName, ResolutionStudy, WindowName};
+use tapjoint_study::resolution::{EstimateMethod, ReadBy, ResolutionStudy, WindowName};
 
 use super::super::chart::axis::{Axis, Tick, extent};
 use super::super::chart::{Block, Chart, Color, Mark, Panel, Series};
@@ -13,9 +13,9 @@ const MOST_BLOCKS: usize = 5;
 pub fn resolution(study: &ResolutionStudy) -> Chart {
     let window = study.answers.first();
     let window = window.map_or(WindowName::Automatic, |answer| answer.window);
-    let mut readings: Vec<ReadingName> = study.answers.iter().map(|one| one.reading).collect();
+    let mut readings: Vec<ReadBy> = study.answers.iter().map(|one| one.reading).collect();
     readings.dedup();
-    readings.truncate(ReadingName::ALL.len());
+    readings.truncate(ReadBy::ALL.len());
     let frequencies = readings
         .iter()
         .map(|reading| mode_curves(study, window, *reading));
@@ -62,7 +62,7 @@ pub fn resolution(study: &ResolutionStudy) -> Chart {
 /// A panel for each reading, all with the same vertical axis.
 fn panels(
     study: &ResolutionStudy,
-    readings: &[ReadingName],
+    readings: &[ReadBy],
     label: &str,
     curves: Vec<Vec<Series>>,
 ) -> Vec<Panel> {
@@ -79,9 +79,9 @@ fn panels(
     let mut panels = Vec::new();
     for (reading, series) in readings.iter().zip(curves) {
         let title = match reading {
-            ReadingName::Line => "read on the line",
-            ReadingName::Interpolated => "read between the lines",
-            ReadingName::Fit => "fitted",
+            ReadBy::Line => "read on the line",
+            ReadBy::Interpolated => "read between the lines",
+            ReadBy::Fit => "fitted",
         };
         let y = Axis::logarithmic(low / 1.5, high * 1.5).of(label, "%");
         panels.push(Panel::new(300.0, x.clone(), y).titled(title).with(series));
@@ -107,7 +107,7 @@ fn marked(name: &str, color: Color, mark: Mark, points: Vec<(f64, f64)>) -> [Ser
 }
 
 /// Errors of the frequencies in percent of each, and their half lines.
-fn mode_curves(study: &ResolutionStudy, window: WindowName, reading: ReadingName) -> Vec<Series> {
+fn mode_curves(study: &ResolutionStudy, window: WindowName, reading: ReadBy) -> Vec<Series> {
     let mut curves = Vec::new();
     for (index, mode) in study.modes.iter().enumerate() {
         let color = Color::curve(index);
@@ -131,11 +131,7 @@ fn mode_curves(study: &ResolutionStudy, window: WindowName, reading: ReadingName
 }
 
 /// Errors of the stiffnesses, the largest that half lines make of them, and the wanted accuracy.
-fn stiffness_curves(
-    study: &ResolutionStudy,
-    window: WindowName,
-    reading: ReadingName,
-) -> Vec<Series> {
+fn stiffness_curves(study: &ResolutionStudy, window: WindowName, reading: ReadBy) -> Vec<Series> {
     let mut curves = Vec::new();
     for (index, stiffness) in study.stiffnesses.iter().enumerate() {
         let color = Color::curve(index);

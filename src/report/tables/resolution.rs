@@ -3,7 +3,7 @@
 use super::super::format::{MISSING, optional, significant, trimmed};
 use super::{Column, Table, number};
 use tapjoint_study::resolution::{
-    EstimateMethod, FrequencyError, ReadingName, ResolutionStudy, StiffnessError, StudiedMode,
+    EstimateMethod, FrequencyError, ReadBy, ResolutionStudy, StiffnessError, StudiedMode,
     StudiedStiffness, WindowName,
 };
 
@@ -47,7 +47,7 @@ pub fn resolution_lines(study: &ResolutionStudy) -> Table {
 }
 
 /// The readings that the study has, in its order.
-fn readings(study: &ResolutionStudy) -> Vec<ReadingName> {
+fn readings(study: &ResolutionStudy) -> Vec<ReadBy> {
     let mut readings = Vec::new();
     for answer in &study.answers {
         if !readings.contains(&answer.reading) {
@@ -57,7 +57,7 @@ fn readings(study: &ResolutionStudy) -> Vec<ReadingName> {
     readings
 }
 
-fn reading_columns(readings: &[ReadingName]) -> impl Iterator<Item = Column> + '_ {
+fn reading_columns(readings: &[ReadBy]) -> impl Iterator<Item = Column> + '_ {
     readings.iter().map(|reading| number(reading.name()))
 }
 
@@ -75,7 +75,7 @@ pub fn resolution_frequencies(
     ];
     columns.extend(reading_columns(&readings));
     columns.push(number("Read"));
-    let find = |block: usize, reading: ReadingName| {
+    let find = |block: usize, reading: ReadBy| {
         study.frequency_errors.iter().find(|row| {
             (row.block, row.window, row.reading) == (block, window, reading)
                 && (row.mode, row.band) == (mode.mode, mode.band)
@@ -128,7 +128,7 @@ pub fn resolution_stiffnesses(
     ];
     columns.extend(reading_columns(&readings));
     columns.push(number("Estimated"));
-    let find = |block: usize, reading: ReadingName| {
+    let find = |block: usize, reading: ReadBy| {
         study.stiffness_errors.iter().find(|row| {
             (row.block, row.window, row.reading) == (block, window, reading)
                 && (row.method, row.parameter) == (method, stiffness.parameter)

@@ -1,5 +1,6 @@
 //! One list of modes from several recordings and bands.
 
+use serde::Serialize;
 use std::fmt;
 
 use super::amplitude::AmplitudeCurve;
@@ -39,7 +40,8 @@ pub struct ModeReading {
 }
 
 /// Way of reading a natural frequency, wanted or used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ReadBy {
     /// By a fit of decaying oscillations, with a standard deviation. Modes that cannot be fitted are read
     /// between the lines or on their line.
@@ -49,6 +51,20 @@ pub enum ReadBy {
     Interpolated,
     /// On the highest spectral line, as Ingole & Chatterjee read their frequencies.
     Line,
+}
+
+impl ReadBy {
+    /// All ways, from the coarsest to the finest.
+    pub const ALL: [Self; 3] = [Self::Line, Self::Interpolated, Self::Fit];
+
+    /// Name in descriptions and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Interpolated => "interpolated",
+            Self::Fit => "fit",
+        }
+    }
 }
 
 impl ModeReading {

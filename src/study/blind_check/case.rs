@@ -1,8 +1,10 @@
 //! What was planted in a test, and what the diagnosis answered: all that the score sees.
+//!
+//! What the score needs of a diagnosis.
 
 use std::collections::BTreeMap;
-
 use tapjoint_beam::effects::{EffectId, Group, Place};
+use tapjoint_diagnosis::{Diagnosis, Hypothesis, Verdict};
 
 /// What a diagnosis chooses between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -93,45 +95,11 @@ impl Truth {
     }
 }
 
-/// Kinds of verdicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// The nominal model explains the data.
-    NoGap,
-    /// One effect, or the two that are needed.
-    Named,
-    /// One group of effects that cannot be told apart.
-    Group,
-    /// A short list.
-    Set,
-    /// Something that the catalogue does not explain.
-    Unknown,
-    /// Too few data for the question.
-    NotEnoughData,
-    /// The test could not be analysed or diagnosed.
-    NoAnswer,
-}
-
-impl Verdict {
-    /// As in the report.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NoGap => "no-gap",
-            Self::Named => "named",
-            Self::Group => "group",
-            Self::Set => "set",
-            Self::Unknown => "unknown",
-            Self::NotEnoughData => "not-enough-data",
-            Self::NoAnswer => "no-answer",
-        }
-    }
-}
-
 /// What the diagnosis said of one test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
-    /// Its verdict.
-    pub verdict: Verdict,
+    /// Verdict of the diagnosis; `None` where the test could not be analysed or diagnosed.
+    pub verdict: Option<Verdict>,
     /// The effects that the verdict names.
     pub effects: Vec<EffectId>,
     /// Probability of each class, adding to 1.
@@ -145,6 +113,11 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Name of the verdict, as in the report; "no-answer" where there is none.
+    pub fn verdict_name(&self) -> &'static str {
+        self.verdict.as_ref().map_or("no-answer", Verdict::kind)
+    }
+
     /// The most probable class, and its probability.
     pub fn first(&self) -> Option<(Class, f64)> {
         self.ranked().into_iter().next()
@@ -187,4 +160,88 @@ impl Answer {
         groups.dedup();
         groups
     }
+}
+
+impl Answer {
+    /// Of a diagnosis.
+    pub fn of(diagnosis: &Diagnosis) -> Self {
+        let effects = match &diagnosis.verdict {
+            Verdict::Named(effects) | Verdict::Group(effects) => effects.clone(),
+            Verdict::Set(list) => listed(list),
+            Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
+        };
+        let named = diagnosis
+            .hypotheses
+            .iter()
+            .find(|found| matches!(&found.hypothesis, Hypothesis::Effects(own) if *own == effects));
+        let parameters = named.map(|found| {
+            let values = found.parameters.iter();
+            values
+                .map(|value| (value.effect, value.name.to_owned(), value.value))
+                .collect()
+        });
+        Self {
+            verdict: Some(diagnosis.verdict.clone()),
+            classes: classes(diagnosis),
+            places: places(diagnosis),
+            parameters: parameters.unwrap_or_default(),
+            closure: named
+                .and_then(|found| found.closure)
+                .map(|closure| closure.value),
+            effects,
+        }
+    }
+
+    /// Of a test that could not be diagnosed: no verdict and no probabilities.
+    pub fn none() -> Self {
+        Self {
+            verdict: None,
+            effects: Vec::new(),
+            classes: BTreeMap::new(),
+            places: Vec::new(),
+            parameters: Vec::new(),
+            closure: None,
+        }
+    }
+}
+
+fn listed(list: &[Hypothesis]) -> Vec<EffectId> {
+    let effects = list.iter().filter_map(|hypothesis| match hypothesis {
+        Hypothesis::Effects(effects) => Some(effects.as_slice()),
+        Hypothesis::None | Hypothesis::Unknown => None,
+    });
+    effects.flatten().copied().collect()
+}
+
+/// Probabilities by group. Hypotheses of two effects belong to no class; the rest is made to add to 1.
+fn classes(diagnosis: &Diagnosis) -> BTreeMap<Class, f64> {
+    let mut classes = BTreeMap::new();
+    for found in &diagnosis.hypotheses {
+        let class = match &found.hypothesis {
+            Hypothesis::None => Class::None,
+            Hypothesis::Unknown => Class::Unknown,
+            Hypothesis::Effects(effects) => match effects[..] {
+                [one] => Class::Group(one.group()),
+                _ => continue,
+            },
+        };
+        *classes.entry(class).or_insert(0.0) += found.probability;
+    }
+    let sum: f64 = classes.values().sum();
+    if sum > 0.0 {
+        classes.values_mut().for_each(|p| *p /= sum);
+    }
+    classes
+}
+
+fn places(diagnosis: &Diagnosis) -> Vec<(Option<Place>, f64)> {
+    let p = &diagnosis.locations;
+    vec![
+        (Some(Place::Joint), p.joint),
+        (Some(Place::Fixture), p.fixture),
+        (Some(Place::Sensor), p.sensor),
+        (Some(Place::Body), p.body),
+        (Some(Place::Acquisition), p.acquisition),
+        (None, p.unknown),
+    ]
 }

@@ -4,25 +4,35 @@
 //! All tests of a campaign look alike from outside: a cantilever that is described as an Euler beam
 //! with two springs and sensors without mass, so that the description does not give the effect away.
 //! Sizes are drawn from small to large as a test engineer meets them, positions off any grid.
+//!
+//! What the readings of a drawn test can show at all, by what was planted and not by what was answered.
+//!
+//! Records a drawn test.
 
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
-
+use super::case::{CaseKind, Planted, Truth};
+use super::planted_effects::{Fastened, GROUPS, OutsideKind, draw_effect};
+use crate::plan::{NOTICED, PlanError, PlanSettings, plan_of};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-
-use super::case::{Planted, Truth};
-use super::outside::{Fastened, OutsideKind};
-use super::sizes::{GROUPS, draw_effect};
-use crate::plan::PlanError;
-use tapjoint_beam::StructureError;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use tapjoint_analysis::nominal_with;
 use tapjoint_beam::effects::{Effect, EffectError, EffectId};
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies};
+use tapjoint_beam::{
+    Assembly, Beam, BeamTheory, JointStiffness, StructureError, natural_frequencies,
+};
 use tapjoint_description::{DescriptionError, TestDescription};
-use tapjoint_diagnosis::GapError;
-use tapjoint_simulate::{Damping, Laboratory, SimulateError};
+use tapjoint_diagnosis::{
+    GapError, GapSettings, Hypothesis, diagnose, nominal_chi_square, observe,
+};
+use tapjoint_identify::observation::Observations;
+use tapjoint_numerics::stats::{chi_square_quantile, root_mean_square};
+use tapjoint_simulate::{
+    Damping, Laboratory, SeenStructure, SimulateError, TestPlan, VirtualRecording,
+    believed_description, plan_test,
+};
 
 /// How many recordings a drawn test has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -328,5 +338,179 @@ impl Subject {
         let ratio = |_| random.random_range(0.0015f64.ln()..0.006f64.ln()).exp();
         laboratory.specimen.damping = Damping::Modal((0..8).map(ratio).collect());
         Ok(laboratory)
+    }
+}
+
+/// Relative standard uncertainty of a frequency, mean of five taps at 60 dB: what a steel beam's
+/// temperature leaves, since the noise is smaller.
+const FREQUENCY_STD: f64 = 5e-5;
+
+impl DrawnTest {
+    /// The truth, with what readings without scatter show of it: whether the nominal model misses them by
+    /// what is noticed nine times out of ten (one effect), whether so do both of two effects alone (two
+    /// effects), and whether the best of the catalogue misses them so far that with the usual scatter chi
+    /// square would exceed its 1 % limit (outside it).
+    ///
+    /// # Errors
+    /// [`DrawError`]: a defect of the drawing.
+    pub fn with_limits(&self) -> Result<Truth, DrawError> {
+        let mut truth = self.truth.clone();
+        match truth.kind() {
+            CaseKind::Single(_) => truth.detectable = Some(self.is_detectable()?),
+            CaseKind::Outside => truth.refutable = self.is_refutable()?,
+            CaseKind::Several => truth.detectable = self.are_both_detectable()?,
+            CaseKind::Null => {}
+        }
+        Ok(truth)
+    }
+
+    fn is_detectable(&self) -> Result<bool, DrawError> {
+        let nominal = nominal_with(&self.description, None);
+        let chi_square = nominal_chi_square(&self.exact()?, &nominal, &GapSettings::default())?;
+        Ok(chi_square > NOTICED)
+    }
+
+    /// Whether readings without scatter are missed by each of the planted effects without the others;
+    /// `None` where an effect is no hypothesis of such a test.
+    fn are_both_detectable(&self) -> Result<Option<bool>, DrawError> {
+        let nominal = nominal_with(&self.description, None);
+        let found = diagnose(&self.exact()?, &nominal, &GapSettings::default())?;
+        let alone = |effect: &Effect| {
+            let own = Hypothesis::Effects(vec![effect.id]);
+            let mut all = found.hypotheses.iter();
+            let misfit = all.find(|one| one.hypothesis == own)?.misfit?;
+            Some(misfit.chi_square)
+        };
+        let misses: Option<Vec<f64>> = self.effects.iter().map(alone).collect();
+        Ok(misses.map(|misses| misses.iter().all(|miss| *miss > NOTICED)))
+    }
+
+    fn is_refutable(&self) -> Result<Option<bool>, DrawError> {
+        let nominal = nominal_with(&self.description, None);
+        let found = diagnose(&self.exact()?, &nominal, &GapSettings::default())?;
+        // Scatter adds one for each degree of freedom.
+        Ok(found.misfit.and_then(|misfit| {
+            let limit = chi_square_quantile(0.99, misfit.freedom)?;
+            Some(misfit.chi_square + misfit.freedom > limit)
+        }))
+    }
+
+    /// Readings without scatter, on a mesh and by a code that the diagnosis does not use.
+    fn exact(&self) -> Result<Observations, DrawError> {
+        let settings = PlanSettings {
+            modes: self.modes,
+            frequency_std: FREQUENCY_STD,
+            drift: 0.0,
+            ..PlanSettings::default()
+        };
+        let mut plan = plan_of(&self.description, &settings)?;
+        plan.scatter = 0.0;
+        let mut truth = nominal_with(&self.description, None);
+        self.fastened.add_to(&mut truth.specimen);
+        Ok(observe(&plan, &truth, &self.effects, 0)?)
+    }
+}
+
+/// What the diagnosis is given: recordings, and the description without the truth.
+#[derive(Debug, Clone)]
+pub struct RecordedTest {
+    /// The description's text.
+    pub description: String,
+    /// The recordings.
+    pub recordings: Vec<Recorded>,
+}
+
+/// One recording.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// Its file's name.
+    pub file: String,
+    /// Sample rate (Hz).
+    pub sample_rate: u32,
+    /// The channels, in units of the file.
+    pub channels: Vec<Vec<f64>>,
+}
+
+/// Noise of the hammer's channel lies so far below that of the responses, seen from the peak (dB).
+const FORCE_MARGIN_DB: f64 = 20.0;
+
+impl DrawnTest {
+    /// Records the test.
+    ///
+    /// # Errors
+    /// [`DrawError`]: a defect of the drawing.
+    pub fn record(&self) -> Result<RecordedTest, DrawError> {
+        let plan = TestPlan {
+            description: &self.description,
+            effects: &self.effects,
+            laboratory: &self.laboratory,
+            joint: None,
+            seed: self.seed,
+        };
+        let mut test = plan_test(&plan)?;
+        if !self.fastened.is_empty() {
+            for (number, recording) in test.recordings.iter_mut().enumerate() {
+                self.fasten(recording, number)?;
+            }
+        }
+        let recordings = test.recordings.iter().enumerate();
+        Ok(RecordedTest {
+            description: believed_description(&self.text, &self.description, &test)?,
+            recordings: recordings
+                .map(|(n, recording)| self.take(recording, n))
+                .collect(),
+        })
+    }
+
+    /// Adds what no effect describes, and looks at the structure again.
+    fn fasten(&self, recording: &mut VirtualRecording, number: usize) -> Result<(), DrawError> {
+        self.fastened.add_to(&mut recording.seen.specimen);
+        let moved = &self.description.recordings[number].at;
+        let place = |sensor: &tapjoint_description::SensorDescription| {
+            moved.get(&sensor.name).copied().or(sensor.position)
+        };
+        let places: Vec<f64> = self.description.sensors.iter().filter_map(place).collect();
+        recording.structure = SeenStructure::new(
+            &recording.seen.specimen,
+            &self.laboratory.specimen,
+            &places,
+            (
+                recording.seen.joint_loss_factor,
+                recording.take.highest_mode(&self.laboratory),
+            ),
+        )?;
+        Ok(())
+    }
+
+    fn take(&self, recording: &VirtualRecording, number: usize) -> Recorded {
+        let mut session = recording.begin(&self.laboratory);
+        let count = recording.take.channels.len();
+        let mut channels = vec![Vec::with_capacity(recording.take.frames as usize); count];
+        let mut frame = vec![0.0; count];
+        while session.next_frame(&mut frame) {
+            for (channel, value) in channels.iter_mut().zip(&frame) {
+                channel.push(*value);
+            }
+        }
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        // Beyond the streams of the recording itself.
+        random.set_stream(1 << 50 | number as u64);
+        for (index, channel) in channels.iter_mut().enumerate() {
+            let level = if index == 0 {
+                let peak = channel.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
+                peak * 10f64.powf(-(self.noise_db + FORCE_MARGIN_DB) / 20.0)
+            } else {
+                root_mean_square(channel) * 10f64.powf(-self.noise_db / 20.0)
+            };
+            for value in channel {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                *value += level * noise;
+            }
+        }
+        Recorded {
+            file: recording.file.clone(),
+            sample_rate: recording.take.sample_rate,
+            channels,
+        }
     }
 }

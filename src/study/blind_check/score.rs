@@ -1,9 +1,19 @@
 //! The score of a blind check: how often the answers were right, each rate with its interval.
+//!
+//! A rate of right answers and what so many cases can say of it.
+//!
+//! Whether stated probabilities are what they say: Brier's score and a reliability table.
+//!
+//! Checks of the check: answers that cannot know must score as if they did not know.
 
-use super::calibration::{Calibration, calibrate};
-use super::case::{Answer, CaseKind, Class, Planted, Truth, Verdict};
-use super::rate::Rate;
+use super::case::{Answer, CaseKind, Class, Planted, Truth};
+use super::draw::Extent;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use statrs::distribution::{Beta, ContinuousCDF};
 use tapjoint_beam::effects::{EffectId, Group, Place};
+use tapjoint_diagnosis::Verdict;
 
 /// Share of the probability that an answer's set holds.
 pub const SET_SHARE: f64 = 0.9;
@@ -85,7 +95,7 @@ pub fn score(cases: &[Case]) -> Scores {
         counts: kinds.map(|kind| of(kind).count()),
         failed: cases
             .iter()
-            .filter(|(_, answer)| answer.verdict == Verdict::NoAnswer)
+            .filter(|(_, answer)| answer.verdict.is_none())
             .count(),
         top_1: Rate::of(of(Kind::Single), |case| rank_within(case, 1)),
         top_1_detectable: Rate::of(of(Kind::Single), |case| {
@@ -110,7 +120,7 @@ pub fn score(cases: &[Case]) -> Scores {
             (truth.refutable == Some(true)).then(|| is_refused(answer))
         }),
         outside_unknown: Rate::of(of(Kind::Outside), |(_, answer)| {
-            Some(answer.verdict == Verdict::Unknown)
+            Some(answer.verdict == Some(Verdict::Unknown))
         }),
         several_found_or_refused: Rate::of(of(Kind::Several), |case| Some(found_or_refused(case))),
         several_detectable: Rate::of(of(Kind::Several), |case| {
@@ -127,7 +137,9 @@ pub fn score(cases: &[Case]) -> Scores {
                 .map(|(_, answer)| answer.set(SET_SHARE).len() as f64),
         ),
         truth_probability: mean(of(Kind::Single).filter_map(|(truth, answer)| {
-            let class = truth.class().filter(|_| answer.verdict != Verdict::NoGap)?;
+            let class = truth
+                .class()
+                .filter(|_| answer.verdict != Some(Verdict::NoGap))?;
             Some(answer.classes.get(&class).copied().unwrap_or(0.0))
         })),
         calibration: calibrate(cases),
@@ -158,21 +170,24 @@ impl Kind {
 }
 
 fn is_named(answer: &Answer) -> bool {
-    answer.verdict == Verdict::Named
+    matches!(answer.verdict, Some(Verdict::Named(_)))
 }
 
 /// Whether somebody who reads the verdict believes in an effect.
 fn calls_effect(answer: &Answer) -> bool {
-    match answer.verdict {
-        Verdict::Named | Verdict::Group => true,
-        Verdict::Set => !answer.set(SET_SHARE).contains(&Class::None),
-        Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData | Verdict::NoAnswer => false,
+    match &answer.verdict {
+        Some(Verdict::Named(_) | Verdict::Group(_)) => true,
+        Some(Verdict::Set(_)) => !answer.set(SET_SHARE).contains(&Class::None),
+        Some(Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_)) | None => false,
     }
 }
 
 /// Neither a name nor a clean bill: the user is told that the catalogue does not decide it.
 fn is_refused(answer: &Answer) -> bool {
-    matches!(answer.verdict, Verdict::Unknown | Verdict::NotEnoughData)
+    matches!(
+        answer.verdict,
+        Some(Verdict::Unknown | Verdict::NotEnoughData(_))
+    )
 }
 
 fn found_or_refused(case: &Case) -> bool {
@@ -272,4 +287,217 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.fold((0.0, 0usize), |(sum, count), x| (sum + x, count + 1));
     (count > 0).then(|| sum / count as f64)
+}
+
+/// So many of so many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Rate {
+    /// Cases that count as hits.
+    pub hits: usize,
+    /// Cases that could have been hits.
+    pub of: usize,
+}
+
+impl Rate {
+    /// Of all cases for which `hit` says something.
+    pub fn of<T>(
+        cases: impl IntoIterator<Item = T>,
+        mut hit: impl FnMut(T) -> Option<bool>,
+    ) -> Self {
+        let mut rate = Self::default();
+        for case in cases {
+            if let Some(hit) = hit(case) {
+                rate.hits += usize::from(hit);
+                rate.of += 1;
+            }
+        }
+        rate
+    }
+
+    /// hits/of; `None` without a case.
+    pub fn value(&self) -> Option<f64> {
+        (self.of > 0).then(|| self.hits as f64 / self.of as f64)
+    }
+
+    /// The 95 % interval of the true rate (Clopper & Pearson 1934), which never covers less than it
+    /// says: the rates at which so many hits or more, or so few or less, have a chance of 2.5 %.
+    /// `None` without a case.
+    pub fn interval(&self) -> Option<(f64, f64)> {
+        if self.of == 0 {
+            return None;
+        }
+        let quantile = |first: usize, second: usize, chance: f64| {
+            Beta::new(first as f64, second as f64).map(|beta| beta.inverse_cdf(chance))
+        };
+        let misses = self.of - self.hits;
+        let low = match self.hits {
+            0 => 0.0,
+            hits => quantile(hits, misses + 1, 0.025).unwrap_or(0.0),
+        };
+        let high = match misses {
+            0 => 1.0,
+            misses => quantile(self.hits + 1, misses, 0.975).unwrap_or(1.0),
+        };
+        Some((low, high))
+    }
+}
+
+/// Bins of the reliability table, equal in width.
+const BINS: usize = 10;
+
+/// One row of the reliability table: answers whose first class has about this probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReliabilityBin {
+    /// Lower edge of the bin (1).
+    pub from: f64,
+    /// Answers in it.
+    pub cases: usize,
+    /// Their mean stated probability; `None` without a case.
+    pub stated: Option<f64>,
+    /// How many of them were right (1); `None` without a case.
+    pub right: Option<f64>,
+}
+
+/// How far stated probabilities can be trusted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// Mean over cases of the sum over classes of (p - truth)^2, from 0 (certain and right) to 2;
+    /// `None` without a case. It cannot be improved by stating what one does not believe.
+    pub brier: Option<f64>,
+    /// Mean distance between stated probability and share of right answers, weighted by cases.
+    pub expected_calibration_error: Option<f64>,
+    /// The table behind it.
+    pub reliability: Vec<ReliabilityBin>,
+}
+
+/// Judges the probabilities of all cases with one right class.
+pub fn calibrate(cases: &[(Truth, Answer)]) -> Calibration {
+    let cases: Vec<(Class, &Answer)> = cases
+        .iter()
+        .filter_map(|(truth, answer)| Some((truth.class()?, answer)))
+        .collect();
+    let reliability: Vec<ReliabilityBin> = (0..BINS).map(|bin| row(bin, &cases)).collect();
+    let total = cases.len() as f64;
+    let distance = |bin: &ReliabilityBin| {
+        let (stated, right) = bin.stated.zip(bin.right)?;
+        Some(bin.cases as f64 / total * (stated - right).abs())
+    };
+    Calibration {
+        brier: (!cases.is_empty()).then(|| {
+            cases
+                .iter()
+                .map(|(class, answer)| brier(*class, answer))
+                .sum::<f64>()
+                / total
+        }),
+        expected_calibration_error: (!cases.is_empty())
+            .then(|| reliability.iter().filter_map(distance).sum()),
+        reliability,
+    }
+}
+
+/// sum over classes of (p - 1 or 0)^2.
+fn brier(truth: Class, answer: &Answer) -> f64 {
+    let stated = |class: &Class| answer.classes.get(class).copied().unwrap_or(0.0);
+    let others = answer.classes.iter().filter(|(class, _)| **class != truth);
+    (1.0 - stated(&truth)).powi(2) + others.map(|(_, p)| p * p).sum::<f64>()
+}
+
+fn row(bin: usize, cases: &[(Class, &Answer)]) -> ReliabilityBin {
+    let inside: Vec<(bool, f64)> = cases
+        .iter()
+        .filter_map(|(truth, answer)| {
+            let (class, probability) = answer.first()?;
+            let own = ((probability * BINS as f64) as usize).min(BINS - 1);
+            (own == bin).then_some((class == *truth, probability))
+        })
+        .collect();
+    let count = inside.len() as f64;
+    let mean = |sum: f64| (!inside.is_empty()).then(|| sum / count);
+    ReliabilityBin {
+        from: bin as f64 / BINS as f64,
+        cases: inside.len(),
+        stated: mean(inside.iter().map(|(_, p)| p).sum()),
+        right: mean(inside.iter().filter(|(right, _)| *right).count() as f64),
+    }
+}
+
+/// How a check was conducted, and what answers earn that cannot know.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Conduct {
+    /// Recordings of each test; `None` of tests made elsewhere.
+    pub extent: Option<Extent>,
+    /// SHA-256 of the truths, printed before anything was diagnosed; `None` of tests made elsewhere.
+    pub commitment: Option<String>,
+    /// Share of first groups right by answers dealt out to other tests; `None` without a test of one effect.
+    pub shuffled: Option<f64>,
+    /// The same by always answering one common factor on all frequencies.
+    pub always_scale: Option<f64>,
+    /// Tests that were diagnosed again under other names of their files, with the same answer.
+    pub renamed: usize,
+}
+
+impl Conduct {
+    /// With what the answers earn once they are dealt out to other tests, and once they are all the same.
+    pub fn mutated(self, cases: &[Case], seed: u64) -> Self {
+        Conduct {
+            shuffled: score(&shuffled(cases, seed)).top_1.value(),
+            always_scale: score(&always_scale(cases)).top_1.value(),
+            ..self
+        }
+    }
+}
+
+/// The same answers, dealt out to other cases: what is left is what guessing earns.
+pub fn shuffled(cases: &[Case], seed: u64) -> Vec<Case> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut order: Vec<usize> = (0..cases.len()).collect();
+    order.shuffle(&mut random);
+    let with = |((truth, _), from): (&Case, &usize)| (truth.clone(), cases[*from].1.clone());
+    cases.iter().zip(&order).map(with).collect()
+}
+
+/// What somebody would score who always answers with one common factor on all frequencies.
+pub fn always_scale(cases: &[Case]) -> Vec<Case> {
+    let answer = Answer {
+        verdict: Some(Verdict::Named(vec![EffectId::Modulus])),
+        effects: vec![EffectId::Modulus],
+        classes: [(Class::Group(EffectId::Modulus.group()), 1.0)].into(),
+        places: vec![(Some(EffectId::Modulus.place()), 1.0)],
+        parameters: Vec::new(),
+        closure: None,
+    };
+    let with = |(truth, _): &(Truth, Answer)| (truth.clone(), answer.clone());
+    cases.iter().map(with).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_intervals_of_clopper_and_pearson() {
+        // scipy.stats.binomtest(k, n).proportion_ci(): 8 of 10, 0 of 100, 100 of 100.
+        let close = |rate: Rate, low: f64, high: f64| {
+            let (l, h) = rate.interval().expect("there are cases");
+            // The digits of the table.
+            assert!(
+                (l - low).abs() < 1e-6 && (h - high).abs() < 1e-6,
+                "{rate:?}: {l} {h}"
+            );
+        };
+        close(Rate { hits: 8, of: 10 }, 0.443_905, 0.974_789);
+        close(Rate { hits: 0, of: 100 }, 0.0, 0.036_217);
+        close(Rate { hits: 100, of: 100 }, 0.963_783, 1.0);
+    }
+
+    #[test]
+    fn limit_no_case_has_no_rate() {
+        assert_eq!(
+            (Rate::default().value(), Rate::default().interval()),
+            (None, None)
+        );
+        let rate = Rate::of([Some(true), None, Some(false)], |hit| hit);
+        assert_eq!(rate, Rate { hits: 1, of: 2 });
+    }
 }

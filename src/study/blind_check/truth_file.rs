@@ -5,14 +5,16 @@
 //! there is but one effect. `"detectable"` and `"refutable"` say whether the effect could be noticed, and
 //! whether the catalogue could be seen not to explain it; both may be left out. What a slip of the pen may
 //! have left is told as a doubt: it would change the score without a word.
-
-use std::collections::BTreeMap;
-
-use serde::Deserialize;
-use serde_json::Value;
+//!
+//! A promise that the answers are not changed after the diagnosis has been seen.
 
 use super::case::{Planted, Truth};
-use super::outside::OutsideKind;
+use super::planted_effects::OutsideKind;
+use serde::Deserialize;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use tapjoint_beam::effects::{EffectError, EffectId};
 
 /// Why a truth file cannot be used.
@@ -273,5 +275,31 @@ fn parameters_of(
         Some(Value::Object(own)) => numbers(&mut own.iter()),
         _ if alone => numbers(&mut params.iter()),
         _ => BTreeMap::new(),
+    }
+}
+
+/// SHA-256 of a text, in hexadecimal digits. Printed before the diagnosis begins; whoever has the
+/// text can check afterwards that it is the one that was meant.
+pub fn commitment(text: &str) -> String {
+    Sha256::digest(text.as_bytes())
+        .iter()
+        .fold(String::with_capacity(64), |mut digits, byte| {
+            // Writing to a string cannot fail.
+            let _ = write!(digits, "{byte:02x}");
+            digits
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_the_digest_of_abc() {
+        // FIPS 180-4, example of the standard.
+        assert_eq!(
+            commitment("abc"),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
     }
 }

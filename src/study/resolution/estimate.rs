@@ -1,12 +1,13 @@
 //! From readings to stiffnesses, by both estimators, and how far they are from the draw's truth.
 
-use super::draw::{Truth, Truths};
 use super::plan::{BlockPlan, Layout};
-use super::reading::Read;
-use super::result::{EstimateMethod, ReadingName, StudiedStiffness};
+use super::result::StudiedStiffness;
+use super::virtual_test::{Read, Truth, Truths, index_of};
 use super::{ResolutionError, StudiedTest};
+use tapjoint_analysis::EstimateMethod;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_description::ReadBy;
 use tapjoint_identify::consistent::{
     ConsistentEstimator, ConsistentSettings, HeldJoint, JointedStructure, Neighbourhood, Parameter,
 };
@@ -98,13 +99,13 @@ impl Estimators {
         &self,
         truth: &Truth,
         (plan, bands): (&BlockPlan, &[Vec<[Option<Read>; 3]>]),
-        reading: ReadingName,
+        reading: ReadBy,
     ) -> [ParameterErrors; 2] {
         let modes: Option<Vec<MeasuredMode>> = self
             .used
             .iter()
             .map(|&mode| {
-                let read = read_of(plan, bands, mode)?[reading as usize]?;
+                let read = read_of(plan, bands, mode)?[index_of(reading)]?;
                 Some(MeasuredMode {
                     mode: self.numbers[mode],
                     // The draw's beam is the nominal one but for a factor on its modulus, which is

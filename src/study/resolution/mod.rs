@@ -6,30 +6,29 @@
 //! by the measurement stage, and its joint estimated by the estimators that a real test meets. Each
 //! draw is judged by its own truth, so that nothing but the reading is left in its errors.
 
-mod answer;
-mod described;
-mod draw;
 mod estimate;
 mod plan;
-mod reading;
 mod result;
 mod statistics;
+mod virtual_test;
 
-pub use answer::formula_percent;
 pub use result::{
-    Answer, BandLines, BlockLines, EstimateMethod, FrequencyError, Omitted, ReadingName,
-    ResolutionStudy, StiffnessError, StudiedMode, StudiedStiffness, WindowName,
+    Answer, BandLines, BlockLines, FrequencyError, Omitted, ResolutionStudy, StiffnessError,
+    StudiedMode, StudiedStiffness, WindowName,
 };
+pub use statistics::formula_percent;
+pub use tapjoint_analysis::EstimateMethod;
+pub use tapjoint_description::ReadBy;
 
 use rayon::prelude::*;
 
-use draw::{Truths, drawn};
 use estimate::Estimators;
 use plan::{BlockPlan, Layout};
 use tapjoint_analysis::{StructureDetails, TestedStructure};
 use tapjoint_beam::{JointStiffness, StructureError};
 use tapjoint_identify::IdentifyError;
 use tapjoint_signal::spectral::SpectralError;
+use virtual_test::{Truths, drawn};
 
 /// What is tested virtually.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +60,7 @@ pub struct ResolutionSettings {
     /// Windows. Chosen by the decay, as in a test that asks for none.
     pub windows: Vec<WindowName>,
     /// Readings. All three.
-    pub readings: Vec<ReadingName>,
+    pub readings: Vec<ReadBy>,
     /// Virtual tests for each block size. 1000: an rms error then has a standard error of 1 to 2 %.
     pub draws: usize,
     /// Of these, so many are fitted too. 100: a fit takes longer than all else, and its errors of some
@@ -82,7 +81,7 @@ impl Default for ResolutionSettings {
         ResolutionSettings {
             blocks: (9..=16).map(|power| 1 << power).collect(),
             windows: vec![WindowName::Automatic],
-            readings: ReadingName::ALL.to_vec(),
+            readings: ReadBy::ALL.to_vec(),
             draws: 1000,
             fit_draws: 100,
             damping_ratio: 0.003,
@@ -160,7 +159,7 @@ pub fn study_resolution(
     let mut study = result::empty(test, settings, (&layout, &plans), &estimators);
     for (number, plan) in plans.iter().enumerate() {
         // Collected in order: sums are then the same whatever the number of threads.
-        let outcomes: Vec<draw::Outcome> = (0..settings.draws)
+        let outcomes: Vec<virtual_test::Outcome> = (0..settings.draws)
             .into_par_iter()
             .map(|index| {
                 let outcome = drawn(
@@ -181,6 +180,6 @@ pub fn study_resolution(
             (settings, &layout, &estimators),
         );
     }
-    answer::conclude(&mut study, settings);
+    statistics::conclude(&mut study, settings);
     Ok(study)
 }

@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use super::estimate::Estimators;
 use super::plan::{BlockPlan, Layout};
-use super::{ResolutionSettings, StudiedTest, answer};
+use super::statistics::formula_percent;
+use super::{ResolutionSettings, StudiedTest};
+use tapjoint_analysis::EstimateMethod;
 use tapjoint_description::{ReadBy, WindowKind};
 
 /// A window of the study.
@@ -39,69 +41,6 @@ impl From<WindowKind> for WindowName {
             WindowKind::Rectangular => WindowName::Rectangular,
             WindowKind::Hann => WindowName::Hann,
             WindowKind::Exponential => WindowName::Exponential,
-        }
-    }
-}
-
-/// A way of reading frequencies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ReadingName {
-    /// On the line.
-    Line,
-    /// Between the lines.
-    Interpolated,
-    /// By a fit of the free decay.
-    Fit,
-}
-
-impl ReadingName {
-    /// All, from the coarsest to the finest.
-    pub const ALL: [ReadingName; 3] = [
-        ReadingName::Line,
-        ReadingName::Interpolated,
-        ReadingName::Fit,
-    ];
-
-    /// As written.
-    pub fn name(self) -> &'static str {
-        match self {
-            ReadingName::Line => "line",
-            ReadingName::Interpolated => "interpolated",
-            ReadingName::Fit => "fit",
-        }
-    }
-}
-
-impl From<ReadBy> for ReadingName {
-    fn from(method: ReadBy) -> Self {
-        match method {
-            ReadBy::Line => ReadingName::Line,
-            ReadBy::Interpolated => ReadingName::Interpolated,
-            ReadBy::Fit => ReadingName::Fit,
-        }
-    }
-}
-
-/// How a stiffness is estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum EstimateMethod {
-    /// Least squares on the frequencies.
-    Consistent,
-    /// Regression over pairs of modes; of a free beam the mean over its modes.
-    Pairs,
-}
-
-impl EstimateMethod {
-    /// Both.
-    pub const ALL: [EstimateMethod; 2] = [EstimateMethod::Consistent, EstimateMethod::Pairs];
-
-    /// As written.
-    pub fn name(self) -> &'static str {
-        match self {
-            EstimateMethod::Consistent => "consistent",
-            EstimateMethod::Pairs => "pairs",
         }
     }
 }
@@ -215,7 +154,7 @@ pub struct FrequencyError {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingName,
+    pub reading: ReadBy,
     /// Mode.
     pub mode: usize,
     /// Band (Hz).
@@ -253,7 +192,7 @@ pub struct StiffnessError {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingName,
+    pub reading: ReadBy,
     /// Estimator.
     pub method: EstimateMethod,
     /// "kx", "ky", "kz" or "modulus".
@@ -282,7 +221,7 @@ pub struct Answer {
     /// Window.
     pub window: WindowName,
     /// Reading.
-    pub reading: ReadingName,
+    pub reading: ReadBy,
     /// Estimator.
     pub method: EstimateMethod,
     /// Block (samples); `None` where none in the range does.
@@ -336,7 +275,7 @@ fn block_lines(plan: &BlockPlan) -> BlockLines {
     BlockLines {
         block: plan.block,
         lines,
-        half_line_percent_of_band: answer::formula_percent(lines),
+        half_line_percent_of_band: formula_percent(lines),
         bands: plan.bands.iter().map(band).collect(),
     }
 }

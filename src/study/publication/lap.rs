@@ -1,7 +1,8 @@
 //! Tables 10 to 14: the lap joint, simulated and measured.
 
-use super::printed::{Printed, PrintedTable};
-use super::{PaperError, Row, Table, Verdict, estimate_from_printed, joint_label};
+use super::table::{
+    PaperError, Printed, PrintedTable, Row, Table, Verdict, estimate_from_printed, joint_label,
+};
 use tapjoint_beam::{Assembly, JointStiffness, natural_lambdas};
 use tapjoint_identify::{
     ModeLambda, PairsModel, Stiffnesses, estimate_pairs, single_mode_stiffness,

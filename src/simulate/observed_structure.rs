@@ -1,0 +1,381 @@
+//! Structures of a virtual test: as planted, as the sensors observe it, and as the description gives it.
+
+use super::laboratory::SimulateError;
+use super::laboratory::SpecimenSettings;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+use tapjoint_beam::StructureError;
+use tapjoint_beam::effects::SensorPlace;
+use tapjoint_beam::joint::StiffnessUnits;
+use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
+use tapjoint_description::described::{
+    coupling, described_beam, described_specimen, fastened_masses, stiffness_of,
+};
+use tapjoint_description::{JointKind, RecordingDescription, SensorKind, TestDescription};
+
+/// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
+/// them has fallen with the cube of their number.
+const COMPLIANT_MODES: usize = 24;
+/// More modes say nothing about a beam of which 200 elements are made.
+const MOST_MODES: usize = 100;
+/// A mode that is damped more follows like a spring.
+const MOST_DAMPING: f64 = 0.9;
+/// Damping ratio of a beam on rubber bands.
+const SUSPENSION_DAMPING: f64 = 0.03;
+
+/// A structure and the test's view of it.
+#[derive(Debug, Clone)]
+pub struct SeenStructure {
+    /// Motions on the suspension first, then the elastic modes.
+    modes: Arc<SpecimenModes>,
+    /// How many of them are motions on the suspension.
+    suspended: usize,
+    sensors: Vec<f64>,
+    reduced: ReducedStructure,
+    /// How many of the modes move in time.
+    moving: usize,
+}
+
+impl SeenStructure {
+    /// The structure with `sensors` at these places (m) and this `joint_loss` factor (1); modes up to
+    /// `highest` (Hz) move in time.
+    ///
+    /// # Errors
+    /// As [`Specimen::modes`].
+    pub fn new(
+        specimen: &Specimen,
+        settings: &SpecimenSettings,
+        sensors: &[f64],
+        (joint_loss, highest): (f64, f64),
+    ) -> Result<Self, StructureError> {
+        let count = count_below(specimen, highest) + COMPLIANT_MODES;
+        let elastic = specimen.modes(count.min(MOST_MODES), Mesh::SIMULATION)?;
+        let unseen = joint_compliance(specimen, &elastic);
+        let (modes, suspended) = hang(specimen, settings, elastic)?;
+        let damping = |mode: usize| {
+            let Some(elastic) = mode.checked_sub(suspended) else {
+                return SUSPENSION_DAMPING;
+            };
+            // The joint's loss acts on its share of the strain energy: zeta = eta/2 share.
+            settings.damping.ratio(elastic, modes.frequencies()[mode])
+                + 0.5 * joint_loss * modes.joint_energy_share(mode)
+        };
+        let moving = (0..modes.len())
+            .take_while(|&mode| {
+                modes.frequencies()[mode] <= highest && damping(mode) < MOST_DAMPING
+            })
+            .count();
+        let reduced = ReducedStructure {
+            modes: (0..moving)
+                .map(|mode| ReducedMode {
+                    frequency: modes.frequencies()[mode],
+                    damping_ratio: damping(mode),
+                    at_sensors: sensors
+                        .iter()
+                        .map(|&x| modes.displacement(mode, x))
+                        .collect(),
+                    at_joint: modes.joint_motion(mode)[1],
+                })
+                .collect(),
+            joint_compliance: unseen
+                + beyond(&modes, moving, |mode| modes.joint_motion(mode)[1].powi(2)),
+            joint_to_sensors: sensors
+                .iter()
+                .map(|&x| joint_to(&modes, moving, x))
+                .collect(),
+        };
+        Ok(Self {
+            modes: Arc::new(modes),
+            suspended,
+            sensors: sensors.to_vec(),
+            reduced,
+            moving,
+        })
+    }
+
+    /// Its modes and what lies beyond them.
+    pub fn reduced(&self) -> &ReducedStructure {
+        &self.reduced
+    }
+
+    /// Natural frequencies (Hz) and damping ratios of the elastic modes that move in time.
+    pub fn elastic_modes(&self) -> impl Iterator<Item = (f64, f64)> {
+        let elastic = self.reduced.modes.iter().skip(self.suspended);
+        elastic.map(|mode| (mode.frequency, mode.damping_ratio))
+    }
+
+    /// Natural frequencies (Hz) of a hanging structure on its suspension, with what else holds it to
+    /// the ground.
+    pub fn suspension_frequencies(&self) -> impl Iterator<Item = f64> {
+        let modes = self.reduced.modes.iter().take(self.suspended);
+        modes.map(|mode| mode.frequency)
+    }
+
+    /// How it feels a strike at a position (m).
+    pub fn struck(&self, position: f64) -> StruckPlace {
+        StruckPlace {
+            at_modes: (0..self.moving)
+                .map(|mode| self.modes.displacement(mode, position))
+                .collect(),
+            to_sensors: self
+                .sensors
+                .iter()
+                .map(|&x| {
+                    beyond(&self.modes, self.moving, |mode| {
+                        self.modes.displacement(mode, x) * self.modes.displacement(mode, position)
+                    })
+                })
+                .collect(),
+            to_joint: joint_to(&self.modes, self.moving, position),
+        }
+    }
+}
+
+/// Whether a specimen hangs, since nothing holds it.
+pub(super) fn hangs(specimen: &Specimen) -> bool {
+    matches!(specimen.body, Body::Joined(_)) || specimen.joint.stiffnesses() == [0.0; 2]
+}
+
+/// The modes with the motions on the suspension before them, and the number of those.
+fn hang(
+    specimen: &Specimen,
+    settings: &SpecimenSettings,
+    elastic: SpecimenModes,
+) -> Result<(SpecimenModes, usize), StructureError> {
+    match settings.suspension {
+        // No rigid-body motion at all.
+        None if hangs(specimen) => Ok((elastic, 0)),
+        Some(frequencies) if hangs(specimen) => elastic.hung(Some(frequencies)),
+        // What turns about a pivot may be held by cables.
+        _ => elastic.hung(None),
+    }
+}
+
+/// Sum over the modes that do not move in time of a product of shapes, over omega^2.
+fn beyond(modes: &SpecimenModes, moving: usize, product: impl Fn(usize) -> f64) -> f64 {
+    (moving..modes.len())
+        .map(|mode| product(mode) / (TAU * modes.frequencies()[mode]).powi(2))
+        .sum()
+}
+
+fn joint_to(modes: &SpecimenModes, moving: usize, position: f64) -> f64 {
+    beyond(modes, moving, |mode| {
+        modes.joint_motion(mode)[1] * modes.displacement(mode, position)
+    })
+}
+
+/// What the modes that are not even computed leave of the joint's compliance.
+fn joint_compliance(specimen: &Specimen, modes: &SpecimenModes) -> f64 {
+    match specimen.joint {
+        SpecimenJoint::Free => 0.0,
+        SpecimenJoint::Springs { .. } => modes.joint_compliance_beyond(),
+    }
+}
+
+/// About how many modes lie below a frequency (Hz): lambda grows by pi from mode to mode.
+fn count_below(specimen: &Specimen, frequency: f64) -> usize {
+    let beams = specimen.body.beams().iter();
+    let lambda: f64 = beams.map(|beam| beam.lambda_of(frequency)).sum();
+    (lambda / std::f64::consts::PI) as usize + 2
+}
+
+/// Non-dimensional stiffnesses of a joint, in place of the description's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GivenJoint {
+    /// Kx (1).
+    pub kx: f64,
+    /// Ky (1).
+    pub ky: f64,
+    /// 1/Kz (1), 0 without coupling.
+    pub cross_compliance: f64,
+}
+
+/// The described specimen as one recording finds it.
+pub(super) fn nominal_specimen(
+    test: &TestDescription,
+    recording: &RecordingDescription,
+    given: Option<GivenJoint>,
+) -> Result<Specimen, SimulateError> {
+    let mut specimen = described_specimen(test, joint(test, given)?);
+    for place in sensor_places(test, recording)? {
+        if place.mass > 0.0 {
+            specimen.masses.push(PointMass {
+                position: place.position,
+                mass: place.mass,
+                inertia: 0.0,
+            });
+        }
+    }
+    specimen.masses.extend(fastened_masses(recording));
+    Ok(specimen)
+}
+
+fn joint(
+    test: &TestDescription,
+    given: Option<GivenJoint>,
+) -> Result<SpecimenJoint, SimulateError> {
+    if test.joint.kind == JointKind::Free {
+        return Ok(SpecimenJoint::Free);
+    }
+    let units = StiffnessUnits::of(&described_beam(test));
+    if let Some(given) = given {
+        return Ok(SpecimenJoint::Springs {
+            kt: given.kx * units.kt,
+            kr: given.ky * units.kr,
+            coupling: coupling(given.kx, given.ky, given.cross_compliance),
+        });
+    }
+    let (missing, keys) = match (test.joint.kt, test.joint.kr) {
+        (Some(kt), Some(kr)) => {
+            let (kt, kr) = (stiffness_of(kt), stiffness_of(kr));
+            let ktr = test.joint.ktr.map_or(f64::INFINITY, stiffness_of);
+            return Ok(SpecimenJoint::Springs {
+                kt,
+                kr,
+                coupling: coupling(kt, kr, 1.0 / ktr),
+            });
+        }
+        (None, None) => (
+            "kt and kr are",
+            "`kt = 1.9e6` (N/m) and `kr = 1.2e3` (N m/rad)",
+        ),
+        (None, Some(_)) => ("kt is", "`kt = 1.9e6` (N/m)"),
+        (Some(_), None) => ("kr is", "`kr = 1.2e3` (N m/rad)"),
+    };
+    Err(SimulateError::NoJoint { missing, keys })
+}
+
+/// Where the sensors sit in a recording, with their masses by the datasheet.
+pub(super) fn sensor_places(
+    test: &TestDescription,
+    recording: &RecordingDescription,
+) -> Result<Vec<SensorPlace>, SimulateError> {
+    let places = test.sensors.iter().map(|sensor| {
+        if sensor.kind == SensorKind::Sound {
+            return Err(SimulateError::Sound {
+                name: sensor.name.clone(),
+            });
+        }
+        let position = recording.place_of(sensor);
+        Ok(SensorPlace {
+            position: position.ok_or_else(|| SimulateError::NoPosition {
+                name: sensor.name.clone(),
+            })?,
+            mass: sensor.mass.unwrap_or(0.0),
+        })
+    });
+    places.collect()
+}
+
+/// One mode of unit modal mass.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReducedMode {
+    /// Natural frequency (Hz), undamped.
+    pub frequency: f64,
+    /// Damping ratio, at least 0 and below 1.
+    pub damping_ratio: f64,
+    /// Shape at each sensor (kg^-1/2).
+    pub at_sensors: Vec<f64>,
+    /// Rotation of the joint's spring (rad kg^-1/2 m^-1).
+    pub at_joint: f64,
+}
+
+/// What a structure answers with: its modes up to some frequency, those beyond as springs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReducedStructure {
+    /// The modes that move in time.
+    pub modes: Vec<ReducedMode>,
+    /// Rotation of the joint's spring per moment on it (rad/(N m)), of all modes left out.
+    pub joint_compliance: f64,
+    /// Displacement of each sensor per moment on the joint's spring (1/N), of all modes left out.
+    pub joint_to_sensors: Vec<f64>,
+}
+
+/// How one place is struck: the shapes there, and the compliance of the modes left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StruckPlace {
+    /// Shape of each mode (kg^-1/2).
+    pub at_modes: Vec<f64>,
+    /// Displacement of each sensor per force (m/N), of all modes left out.
+    pub to_sensors: Vec<f64>,
+    /// Rotation of the joint's spring per force (rad/N), of all modes left out.
+    pub to_joint: f64,
+}
+
+/// What a sensor senses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensed {
+    /// Acceleration (m/s2).
+    Acceleration,
+    /// Velocity (m/s).
+    Velocity,
+    /// Displacement (m).
+    Displacement,
+}
+
+/// A mode's constants of motion, q'' + 2 zeta omega q' + omega^2 q = force.
+///
+/// With the pole p = -zeta omega + j omega_d the state z = q' - conj(p) q obeys z' = p z + force,
+/// so that q = Im z/omega_d and q' = Re z + Re(p) q.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Oscillator {
+    pub(super) pole: Complex64,
+    omega: f64,
+}
+
+impl Oscillator {
+    pub(super) fn new(mode: &ReducedMode) -> Self {
+        let omega = TAU * mode.frequency;
+        let damped = omega * (1.0 - mode.damping_ratio.powi(2)).sqrt();
+        Self {
+            pole: Complex64::new(-mode.damping_ratio * omega, damped),
+            omega,
+        }
+    }
+
+    /// Displacement, velocity and acceleration of the modal coordinate with the state z under a
+    /// modal force.
+    pub(super) fn motion(&self, z: Complex64, force: f64) -> [f64; 3] {
+        let q = z.im / self.pole.im;
+        let velocity = z.re + self.pole.re * q;
+        let acceleration = force + 2.0 * self.pole.re * velocity - self.omega * self.omega * q;
+        [q, velocity, acceleration]
+    }
+
+    /// Energy of the modal coordinate (J), (q'^2 + omega^2 q^2)/2.
+    pub(super) fn energy(&self, z: Complex64) -> f64 {
+        let [q, velocity, _] = self.motion(z, 0.0);
+        0.5 * (velocity * velocity + (self.omega * q).powi(2))
+    }
+}
+
+/// Sum over the modes of factors of their states' real and imaginary parts.
+pub(super) fn seen(factors: &[[f64; 2]], states: &[Complex64]) -> f64 {
+    // Sums of their own for each lane keep the processor's units busy.
+    let mut sums = [[0.0; 2]; 4];
+    let (fours, rest) = factors.as_chunks::<4>();
+    let (state_fours, others) = states.as_chunks::<4>();
+    for (factors, states) in fours.iter().zip(state_fours) {
+        for ((sum, factor), state) in sums.iter_mut().zip(factors).zip(states) {
+            sum[0] += factor[0] * state.re;
+            sum[1] += factor[1] * state.im;
+        }
+    }
+    let tail = rest.iter().zip(others);
+    let tail: f64 = tail
+        .map(|([real, imaginary], z)| real * z.re + imaginary * z.im)
+        .sum();
+    sums.as_flattened().iter().sum::<f64>() + tail
+}
+
+impl Sensed {
+    /// Which of displacement, velocity, acceleration it is.
+    pub(super) fn derivative(self) -> usize {
+        match self {
+            Self::Displacement => 0,
+            Self::Velocity => 1,
+            Self::Acceleration => 2,
+        }
+    }
+}

@@ -1,0 +1,497 @@
+//! One recording as it is made: the structure moves, the hammer strikes, the recorder takes samples.
+//! Nothing is kept that grows with the recording.
+//!
+//! Time series of given modes, in memory: what tests of the measuring stages need.
+//!
+//! A linear structure is given by its modes (natural frequency, damping ratio, shape at sensors and
+//! tap, unit modal mass); hammer pulses drive each mode, whose response is computed by the exact
+//! recursion for a force that is linear between samples. (Such a force is the sampled one times
+//! sinc^2(f/rate): poles are exact, and amplitudes at a fifth of the sample rate 1.1 dB low.) Noise is
+//! added and the channels are scaled
+//! to a recorder's full scale. What the diagnosis must not see stays here: the truth is an argument,
+//! never a part of the recording.
+//!
+//! One mean tap on the linear structure: how far channels and joint will be driven.
+
+use super::chain::HALF_LENGTH;
+use super::chain::{Chain, Rates, Signal};
+use super::hammer::Pulse;
+use super::hammer::{Hammer, Tap, TapPlan};
+use super::joint_moment::JointMoment;
+use super::laboratory::{AntiAlias, Laboratory};
+use super::motion::{Motion, Strike};
+use super::observed_structure::SeenStructure;
+use super::observed_structure::Sensed;
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::{PI, TAU};
+use tapjoint_beam::ModeShape;
+use tapjoint_numerics::stats::root_mean_square;
+
+/// Least rate (Hz) of the simulation: pulses of a steel tip are resolved, and the filter sees what
+/// would fold.
+const LEAST_RATE: f64 = 48e3;
+/// Least number of steps of the simulation for each sample.
+const LEAST_FACTOR: usize = 4;
+/// The mounting's resonance must lie below half the rate of the simulation, with some room.
+const RATE_OVER_RESONANCE: f64 = 2.3;
+
+/// A recording to be made.
+#[derive(Debug, Clone)]
+pub struct TakePlan {
+    /// Sample rate that the file states (Hz).
+    pub sample_rate: u32,
+    /// Samples per channel.
+    pub frames: u64,
+    /// What a true frequency is multiplied by when the file is read: the clock's error.
+    pub frequency_scale: f64,
+    /// Channels in the order of the file, each with its SI units per unit of the file. Responses come
+    /// in the order of the structure's sensors.
+    pub channels: Vec<(Signal, f64)>,
+    /// The taps.
+    pub taps: TapPlan,
+    /// Joint that is no linear spring.
+    pub joint: Option<JointMoment>,
+    /// Seed of everything random, and the recording's number, which gives it random numbers of its own.
+    pub seed: (u64, u64),
+}
+
+/// Streams of the channels' sensitivities, behind those of the recordings.
+const SENSITIVITIES: u64 = 1 << 42;
+
+impl TakePlan {
+    /// Samples per true second (Hz): the clock's seconds are too long where frequencies read high.
+    pub fn true_rate(&self) -> f64 {
+        f64::from(self.sample_rate) / self.frequency_scale
+    }
+
+    /// Steps of the simulation for each sample.
+    pub fn steps_per_sample(&self, laboratory: &Laboratory) -> usize {
+        let rate = self.true_rate();
+        let resonance = RATE_OVER_RESONANCE * laboratory.sensors.mounting_resonance;
+        let wanted = (LEAST_RATE.max(resonance) / rate).ceil() as usize;
+        wanted.max(LEAST_FACTOR)
+    }
+
+    /// Highest frequency (Hz) of a mode that moves in time; what lies beyond follows like a spring.
+    pub fn highest_mode(&self, laboratory: &Laboratory) -> f64 {
+        // Below half the simulation's rate, and far enough above the band that what is left of the modes
+        // beyond is their compliance.
+        let inner = self.true_rate() * self.steps_per_sample(laboratory) as f64;
+        (1.8 * self.true_rate()).min(0.45 * inner)
+    }
+}
+
+/// A recording in the making.
+#[derive(Debug, Clone)]
+pub struct Take {
+    motion: Motion,
+    structure: SeenStructure,
+    hammer: std::iter::Peekable<Hammer>,
+    shape: crate::hammer::PulseShape,
+    chains: Vec<Chain>,
+    /// For each channel the sensor it belongs to; `None` = the hammer.
+    sources: Vec<Option<usize>>,
+    factor: usize,
+    frames_left: u64,
+    primed: u64,
+    responses: Vec<f64>,
+}
+
+impl Take {
+    /// Prepares a recording of a structure.
+    pub fn new(structure: SeenStructure, plan: &TakePlan, laboratory: &Laboratory) -> Self {
+        let factor = plan.steps_per_sample(laboratory);
+        let file_rate = plan.true_rate();
+        let step = 1.0 / (file_rate * factor as f64);
+        let delay = match laboratory.recorder.anti_alias {
+            AntiAlias::On => HALF_LENGTH * factor,
+            AntiAlias::Off => 0,
+        };
+        let sensed: Vec<Sensed> = plan
+            .channels
+            .iter()
+            .filter_map(|(signal, _)| match signal {
+                Signal::Force => None,
+                Signal::Response(sensed) => Some(*sensed),
+            })
+            .collect();
+        let random = |purpose: u64| {
+            let mut random = ChaCha8Rng::seed_from_u64(plan.seed.0);
+            random.set_stream(plan.seed.1 << 16 | purpose);
+            random
+        };
+        let rates = Rates {
+            factor,
+            file: file_rate,
+        };
+        let channels = plan.channels.iter().zip(1..);
+        let chains = channels
+            .map(|((signal, scale), number)| {
+                let mut gains = ChaCha8Rng::seed_from_u64(plan.seed.0);
+                gains.set_stream(SENSITIVITIES | number);
+                let random = (random(number), &mut gains);
+                Chain::new(*signal, *scale, laboratory, rates, random)
+            })
+            .collect();
+        // The filter looks ahead by half its length: the simulation begins so much earlier.
+        let start = (-(delay as f64) * step, step);
+        Self {
+            motion: Motion::new(
+                structure.reduced().clone(),
+                &sensed,
+                start,
+                plan.joint.clone(),
+            ),
+            structure,
+            hammer: Hammer::new(&laboratory.hammer, &plan.taps, random(0)).peekable(),
+            shape: plan.taps.pulse.1,
+            chains,
+            sources: sources(plan),
+            factor,
+            frames_left: plan.frames,
+            primed: 2 * delay as u64,
+            responses: vec![0.0; sensed.len()],
+        }
+    }
+
+    /// Gain (1) of each channel beside the one its scale states: the errors of the sensitivities.
+    pub fn gains(&self) -> Vec<f64> {
+        self.chains.iter().map(Chain::gain).collect()
+    }
+
+    /// The taps that are still to come.
+    pub fn taps(&self) -> Vec<Tap> {
+        self.hammer.clone().collect()
+    }
+
+    /// Writes the next sample of every channel into `frame`, in units of the file; `false` at the end.
+    pub fn next_frame(&mut self, frame: &mut [f64]) -> bool {
+        if self.frames_left == 0 {
+            return false;
+        }
+        if self.primed != u64::MAX {
+            // The state at the very beginning counts as the first step.
+            self.feed();
+            for _ in 0..self.primed {
+                self.step();
+            }
+            self.primed = u64::MAX;
+        } else {
+            for _ in 0..self.factor {
+                self.step();
+            }
+        }
+        for (value, chain) in frame.iter_mut().zip(&mut self.chains) {
+            *value = chain.sample();
+        }
+        self.frames_left -= 1;
+        true
+    }
+
+    /// Steps that met the finest division before their tolerance ([`Motion::forced_steps`]).
+    pub fn forced_steps(&self) -> u64 {
+        self.motion.forced_steps()
+    }
+
+    fn step(&mut self) {
+        let horizon = self.motion.time() + 2.0 * self.motion.step();
+        while let Some(tap) = self.hammer.next_if(|tap| tap.time <= horizon) {
+            for pulse in tap.pulses(self.shape) {
+                let place = self.structure.struck(tap.position);
+                self.motion.strike(Strike { pulse, place });
+            }
+        }
+        self.motion.advance();
+        self.feed();
+    }
+
+    fn feed(&mut self) {
+        self.motion.responses(&mut self.responses);
+        let force = self.motion.force();
+        for (chain, source) in self.chains.iter_mut().zip(&self.sources) {
+            let value = source.map_or(force, |sensor| self.responses[sensor]);
+            chain.push(value);
+        }
+    }
+}
+
+/// For each channel the sensor it belongs to.
+fn sources(plan: &TakePlan) -> Vec<Option<usize>> {
+    let mut sensors = 0..;
+    let channels = plan.channels.iter();
+    channels
+        .map(|(signal, _)| match signal {
+            Signal::Force => None,
+            Signal::Response(_) => sensors.next(),
+        })
+        .collect()
+}
+
+/// One mode of the structure as the sensors see it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulatedMode {
+    /// Natural frequency (Hz).
+    pub frequency: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Mass-normalised shape where the hammer strikes (kg^-1/2).
+    pub shape_at_tap: f64,
+    /// Mass-normalised shape at each sensor (kg^-1/2).
+    pub shape_at_sensors: Vec<f64>,
+}
+
+/// How a virtual test is carried out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapTestSettings {
+    /// Sample rate (Hz). 5120, for a band to 2000 Hz.
+    pub sample_rate: f64,
+    /// Number of taps. 5, what good practice asks for.
+    pub taps: usize,
+    /// Time between taps (s).
+    pub interval: f64,
+    /// Quiet time before the first tap (s).
+    pub lead: f64,
+    /// Peak force (N); each tap varies by 20 % about it.
+    pub peak_force: f64,
+    /// Length of the pulse (s); each tap varies by 10 % about it. 1.5 ms: a plastic tip.
+    pub pulse: f64,
+    /// Noise of each response: rms of the response over the record to rms of the noise (dB);
+    /// infinite for none.
+    pub signal_to_noise_db: f64,
+    /// Noise of the force: peak to rms of the noise (dB); infinite for none.
+    pub force_to_noise_db: f64,
+}
+
+impl Default for TapTestSettings {
+    fn default() -> Self {
+        TapTestSettings {
+            sample_rate: 5120.0,
+            taps: 5,
+            interval: 5.0,
+            lead: 0.5,
+            peak_force: 50.0,
+            pulse: 1.5e-3,
+            signal_to_noise_db: 60.0,
+            force_to_noise_db: 70.0,
+        }
+    }
+}
+
+/// Time series of a virtual test, in physical units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapTest {
+    /// Sample rate (Hz).
+    pub sample_rate: f64,
+    /// Times at which the pulses begin (s).
+    pub tap_times: Vec<f64>,
+    /// Force (N).
+    pub force: Vec<f64>,
+    /// Acceleration at each sensor (m/s2).
+    pub responses: Vec<Vec<f64>>,
+}
+
+/// Simulates a tap test of the structure with these `modes`; the same seed gives the same test.
+pub fn simulate_tap_test(
+    modes: &[SimulatedMode],
+    settings: &TapTestSettings,
+    seed: u64,
+) -> TapTest {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let length = settings.lead + settings.interval * settings.taps as f64;
+    let samples = (length * settings.sample_rate).round() as usize;
+    let mut force = vec![0.0; samples];
+    let mut tap_times = Vec::with_capacity(settings.taps);
+    for tap in 0..settings.taps {
+        // Taps fall between samples and are never quite in rhythm.
+        let time = settings.lead + tap as f64 * settings.interval + random.random_range(0.0..0.02);
+        let peak = settings.peak_force * (1.0 + random.random_range(-0.2..0.2));
+        let pulse = settings.pulse * (1.0 + random.random_range(-0.1..0.1));
+        add_pulse(&mut force, settings.sample_rate, time, (pulse, peak));
+        tap_times.push(time);
+    }
+    let sensors = modes.first().map_or(0, |mode| mode.shape_at_sensors.len());
+    let mut responses = vec![vec![0.0; samples]; sensors];
+    for mode in modes {
+        let acceleration = modal_acceleration(mode, &force, settings.sample_rate);
+        for (response, shape) in responses.iter_mut().zip(&mode.shape_at_sensors) {
+            for (x, a) in response.iter_mut().zip(&acceleration) {
+                *x += shape * a;
+            }
+        }
+    }
+    for response in &mut responses {
+        let level = root_mean_square(response) * decibels(-settings.signal_to_noise_db);
+        add_noise(response, level, &mut random);
+    }
+    let level = settings.peak_force * decibels(-settings.force_to_noise_db);
+    add_noise(&mut force, level, &mut random);
+    TapTest {
+        sample_rate: settings.sample_rate,
+        tap_times,
+        force,
+        responses,
+    }
+}
+
+/// Adds the pulse peak sin^2(pi t/pulse) that begins at `time` (s).
+fn add_pulse(force: &mut [f64], sample_rate: f64, time: f64, (pulse, peak): (f64, f64)) {
+    let first = (time * sample_rate).ceil() as usize;
+    let last = ((time + pulse) * sample_rate) as usize;
+    for index in first..=last.min(force.len().saturating_sub(1)) {
+        let phase = PI * (index as f64 / sample_rate - time) / pulse;
+        force[index] += peak * phase.sin().powi(2);
+    }
+}
+
+/// Acceleration of one modal coordinate, q'' + 2 zeta omega q' + omega^2 q = shape_at_tap F, for a
+/// force that is linear between samples.
+///
+/// With p = -zeta omega + j omega_d, z = q' - conj(p) q obeys z' = p z + F, which integrates exactly
+/// over a step; q = Im z/omega_d, and q'' follows from the equation itself.
+fn modal_acceleration(mode: &SimulatedMode, force: &[f64], sample_rate: f64) -> Vec<f64> {
+    use num_complex::Complex64;
+    let omega = TAU * mode.frequency;
+    let damped = omega * (1.0 - mode.damping_ratio.powi(2)).sqrt();
+    let pole = Complex64::new(-mode.damping_ratio * omega, damped);
+    let step = pole / sample_rate;
+    let advance = step.exp();
+    // Integrals of e^{p (h - t)} and of e^{p (h - t)} t/h over one step h.
+    let constant = (advance - 1.0) / pole;
+    let ramp = (constant * sample_rate - 1.0) / pole;
+    let mut z = Complex64::ZERO;
+    let mut before = 0.0;
+    force
+        .iter()
+        .map(|&f| {
+            let drive = mode.shape_at_tap * f;
+            z = advance * z + constant * before + ramp * (drive - before);
+            before = drive;
+            let q = z.im / damped;
+            let velocity = z.re + pole.re * q;
+            drive - 2.0 * mode.damping_ratio * omega * velocity - omega * omega * q
+        })
+        .collect()
+}
+
+fn decibels(level: f64) -> f64 {
+    10f64.powf(level / 20.0)
+}
+
+fn add_noise(samples: &mut [f64], level: f64, random: &mut impl Rng) {
+    if level > 0.0 {
+        for x in samples {
+            let noise: f64 = StandardNormal.sample(random);
+            *x += level * noise;
+        }
+    }
+}
+
+/// The modes of a beam as a test with these positions sees them.
+///
+/// `shapes` are the structure's, `damping_ratios` one for each (the last one for all beyond);
+/// `tap` and `sensors` are positions along the beam (m). Modes beyond `highest` (Hz) are left out:
+/// nothing above half the sample rate may be simulated.
+pub fn seen_modes(
+    shapes: &[ModeShape],
+    damping_ratios: &[f64],
+    (tap, sensors): (f64, &[f64]),
+    highest: f64,
+) -> Vec<SimulatedMode> {
+    let last = damping_ratios.last().copied().unwrap_or(0.0);
+    shapes
+        .iter()
+        .enumerate()
+        .filter(|(_, shape)| shape.frequency < highest)
+        .map(|(index, shape)| SimulatedMode {
+            frequency: shape.frequency,
+            damping_ratio: damping_ratios.get(index).copied().unwrap_or(last),
+            shape_at_tap: shape.displacement(tap),
+            shape_at_sensors: sensors.iter().map(|&x| shape.displacement(x)).collect(),
+        })
+        .collect()
+}
+
+impl TapTest {
+    /// Force and responses as channels in file units: divided by these scales (N, and m/s2, per
+    /// unit of the file).
+    pub fn channels(&self, force_scale: f64, response_scale: f64) -> Vec<Vec<f64>> {
+        let scaled = |samples: &[f64], scale: f64| samples.iter().map(|x| x / scale).collect();
+        std::iter::once(scaled(&self.force, force_scale))
+            .chain(
+                self.responses
+                    .iter()
+                    .map(|response| scaled(response, response_scale)),
+            )
+            .collect()
+    }
+}
+
+/// What a mean tap brings.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Trial {
+    /// Largest value of each channel (SI).
+    pub(super) peaks: Vec<f64>,
+    /// Largest rotation of the joint (rad).
+    pub(super) joint_rotation: f64,
+}
+
+/// So long the tap is followed: some periods of the lowest mode of beams that are tapped by hand (s).
+const FOLLOWED: f64 = 0.3;
+
+pub(super) fn try_out(
+    structure: &SeenStructure,
+    plan: &TakePlan,
+    laboratory: &Laboratory,
+) -> Trial {
+    let sensed: Vec<Sensed> = plan
+        .channels
+        .iter()
+        .filter_map(|(signal, _)| match signal {
+            Signal::Force => None,
+            Signal::Response(sensed) => Some(*sensed),
+        })
+        .collect();
+    let rate = plan.true_rate() * plan.steps_per_sample(laboratory) as f64;
+    let step = 1.0 / rate;
+    let mut motion = Motion::new(structure.reduced().clone(), &sensed, (0.0, step), None);
+    let (length, shape) = plan.taps.pulse;
+    motion.strike(Strike {
+        pulse: Pulse {
+            start: 0.5 * step,
+            length,
+            peak: plan.taps.peak_force,
+            shape,
+        },
+        place: structure.struck(plan.taps.place.0),
+    });
+    let mut largest = vec![0.0; sensed.len()];
+    let mut responses = largest.clone();
+    let mut joint_rotation: f64 = 0.0;
+    for _ in 0..(FOLLOWED * rate) as usize {
+        motion.advance();
+        motion.responses(&mut responses);
+        for (largest, value) in largest.iter_mut().zip(&responses) {
+            *largest = f64::max(*largest, value.abs());
+        }
+        joint_rotation = joint_rotation.max(motion.joint_rotation().abs());
+    }
+    let hammer = plan.channels.len() > sensed.len();
+    let force = hammer.then_some(plan.taps.peak_force);
+    Trial {
+        peaks: force.into_iter().chain(largest).collect(),
+        joint_rotation,
+    }
+}
+
+/// The next of 1, 2, 5, 10, ... at or above.
+pub(super) fn round_scale(value: f64) -> f64 {
+    if value.is_nan() || value <= 0.0 {
+        return 1.0;
+    }
+    let decade = 10f64.powf(value.log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0];
+    let found = steps.into_iter().find(|step| step * decade >= value);
+    found.unwrap_or(10.0) * decade
+}

@@ -1,0 +1,445 @@
+//! Printed tables, their numbers beside ours, and both as text for a terminal of 80 columns.
+
+use tapjoint_beam::StructureError;
+use tapjoint_identify::perturbation::{Span, sign_pattern_spans};
+use tapjoint_identify::{
+    IdentifyError, ModeLambda, PairsEstimate, PairsModel, Stiffnesses, estimate_pairs,
+};
+
+/// Why the tables cannot be set beside ours. Both would be defects of this crate.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PaperError {
+    /// A printed number that is none.
+    #[error("\"{text}\" in the printed tables is not a number")]
+    Number {
+        /// The text.
+        text: String,
+    },
+    /// A cell that is not there.
+    #[error("the printed tables have no {column} in row {row}")]
+    Cell {
+        /// Row, from 0.
+        row: usize,
+        /// Name of the column.
+        column: String,
+    },
+    /// An estimate without answer.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// A prediction without answer.
+    #[error(transparent)]
+    Structure(#[from] StructureError),
+}
+
+/// How a printed number compares with ours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Equal within the row's tolerance.
+    Reproduces,
+    /// Different, but not beyond what the rounding of the printed input does to our number.
+    WithinRounding,
+    /// Different; the remark says why.
+    DoesNotReproduce,
+    /// A measurement or a property of the specimen: there is nothing to reproduce.
+    Given,
+}
+
+/// One printed number beside ours.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Row {
+    /// What the number is.
+    pub label: String,
+    /// As printed.
+    pub printed: Printed,
+    /// Ours; `None` where there is nothing to compute.
+    pub ours: Option<f64>,
+    /// Largest difference that still counts as equal, in the unit of the numbers.
+    pub tolerance: f64,
+    /// How they compare.
+    pub verdict: Verdict,
+    /// Why they differ, or what else is to be said.
+    pub remark: Option<&'static str>,
+}
+
+impl Row {
+    /// A row that reproduces within one unit in the last printed digit.
+    pub(super) fn to_last_digit(label: String, printed: Printed, ours: f64) -> Self {
+        // A millionth of a unit allows for the binary fraction that stands for the printed one.
+        let tolerance = printed.unit * (1.0 + 1e-6);
+        Self::within(label, printed, ours, tolerance)
+    }
+
+    /// A row that reproduces within `tolerance`.
+    pub(super) fn within(label: String, printed: Printed, ours: f64, tolerance: f64) -> Self {
+        let equal = (ours - printed.value).abs() <= tolerance;
+        Self {
+            label,
+            printed,
+            ours: Some(ours),
+            tolerance,
+            verdict: if equal {
+                Verdict::Reproduces
+            } else {
+                Verdict::DoesNotReproduce
+            },
+            remark: None,
+        }
+    }
+
+    /// The same row judged by the digits of another printed form of its number.
+    pub(super) fn judged_by(self, printed: &Printed) -> Self {
+        let ours = self.ours.unwrap_or(f64::NAN);
+        let judged = Self::to_last_digit(String::new(), printed.clone(), ours);
+        Self {
+            tolerance: judged.tolerance,
+            verdict: judged.verdict,
+            ..self
+        }
+    }
+
+    /// A row with nothing to compute.
+    pub(super) fn given(label: String, printed: Printed) -> Self {
+        Self {
+            label,
+            printed,
+            ours: None,
+            tolerance: 0.0,
+            verdict: Verdict::Given,
+            remark: None,
+        }
+    }
+
+    /// Takes a row that differs as explained by the rounding of its input, if the printed number
+    /// lies in this span of what that rounding makes of ours.
+    pub(super) fn or_within(mut self, span: Option<Span>) -> Self {
+        let inside = |span: Span| {
+            let value = self.printed.value;
+            // Half a unit on either side: the printed number is rounded too.
+            let half = 0.5 * self.printed.unit;
+            span.low - half <= value && value <= span.high + half
+        };
+        if self.verdict == Verdict::DoesNotReproduce && span.is_some_and(inside) {
+            self.verdict = Verdict::WithinRounding;
+        }
+        self
+    }
+
+    /// The same for Kz, by way of its reciprocal.
+    pub(super) fn or_reciprocal_within(mut self, span: Option<Span>) -> Self {
+        let compliance = 1.0 / self.printed.value;
+        let inside = |span: Span| span.low <= compliance && compliance <= span.high;
+        if self.verdict == Verdict::DoesNotReproduce && span.is_some_and(inside) {
+            self.verdict = Verdict::WithinRounding;
+        }
+        self
+    }
+
+    /// Adds the remark where the row does not reproduce.
+    pub(super) fn or_because(mut self, remark: &'static str) -> Self {
+        if self.verdict == Verdict::DoesNotReproduce {
+            self.remark = Some(remark);
+        }
+        self
+    }
+
+    /// Adds the remark in any case.
+    pub(super) fn noting(mut self, remark: &'static str) -> Self {
+        self.remark = Some(remark);
+        self
+    }
+
+    /// 100 (ours - printed)/printed (%), where both exist.
+    pub fn difference_percent(&self) -> Option<f64> {
+        let ours = self.ours?;
+        let percent = 100.0 * (ours - self.printed.value) / self.printed.value;
+        percent.is_finite().then_some(percent)
+    }
+}
+
+/// One table of the paper.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Table {
+    /// Its number, "1a".
+    pub number: &'static str,
+    /// What it holds.
+    pub title: &'static str,
+    /// Its numbers.
+    pub rows: Vec<Row>,
+}
+
+/// All tables.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Reproduction {
+    /// In the order of the paper.
+    pub tables: Vec<Table>,
+}
+
+impl Reproduction {
+    /// How many rows have this verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        let rows = self.tables.iter().flat_map(|table| &table.rows);
+        rows.filter(|row| row.verdict == verdict).count()
+    }
+
+    /// The table of that number.
+    pub fn table(&self, number: &str) -> Option<&Table> {
+        self.tables.iter().find(|table| table.number == number)
+    }
+}
+
+/// Label of a joint, "Kx 500, Ky 100".
+pub(super) fn joint_label(kx: &Printed, ky: &Printed) -> String {
+    format!("Kx {}, Ky {}", kx.text, ky.text)
+}
+
+/// An estimate from printed lambdas, with the spans over the rounding of their last digit. The
+/// span of "kz" is that of 1/Kz, which does not pass through infinity.
+pub(super) fn estimate_from_printed(
+    model: PairsModel,
+    lambdas: &[Printed],
+) -> Result<(PairsEstimate, Spans), PaperError> {
+    let values: Vec<f64> = lambdas.iter().map(|lambda| lambda.value).collect();
+    let halves: Vec<f64> = lambdas.iter().map(|lambda| 0.5 * lambda.unit).collect();
+    let estimate = estimate_pairs(model, &ModeLambda::numbered(&values))?;
+    let at = |values: &[f64]| {
+        let found = estimate_pairs(model, &ModeLambda::numbered(values)).ok()?;
+        found.stiffnesses()
+    };
+    let direct = sign_pattern_spans(&values, &halves, at)?;
+    // Through the slot of Kx, which may change its sign without harm.
+    let reciprocal = sign_pattern_spans(&values, &halves, |values| {
+        let found = at(values)?;
+        Some(Stiffnesses {
+            kx: found.kz?.recip(),
+            ..found
+        })
+    })?;
+    let spans = Spans {
+        kx: direct.kx,
+        ky: direct.ky,
+        cross_compliance: reciprocal.kx,
+    };
+    Ok((estimate, spans))
+}
+
+/// Spans of an estimate.
+pub(super) struct Spans {
+    pub kx: Option<Span>,
+    pub ky: Option<Span>,
+    pub cross_compliance: Option<Span>,
+}
+
+/// A printed number.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Printed {
+    /// As printed, "1.8066" or "-8.11e5".
+    pub text: String,
+    /// Its value.
+    pub value: f64,
+    /// One unit in the last printed digit.
+    pub unit: f64,
+}
+
+impl Printed {
+    /// Reads a decimal number with an optional exponent.
+    ///
+    /// # Errors
+    /// [`PaperError::Number`] for any other text.
+    pub fn parse(text: &str) -> Result<Self, PaperError> {
+        let wrong = || PaperError::Number {
+            text: text.to_owned(),
+        };
+        let value: f64 = text.parse().map_err(|_| wrong())?;
+        let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+        let exponent: i32 = exponent.parse().map_err(|_| wrong())?;
+        let decimals = mantissa
+            .split_once('.')
+            .map_or(0, |(_, digits)| digits.len());
+        let decimals = i32::try_from(decimals).map_err(|_| wrong())?;
+        Ok(Self {
+            text: text.to_owned(),
+            value,
+            unit: 10f64.powi(exponent - decimals),
+        })
+    }
+
+    /// Another value with one digit more than this number was printed with.
+    pub fn format_like(&self, value: f64) -> String {
+        if self.text.contains(['e', 'E']) {
+            return format!("{value:.3e}");
+        }
+        let decimals = self
+            .text
+            .split_once('.')
+            .map_or(0, |(_, digits)| digits.len());
+        let large = value.abs() >= 1e7;
+        if large {
+            format!("{value:.3e}")
+        } else {
+            format!("{value:.*}", decimals + 1)
+        }
+    }
+}
+
+/// A printed table: comma-separated text with a header line.
+pub(super) struct PrintedTable {
+    header: Vec<&'static str>,
+    rows: Vec<Vec<&'static str>>,
+}
+
+impl PrintedTable {
+    pub(super) fn new(text: &'static str) -> Self {
+        let mut lines = text
+            .lines()
+            .map(|line| line.split(',').map(str::trim).collect::<Vec<_>>());
+        Self {
+            header: lines.next().unwrap_or_default(),
+            rows: lines.collect(),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    pub(super) fn text(&self, row: usize, column: &str) -> Result<&'static str, PaperError> {
+        let place = self.header.iter().position(|&name| name == column);
+        place
+            .and_then(|place| self.rows.get(row)?.get(place).copied())
+            .ok_or_else(|| PaperError::Cell {
+                row,
+                column: column.to_owned(),
+            })
+    }
+
+    pub(super) fn number(&self, row: usize, column: &str) -> Result<Printed, PaperError> {
+        Printed::parse(self.text(row, column)?)
+    }
+
+    pub(super) fn value(&self, row: usize, column: &str) -> Result<f64, PaperError> {
+        Ok(self.number(row, column)?.value)
+    }
+
+    /// A whole column.
+    pub(super) fn column(&self, column: &str) -> Result<Vec<Printed>, PaperError> {
+        (0..self.len())
+            .map(|row| self.number(row, column))
+            .collect()
+    }
+
+    /// lambda1 to lambda5 of one row.
+    pub(super) fn lambdas(&self, row: usize) -> Result<Vec<Printed>, PaperError> {
+        (1..=5)
+            .map(|mode| self.number(row, &format!("lambda{mode}")))
+            .collect()
+    }
+
+    /// The number in column "printed" of the row whose first two cells are these.
+    pub(super) fn named(&self, case: &str, quantity: &str) -> Result<Printed, PaperError> {
+        let found = self
+            .rows
+            .iter()
+            .position(|cells| cells.first() == Some(&case) && cells.get(1) == Some(&quantity));
+        match found {
+            Some(row) => self.number(row, "printed"),
+            None => Err(PaperError::Cell {
+                row: 0,
+                column: format!("{case} {quantity}"),
+            }),
+        }
+    }
+}
+
+const WIDTH: usize = 80;
+
+/// All tables, each with its remarks, and a count of the verdicts.
+pub fn render(reproduction: &Reproduction) -> String {
+    let mut text = String::from(
+        "The tables of Ingole & Chatterjee beside our numbers\n\n\
+         reproduces: yes = equal within the row's tolerance (one unit in the last\n\
+         printed digit, unless the rounding of the input is known to leave more);\n\
+         rounding = different, but not beyond what that rounding does; NO (n) = see\n\
+         remark n; given = measured or chosen, nothing to compute.\n",
+    );
+    for table in &reproduction.tables {
+        text.push('\n');
+        text.push_str(&render_table(table));
+    }
+    let count = |verdict| reproduction.count(verdict);
+    text.push_str(&format!(
+        "\n{} rows reproduce, {} within the rounding of their input, {} do not,\n{} are given.\n",
+        count(Verdict::Reproduces),
+        count(Verdict::WithinRounding),
+        count(Verdict::DoesNotReproduce),
+        count(Verdict::Given),
+    ));
+    text
+}
+
+fn render_table(table: &Table) -> String {
+    let mut text = format!("Table {}: {}\n", table.number, table.title);
+    text.push_str(&line(&["", "printed", "ours", "diff %", "reproduces"]));
+    let mut remarks: Vec<&str> = Vec::new();
+    for row in &table.rows {
+        let number = row.remark.map(|remark| {
+            let known = remarks.iter().position(|known| *known == remark);
+            known.unwrap_or_else(|| {
+                remarks.push(remark);
+                remarks.len() - 1
+            }) + 1
+        });
+        text.push_str(&render_row(row, number));
+    }
+    for (index, remark) in remarks.iter().enumerate() {
+        text.push_str(&wrapped(&format!("({})", index + 1), remark));
+    }
+    text
+}
+
+fn render_row(row: &Row, remark: Option<usize>) -> String {
+    let ours = row
+        .ours
+        .map_or(String::new(), |ours| row.printed.format_like(ours));
+    let difference =
+        row.difference_percent()
+            .map_or(String::new(), |percent| match percent.abs() {
+                large if large >= 1000.0 => "> 1000".to_owned(),
+                large if large >= 10.0 => format!("{percent:+.1}"),
+                _ => format!("{percent:+.3}"),
+            });
+    let verdict = match row.verdict {
+        Verdict::Reproduces => "yes",
+        Verdict::WithinRounding => "rounding",
+        Verdict::DoesNotReproduce => "NO",
+        Verdict::Given => "given",
+    };
+    let verdict = match remark {
+        Some(number) => format!("{verdict} ({number})"),
+        None => verdict.to_owned(),
+    };
+    line(&[&row.label, &row.printed.text, &ours, &difference, &verdict])
+}
+
+fn line([label, printed, ours, difference, verdict]: &[&str; 5]) -> String {
+    let line = format!("{label:<37}{printed:>10} {ours:>10} {difference:>8} {verdict}");
+    format!("{}\n", line.trim_end())
+}
+
+/// A remark after its number, broken between words.
+fn wrapped(number: &str, remark: &str) -> String {
+    let mut text = String::new();
+    let mut line = number.to_owned();
+    for word in remark.split_whitespace() {
+        if line.len() + 1 + word.len() > WIDTH {
+            text.push_str(&line);
+            text.push('\n');
+            line = " ".repeat(number.len());
+        }
+        line.push(' ');
+        line.push_str(word);
+    }
+    text.push_str(&line);
+    text.push('\n');
+    text
+}

@@ -252,7 +252,7 @@ pub struct SampledShape {
     /// Positions (m) from the joint; of a lap joint or a free beam from the left end. The place of a lap
     /// joint stands twice, for either half's end.
     pub positions: Vec<f64>,
-    /// Displacement relative to the largest (1).
+    /// Displacement relative to the largest (1), positive at the last position.
     pub displacements: Vec<f64>,
 }
 
@@ -273,7 +273,9 @@ pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
     let shape = |mode: usize| {
         let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
         let raw: Vec<f64> = raw.collect();
-        let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        // A free end is no node, so that its sign fixes that of the shape.
+        let sign = raw.last().map_or(1.0, |tip| 1f64.copysign(*tip));
+        let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs())) * sign;
         SampledShape {
             mode: mode + 1,
             frequency: modes.frequencies()[mode],

@@ -1,7 +1,7 @@
 //! Theory: beams, joints and their natural frequencies. Pure functions of geometry; sees no data.
 //!
 //! Every assembly is made of one building block, a uniform beam whose far end is free and whose
-//! near end is held by a translational and a rotational spring ([`frequency_equation`]):
+//! near end is held by a translational and a rotational spring ([`interface`]):
 //!
 //! - a cantilever is that block with the joint's springs,
 //! - a free beam is the block with springs of zero stiffness,

@@ -1,12 +1,14 @@
 //! Arguments that several commands share, and the texts they are made of.
 
+use anyhow::{anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tapjoint::description::ChannelRef;
+use tapjoint::description::{ChannelRef, JointKind};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
+use tapjoint::structure::JointStiffness;
 
 /// Arguments of every command.
 #[derive(Debug, Args)]
@@ -208,7 +210,7 @@ fn positive_numbers(text: &str, wanted: &str) -> Result<Vec<f64>, String> {
 
 /// A non-dimensional stiffness of the joint, from 0 to infinity ("rigid").
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stiffness(pub(super) f64);
+struct Stiffness(f64);
 
 impl FromStr for Stiffness {
     type Err = String;
@@ -226,7 +228,7 @@ impl FromStr for Stiffness {
 
 /// A non-dimensional cross-coupling stiffness: any number but 0, infinite for no coupling.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CrossStiffness(pub(super) f64);
+struct CrossStiffness(f64);
 
 impl FromStr for CrossStiffness {
     type Err = String;
@@ -256,5 +258,50 @@ impl FromStr for ChannelScale {
             Ok(value) => Err(format!("{value} is no scale; {wanted}")),
             Err(_) => Err(format!("\"{text}\" is not a number; {wanted}")),
         }
+    }
+}
+
+/// A joint instead of the described one.
+#[derive(Debug, Args)]
+pub(super) struct StiffnessArguments {
+    /// Translational stiffness, 0 to inf (non-dimensional); default: kt of TEST
+    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true)]
+    kx: Option<Stiffness>,
+    /// Rotational stiffness, 0 to inf (non-dimensional); default: kr of TEST
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
+    ky: Option<Stiffness>,
+    /// Cross-coupling stiffness, negative for a soft root (non-dimensional); default: no coupling
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
+    kz: Option<CrossStiffness>,
+}
+
+impl StiffnessArguments {
+    /// The joint that --kx, --ky and --kz give; `None` without them.
+    ///
+    /// # Errors
+    /// A free beam, a lap joint's coupling, a joint that would be a source of energy.
+    pub(super) fn given(&self, kind: JointKind) -> anyhow::Result<Option<JointStiffness>> {
+        let Some((Stiffness(kx), Stiffness(ky))) = self.kx.zip(self.ky) else {
+            return Ok(None);
+        };
+        if kind == JointKind::Free {
+            bail!("a free beam has no joint; leave out --kx, --ky and --kz");
+        }
+        let Some(CrossStiffness(kz)) = self.kz else {
+            return Ok(Some(JointStiffness::two_parameter(kx, ky)));
+        };
+        if kind == JointKind::Lap {
+            bail!("a lap joint has no coupling stiffness; leave out --kz");
+        }
+        // A passive joint's compliance matrix is positive definite: 1/Kz^2 < 1/(Kx Ky). Taken as a
+        // quotient of roots, because products of large stiffnesses overflow.
+        let ratio = (kx / kz.abs()) * (ky / kz.abs());
+        if kz.is_finite() && (ratio.is_nan() || ratio >= 1.0) {
+            let limit = kx.sqrt() * ky.sqrt();
+            return Err(anyhow!(
+                "--kz {kz} makes the joint a source of energy; its size must exceed sqrt(kx ky) = {limit:.6}"
+            ));
+        }
+        Ok(Some(JointStiffness::three_parameter(kx, ky, kz)))
     }
 }

@@ -2,13 +2,12 @@
 
 use super::Outcome;
 use super::arguments::{Band, ChannelScale, RecordingArguments, block_size};
-use super::bare::{BareSettings, analyse, holds_functions, refuse_given};
+use super::bare::{BareSettings, analyse, holds_functions, refuse_given, wire};
 use super::choices::{EstimatorArgument, FormArgument, SensorArgument, WindowArgument};
 use super::input::{TestFile, check_file, is_description, read_test};
 use super::output::OutputFile;
 use super::overwrite::Expanded;
 use super::terminal::Terminal;
-use super::wiring::wire;
 use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};

@@ -10,13 +10,9 @@ mod help;
 mod input;
 mod output;
 mod overwrite;
-mod progress;
-mod renamed;
 mod signature;
-mod stiffness;
 mod terminal;
 mod updated_model;
-mod wiring;
 
 mod blind_check;
 mod completions;

@@ -1,9 +1,9 @@
 //! `tapjoint plan`: before anything is measured, which effects a test could tell apart.
 
 use super::Outcome;
+use super::arguments::StiffnessArguments;
 use super::input::read_test;
 use super::output::OutputFile;
-use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use anyhow::{Context, ensure};
 use clap::Args;

@@ -1,9 +1,9 @@
 //! `tapjoint predict`: natural frequencies of a known joint.
 
 use super::Outcome;
+use super::arguments::StiffnessArguments;
 use super::choices::KindArgument;
 use super::input::{TestFile, read_model};
-use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use super::updated_model::effect_at;
 use anyhow::{Context, anyhow, bail};

@@ -1,11 +1,10 @@
 //! `tapjoint resolution`: what block size, window and reading do to frequencies and stiffness.
 
 use super::Outcome;
-use super::arguments::{Band, block_size};
+use super::arguments::{Band, StiffnessArguments, block_size};
 use super::choices::{ReadingArgument, WindowArgument};
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
-use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use anyhow::anyhow;
 use clap::Args;

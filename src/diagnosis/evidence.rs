@@ -139,8 +139,12 @@ pub fn linear_optimum(data: &[Datum], priors: &[Prior], at: &Optimum) -> Option<
 /// another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
 fn moved_optimum(data: &[Datum], layout: &Layout, priors: &[Prior], at: &Optimum) -> Optimum {
     let mut held = priors.to_vec();
-    for k in layout.joint.len()..layout.first_nuisance() {
-        held[k] = Prior::held(at.parameters[k]);
+    let of_effects = layout.joint.len()..layout.first_nuisance();
+    for (prior, value) in held[of_effects.clone()]
+        .iter_mut()
+        .zip(&at.parameters[of_effects])
+    {
+        *prior = Prior::held(*value);
     }
     match linear_optimum(data, &held, at) {
         Some(moved) => optimum_at(data, priors, moved.parameters, moved.model),

@@ -382,7 +382,7 @@ impl<'a> Forward<'a> {
             if let (EffectId::AddedMass, Some(range), Some(location)) =
                 (one.effect, one.location, self.layout.location(k))
             {
-                let position = range.from_searched(parameters[location]);
+                let position = range.value_at(parameters[location]);
                 all.push((parameters[self.layout.size(k)], position));
             }
         }

@@ -174,7 +174,7 @@ impl LocationRange {
     }
 
     /// Returns the parameter from its searched form.
-    pub fn from_searched(self, searched: f64) -> f64 {
+    pub fn value_at(self, searched: f64) -> f64 {
         if self.is_logarithmic() {
             searched.exp()
         } else {
@@ -378,7 +378,7 @@ impl Layout {
                 let size = parameters[self.size(index)];
                 let mut pairs = vec![(candidate.size.name, size)];
                 if let (Some(range), Some(location)) = (candidate.location, self.location(index)) {
-                    let value = range.from_searched(parameters[location]);
+                    let value = range.value_at(parameters[location]);
                     pairs.push(match range.kind {
                         LocationKind::Position => ("position", value),
                         LocationKind::FixtureFrequency => ("frequency", value),

@@ -243,7 +243,7 @@ impl<'a> Reference<'a> {
                 ..value_of(effect.effect, effect.size.name, size, Some(size_std))
             });
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
-                let value = range.from_searched(values[location]);
+                let value = range.value_at(values[location]);
                 let std = match range.kind {
                     LocationKind::FixtureFrequency | LocationKind::Gyration => {
                         value * stds[location]

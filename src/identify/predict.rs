@@ -181,10 +181,11 @@ pub fn pair_by_frequency(
     for (index, frequency) in measured.iter().enumerate() {
         let distances = predicted.iter().map(|f| ((frequency - f) / f).abs());
         let nearest = distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((mode, distance)) = nearest.filter(|(_, distance)| *distance <= tolerance) {
-            if best[mode].is_none_or(|(_, known)| distance < known) {
-                best[mode] = Some((index, distance));
-            }
+        if let Some((mode, distance)) = nearest
+            && distance <= tolerance
+            && best[mode].is_none_or(|(_, known)| distance < known)
+        {
+            best[mode] = Some((index, distance));
         }
     }
     let mut numbers = vec![None; measured.len()];

@@ -222,10 +222,10 @@ fn judged(changes: Vec<FrequencyChange>) -> AmplitudeDependence {
 
 #[test]
 fn regress_one_frequency_that_changes_is_no_joint() {
-    assert!(!finding(&[]).effect.is_some());
-    assert!(!finding(&[-0.2]).effect.is_some());
+    assert!(finding(&[]).effect.is_none());
+    assert!(finding(&[-0.2]).effect.is_none());
     assert!(finding(&[-0.2, -0.1]).effect.is_some());
-    assert!(!finding(&[-0.2, 0.1]).effect.is_some());
+    assert!(finding(&[-0.2, 0.1]).effect.is_none());
     assert!(!finding(&[-0.2]).enough && finding(&[-0.2, 0.1]).enough);
     // A change within two standard uncertainties has no direction.
     let mut weak = finding(&[-0.2, 0.1, -0.1]);

@@ -5,11 +5,11 @@ mod planted;
 mod summary;
 
 use super::Outcome;
+use super::arguments::StiffnessArguments;
 use super::input::{TestFile, read_model};
 use super::output::OutputFolder;
 use super::overwrite::Expanded;
 use super::signature::CHECKSUMS;
-use super::stiffness::StiffnessArguments;
 use super::terminal::Terminal;
 use super::updated_model::effect_at;
 use anyhow::{Context, anyhow};

@@ -515,7 +515,7 @@ fn view(name: String, panels: &[Panel]) -> View {
             .iter()
             .map(|series| set(series, &panel.x))
             .collect(),
-        rules: panel.rules.iter().map(|rule| point_rule(rule)).collect(),
+        rules: panel.rules.iter().map(point_rule).collect(),
     });
     View {
         name,

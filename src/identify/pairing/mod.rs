@@ -1,7 +1,7 @@
 //! Which measured frequency is which mode.
 //!
 //! A structure without a joint is known but for a common factor, and its peaks are paired by frequency
-//! (by their ratios). With a joint the natural frequencies themselves are unknown, so that pairing and
+//! ([`crate::predict::pair_by_ratio`]). With a joint the natural frequencies themselves are unknown, so that pairing and
 //! joint are sought together ([`pair_modes`]):
 //! 1. *Candidates* (`candidates`): for every joint of a grid the assignment of peaks to modes that suits
 //!    it best, peaks left over and modes left out at a price. Mode n of any joint lies between those of

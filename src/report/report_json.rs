@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::ReportError;
 use super::document::Document;
-use super::run::stems;
+use super::short_names::stems;
 
 /// The document as indented JSON with a newline at its end.
 ///

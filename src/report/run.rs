@@ -13,6 +13,7 @@ use super::charts::taps::taps;
 use super::document::Document;
 use super::figures::RecordingFigure;
 use super::html::{InlineFigure, PageFigures, render_html};
+use super::short_names::stems;
 use super::{
     ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv,
     render_perturbation_csv,
@@ -169,37 +170,4 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
         chart,
     }));
     pictures
-}
-
-/// File names without folder and ending, safe as part of a name, each different.
-pub(super) fn stems<'a>(files: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let mut stems: Vec<String> = Vec::new();
-    for file in files {
-        let stem = stem(file);
-        let mut unique = stem.clone();
-        let mut number = 2;
-        while stems.contains(&unique) {
-            unique = format!("{stem}-{number}");
-            number += 1;
-        }
-        stems.push(unique);
-    }
-    stems
-}
-
-fn stem(file: &str) -> String {
-    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    let safe: String = stem
-        .chars()
-        .map(|c| {
-            let plain = c.is_alphanumeric() || matches!(c, '-' | '_');
-            if plain { c } else { '-' }
-        })
-        .collect();
-    if safe.is_empty() {
-        "recording".to_owned()
-    } else {
-        safe
-    }
 }

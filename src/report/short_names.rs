@@ -1,4 +1,4 @@
-//! Names of files that are too long, shortened so that no two of them look alike.
+//! Names of files: shortened so that no two of them look alike, and as parts of other names.
 
 use std::collections::BTreeSet;
 
@@ -145,6 +145,39 @@ fn middle_out(name: &str, width: usize) -> String {
     let first = letters.iter().take(head);
     let last = letters.iter().skip(letters.len() - tail);
     first.chain(&[LEFT_OUT]).chain(last).collect()
+}
+
+/// File names without folder and ending, safe as part of a name, each different.
+pub(super) fn stems<'a>(files: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for file in files {
+        let stem = stem(file);
+        let mut unique = stem.clone();
+        let mut number = 2;
+        while stems.contains(&unique) {
+            unique = format!("{stem}-{number}");
+            number += 1;
+        }
+        stems.push(unique);
+    }
+    stems
+}
+
+fn stem(file: &str) -> String {
+    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let safe: String = stem
+        .chars()
+        .map(|c| {
+            let plain = c.is_alphanumeric() || matches!(c, '-' | '_');
+            if plain { c } else { '-' }
+        })
+        .collect();
+    if safe.is_empty() {
+        "recording".to_owned()
+    } else {
+        safe
+    }
 }
 
 #[cfg(test)]

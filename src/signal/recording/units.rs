@@ -102,7 +102,7 @@ const QUANTITIES: &[Quantity] = &[
 /// acceleration here (9.80665 m/s2): channels carry signals, and no signal is a mass.
 ///
 /// ```
-/// use tapjoint::recording::channel_unit;
+/// use tapjoint_signal::recording::channel_unit;
 /// assert_eq!(channel_unit("mm/s^2"), Some((1e-3, "m/s2")));
 /// assert_eq!(channel_unit("furlong"), None);
 /// ```

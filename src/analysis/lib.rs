@@ -53,7 +53,6 @@ pub use structure::{
 };
 pub use warning::Warning;
 
-pub use tapjoint_description::described::fastened_masses;
 use tapjoint_description::{ChannelRef, TestDescription};
 use tapjoint_signal::recording::Recording;
 

@@ -16,8 +16,8 @@ use super::observed_mode::{ModeSeen, shape_of};
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::SpecimenJoint;
-use tapjoint_description::described::{coupling, described_beam, described_specimen, stiffness_of};
-use tapjoint_description::{JointKind, JointModel, KnownStiffness, SensorKind, TestDescription};
+use tapjoint_description::described::{coupling, described_beam, described_specimen};
+use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
 use tapjoint_identify::observation::{
     Configuration, ExtraPeak, Observations, ObservedMode, ObservedSensor, UNPAIRED,
@@ -270,20 +270,19 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
 /// Where the search for the joint begins: known stiffnesses, else those found, else usual ones; and the
 /// coupling, where the joint's model has one.
 fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
-    if test.joint.kind == JointKind::Free {
+    if test.joint.kind == Assembly::Free {
         return SpecimenJoint::Free;
     }
     let units = StiffnessUnits::of(&described_beam(test));
-    let start = |known: Option<KnownStiffness>, found: Option<f64>, (usual, unit): (f64, f64)| {
+    let start = |known: Option<f64>, found: Option<f64>, (usual, unit): (f64, f64)| {
         let begin = found.filter(|k| *k > 0.0).unwrap_or(usual);
-        known.map_or(unit * begin.min(STIFFEST_START), stiffness_of)
+        known.unwrap_or(unit * begin.min(STIFFEST_START))
     };
     let [kx, ky] = USUAL_JOINT;
     let model = test.joint.model;
     let kt = start(test.joint.kt, found.map(|joint| joint.kx), (kx, units.kt));
     let kr = start(test.joint.kr, found.map(|joint| joint.ky), (ky, units.kr));
-    let described = test.joint.ktr.map(stiffness_of);
-    let coupling = match (model, found, described) {
+    let coupling = match (model, found, test.joint.ktr) {
         (JointModel::ThreeParameter, Some(joint), _) => joint.coupling(),
         (JointModel::ThreeParameter, None, Some(ktr)) => {
             let begin = coupling(kt, kr, 1.0 / ktr);

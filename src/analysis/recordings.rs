@@ -12,9 +12,8 @@ use super::warning::Warning;
 use num_complex::Complex64;
 use std::ops::Range;
 use std::path::Path;
-use tapjoint_description::described::fastened_masses;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, FrfForm, ReadBy, RecordingDescription, Scale, SensorDescription,
+    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorDescription,
     SensorKind, TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
@@ -90,7 +89,7 @@ pub(super) fn measure_described(
 fn described_functions(
     test: &TestDescription,
     description: &RecordingDescription,
-    (folder, form): (&Path, FrfForm),
+    (folder, form): (&Path, ResponseForm),
 ) -> Result<RecordingResult, PipelineError> {
     let mut functions = open_frequency_responses(&folder.join(&description.file))?;
     functions.file = description.file.display().to_string();
@@ -99,7 +98,7 @@ fn described_functions(
         _ => None,
     };
     let settings = FunctionSettings {
-        form: Some(form_of_description(form)),
+        form: Some(form),
         sensor: description.sensor.clone().or_else(|| only(&test.sensors)),
         band: description.band,
         reading: test.analysis.reading,
@@ -174,7 +173,7 @@ fn conditions(test: &TestDescription, description: &RecordingDescription) -> Con
         tap: description.tap,
         sensor_positions: test.sensors.iter().filter_map(place).collect(),
         sensor_masses: test.sensors.iter().filter_map(mass).collect(),
-        masses: fastened_masses(description),
+        masses: description.masses.clone(),
         torque: description.torque,
         temperature: description.temperature,
         date: description.date.clone(),
@@ -591,15 +590,6 @@ fn add_constants(
     let Some(forms) = forms else { return };
     for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {
         fit.constants = modal_constants_of_frf(&fit.mode, &forms);
-    }
-}
-
-/// The form that a description states.
-pub(super) fn form_of_description(form: FrfForm) -> ResponseForm {
-    match form {
-        FrfForm::Accelerance => ResponseForm::Accelerance,
-        FrfForm::Mobility => ResponseForm::Mobility,
-        FrfForm::Receptance => ResponseForm::Receptance,
     }
 }
 

@@ -4,10 +4,10 @@ use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
 use tapjoint_description::described::{
-    assembly_of, described_beam, fastened_masses, lap_layout, stiffness_of,
+    described_beam, lap_layout,
 };
 use tapjoint_description::{
-    FitParameter, JointKind, JointModel, KnownStiffness, RecordingDescription, SensorKind,
+    FitParameter, JointModel, RecordingDescription, SensorKind,
     TestDescription, Weights,
 };
 use tapjoint_identify::consistent::{
@@ -67,13 +67,13 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
     let beam = described_beam(test);
     TestedStructure {
         beam,
-        assembly: assembly_of(test.joint.kind),
+        assembly: test.joint.kind,
         theory: test.joint.beam,
         regression: match (test.joint.kind, test.joint.model) {
-            (JointKind::Free, _) => None,
-            (JointKind::Lap, _) => Some(PairsModel::Lap),
-            (JointKind::Cantilever, JointModel::TwoParameter) => Some(PairsModel::TwoParameter),
-            (JointKind::Cantilever, JointModel::ThreeParameter) => Some(PairsModel::ThreeParameter),
+            (Assembly::Free, _) => None,
+            (Assembly::Lap, _) => Some(PairsModel::Lap),
+            (Assembly::Cantilever, JointModel::TwoParameter) => Some(PairsModel::TwoParameter),
+            (Assembly::Cantilever, JointModel::ThreeParameter) => Some(PairsModel::ThreeParameter),
         },
         known: known_joint(test, &beam),
     }
@@ -82,7 +82,7 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
 fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
     let units = StiffnessUnits::of(beam);
     let in_units =
-        |known: Option<KnownStiffness>, unit: f64| known.map(|known| stiffness_of(known) / unit);
+        |known: Option<f64>, unit: f64| known.map(|known| known / unit);
     KnownJoint {
         kx: in_units(test.joint.kt, units.kt),
         ky: in_units(test.joint.kr, units.kr),
@@ -143,8 +143,8 @@ pub(super) fn masses_in(
             inertia: 0.0,
         })
     });
-    let fastened = recording.map(fastened_masses).unwrap_or_default();
-    sensors.chain(fastened).collect()
+    let fastened = recording.into_iter().flat_map(|one| &one.masses);
+    sensors.chain(fastened.copied()).collect()
 }
 
 /// The structure that the estimator takes.

@@ -1,16 +1,18 @@
-//! `[analysis]`: how to analyse.
+//! `[analysis]`: settings of the analysis.
 
 use super::error::{DescriptionError, DescriptionProblem};
 use super::reader::{Entry, Limits, Table};
-use super::{JointDescription, JointKind, JointModel};
+use super::{Assembly, JointDescription, JointModel};
 use tapjoint_signal::modal::ReadBy;
 
-const WINDOWS: [(&str, WindowKind); 3] = [
+/// Words of `window` in `[analysis]`.
+pub const WINDOWS: [(&str, WindowKind); 3] = [
     ("rectangular", WindowKind::Rectangular),
     ("hann", WindowKind::Hann),
     ("exponential", WindowKind::Exponential),
 ];
-const READINGS: [(&str, ReadBy); 3] = [
+/// Words of `reading` in `[analysis]`.
+pub const READINGS: [(&str, ReadBy); 3] = [
     ("fit", ReadBy::Fit),
     ("interpolated", ReadBy::Interpolated),
     ("line", ReadBy::Line),
@@ -48,7 +50,7 @@ pub enum Weights {
     Relative,
 }
 
-/// What an estimate may determine.
+/// A quantity that an estimate can determine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FitParameter {
     /// Translational stiffness.
@@ -63,20 +65,20 @@ pub enum FitParameter {
     Density,
 }
 
-/// How to analyse.
+/// Settings of the analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnalysisDescription {
     /// Window; `None` = chosen from the decay in the record.
     pub window: Option<WindowKind>,
-    /// How natural frequencies are read.
+    /// Way of reading natural frequencies.
     pub reading: ReadBy,
     /// The first so many modes enter the estimate; `None` = all.
     pub fit_modes: Option<usize>,
     /// Weights of the frequencies; `None` = measured where bounds are known.
     pub weights: Option<Weights>,
-    /// Whether the sensors' masses enter the nominal model.
+    /// The sensors' masses enter the nominal model.
     pub sensor_mass: bool,
-    /// What is estimated; `None` = the joint model's stiffnesses, free beam: modulus.
+    /// Estimated quantities; `None` = the joint model's stiffnesses, of a free beam the modulus.
     pub fit: Option<Vec<FitParameter>>,
 }
 
@@ -124,16 +126,13 @@ fn read_fit(
     for item in &items {
         let parameter = item.choice(&PARAMETERS)?;
         if let Some((reason, remedy)) = objection(parameter, joint) {
-            let reason = reason.to_owned();
-            return Err(item.error(DescriptionProblem::Conflict { reason, remedy }));
+            return Err(item.conflict(reason, remedy));
         }
         if fit.contains(&parameter) {
-            let value = format!("\"{}\"", item.as_text().unwrap_or_default());
-            let (first_line, remedy) = (entry.line, "list each parameter once");
             return Err(item.error(DescriptionProblem::Duplicate {
-                value,
-                first_line,
-                remedy,
+                value: format!("\"{}\"", item.as_text().unwrap_or_default()),
+                first_line: entry.line,
+                remedy: "list each parameter once",
             }));
         }
         fit.push(parameter);
@@ -141,7 +140,7 @@ fn read_fit(
     Ok(fit)
 }
 
-/// Why a parameter cannot be fitted with this joint, and what to do.
+/// Returns the reason why a parameter cannot be fitted with this joint, and the remedy.
 fn objection(
     parameter: FitParameter,
     joint: &JointDescription,
@@ -152,7 +151,7 @@ fn objection(
         FitParameter::Ktr => joint.ktr,
         FitParameter::Modulus | FitParameter::Density => return None,
     };
-    if joint.kind == JointKind::Free {
+    if joint.kind == Assembly::Free {
         return Some((
             "a free beam has no joint stiffness",
             "fit \"modulus\" or \"density\"",

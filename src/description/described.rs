@@ -1,14 +1,11 @@
-//! From a test description to the structure it describes, in the theory's terms: for the pipeline and
-//! for virtual tests alike.
+//! From a test description to the structure it describes, for the analysis and for virtual tests.
 
-use crate::{
-    FastenedMass, JointKind, KnownStiffness, RecordingDescription, RightHalf, TestDescription,
-};
+use crate::TestDescription;
+use tapjoint_beam::Beam;
 use tapjoint_beam::beam::DEFAULT_POISSON;
-use tapjoint_beam::specimen::{LapLayout, PointMass, Specimen, SpecimenJoint};
-use tapjoint_beam::{Assembly, Beam};
+use tapjoint_beam::specimen::{LapLayout, Specimen, SpecimenJoint};
 
-/// The beam; of a lap joint the left half's properties and the total length.
+/// Returns the beam; for a lap joint the left half's properties and the total length.
 pub fn described_beam(test: &TestDescription) -> Beam {
     Beam {
         length: test.beam.length,
@@ -20,28 +17,8 @@ pub fn described_beam(test: &TestDescription) -> Beam {
     }
 }
 
-/// The right half of a lap joint: the left one's length and what is not said to differ.
-fn right_half(right: &RightHalf, left: &Beam) -> Beam {
-    Beam {
-        length: left.length,
-        width: right.width.unwrap_or(left.width),
-        thickness: right.thickness.unwrap_or(left.thickness),
-        modulus: right.modulus.unwrap_or(left.modulus),
-        density: right.density.unwrap_or(left.density),
-        poisson: right.poisson.unwrap_or(left.poisson),
-    }
-}
-
-/// A described stiffness (N/m, N m/rad or N/rad); infinite where it is rigid.
-pub fn stiffness_of(known: KnownStiffness) -> f64 {
-    match known {
-        KnownStiffness::Value(value) => value,
-        KnownStiffness::Rigid => f64::INFINITY,
-    }
-}
-
-/// Coupling of a joint (1), sqrt(Kt Kr)/Ktr, from stiffnesses and 1/Ktr in one system of units; none where
-/// Ktr is rigid.
+/// Returns the coupling of a joint (1), sqrt(Kt Kr)/Ktr, from stiffnesses and 1/Ktr in one system of units.
+/// A rigid Ktr gives 0.
 pub fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
     if cross_compliance == 0.0 {
         0.0
@@ -50,38 +27,31 @@ pub fn coupling(kt: f64, kr: f64, cross_compliance: f64) -> f64 {
     }
 }
 
-/// Where a described lap joint's halves differ from two equal pieces; nothing of one beam.
+/// Returns the differences of a lap joint's halves from two equal pieces; of other structures the default.
 pub fn lap_layout(test: &TestDescription) -> LapLayout {
     let joint = &test.joint;
-    let beam = described_beam(test);
+    let left = described_beam(test);
     LapLayout {
         position: joint.position,
-        right: joint.right.as_ref().map(|right| right_half(right, &beam)),
+        right: joint.right.as_ref().map(|right| Beam {
+            length: left.length,
+            width: right.width.unwrap_or(left.width),
+            thickness: right.thickness.unwrap_or(left.thickness),
+            modulus: right.modulus.unwrap_or(left.modulus),
+            density: right.density.unwrap_or(left.density),
+            poisson: right.poisson.unwrap_or(left.poisson),
+        }),
         overlap: joint.overlap.as_ref().map(|o| (o.length, o.mass)),
     }
 }
 
-/// How the described beam is held.
-pub fn assembly_of(kind: JointKind) -> Assembly {
-    match kind {
-        JointKind::Cantilever => Assembly::Cantilever,
-        JointKind::Lap => Assembly::Lap,
-        JointKind::Free => Assembly::Free,
-    }
-}
-
-/// The specimen on this joint, without sensors and what is fastened for single recordings.
+/// Returns the specimen on this joint, without sensors and without masses of single recordings.
 pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
-    let (beam, assembly) = (described_beam(test), assembly_of(test.joint.kind));
-    Specimen::jointed(test.joint.beam, &beam, assembly, &lap_layout(test), joint)
-}
-
-/// The known masses that are fastened to the beam for a recording.
-pub fn fastened_masses(recording: &RecordingDescription) -> Vec<PointMass> {
-    let point = |fastened: &FastenedMass| PointMass {
-        position: fastened.position,
-        mass: fastened.mass,
-        inertia: 0.0,
-    };
-    recording.masses.iter().map(point).collect()
+    Specimen::jointed(
+        test.joint.beam,
+        &described_beam(test),
+        test.joint.kind,
+        &lap_layout(test),
+        joint,
+    )
 }

@@ -15,13 +15,18 @@ mod sensors;
 mod structure;
 mod template;
 
-pub use analysis::{AnalysisDescription, FitParameter, Weights, WindowKind};
+pub use analysis::{AnalysisDescription, FitParameter, READINGS, WINDOWS, Weights, WindowKind};
 pub use error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, Suggestion};
 pub use parse::ChannelRefError;
+pub use recordings::FORMS;
 use schemars::JsonSchema;
+pub use sensors::SENSOR_KINDS;
 use serde::Serialize;
-pub use tapjoint_beam::BeamTheory;
+pub use structure::ASSEMBLIES;
+pub use tapjoint_beam::specimen::{LapOverlap, PointMass};
+pub use tapjoint_beam::{Assembly, BeamTheory};
 pub use tapjoint_signal::modal::ReadBy;
+pub use tapjoint_signal::recording::ResponseForm;
 pub use template::{runnable_template, template, template_of};
 
 use std::collections::BTreeMap;
@@ -30,36 +35,36 @@ use std::path::PathBuf;
 /// A tested structure, how it was instrumented, and which recordings belong to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestDescription {
-    /// What the test is called.
+    /// Name of the test.
     pub name: String,
     /// The beam.
     pub beam: BeamDescription,
     /// The joint that holds it.
     pub joint: JointDescription,
-    /// The hammer's channel; `None` for response-only tests.
+    /// The hammer; `None` for a test that measures responses alone.
     pub hammer: Option<HammerDescription>,
     /// The sensors, in the order of the file.
     pub sensors: Vec<SensorDescription>,
-    /// Where the natural frequencies come from.
+    /// Recordings that give the natural frequencies.
     pub recordings: Vec<RecordingDescription>,
-    /// Frequencies read elsewhere, instead of recordings.
+    /// Natural frequencies read elsewhere, instead of recordings.
     pub measured: Option<MeasuredFrequencies>,
-    /// How to analyse.
+    /// Settings of the analysis.
     pub analysis: AnalysisDescription,
-    /// What the model has besides: to predict and to simulate with.
+    /// Effects of the model, for predictions and virtual tests.
     pub effects: Vec<EffectDescription>,
-    /// What is odd but usable, in the order of reading.
+    /// Doubtful values that can still be used, in the order of reading.
     pub warnings: Vec<DescriptionWarning>,
 }
 
-/// An effect of a model that was brought up to date.
+/// An effect of an updated model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectDescription {
-    /// Its name.
+    /// Name of the effect.
     pub id: String,
-    /// Its parameters (SI) by name; the others are typical.
+    /// Parameters (SI) by name; the others keep their typical values.
     pub values: BTreeMap<String, f64>,
-    /// Line of its table.
+    /// Line of the table.
     pub line: usize,
 }
 
@@ -78,37 +83,26 @@ pub struct BeamDescription {
     pub density: f64,
     /// Poisson's ratio; `None` when the file is silent (0.3 is then assumed).
     pub poisson: Option<f64>,
-    /// Standard uncertainties of the above.
+    /// Standard uncertainties of these properties.
     pub tolerance: BeamTolerance,
 }
 
-/// Standard uncertainties of a beam's properties, where stated. Absolute, SI.
+/// Standard uncertainties of a beam's properties, where stated (absolute, SI).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct BeamTolerance {
-    /// Of the length (m).
+    /// Length (m).
     pub length: Option<f64>,
-    /// Of the width (m).
+    /// Width (m).
     pub width: Option<f64>,
-    /// Of the thickness (m).
+    /// Thickness (m).
     pub thickness: Option<f64>,
-    /// Of Young's modulus (Pa).
+    /// Young's modulus (Pa).
     pub modulus: Option<f64>,
-    /// Of the density (kg/m3).
+    /// Density (kg/m3).
     pub density: Option<f64>,
 }
 
-/// What kind of structure it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum JointKind {
-    /// A beam held at one end.
-    Cantilever,
-    /// Two beams joined end to end by a lap joint, free otherwise.
-    Lap,
-    /// A free beam: no joint.
-    Free,
-}
-
-/// How many stiffnesses describe the joint.
+/// Number of stiffnesses that describe the joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub enum JointModel {
     /// Translation and rotation.
@@ -119,45 +113,27 @@ pub enum JointModel {
     ThreeParameter,
 }
 
-/// A joint stiffness that is known and compared instead of fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum KnownStiffness {
-    /// A finite value (N/m, N m/rad or N/rad).
-    Value(f64),
-    /// Held without give.
-    Rigid,
-}
-
 /// The joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointDescription {
     /// Cantilever, lap joint or free beam.
-    pub kind: JointKind,
-    /// Two or three stiffnesses; of no meaning for a free beam.
+    pub kind: Assembly,
+    /// Two or three stiffnesses; ignored for a free beam.
     pub model: JointModel,
-    /// Translational stiffness (N/m), when known.
-    pub kt: Option<KnownStiffness>,
-    /// Rotational stiffness (N m/rad), when known.
-    pub kr: Option<KnownStiffness>,
-    /// Cross-coupling stiffness (N/rad), when known.
-    pub ktr: Option<KnownStiffness>,
+    /// Translational stiffness (N/m) when known, which is compared instead of fitted; infinite when rigid.
+    pub kt: Option<f64>,
+    /// Rotational stiffness (N m/rad) when known; infinite when rigid.
+    pub kr: Option<f64>,
+    /// Cross-coupling stiffness (N/rad) when known; infinite without coupling.
+    pub ktr: Option<f64>,
     /// Beam theory of the predicting model.
     pub beam: BeamTheory,
-    /// Lap joint: where it sits (m from the left end); `None` = the middle.
+    /// Place of a lap joint (m from the left end); `None` = the middle.
     pub position: Option<f64>,
-    /// Lap joint: overlapping piece.
-    pub overlap: Option<Overlap>,
-    /// Lap joint: properties of the right half where they differ.
+    /// Overlapping piece of a lap joint.
+    pub overlap: Option<LapOverlap>,
+    /// Properties of a lap joint's right half, where they differ.
     pub right: Option<RightHalf>,
-}
-
-/// The overlapping piece of a lap joint.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Overlap {
-    /// Length of the overlap (m).
-    pub length: f64,
-    /// Mass added by overlap and bolts (kg).
-    pub mass: f64,
 }
 
 /// Properties of a lap joint's right half that differ from the left one's.
@@ -175,7 +151,7 @@ pub struct RightHalf {
     pub poisson: Option<f64>,
 }
 
-/// Which channel of a recording.
+/// A channel of a recording, by number or by name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChannelRef {
     /// 1-based, not counting a time column.
@@ -184,16 +160,16 @@ pub enum ChannelRef {
     Name(String),
 }
 
-/// Where a description names a channel, for messages about recordings that do not have it.
+/// Place in the description that names a channel, for messages about recordings without this channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChannelPlace {
-    /// Its line, counted from 1.
+    /// Line, counted from 1.
     pub line: usize,
-    /// Its key: `sensor[2].channel`; `sensor[2].name` where the name alone says it.
+    /// Key: `sensor[2].channel`, or `sensor[2].name` where the name alone gives the channel.
     pub key: String,
 }
 
-/// What a channel's signal is multiplied by.
+/// Factor of a channel's signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scale {
     /// SI units per unit of the file, whatever unit a header names.
@@ -205,16 +181,16 @@ pub enum Scale {
 /// The impact hammer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HammerDescription {
-    /// Where its signal is.
+    /// Channel of the force.
     pub channel: ChannelRef,
-    /// Where that is said.
+    /// Place in the description that names the channel.
     pub place: ChannelPlace,
     /// Newtons per unit of the file (integer WAV: full scale = 1); `None` when the file does not
     /// say, so that a unit in a CSV header may decide (else 1).
     pub scale: Option<Scale>,
 }
 
-/// What a sensor senses.
+/// Quantity that a sensor measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorKind {
     /// Acceleration (m/s2).
@@ -230,40 +206,20 @@ pub enum SensorKind {
 /// A response sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SensorDescription {
-    /// Its name.
+    /// Name of the sensor.
     pub name: String,
-    /// Where its signal is; when the file is silent, the column of the sensor's name.
+    /// Channel of the signal; by default the column with the sensor's name.
     pub channel: ChannelRef,
-    /// Where that is said.
+    /// Place in the description that names the channel.
     pub place: ChannelPlace,
     /// SI units per unit of the file, negative when mounted the other way; `None` when not given.
     pub scale: Option<Scale>,
-    /// Where it sits (m); `None` for a microphone, or when unknown (it then has no mass either).
+    /// Position along the beam (m); `None` for a microphone, or when unknown.
     pub position: Option<f64>,
-    /// Its mass (kg), where the data sheet is known.
+    /// Mass (kg), where the data sheet is known.
     pub mass: Option<f64>,
-    /// What it senses.
+    /// Quantity that it measures.
     pub kind: SensorKind,
-}
-
-/// Form of a frequency response function.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrfForm {
-    /// Acceleration per force.
-    Accelerance,
-    /// Velocity per force.
-    Mobility,
-    /// Displacement per force.
-    Receptance,
-}
-
-/// A known mass that is fastened to the beam for one recording.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FastenedMass {
-    /// Where it sits (m).
-    pub position: f64,
-    /// What it weighs (kg).
-    pub mass: f64,
 }
 
 /// One recording of the test.
@@ -273,10 +229,10 @@ pub struct RecordingDescription {
     pub file: PathBuf,
     /// Line of the description that names the file.
     pub line: usize,
-    /// Where the hammer strikes (m).
+    /// Position of the hammer's taps (m).
     pub tap: Option<f64>,
-    /// How hard it is struck, relative to the test's other recordings (1): the simulator follows it, the
-    /// analysis measures it.
+    /// Force of the taps, relative to the test's other recordings (1). The simulator follows it. The
+    /// analysis measures the force instead.
     pub level: Option<f64>,
     /// Zoom band (Hz).
     pub band: Option<(f64, f64)>,
@@ -285,12 +241,12 @@ pub struct RecordingDescription {
     /// Sensors moved for this recording: name to position (m).
     pub at: BTreeMap<String, f64>,
     /// Known masses fastened to the beam for this recording, in the order of the file.
-    pub masses: Vec<FastenedMass>,
+    pub masses: Vec<PointMass>,
     /// Sample rate (Hz) of a CSV file without a time column.
     pub sample_rate: Option<f64>,
     /// Given when the file holds frequency response functions instead of time series.
-    pub form: Option<FrfForm>,
-    /// The sensor such a file belongs to.
+    pub form: Option<ResponseForm>,
+    /// The sensor of such a file.
     pub sensor: Option<String>,
     /// Carried to the outputs: tightening torque (N m).
     pub torque: Option<f64>,

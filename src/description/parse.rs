@@ -1,24 +1,19 @@
 //! From text to [`TestDescription`]: the tables in their order.
 
 use super::analysis::read_analysis;
-use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning};
+use super::error::{DescriptionError, DescriptionProblem};
 use super::reader::{Entry, Source, Table};
-use super::recordings::read_measured;
-use super::recordings::{Surroundings, read_recording};
+use super::recordings::{Surroundings, read_measured, read_recording};
 use super::sensors::{check_places, read_hammer, read_sensors};
-use super::structure::read_beam;
-use super::structure::read_effect;
-use super::structure::read_joint;
-use super::{
-    ChannelRef, HammerDescription, RecordingDescription, SensorDescription, TestDescription, keys,
-};
+use super::structure::{read_beam, read_effect, read_joint};
+use super::{ChannelRef, RecordingDescription, SensorDescription, TestDescription, keys};
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 use toml::de::DeTable;
 
 impl TestDescription {
-    /// Reads a test description. `file_name` is what messages call the file; nothing is opened.
+    /// Reads a test description. Messages call the file `file_name`; no file is opened.
     ///
     /// A description without recordings and frequencies is valid, because a prediction needs
     /// neither; [`TestDescription::check_has_data`] asks for them.
@@ -31,7 +26,9 @@ impl TestDescription {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let source = Source::new(file_name, text);
         let document = DeTable::parse(text).map_err(|error| syntax_error(&source, text, &error))?;
-        read_document(&Table::top(&source, document.get_ref())?, file_name)
+        let mut test = read_document(&Table::top(&source, document.get_ref())?, file_name)?;
+        test.warnings = source.into_warnings();
+        Ok(test)
     }
 
     /// Asks for something to analyse.
@@ -48,7 +45,6 @@ impl TestDescription {
 }
 
 fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, DescriptionError> {
-    let mut warnings = Vec::new();
     let name = top.optional("name", |entry| {
         entry.text("a name such as \"Cantilever, one-bolt clamp\"")
     })?;
@@ -56,27 +52,40 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
     let beam_table = top
         .need("beam", "a description of the beam", example)?
         .table(&keys::BEAM)?;
-    let beam = read_beam(&beam_table, &mut warnings)?;
+    let beam = read_beam(&beam_table)?;
     let example = "[joint]` with `kind = \"cantilever\"";
     let joint_table = top
         .need("joint", "the kind of joint", example)?
         .table(&keys::JOINT)?;
     let right = beam_table.get("right");
-    let joint = read_joint(&joint_table, right.as_ref(), beam.length, &mut warnings)?;
-    let (hammer, hammer_channel) = hammer(top)?;
+    let joint = read_joint(&joint_table, right.as_ref(), beam.length)?;
+    let hammer_table = top.optional("hammer", |entry| entry.table(&keys::HAMMER))?;
+    let hammer = hammer_table.as_ref().map(read_hammer).transpose()?;
+    let hammer_channel = hammer_table.and_then(|table| table.get("channel"));
     let sensor_tables = array_of_tables(top, "sensor", "[[sensor]]")?;
-    let channel = hammer_channel.as_ref();
-    let sensors = read_sensors(&sensor_tables, channel, &beam, &mut warnings)?;
+    let sensors = read_sensors(&sensor_tables, hammer_channel.as_ref(), &beam)?;
     let surroundings = Surroundings {
         beam: &beam,
         sensors: &sensors,
     };
     let recordings = array_of_tables(top, "recording", "[[recording]]")?
         .iter()
-        .map(|entry| read_recording(entry, &surroundings, &mut warnings))
+        .map(|entry| read_recording(entry, &surroundings))
         .collect::<Result<Vec<_>, _>>()?;
-    check_places(&sensor_tables, &sensors, &recordings, &mut warnings)?;
-    let measured = measured(top, &recordings, &mut warnings)?;
+    check_places(&sensor_tables, &sensors, &recordings)?;
+    let measured = top.optional("measured", |entry| {
+        let measured = read_measured(&entry.table(&keys::MEASURED)?)?;
+        match recordings.first() {
+            None => Ok(measured),
+            Some(first) => Err(entry.conflict(
+                format!(
+                    "frequencies come from [measured] or from recordings (line {}), not from both",
+                    first.line
+                ),
+                "remove one of them",
+            )),
+        }
+    })?;
     let analysis = top.optional("analysis", |entry| entry.table(&keys::ANALYSIS))?;
     let analysis = read_analysis(analysis.as_ref(), &joint)?;
     let effects = array_of_tables(top, "effect", "[[effect]]")?
@@ -84,7 +93,6 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
         .map(read_effect)
         .collect::<Result<Vec<_>, _>>()?;
     Ok(TestDescription {
-        effects,
         name: name.unwrap_or_else(|| name_from_file(file_name)),
         beam,
         joint,
@@ -93,18 +101,9 @@ fn read_document(top: &Table<'_>, file_name: &str) -> Result<TestDescription, De
         recordings,
         measured,
         analysis,
-        warnings,
+        effects,
+        warnings: Vec::new(),
     })
-}
-
-/// The hammer, and the entry of its channel, with which no sensor may collide.
-fn hammer<'t>(
-    top: &Table<'t>,
-) -> Result<(Option<HammerDescription>, Option<Entry<'t>>), DescriptionError> {
-    let Some(table) = top.optional("hammer", |entry| entry.table(&keys::HAMMER))? else {
-        return Ok((None, None));
-    };
-    Ok((Some(read_hammer(&table)?), table.get("channel")))
 }
 
 fn array_of_tables<'t>(
@@ -118,28 +117,7 @@ fn array_of_tables<'t>(
         .unwrap_or_default())
 }
 
-fn measured(
-    top: &Table<'_>,
-    recordings: &[RecordingDescription],
-    warnings: &mut Vec<DescriptionWarning>,
-) -> Result<Option<super::MeasuredFrequencies>, DescriptionError> {
-    let Some(entry) = top.get("measured") else {
-        return Ok(None);
-    };
-    let measured = read_measured(&entry.table(&keys::MEASURED)?, warnings)?;
-    let Some(first) = recordings.first() else {
-        return Ok(Some(measured));
-    };
-    Err(entry.error(DescriptionProblem::Conflict {
-        reason: format!(
-            "frequencies come from [measured] or from recordings (line {}), not from both",
-            first.line
-        ),
-        remedy: "remove one of them",
-    }))
-}
-
-/// A test without a name is called what its file is called.
+/// Returns the file's name without its ending, for a test without a name.
 fn name_from_file(file_name: &str) -> String {
     let stem = Path::new(file_name)
         .file_stem()
@@ -149,7 +127,7 @@ fn name_from_file(file_name: &str) -> String {
 }
 
 fn syntax_error(source: &Source<'_>, text: &str, error: &toml::de::Error) -> DescriptionError {
-    // What is missing at the end of the text belongs to the last line with something on it.
+    // An error at the end of the text belongs to the last line that is not empty.
     let last = text.trim_end().len();
     let line = source.line_at(error.span().map_or(0, |span| span.start).min(last));
     let message = error.message().replace('\n', " ");
@@ -173,7 +151,7 @@ impl fmt::Display for ChannelRef {
 }
 
 impl TestDescription {
-    /// Where a sensor sits (m) in the reference configuration, that of the first recording.
+    /// Returns the position of a sensor (m) in the reference configuration, that of the first recording.
     pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {
         let first = self.recordings.first();
         first.map_or(sensor.position, |recording| recording.place_of(sensor))
@@ -181,13 +159,13 @@ impl TestDescription {
 }
 
 impl RecordingDescription {
-    /// Where a sensor sits (m) in this recording.
+    /// Returns the position of a sensor (m) in this recording.
     pub fn place_of(&self, sensor: &SensorDescription) -> Option<f64> {
         self.at.get(&sensor.name).copied().or(sensor.position)
     }
 
-    /// The error of a recording that the caller, who opens files, cannot open: it points to the
-    /// line of the description that names the file.
+    /// Returns the error of a recording that the caller cannot open. It points to the line of the
+    /// description that names the file.
     pub fn file_error(&self, description: &str, path: &Path, cause: &str) -> DescriptionError {
         let (path, cause) = (path.display().to_string(), cause.to_owned());
         let problem = DescriptionProblem::UnreadableFile { path, cause };

@@ -5,16 +5,17 @@ use super::error::{
     DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, number, with_unit,
 };
 use super::keys::{self, KnownTable};
-use std::collections::BTreeMap;
+use std::cell::RefCell;
 use std::ops::{Bound, RangeBounds};
 use tapjoint_numerics::quantity::{Dimension, parse_quantity};
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-/// The text and the positions of its lines.
+/// The file's name, the positions of its lines, and the warnings so far.
 pub(super) struct Source<'t> {
     file: &'t str,
     line_starts: Vec<usize>,
+    warnings: RefCell<Vec<DescriptionWarning>>,
 }
 
 impl<'t> Source<'t> {
@@ -23,26 +24,34 @@ impl<'t> Source<'t> {
         let line_starts = std::iter::once(0)
             .chain(breaks.map(|(at, _)| at + 1))
             .collect();
-        Self { file, line_starts }
+        Self {
+            file,
+            line_starts,
+            warnings: RefCell::default(),
+        }
     }
 
-    /// The line of a byte position, counted from 1.
+    /// Returns all warnings, in the order of reading.
+    pub(super) fn into_warnings(self) -> Vec<DescriptionWarning> {
+        self.warnings.into_inner()
+    }
+
+    /// Returns the line of a byte position, counted from 1.
     pub(super) fn line_at(&self, byte: usize) -> usize {
         self.line_starts
             .partition_point(|start| *start <= byte)
             .max(1)
     }
 
-    /// An error at a line.
+    /// Returns an error at a line.
     pub(super) fn error(
         &self,
         line: usize,
         key: impl Into<String>,
         problem: DescriptionProblem,
     ) -> DescriptionError {
-        let file = self.file.to_owned();
         DescriptionError {
-            file,
+            file: self.file.to_owned(),
             line,
             key: key.into(),
             problem: Box::new(problem),
@@ -60,7 +69,7 @@ pub(super) struct Table<'t> {
 }
 
 impl<'t> Table<'t> {
-    /// The whole document.
+    /// Returns the whole document as a table.
     pub(super) fn top(
         source: &'t Source<'t>,
         entries: &'t DeTable<'t>,
@@ -74,7 +83,7 @@ impl<'t> Table<'t> {
         .checked(&keys::TOP)
     }
 
-    /// Reports the first key, in the order of the text, that the table does not know.
+    /// Refuses the first unknown key, in the order of the text.
     fn checked(self, known: &'static KnownTable) -> Result<Self, DescriptionError> {
         let unknown = self
             .entries
@@ -103,7 +112,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// The value of a key, if it is there.
+    /// Returns the value of a key, if it is there.
     pub(super) fn get(&self, key: &str) -> Option<Entry<'t>> {
         let (name, value) = self.entries.get_key_value(key)?;
         let line = self.source.line_at(name.span().start);
@@ -115,14 +124,14 @@ impl<'t> Table<'t> {
         })
     }
 
-    /// Every entry, for tables whose keys are free.
+    /// Returns every entry, for tables with free keys.
     pub(super) fn all(&self) -> impl Iterator<Item = (&'t str, Entry<'t>)> {
         self.entries
             .keys()
             .filter_map(|key| Some((&**key.get_ref(), self.get(key.get_ref())?)))
     }
 
-    /// The value of a key without which nothing can be done.
+    /// Returns the value of a required key.
     pub(super) fn need(
         &self,
         key: &str,
@@ -159,14 +168,26 @@ impl<'t> Entry<'t> {
         self.source.error(self.line, self.path.clone(), problem)
     }
 
-    pub(super) fn warning(&self, doubt: Doubt) -> DescriptionWarning {
-        let file = self.source.file.to_owned();
-        DescriptionWarning {
-            file,
+    /// Returns the error of a value that contradicts another one.
+    pub(super) fn conflict(
+        &self,
+        reason: impl Into<String>,
+        remedy: &'static str,
+    ) -> DescriptionError {
+        self.error(DescriptionProblem::Conflict {
+            reason: reason.into(),
+            remedy,
+        })
+    }
+
+    /// Adds a warning about this value.
+    pub(super) fn warn(&self, doubt: Doubt) {
+        self.source.warnings.borrow_mut().push(DescriptionWarning {
+            file: self.source.file.to_owned(),
             line: self.line,
             key: self.path.clone(),
             doubt,
-        }
+        });
     }
 
     pub(super) fn wrong_type(&self, wanted: impl Into<String>) -> DescriptionError {
@@ -199,29 +220,27 @@ impl<'t> Entry<'t> {
         })
     }
 
-    /// The value as a string, if it is one.
+    /// Returns the value as a string, if it is one.
     pub(super) fn as_text(&self) -> Option<&'t str> {
         self.value.get_ref().as_str()
     }
 
-    /// A text that is not empty.
+    /// Returns a text that is not empty.
     pub(super) fn text(&self, wanted: &str) -> Result<String, DescriptionError> {
         let text = self
             .as_text()
             .ok_or_else(|| self.wrong_type(wanted))?
             .trim();
         if text.is_empty() {
-            let wanted = wanted.to_owned();
-            let problem = DescriptionProblem::WrongType {
+            return Err(self.error(DescriptionProblem::WrongType {
                 found: "an empty string",
-                wanted,
-            };
-            return Err(self.error(problem));
+                wanted: wanted.to_owned(),
+            }));
         }
         Ok(text.to_owned())
     }
 
-    /// A text or a TOML date, as it is written.
+    /// Returns a text or a TOML date, as it is written.
     pub(super) fn date(&self) -> Result<String, DescriptionError> {
         match self.value.get_ref() {
             DeValue::Datetime(date) => Ok(date.to_string()),
@@ -236,7 +255,7 @@ impl<'t> Entry<'t> {
             .ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// A finite quantity, SI: a bare number, or a string with a unit.
+    /// Returns a finite quantity in SI units: a bare number, or a string with a unit.
     pub(super) fn quantity(&self, dimension: Dimension) -> Result<f64, DescriptionError> {
         let (value, text) = match self.value.get_ref() {
             DeValue::String(text) => {
@@ -244,13 +263,23 @@ impl<'t> Entry<'t> {
             }
             DeValue::Integer(number) => (integer(number).map(|n| n as f64), number.to_string()),
             DeValue::Float(number) => (number.as_str().parse().ok(), number.to_string()),
-            _ => return Err(self.wrong_type(quantity_in_words(dimension))),
+            _ => {
+                let unit = dimension.allowed_units().next().unwrap_or_default();
+                let si = match dimension.si_unit() {
+                    "" => "1",
+                    si => si,
+                };
+                return Err(self.wrong_type(format!(
+                    "{} as a number ({si}) or a text such as \"1.5 {unit}\"",
+                    dimension.in_words()
+                )));
+            }
         };
         let finite = value.filter(|value: &f64| value.is_finite());
         finite.ok_or_else(|| self.error(DescriptionProblem::NotFinite { text }))
     }
 
-    /// A quantity within limits, SI.
+    /// Returns a quantity within limits, in SI units.
     pub(super) fn within(
         &self,
         dimension: Dimension,
@@ -264,7 +293,7 @@ impl<'t> Entry<'t> {
         }
     }
 
-    /// A whole number within limits.
+    /// Returns a whole number within limits.
     pub(super) fn count(&self, limits: &Limits) -> Result<usize, DescriptionError> {
         let DeValue::Integer(written) = self.value.get_ref() else {
             return Err(self.wrong_type("a whole number"));
@@ -280,49 +309,51 @@ impl<'t> Entry<'t> {
             .ok_or_else(|| self.out_of_range(value as f64, "", limits))
     }
 
-    /// One of a few words.
+    /// Returns the meaning of one of a few words.
     pub(super) fn choice<T: Copy>(
         &self,
         words: &[(&'static str, T)],
     ) -> Result<T, DescriptionError> {
         let allowed: Vec<_> = words.iter().map(|(word, _)| *word).collect();
-        let wanted = || format!("one of \"{}\"", allowed.join("\", \""));
-        let text = self.as_text().ok_or_else(|| self.wrong_type(wanted()))?;
+        let text = self
+            .as_text()
+            .ok_or_else(|| self.wrong_type(format!("one of \"{}\"", allowed.join("\", \""))))?;
         if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == text) {
             return Ok(*meaning);
         }
         let lower = text.to_lowercase();
         let nearest = keys::nearest(&lower, allowed.iter().copied()).map(str::to_owned);
-        let value = text.to_owned();
         Err(self.error(DescriptionProblem::UnknownChoice {
-            value,
+            value: text.to_owned(),
             allowed,
             nearest,
         }))
     }
 
-    /// The items of a list.
+    /// Returns the items of a list.
     pub(super) fn list(&self, wanted: &str) -> Result<Vec<Entry<'t>>, DescriptionError> {
         let items = self
             .value
             .get_ref()
             .as_array()
             .ok_or_else(|| self.wrong_type(wanted))?;
-        let entry = |(position, value): (usize, &'t Spanned<DeValue<'t>>)| Entry {
-            source: self.source,
-            value,
-            path: format!("{}[{}]", self.path, position + 1),
-            line: self.source.line_at(value.span().start),
-        };
-        Ok(items.iter().enumerate().map(entry).collect())
+        Ok((1..)
+            .zip(items.iter())
+            .map(|(position, value)| Entry {
+                source: self.source,
+                value,
+                path: format!("{}[{position}]", self.path),
+                line: self.source.line_at(value.span().start),
+            })
+            .collect())
     }
 
-    /// Whether the value is a list.
+    /// Returns true if the value is a list.
     pub(super) fn is_list(&self) -> bool {
         self.value.get_ref().is_array()
     }
 
-    /// A table with known keys.
+    /// Returns a table with known keys.
     pub(super) fn table(&self, known: &'static KnownTable) -> Result<Table<'t>, DescriptionError> {
         self.free_table(&format!(
             "a table {} with the keys {}",
@@ -332,54 +363,28 @@ impl<'t> Entry<'t> {
         .checked(known)
     }
 
-    /// A table whose keys are free.
+    /// Returns a table with free keys.
     pub(super) fn free_table(&self, wanted: &str) -> Result<Table<'t>, DescriptionError> {
         let entries = self
             .value
             .get_ref()
             .as_table()
             .ok_or_else(|| self.wrong_type(wanted))?;
-        let (source, path, line) = (self.source, self.path.clone(), self.line);
         Ok(Table {
-            source,
+            source: self.source,
             entries,
-            path,
-            line,
+            path: self.path.clone(),
+            line: self.line,
         })
     }
 }
 
-/// What a quantity looks like, with an example.
-fn quantity_in_words(dimension: Dimension) -> String {
-    let unit = dimension.allowed_units().next().unwrap_or_default();
-    let si = if dimension.si_unit().is_empty() {
-        "1"
-    } else {
-        dimension.si_unit()
-    };
-    format!(
-        "{} as a number ({si}) or a text such as \"1.5 {unit}\"",
-        dimension.in_words()
-    )
-}
-
-/// The value of a TOML integer; `None` beyond 64 bits.
+/// Returns the value of a TOML integer; `None` beyond 64 bits.
 fn integer(number: &DeInteger<'_>) -> Option<i64> {
     i64::from_str_radix(number.as_str(), number.radix()).ok()
 }
 
-/// Reads a table of quantities under free keys, such as moved sensors.
-pub(super) fn quantities_by_name<'t>(
-    table: &Table<'t>,
-    mut read: impl FnMut(&str, &Entry<'t>) -> Result<f64, DescriptionError>,
-) -> Result<BTreeMap<String, f64>, DescriptionError> {
-    table
-        .all()
-        .map(|(name, entry)| Ok((name.to_owned(), read(name, &entry)?)))
-        .collect()
-}
-
-/// The values a quantity may take, and what to do when it does not.
+/// Limits of a quantity, and the remedy for a value beyond them.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
     pub(super) low: Bound<f64>,
@@ -406,12 +411,12 @@ impl Limits {
         }
     }
 
-    /// Whether a value is within them.
+    /// Returns true if a value is within the limits.
     pub(super) fn contain(&self, value: f64) -> bool {
         (self.low, self.high).contains(&value)
     }
 
-    /// The range as messages name it.
+    /// Returns the range for a message.
     pub(super) fn in_words(&self, unit: &str) -> String {
         if let (Bound::Included(low), Bound::Included(high)) = (self.low, self.high) {
             return format!("{} to {}", number(low), with_unit(high, unit));

@@ -1,26 +1,25 @@
-//! `[[recording]]`: the files, and what is particular to each.
+//! `[[recording]]`: files of the test, each with its own settings.
 //!
 //! `[measured]`: natural frequencies that were read elsewhere.
 
-use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt, with_unit};
-use super::reader::Limits;
-use super::reader::{Entry, Table, quantities_by_name};
+use super::error::{DescriptionError, DescriptionProblem, Doubt, with_unit};
+use super::reader::{Entry, Limits, Table};
 use super::structure::along;
 use super::{
-    BeamDescription, FastenedMass, FrfForm, MeasuredFrequencies, RecordingDescription,
+    BeamDescription, MeasuredFrequencies, PointMass, RecordingDescription, ResponseForm,
     SensorDescription, keys,
 };
 use std::collections::BTreeMap;
 use std::ops::Bound;
 use tapjoint_numerics::quantity::Dimension;
 
-const FORMS: [(&str, FrfForm); 3] = [
-    ("accelerance", FrfForm::Accelerance),
-    ("mobility", FrfForm::Mobility),
-    ("receptance", FrfForm::Receptance),
+/// Words of `form` in `[[recording]]`.
+pub const FORMS: [(&str, ResponseForm); 3] = [
+    ("accelerance", ResponseForm::Accelerance),
+    ("mobility", ResponseForm::Mobility),
+    ("receptance", ResponseForm::Receptance),
 ];
-/// Below 16 samples there are six lines; 4 million samples are 78 s at 51.2 kHz, and as much as fits into
-/// the memory of a small machine.
+/// 16 samples give six lines. 4 million samples are 78 s at 51.2 kHz and still fit into a small memory.
 const BLOCK: Limits = Limits::between(
     16.0,
     4e6,
@@ -41,17 +40,15 @@ const TEMPERATURE: Limits = Limits::between(
     "give degrees Celsius, or a unit: \"293 K\"",
 );
 
-/// What is fastened to a beam that is tapped: a kilogram and more on the heaviest ones.
+/// Largest mass that is fastened to a beam for a test; the heaviest beams take more than a kilogram.
 const FASTENED_MASS: Limits = Limits::positive(
     1e3,
     "give what it weighs in kg, or with its unit: \"50 g\"; leave the table out where nothing is fastened",
 );
 
-/// What the recordings refer to.
+/// Beam and sensors that the recordings refer to.
 pub(super) struct Surroundings<'s> {
-    /// The beam.
     pub(super) beam: &'s BeamDescription,
-    /// The sensors declared.
     pub(super) sensors: &'s [SensorDescription],
 }
 
@@ -59,17 +56,18 @@ pub(super) struct Surroundings<'s> {
 pub(super) fn read_recording(
     entry: &Entry<'_>,
     surroundings: &Surroundings<'_>,
-    warnings: &mut Vec<DescriptionWarning>,
 ) -> Result<RecordingDescription, DescriptionError> {
     let table = entry.table(&keys::RECORDING)?;
     let file = table.need("file", "a file", "file = \"taps.wav\"")?;
     let position = along(surroundings.beam.length);
     let at = table.optional("at", |entry| read_moves(entry, surroundings))?;
-    let masses = table.optional("mass", |entry| {
+    let masses: Option<Vec<_>> = table.optional("mass", |entry| {
         let wanted = "a list of tables, each under its own header [[recording.mass]],";
         let entries = entry.list(wanted)?;
-        let read = |entry| read_fastened(entry, surroundings.beam, &mut *warnings);
-        entries.iter().map(read).collect::<Result<Vec<_>, _>>()
+        entries
+            .iter()
+            .map(|entry| read_fastened(entry, surroundings.beam))
+            .collect()
     })?;
     let (form, sensor) = read_form(&table, surroundings)?;
     Ok(RecordingDescription {
@@ -122,17 +120,15 @@ fn read_moves(
 ) -> Result<BTreeMap<String, f64>, DescriptionError> {
     let table = entry.free_table("a table of sensors and positions such as { A = 0.20 }")?;
     let position = along(surroundings.beam.length);
-    quantities_by_name(&table, |name, entry| {
-        check_sensor(name, entry, surroundings.sensors)?;
-        entry.within(Dimension::Length, &position)
-    })
+    let mut moves = BTreeMap::new();
+    for (name, entry) in table.all() {
+        check_sensor(name, &entry, surroundings.sensors)?;
+        moves.insert(name.to_owned(), entry.within(Dimension::Length, &position)?);
+    }
+    Ok(moves)
 }
 
-fn read_fastened(
-    entry: &Entry<'_>,
-    beam: &BeamDescription,
-    warnings: &mut Vec<DescriptionWarning>,
-) -> Result<FastenedMass, DescriptionError> {
+fn read_fastened(entry: &Entry<'_>, beam: &BeamDescription) -> Result<PointMass, DescriptionError> {
     let table = entry.table(&keys::FASTENED)?;
     let position = table.need("position", "its place on the beam (m)", "position = 0.20")?;
     let weight = table.need("mass", "what it weighs (kg)", "mass = \"50 g\"")?;
@@ -140,14 +136,18 @@ fn read_fastened(
     let mass = weight.within(Dimension::Mass, &FASTENED_MASS)?;
     let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
     if mass > beam_mass {
-        warnings.push(weight.warning(Doubt::Implausible {
+        weight.warn(Doubt::Implausible {
             value: mass,
             unit: "kg",
             usual: format!("less than the beam's {}", with_unit(beam_mass, "kg")),
             question: "did you mean g? Write \"50 g\"",
-        }));
+        });
     }
-    Ok(FastenedMass { position, mass })
+    Ok(PointMass {
+        position,
+        mass,
+        inertia: 0.0,
+    })
 }
 
 fn check_sensor(
@@ -167,33 +167,28 @@ fn check_sensor(
     }))
 }
 
-/// Form and sensor of a file that holds a frequency response function.
+/// Reads form and sensor of a file that holds a frequency response function.
 fn read_form(
     table: &Table<'_>,
     surroundings: &Surroundings<'_>,
-) -> Result<(Option<FrfForm>, Option<String>), DescriptionError> {
+) -> Result<(Option<ResponseForm>, Option<String>), DescriptionError> {
     let form = table.optional("form", |entry| entry.choice(&FORMS))?;
     let sensor = table.optional("sensor", |entry| {
         let name = entry.text("a sensor's name such as \"A\"")?;
         check_sensor(&name, entry, surroundings.sensors)?;
         Ok(name)
     })?;
-    if let Some(entry) = table
-        .get("form")
-        .filter(|_| sensor.is_none() && surroundings.sensors.len() > 1)
-    {
-        return Err(entry.error(DescriptionProblem::Conflict {
-            reason: "a response function belongs to one sensor, and several are declared".into(),
-            remedy: "add `sensor = \"A\"`",
-        }));
+    match (table.get("form"), table.get("sensor")) {
+        (Some(entry), None) if surroundings.sensors.len() > 1 => Err(entry.conflict(
+            "a response function belongs to one sensor, and several are declared",
+            "add `sensor = \"A\"`",
+        )),
+        (None, Some(entry)) => Err(entry.conflict(
+            "`sensor` names the sensor of a response function, and `form` is missing",
+            "add `form = \"accelerance\"`, or remove `sensor`: a time recording finds its sensors by channel",
+        )),
+        _ => Ok((form, sensor)),
     }
-    if let Some(entry) = table.get("sensor").filter(|_| form.is_none()) {
-        return Err(entry.error(DescriptionProblem::Conflict {
-            reason: "`sensor` names the sensor of a response function, and `form` is missing".into(),
-            remedy: "add `form = \"accelerance\"`, or remove `sensor`: a time recording finds its sensors by channel",
-        }));
-    }
-    Ok((form, sensor))
 }
 
 const FREQUENCY: Limits =
@@ -208,47 +203,19 @@ const SCATTER: Limits = Limits {
     high: Bound::Excluded(1.0),
     remedy: "give the repeatability as a share of the frequency: \"0.3 %\"",
 };
-/// Beam theory has nothing to say about higher modes than this.
+/// Beam theory does not describe higher modes.
 const MODE: Limits = Limits::between(
     1.0,
     1000.0,
     "modes count from 1; rigid-body modes do not count",
 );
-/// Repeated tests that scatter by more than this are not repeated tests.
+/// Repeated tests scatter less than this.
 const LARGE_SCATTER: f64 = 0.1;
 
 /// Reads `[measured]`.
-pub(super) fn read_measured(
-    table: &Table<'_>,
-    warnings: &mut Vec<DescriptionWarning>,
-) -> Result<MeasuredFrequencies, DescriptionError> {
-    let entry = table.need(
-        "frequencies",
-        "a list of frequencies (Hz)",
-        "frequencies = [17, 118]",
-    )?;
-    let frequencies = read_frequencies(&entry)?;
-    let count = frequencies.len();
-    if let Some(entry) = table
-        .get("std")
-        .filter(|_| table.get("half_line").is_some())
-    {
-        return Err(entry.error(DescriptionProblem::Conflict {
-            reason: "`half_line` and `std` both state the reading's uncertainty".into(),
-            remedy: "keep the one you know; a repeatability beside it goes into `scatter`",
-        }));
-    }
-    let modes = table.optional("modes", |entry| read_modes(entry, count))?;
-    Ok(MeasuredFrequencies {
-        frequencies,
-        modes: modes.unwrap_or_else(|| (1..=count).collect()),
-        half_line: table.optional("half_line", |entry| read_bounds(entry, &HALF_LINE, count))?,
-        std: table.optional("std", |entry| read_bounds(entry, &STD, count))?,
-        scatter: table.optional("scatter", |entry| read_scatter(entry, warnings))?,
-    })
-}
-
-fn read_frequencies(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
+pub(super) fn read_measured(table: &Table<'_>) -> Result<MeasuredFrequencies, DescriptionError> {
+    let wanted = "a list of frequencies (Hz)";
+    let entry = table.need("frequencies", wanted, "frequencies = [17, 118]")?;
     let items = entry.list("a list of frequencies such as [17, 118] (Hz)")?;
     if items.is_empty() {
         return Err(entry.error(DescriptionProblem::Count {
@@ -257,10 +224,26 @@ fn read_frequencies(entry: &Entry<'_>) -> Result<Vec<f64>, DescriptionError> {
             remedy: "list the natural frequencies in Hz, lowest first",
         }));
     }
-    let read = |item: &Entry<'_>| item.within(Dimension::Frequency, &FREQUENCY);
-    let frequencies = items.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let frequencies = items
+        .iter()
+        .map(|item| item.within(Dimension::Frequency, &FREQUENCY))
+        .collect::<Result<Vec<_>, _>>()?;
     check_ascending(&items, &frequencies)?;
-    Ok(frequencies)
+    let count = frequencies.len();
+    if let (Some(entry), Some(_)) = (table.get("std"), table.get("half_line")) {
+        return Err(entry.conflict(
+            "`half_line` and `std` both state the reading's uncertainty",
+            "keep the one you know; a repeatability beside it goes into `scatter`",
+        ));
+    }
+    let modes = table.optional("modes", |entry| read_modes(entry, count))?;
+    Ok(MeasuredFrequencies {
+        frequencies,
+        modes: modes.unwrap_or_else(|| (1..=count).collect()),
+        half_line: table.optional("half_line", |entry| read_bounds(entry, &HALF_LINE, count))?,
+        std: table.optional("std", |entry| read_bounds(entry, &STD, count))?,
+        scatter: table.optional("scatter", read_scatter)?,
+    })
 }
 
 fn read_modes(entry: &Entry<'_>, count: usize) -> Result<Vec<usize>, DescriptionError> {
@@ -275,7 +258,7 @@ fn read_modes(entry: &Entry<'_>, count: usize) -> Result<Vec<usize>, Description
     Ok(modes)
 }
 
-/// One number for all frequencies, or a list with one for each.
+/// Reads one number for all frequencies, or a list with one for each.
 fn read_bounds(
     entry: &Entry<'_>,
     limits: &Limits,
@@ -292,20 +275,15 @@ fn read_bounds(
         .collect()
 }
 
-fn read_scatter(
-    entry: &Entry<'_>,
-    warnings: &mut Vec<DescriptionWarning>,
-) -> Result<f64, DescriptionError> {
+fn read_scatter(entry: &Entry<'_>) -> Result<f64, DescriptionError> {
     let value = entry.within(Dimension::Ratio, &SCATTER)?;
     if value > LARGE_SCATTER {
-        let usual = "0.0001 to 0.03".to_owned();
-        let question = "did you mean percent? Write \"0.3 %\"";
-        warnings.push(entry.warning(Doubt::Implausible {
+        entry.warn(Doubt::Implausible {
             value,
             unit: "",
-            usual,
-            question,
-        }));
+            usual: "0.0001 to 0.03".to_owned(),
+            question: "did you mean percent? Write \"0.3 %\"",
+        });
     }
     Ok(value)
 }
@@ -326,17 +304,12 @@ fn check_count(
 }
 
 fn check_ascending(items: &[Entry<'_>], values: &[f64]) -> Result<(), DescriptionError> {
-    let pairs = values
-        .iter()
-        .zip(values.iter().skip(1))
-        .zip(items.iter().skip(1))
-        .enumerate();
-    for (index, ((previous, value), item)) in pairs {
-        if value <= previous {
+    for (index, (pair, item)) in values.windows(2).zip(items.iter().skip(1)).enumerate() {
+        if pair[1] <= pair[0] {
             return Err(item.error(DescriptionProblem::NotAscending {
                 position: index + 2,
-                value: *value,
-                previous: *previous,
+                value: pair[1],
+                previous: pair[0],
             }));
         }
     }

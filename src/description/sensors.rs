@@ -1,8 +1,7 @@
-//! `[hammer]` and `[[sensor]]`: which channel carries what.
+//! `[hammer]` and `[[sensor]]`: channels of the recordings and their scales.
 
-use super::error::{DescriptionError, DescriptionProblem, DescriptionWarning, Doubt};
-use super::reader::Limits;
-use super::reader::{Entry, Table};
+use super::error::{DescriptionError, DescriptionProblem, Doubt, with_unit};
+use super::reader::{Entry, Limits, Table};
 use super::structure::along;
 use super::{
     BeamDescription, ChannelPlace, ChannelRef, HammerDescription, RecordingDescription, Scale,
@@ -10,13 +9,14 @@ use super::{
 };
 use tapjoint_numerics::quantity::Dimension;
 
-const KINDS: [(&str, SensorKind); 4] = [
+/// Words of `kind` in `[[sensor]]`.
+pub const SENSOR_KINDS: [(&str, SensorKind); 4] = [
     ("acceleration", SensorKind::Acceleration),
     ("velocity", SensorKind::Velocity),
     ("displacement", SensorKind::Displacement),
     ("sound", SensorKind::Sound),
 ];
-/// More channels than any recorder writes into one file.
+/// No recorder writes more channels into one file.
 const CHANNELS: Limits = Limits::between(
     1.0,
     4096.0,
@@ -43,128 +43,118 @@ pub(super) fn read_hammer(table: &Table<'_>) -> Result<HammerDescription, Descri
     })
 }
 
-/// Reads all `[[sensor]]` tables; `hammer` is the entry of the hammer's channel.
+/// Names or channels that are taken, each with its line.
+struct Taken<T>(Vec<(T, usize)>);
+
+impl<T: PartialEq> Taken<T> {
+    /// Adds a value, unless it is taken already. `words` name it in a message.
+    fn add(
+        &mut self,
+        value: T,
+        words: String,
+        entry: &Entry<'_>,
+        remedy: &'static str,
+    ) -> Result<(), DescriptionError> {
+        if let Some((_, first_line)) = self.0.iter().find(|(other, _)| *other == value) {
+            return Err(entry.error(DescriptionProblem::Duplicate {
+                value: words,
+                first_line: *first_line,
+                remedy,
+            }));
+        }
+        self.0.push((value, entry.line));
+        Ok(())
+    }
+}
+
+/// Reads all `[[sensor]]` tables. `hammer` is the entry of the hammer's channel.
 pub(super) fn read_sensors(
     entries: &[Entry<'_>],
     hammer: Option<&Entry<'_>>,
     beam: &BeamDescription,
-    warnings: &mut Vec<DescriptionWarning>,
 ) -> Result<Vec<SensorDescription>, DescriptionError> {
     let mut sensors: Vec<SensorDescription> = Vec::new();
-    let mut names: Vec<(String, usize)> = Vec::new();
-    let mut channels: Vec<(ChannelRef, usize)> = Vec::new();
+    let mut names = Taken(Vec::new());
+    let mut channels = Taken(Vec::new());
     if let Some(entry) = hammer {
-        channels.push((read_channel(entry)?, entry.line));
+        channels.0.push((read_channel(entry)?, entry.line));
     }
     for entry in entries {
         let table = entry.table(&keys::SENSOR)?;
-        let sensor = read_sensor(&table, beam, warnings)?;
+        let sensor = read_sensor(&table, beam)?;
         let name = table.get("name");
         let name = name.as_ref().unwrap_or(entry);
         let channel = table.get("channel");
         let channel = channel.as_ref().unwrap_or(name);
-        claim(
-            &mut names,
+        names.add(
             sensor.name.clone(),
+            format!("the name \"{}\"", sensor.name),
             name,
             "give each sensor a name of its own",
         )?;
-        let remedy = "give each sensor, and the hammer, a channel of its own";
-        claim(&mut channels, sensor.channel.clone(), channel, remedy)?;
+        channels.add(
+            sensor.channel.clone(),
+            format!("channel {}", sensor.channel),
+            channel,
+            "give each sensor, and the hammer, a channel of its own",
+        )?;
         sensors.push(sensor);
     }
     Ok(sensors)
 }
 
-/// Notes that `value` is taken, unless it was before.
-fn claim<T: PartialEq + Claimable>(
-    taken: &mut Vec<(T, usize)>,
-    value: T,
-    entry: &Entry<'_>,
-    remedy: &'static str,
-) -> Result<(), DescriptionError> {
-    if let Some((_, first_line)) = taken.iter().find(|(other, _)| *other == value) {
-        let (value, first_line) = (value.in_words(), *first_line);
-        return Err(entry.error(DescriptionProblem::Duplicate {
-            value,
-            first_line,
-            remedy,
-        }));
-    }
-    taken.push((value, entry.line));
-    Ok(())
-}
-
-/// What two sensors must not share.
-trait Claimable {
-    fn in_words(&self) -> String;
-}
-
-impl Claimable for String {
-    fn in_words(&self) -> String {
-        format!("the name \"{self}\"")
-    }
-}
-
-impl Claimable for ChannelRef {
-    fn in_words(&self) -> String {
-        format!("channel {self}")
-    }
-}
-
 fn read_sensor(
     table: &Table<'_>,
     beam: &BeamDescription,
-    warnings: &mut Vec<DescriptionWarning>,
 ) -> Result<SensorDescription, DescriptionError> {
     let named = table.need("name", "a name", "name = \"A\"")?;
     let name = named.text("a name such as \"A\"")?;
-    let kind = table.optional("kind", |entry| entry.choice(&KINDS))?;
+    let kind = table.optional("kind", |entry| entry.choice(&SENSOR_KINDS))?;
     let kind = kind.unwrap_or(SensorKind::Acceleration);
     let channel = table.optional("channel", read_channel)?;
-    let (signal, sensitivity) = dimensions(kind);
+    let (signal, sensitivity) = match kind {
+        SensorKind::Acceleration => (Dimension::Acceleration, Dimension::AccelerationSensitivity),
+        SensorKind::Velocity => (Dimension::Velocity, Dimension::VelocitySensitivity),
+        SensorKind::Displacement => (Dimension::Length, Dimension::DisplacementSensitivity),
+        SensorKind::Sound => (Dimension::Pressure, Dimension::PressureSensitivity),
+    };
     let sensor = SensorDescription {
         channel: channel.unwrap_or_else(|| ChannelRef::Name(name.clone())),
         place: place_of(&table.get("channel").unwrap_or(named)),
         name,
         scale: read_scale(table, signal, sensitivity)?,
-        position: table.optional("position", |entry| read_position(entry, kind, beam.length))?,
+        position: table.optional("position", |entry| match kind {
+            // A microphone stands beside the beam, perhaps beyond its end.
+            SensorKind::Sound => entry.quantity(Dimension::Length),
+            _ => entry.within(Dimension::Length, &along(beam.length)),
+        })?,
         mass: table.optional("mass", |entry| entry.within(Dimension::Mass, &SENSOR_MASS))?,
         kind,
     };
-    check_mass(table, &sensor, beam, warnings)?;
+    if let Some((entry, mass)) = table.get("mass").zip(sensor.mass) {
+        let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
+        if kind == SensorKind::Sound {
+            let reason = "a microphone does not sit on the beam; remove `mass`";
+            entry.warn(Doubt::NoMeaning { reason });
+        } else if mass > beam_mass {
+            entry.warn(Doubt::Implausible {
+                value: mass,
+                unit: "kg",
+                usual: format!("less than the beam's {}", with_unit(beam_mass, "kg")),
+                question: "did you mean g? Write \"24 g\"",
+            });
+        }
+    }
     Ok(sensor)
 }
 
-/// What a sensor's signal is measured in, and its sensitivity.
-fn dimensions(kind: SensorKind) -> (Dimension, Dimension) {
-    match kind {
-        SensorKind::Acceleration => (Dimension::Acceleration, Dimension::AccelerationSensitivity),
-        SensorKind::Velocity => (Dimension::Velocity, Dimension::VelocitySensitivity),
-        SensorKind::Displacement => (Dimension::Length, Dimension::DisplacementSensitivity),
-        SensorKind::Sound => (Dimension::Pressure, Dimension::PressureSensitivity),
-    }
-}
-
-/// A microphone stands beside the beam, so its position is not held against the beam's length.
-fn read_position(
-    entry: &Entry<'_>,
-    kind: SensorKind,
-    length: f64,
-) -> Result<f64, DescriptionError> {
-    match kind {
-        SensorKind::Sound => entry.quantity(Dimension::Length),
-        _ => entry.within(Dimension::Length, &along(length)),
-    }
-}
-
-/// Warns of masses that some recording leaves without a place, or the description where there is no recording: a mass
-/// acts on the beam where it sits, and without a place only the diagnosis has a use for it.
+/// Warns of each mass without a place in some recording, or in the description if there is no recording.
+///
+/// A mass acts on the beam where it sits. Without a place only the diagnosis can use it.
 pub(super) fn check_places(
     entries: &[Entry<'_>],
     sensors: &[SensorDescription],
     recordings: &[RecordingDescription],
-    warnings: &mut Vec<DescriptionWarning>,
 ) -> Result<(), DescriptionError> {
     for (entry, sensor) in entries.iter().zip(sensors) {
         let is_placed = match recordings {
@@ -173,46 +163,13 @@ pub(super) fn check_places(
         };
         let mass = entry.table(&keys::SENSOR)?.get("mass");
         if let Some(mass) = mass.filter(|_| !is_placed && sensor.kind != SensorKind::Sound) {
-            warnings.push(mass.warning(Doubt::Unplaced));
+            mass.warn(Doubt::Unplaced);
         }
     }
     Ok(())
 }
 
-/// What is doubtful about a mass wherever it sits.
-fn check_mass(
-    table: &Table<'_>,
-    sensor: &SensorDescription,
-    beam: &BeamDescription,
-    warnings: &mut Vec<DescriptionWarning>,
-) -> Result<(), DescriptionError> {
-    let Some((entry, mass)) = table.get("mass").zip(sensor.mass) else {
-        return Ok(());
-    };
-    if sensor.kind == SensorKind::Sound {
-        let reason = "a microphone does not sit on the beam; remove `mass`";
-        warnings.push(entry.warning(Doubt::NoMeaning { reason }));
-        return Ok(());
-    }
-    let beam_mass = beam.length * beam.width * beam.thickness * beam.density;
-    if mass > beam_mass {
-        let usual = format!(
-            "less than the beam's {}",
-            crate::error::with_unit(beam_mass, "kg")
-        );
-        let question = "did you mean g? Write \"24 g\"";
-        let doubt = Doubt::Implausible {
-            value: mass,
-            unit: "kg",
-            usual,
-            question,
-        };
-        warnings.push(entry.warning(doubt));
-    }
-    Ok(())
-}
-
-/// Where a channel is named.
+/// Returns the place that names a channel.
 fn place_of(entry: &Entry<'_>) -> ChannelPlace {
     ChannelPlace {
         line: entry.line,
@@ -229,17 +186,17 @@ fn read_channel(entry: &Entry<'_>) -> Result<ChannelRef, DescriptionError> {
     entry.count(&CHANNELS).map(ChannelRef::Number)
 }
 
-/// The scale, or what a sensitivity makes of volts: SI = volts / sensitivity.
+/// Reads the scale, or the scale that follows from a sensitivity: SI = volts / sensitivity.
 fn read_scale(
     table: &Table<'_>,
     signal: Dimension,
     sensitivity: Dimension,
 ) -> Result<Option<Scale>, DescriptionError> {
     match (table.get("scale"), table.get("sensitivity")) {
-        (Some(_), Some(entry)) => Err(entry.error(DescriptionProblem::Conflict {
-            reason: "`scale` and `sensitivity` say the same thing twice".into(),
-            remedy: "keep `scale` (SI units per unit of the file) or `sensitivity` (files in volts)",
-        })),
+        (Some(_), Some(entry)) => Err(entry.conflict(
+            "`scale` and `sensitivity` say the same thing twice",
+            "keep `scale` (SI units per unit of the file) or `sensitivity` (files in volts)",
+        )),
         (Some(entry), None) => Ok(Some(Scale::PerUnit(nonzero(&entry, signal)?))),
         (None, Some(entry)) => {
             let volts = nonzero(&entry, sensitivity)?;

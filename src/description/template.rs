@@ -1,6 +1,6 @@
 //! The commented `test.toml` that a new test begins with.
 
-use super::JointKind;
+use super::Assembly;
 
 const HEAD: &str = r#"# Test description for tapjoint. Replace the values by those of your test, then: tapjoint run test.toml
 #
@@ -108,11 +108,11 @@ const STAND_IN: &str = "#   Frequencies that stand in for yours, so that this fi
 
 /// A template that runs as it stands: frequencies stand in for the recordings, whose table is there
 /// but commented out.
-pub fn runnable_template(kind: JointKind) -> String {
+pub fn runnable_template(kind: Assembly) -> String {
     let frequencies = match kind {
-        JointKind::Cantilever => "[16.625, 115.25, 323.125, 601.125, 949.25]",
-        JointKind::Lap => "[97.5, 387.125, 657.75, 1110.25, 1698.625]",
-        JointKind::Free => "[147.375, 406, 794.75, 1311.5, 1954.5]",
+        Assembly::Cantilever => "[16.625, 115.25, 323.125, 601.125, 949.25]",
+        Assembly::Lap => "[97.5, 387.125, 657.75, 1110.25, 1698.625]",
+        Assembly::Free => "[147.375, 406, 794.75, 1311.5, 1954.5]",
     };
     let text = template(kind);
     let mut recording = false;
@@ -134,7 +134,7 @@ pub fn runnable_template(kind: JointKind) -> String {
 }
 
 /// A template that reads these recordings, a table for each.
-pub fn template_of(kind: JointKind, files: &[String]) -> String {
+pub fn template_of(kind: Assembly, files: &[String]) -> String {
     let tables: Vec<String> = files
         .iter()
         .map(|file| format!("{RECORDING}\nfile = {}\n", toml::Value::from(file.as_str())))
@@ -156,23 +156,23 @@ pub fn template_of(kind: JointKind, files: &[String]) -> String {
 
 /// A commented test description: every key with its default and unit. It parses as it stands;
 /// replace its numbers by those of the test.
-pub fn template(kind: JointKind) -> String {
+pub fn template(kind: Assembly) -> String {
     let (name, origin, beam, joint, fit) = match kind {
-        JointKind::Cantilever => (
+        Assembly::Cantilever => (
             "Cantilever",
             "the joint",
             "the part that is free to vibrate",
             CANTILEVER,
             FIT_JOINT,
         ),
-        JointKind::Lap => (
+        Assembly::Lap => (
             "Lap joint",
             "the left end",
             "both halves together, length = total",
             LAP,
             FIT_LAP,
         ),
-        JointKind::Free => (
+        Assembly::Free => (
             "Free beam",
             "the left end",
             "the whole beam",

@@ -10,9 +10,9 @@ use tapjoint_beam::effects::SensorPlace;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
 use tapjoint_description::described::{
-    coupling, described_beam, described_specimen, fastened_masses, stiffness_of,
+    coupling, described_beam, described_specimen,
 };
-use tapjoint_description::{JointKind, RecordingDescription, SensorKind, TestDescription};
+use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
 /// them has fallen with the cube of their number.
@@ -207,7 +207,7 @@ pub(super) fn nominal_specimen(
             });
         }
     }
-    specimen.masses.extend(fastened_masses(recording));
+    specimen.masses.extend(&recording.masses);
     Ok(specimen)
 }
 
@@ -215,7 +215,7 @@ fn joint(
     test: &TestDescription,
     given: Option<GivenJoint>,
 ) -> Result<SpecimenJoint, SimulateError> {
-    if test.joint.kind == JointKind::Free {
+    if test.joint.kind == Assembly::Free {
         return Ok(SpecimenJoint::Free);
     }
     let units = StiffnessUnits::of(&described_beam(test));
@@ -228,8 +228,7 @@ fn joint(
     }
     let (missing, keys) = match (test.joint.kt, test.joint.kr) {
         (Some(kt), Some(kr)) => {
-            let (kt, kr) = (stiffness_of(kt), stiffness_of(kr));
-            let ktr = test.joint.ktr.map_or(f64::INFINITY, stiffness_of);
+            let ktr = test.joint.ktr.unwrap_or(f64::INFINITY);
             return Ok(SpecimenJoint::Springs {
                 kt,
                 kr,

@@ -9,10 +9,10 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
-use tapjoint_analysis::{fastened_masses, nominal_with};
+use tapjoint_analysis::nominal_with;
 use tapjoint_beam::effects::{Effect, EffectError, EffectId};
 use tapjoint_beam::{Beam, JointStiffness};
-use tapjoint_description::{JointKind, TestDescription};
+use tapjoint_description::{Assembly, TestDescription};
 use tapjoint_diagnosis::{
     GapError, GapSettings, Nominal, PlannedConfiguration, TestPlan, diagnose, nominal_chi_square,
     observe,
@@ -135,7 +135,7 @@ pub(super) fn plan_of(
             tap: recording.tap.ok_or_else(|| PlanError::NoTap {
                 file: recording.file.display().to_string(),
             })?,
-            masses: fastened_masses(recording),
+            masses: recording.masses.clone(),
             level: recording.level.unwrap_or(1.0) / hardest,
         })
     });
@@ -187,15 +187,15 @@ fn case(
 
 /// Groups of effects that a structure can have: a lap joint has no coupling and no fixture, a beam by itself
 /// no joint. Nothing pulls on either: both are free, and a force that pushed them would buckle them.
-fn groups_of(kind: JointKind) -> Vec<&'static [EffectId]> {
+fn groups_of(kind: Assembly) -> Vec<&'static [EffectId]> {
     let cannot: &[EffectId] = match kind {
-        JointKind::Cantilever => &[],
-        JointKind::Lap => &[
+        Assembly::Cantilever => &[],
+        Assembly::Lap => &[
             EffectId::CrossCoupling,
             EffectId::Fixture,
             EffectId::AxialLoad,
         ],
-        JointKind::Free => &[
+        Assembly::Free => &[
             EffectId::CrossCoupling,
             EffectId::Fixture,
             EffectId::JointMass,

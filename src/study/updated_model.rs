@@ -2,14 +2,14 @@
 //! natural frequencies. What the diagnosis leaves open of shear and rotary inertia, 2 %, has no place in a description
 //! and stays out.
 
-use tapjoint_analysis::{fastened_masses, nominal_with};
+use tapjoint_analysis::nominal_with;
 use tapjoint_beam::StructureError;
 use tapjoint_beam::effects::{
     Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply,
 };
 use tapjoint_beam::specimen::{Mesh, PointMass};
 use tapjoint_description::{
-    FastenedMass, JointKind, SensorDescription, SensorKind, TestDescription,
+    Assembly, SensorDescription, SensorKind, TestDescription,
 };
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use tapjoint_identify::observation::effective_share;
@@ -186,9 +186,9 @@ fn right_half(test: &TestDescription, scale: f64) -> String {
 fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
     use tapjoint_description::BeamTheory;
     let kind = match test.joint.kind {
-        JointKind::Cantilever => "cantilever",
-        JointKind::Lap => "lap",
-        JointKind::Free => "free",
+        Assembly::Cantilever => "cantilever",
+        Assembly::Lap => "lap",
+        Assembly::Free => "free",
     };
     let beam = match test.joint.beam {
         BeamTheory::Euler => "euler",
@@ -241,7 +241,7 @@ const KNOWN_MASSES: &str = "\n# Known, not found: what was fastened in the first
 /// What is fastened in the first recording: no recording describes it any more.
 fn fastened(test: &TestDescription) -> String {
     let masses = test.recordings.first().map(|recording| &recording.masses);
-    let table = |fastened: &FastenedMass| {
+    let table = |fastened: &PointMass| {
         let (mass, position) = (fastened.mass, fastened.position);
         let values = line("mass", mass) + &line("position", position);
         format!(
@@ -354,7 +354,7 @@ fn structure_with(
         mass: sensor.mass,
         inertia: 0.0,
     }));
-    let masses = test.recordings.first().map(fastened_masses);
+    let masses = test.recordings.first().map(|recording| &recording.masses);
     specimen.masses.extend(masses.into_iter().flatten());
     // A joint that changes with amplitude is seen at the amplitude that counts for a whole decay.
     let power = effects.iter().find_map(|effect| effect.value("exponent"));

@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use tapjoint::description::{JointKind, TestDescription};
+use tapjoint::description::{Assembly, TestDescription};
 use tapjoint::recording::{WavFormat, write_wav};
 use tempfile::TempDir;
 
@@ -46,9 +46,9 @@ fn refused(description: &str, arguments: &[&str], says: &[&str]) {
 fn regress_init_prints_a_description_of_each_kind() {
     let folder = tempfile::tempdir().unwrap();
     let kinds = [
-        ("cantilever", JointKind::Cantilever),
-        ("lap", JointKind::Lap),
-        ("free", JointKind::Free),
+        ("cantilever", Assembly::Cantilever),
+        ("lap", Assembly::Lap),
+        ("free", Assembly::Free),
     ];
     for (name, kind) in kinds {
         let output = tapjoint(folder.path())

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tapjoint::described::described_specimen;
-use tapjoint::description::{FastenedMass, TestDescription};
+use tapjoint::description::{PointMass, TestDescription};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     GapSettings, Nominal, TestPlan, Verdict, diagnose, nominal_chi_square, observe,
@@ -38,7 +38,11 @@ fn regress_masses_belong_to_the_recording_above_them() {
     let inline =
         "mass = [{ position = 0.2, mass = 0.05 }, { position = 0.423, mass = \"15 g\" }]\n";
     let expected = [(0.2, 0.05), (0.423, 0.015)];
-    let expected = expected.map(|(position, mass)| FastenedMass { position, mass });
+    let expected = expected.map(|(position, mass)| PointMass {
+        position,
+        mass,
+        inertia: 0.0,
+    });
     for text in [tables, inline] {
         let test = parse(text).unwrap();
         assert!(test.recordings[0].masses.is_empty());

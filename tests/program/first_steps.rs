@@ -98,7 +98,7 @@ fn regress_a_template_of_recordings_names_them() {
     let named: Vec<_> = test.recordings.iter().map(|r| r.file.clone()).collect();
     assert_eq!(named, files.map(std::path::PathBuf::from));
     // Nothing but the table of the file itself has gone.
-    let plain = tapjoint::description::template(tapjoint::description::JointKind::Cantilever);
+    let plain = tapjoint::description::template(tapjoint::description::Assembly::Cantilever);
     for line in plain.lines().filter(|line| !line.starts_with("file = ")) {
         assert!(template.contains(line), "lost: {line}");
     }

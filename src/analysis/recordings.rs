@@ -13,8 +13,8 @@ use num_complex::Complex64;
 use std::ops::Range;
 use std::path::Path;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorDescription,
-    SensorKind, TestDescription,
+    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorDescription, SensorKind,
+    TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use tapjoint_signal::modal::{CompositeLevel, ModeReading, PeakSettings, find_peaks, read_peaks};

@@ -3,12 +3,9 @@
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
-use tapjoint_description::described::{
-    described_beam, lap_layout,
-};
+use tapjoint_description::described::{described_beam, lap_layout};
 use tapjoint_description::{
-    FitParameter, JointModel, RecordingDescription, SensorKind,
-    TestDescription, Weights,
+    FitParameter, JointModel, RecordingDescription, SensorKind, TestDescription, Weights,
 };
 use tapjoint_identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
@@ -81,8 +78,7 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
 
 fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
     let units = StiffnessUnits::of(beam);
-    let in_units =
-        |known: Option<f64>, unit: f64| known.map(|known| known / unit);
+    let in_units = |known: Option<f64>, unit: f64| known.map(|known| known / unit);
     KnownJoint {
         kx: in_units(test.joint.kt, units.kt),
         ky: in_units(test.joint.kr, units.kr),

@@ -1,11 +1,14 @@
-//! Arguments that several commands share, and the texts they are made of.
+//! Arguments that several commands share, and the parsers of their values.
 
+use super::choices::window;
+use super::input::file_name;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use tapjoint::description::{ChannelRef, JointKind};
+use tapjoint::description::{Assembly, ChannelRef, WindowKind};
+use tapjoint::pipeline::MeasureSettings;
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::recording::{ReadSettings, Recording, RecordingError};
 use tapjoint::structure::JointStiffness;
@@ -14,30 +17,30 @@ use tapjoint::structure::JointStiffness;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Common options")]
 pub(super) struct CommonArguments {
-    /// Write the results as JSON to FILE; `-` is standard output, to which nothing else is then
-    /// printed
+    /// Write the results as JSON to FILE. `-` is standard output, and nothing else is then printed
     #[arg(long, global = true, value_name = "FILE")]
     pub(super) json: Option<JsonDestination>,
-    /// Replace existing files that tapjoint did not make, too; without it only files that it made are
-    /// replaced, and inputs never are
+    /// Overwrite any existing file except the inputs. By default only files that tapjoint made are
+    /// overwritten
     #[arg(long, global = true)]
     pub(super) force: bool,
-    /// Print nothing but errors (and the seal of a blind check)
+    /// Print only errors (and the seal of a blind check)
     #[arg(long, short, global = true)]
     pub(super) quiet: bool,
-    /// Seed of everything random: the same seed gives the same numbers
+    /// Seed of the random numbers. The same seed gives the same results
     #[arg(long, global = true, value_name = "N", default_value_t = 1)]
     pub(super) seed: u64,
-    /// Threads to work with; default: one for each processor
+    /// Number of threads; default: one for each processor
     #[arg(long, global = true, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=1024))]
     pub(super) threads: Option<usize>,
-    /// Tell on standard error what was used and how long it took; twice: every tap and peak too
+    /// Print on standard error what each stage used and how long it took. Give it twice for
+    /// every tap and peak
     #[arg(long, short, global = true, action = clap::ArgAction::Count)]
     pub(super) verbose: u8,
 }
 
 impl CommonArguments {
-    /// Whether times are to be told.
+    /// Returns true if times are to be printed.
     pub(super) fn tells_more(&self) -> bool {
         self.verbose > 0 && !self.quiet
     }
@@ -56,7 +59,7 @@ impl CommonArguments {
     }
 }
 
-/// Where `--json` goes.
+/// Destination of `--json`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum JsonDestination {
     /// `-`
@@ -80,7 +83,7 @@ impl FromStr for JsonDestination {
 /// How to read a recording that no test description describes.
 #[derive(Debug, Args)]
 pub(super) struct RecordingArguments {
-    /// Channel of the hammer: its number, counted from 1, or the name of a CSV column; default:
+    /// Channel of the hammer: its number, counted from 1, or the name of a CSV column; default: none,
     /// all channels are responses
     #[arg(long, value_name = "CH")]
     pub(super) hammer: Option<ChannelRef>,
@@ -90,15 +93,14 @@ pub(super) struct RecordingArguments {
 }
 
 impl RecordingArguments {
-    /// Opens a recording, with the sample rate given.
+    /// Opens a recording.
     pub(super) fn open(&self, path: &Path) -> Result<Recording, RecordingError> {
         let settings = ReadSettings {
             sample_rate: self.sample_rate,
         };
         let recording = Recording::open(path, &settings)?;
         // Errors name the whole path, tables the file.
-        let name = path.file_name().unwrap_or(path.as_os_str());
-        Ok(recording.renamed(name.to_string_lossy()))
+        Ok(recording.renamed(file_name(path)))
     }
 }
 
@@ -111,186 +113,162 @@ fn sample_rate(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parser of block sizes, with the limits of the test description's `block`.
+/// Block, band and window of a spectrum.
+#[derive(Debug, Default, Args)]
+pub(super) struct SpectrumSettings {
+    /// Block size (samples); default: the longest that fits the shortest tap
+    #[arg(long, value_name = "N", value_parser = block_size())]
+    pub(super) block: Option<usize>,
+    /// Zoom band (Hz); default: 0 to sample rate/2.56
+    #[arg(long, value_name = "LO:HI", value_parser = band)]
+    pub(super) zoom: Option<(f64, f64)>,
+    /// Window; default: rectangular if the taps decay to 1 % within the block, else exponential
+    #[arg(long, value_name = "W", value_parser = window())]
+    pub(super) window: Option<WindowKind>,
+}
+
+impl SpectrumSettings {
+    /// Puts the settings into those of a measurement.
+    pub(super) fn apply(&self, measure: &mut MeasureSettings) {
+        measure.block = self.block;
+        measure.band = self.zoom;
+        measure.window = self.window;
+    }
+}
+
+/// Returns the parser of block sizes, with the limits of the test description's `block`.
 pub(super) fn block_size() -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(16..=4_000_000)
 }
 
-/// A frequency band, `LO:HI` (Hz).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Band {
-    pub(super) low: f64,
-    pub(super) high: f64,
-}
-
-impl FromStr for Band {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let example = "give two frequencies in Hz such as 0:200";
-        let (low, high) = text
-            .split_once(':')
-            .ok_or_else(|| format!("there is no colon; {example}"))?;
-        let edge = |text| {
-            parse_quantity(text, Dimension::Frequency)
-                .map_err(|error| format!("{error}; {example}"))
-        };
-        let band = Self {
-            low: edge(low)?,
-            high: edge(high)?,
-        };
-        if band.low < 0.0 || band.high <= band.low {
-            return Err(format!(
-                "the edges must be ascending and not negative; {example}"
-            ));
-        }
-        Ok(band)
+/// Parses a frequency band, `LO:HI` (Hz).
+pub(super) fn band(text: &str) -> Result<(f64, f64), String> {
+    let example = "give two frequencies in Hz such as 0:200";
+    let (low, high) = text
+        .split_once(':')
+        .ok_or_else(|| format!("there is no colon; {example}"))?;
+    let mut edges = [0.0; 2];
+    for (edge, text) in edges.iter_mut().zip([low, high]) {
+        *edge = parse_quantity(text, Dimension::Frequency)
+            .map_err(|error| format!("{error}; {example}"))?;
     }
-}
-
-/// Positive ascending frequencies, separated by commas (Hz).
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct FrequencyList(pub(super) Vec<f64>);
-
-impl FromStr for FrequencyList {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let frequencies = positive_numbers(text, "frequencies in Hz such as 17,118,335.6")?;
-        let descent = frequencies.windows(2).find(|pair| pair[1] <= pair[0]);
-        match descent {
-            Some(pair) => Err(format!(
-                "{} does not exceed {}; give ascending frequencies in Hz, the lowest mode first",
-                pair[1], pair[0]
-            )),
-            None => Ok(Self(frequencies)),
-        }
+    let [low, high] = edges;
+    if low < 0.0 || high <= low {
+        return Err(format!(
+            "the edges must be ascending and not negative; {example}"
+        ));
     }
+    Ok((low, high))
 }
 
-/// Half-line bounds, one for all frequencies or one for each (Hz).
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct HalfLines(pub(super) Vec<f64>);
+/// Numbers separated by commas. The alias makes them one value of an option.
+pub(super) type Numbers = Vec<f64>;
 
-impl FromStr for HalfLines {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        positive_numbers(text, "half of the line spacing in Hz such as 0.125").map(Self)
-    }
-}
-
-/// Frequency changes, separated by commas (percent).
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct PercentList(pub(super) Vec<f64>);
-
-impl FromStr for PercentList {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let percents = positive_numbers(text, "percentages such as 0.05,0.1")?;
-        match percents.iter().find(|percent| **percent >= 50.0) {
-            Some(large) => Err(format!("{large} % is no small change; give less than 50 %")),
-            None => Ok(Self(percents)),
-        }
-    }
-}
-
-fn positive_numbers(text: &str, wanted: &str) -> Result<Vec<f64>, String> {
-    let number = |item: &str| match item.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        Ok(value) => Err(format!("{value} is not a positive number; give {wanted}")),
-        Err(_) => Err(format!(
-            "\"{}\" is not a number; give {wanted}",
-            item.trim()
+/// Parses positive ascending frequencies (Hz).
+pub(super) fn frequencies(text: &str) -> Result<Numbers, String> {
+    let frequencies = positive_numbers(text, "give frequencies in Hz such as 17,118,335.6")?;
+    match frequencies.windows(2).find(|pair| pair[1] <= pair[0]) {
+        Some(pair) => Err(format!(
+            "{} does not exceed {}; give ascending frequencies in Hz, the lowest mode first",
+            pair[1], pair[0]
         )),
-    };
-    text.split(',').map(number).collect()
-}
-
-/// A non-dimensional stiffness of the joint, from 0 to infinity ("rigid").
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Stiffness(f64);
-
-impl FromStr for Stiffness {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wanted = "give a number from 0 to infinity; \"inf\" or \"rigid\" for no give";
-        match text.trim().parse::<f64>() {
-            Ok(value) if value >= 0.0 => Ok(Self(value)),
-            Ok(value) => Err(format!("{value} is no stiffness; {wanted}")),
-            Err(_) if text.trim() == "rigid" => Ok(Self(f64::INFINITY)),
-            Err(_) => Err(format!("\"{text}\" is not a number; {wanted}")),
-        }
+        None => Ok(frequencies),
     }
 }
 
-/// A non-dimensional cross-coupling stiffness: any number but 0, infinite for no coupling.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct CrossStiffness(f64);
+/// Parses half-line bounds, one for all frequencies or one for each (Hz).
+pub(super) fn half_lines(text: &str) -> Result<Numbers, String> {
+    positive_numbers(text, "give half of the line spacing in Hz such as 0.125")
+}
 
-impl FromStr for CrossStiffness {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wanted = "give any number but 0; \"inf\" for no coupling, negative for a soft root";
-        match text.trim().parse::<f64>() {
-            Ok(value) if value != 0.0 && !value.is_nan() => Ok(Self(value)),
-            Ok(value) => Err(format!("{value} is no coupling stiffness; {wanted}")),
-            Err(_) => Err(format!("\"{text}\" is not a number; {wanted}")),
-        }
+/// Parses frequency changes (percent).
+pub(super) fn percents(text: &str) -> Result<Numbers, String> {
+    let percents = positive_numbers(text, "give percentages such as 0.05,0.1")?;
+    match percents.iter().find(|percent| **percent >= 50.0) {
+        Some(large) => Err(format!("{large} % is too large; give less than 50 %")),
+        None => Ok(percents),
     }
 }
 
-/// A factor that makes SI units of a file's units; negative = mounted the other way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ChannelScale(pub(super) f64);
+fn positive_numbers(text: &str, remedy: &str) -> Result<Numbers, String> {
+    text.split(',')
+        .map(|item| {
+            number(item, "not a positive number", remedy, |value| {
+                value.is_finite() && value > 0.0
+            })
+        })
+        .collect()
+}
 
-impl FromStr for ChannelScale {
-    type Err = String;
+/// Parses a factor from a file's units to SI units; negative if the sensor is mounted the other way.
+pub(super) fn channel_scale(text: &str) -> Result<f64, String> {
+    let remedy = "give SI units per unit of the file, such as 500; negative = the other way round";
+    number(text, "no scale", remedy, |value| {
+        value.is_finite() && value != 0.0
+    })
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wanted =
-            "give SI units per unit of the file, such as 500; negative = the other way round";
-        match text.trim().parse::<f64>() {
-            Ok(value) if value.is_finite() && value != 0.0 => Ok(Self(value)),
-            Ok(value) => Err(format!("{value} is no scale; {wanted}")),
-            Err(_) => Err(format!("\"{text}\" is not a number; {wanted}")),
-        }
+/// Parses a non-dimensional stiffness of the joint, from 0 to infinity ("rigid").
+fn stiffness(text: &str) -> Result<f64, String> {
+    if text.trim() == "rigid" {
+        return Ok(f64::INFINITY);
+    }
+    let remedy = "give a number from 0 to infinity; \"inf\" or \"rigid\" for no give";
+    number(text, "no stiffness", remedy, |value| value >= 0.0)
+}
+
+/// Parses a non-dimensional cross-coupling stiffness: any number but 0, infinite for no coupling.
+fn cross_stiffness(text: &str) -> Result<f64, String> {
+    let remedy = "give any number but 0; \"inf\" for no coupling, negative for a soft root";
+    number(text, "no coupling stiffness", remedy, |value| {
+        value != 0.0 && !value.is_nan()
+    })
+}
+
+/// Parses a number. Messages call a number that is not allowed `what`.
+fn number(
+    text: &str,
+    what: &str,
+    remedy: &str,
+    is_allowed: impl Fn(f64) -> bool,
+) -> Result<f64, String> {
+    match text.trim().parse() {
+        Ok(value) if is_allowed(value) => Ok(value),
+        Ok(value) => Err(format!("{value} is {what}; {remedy}")),
+        Err(_) => Err(format!("\"{}\" is not a number; {remedy}", text.trim())),
     }
 }
 
-/// A joint instead of the described one.
+/// A joint that replaces the described one.
 #[derive(Debug, Args)]
 pub(super) struct StiffnessArguments {
     /// Translational stiffness, 0 to inf (non-dimensional); default: kt of TEST
-    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true)]
-    kx: Option<Stiffness>,
+    #[arg(long, value_name = "N", requires = "ky", allow_negative_numbers = true, value_parser = stiffness)]
+    kx: Option<f64>,
     /// Rotational stiffness, 0 to inf (non-dimensional); default: kr of TEST
-    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
-    ky: Option<Stiffness>,
-    /// Cross-coupling stiffness, negative for a soft root (non-dimensional); default: no coupling
-    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true)]
-    kz: Option<CrossStiffness>,
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true, value_parser = stiffness)]
+    ky: Option<f64>,
+    /// Cross-coupling stiffness (non-dimensional), negative for a soft root; default: no coupling
+    #[arg(long, value_name = "N", requires = "kx", allow_negative_numbers = true, value_parser = cross_stiffness)]
+    kz: Option<f64>,
 }
 
 impl StiffnessArguments {
-    /// The joint that --kx, --ky and --kz give; `None` without them.
+    /// Returns the joint of --kx, --ky and --kz; `None` without them.
     ///
     /// # Errors
-    /// A free beam, a lap joint's coupling, a joint that would be a source of energy.
-    pub(super) fn given(&self, kind: JointKind) -> anyhow::Result<Option<JointStiffness>> {
-        let Some((Stiffness(kx), Stiffness(ky))) = self.kx.zip(self.ky) else {
+    /// A free beam, a lap joint with coupling, or a joint that would be a source of energy.
+    pub(super) fn given(&self, kind: Assembly) -> anyhow::Result<Option<JointStiffness>> {
+        let Some((kx, ky)) = self.kx.zip(self.ky) else {
             return Ok(None);
         };
-        if kind == JointKind::Free {
+        if kind == Assembly::Free {
             bail!("a free beam has no joint; leave out --kx, --ky and --kz");
         }
-        let Some(CrossStiffness(kz)) = self.kz else {
+        let Some(kz) = self.kz else {
             return Ok(Some(JointStiffness::two_parameter(kx, ky)));
         };
-        if kind == JointKind::Lap {
+        if kind == Assembly::Lap {
             bail!("a lap joint has no coupling stiffness; leave out --kz");
         }
         // A passive joint's compliance matrix is positive definite: 1/Kz^2 < 1/(Kx Ky). Taken as a

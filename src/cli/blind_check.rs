@@ -1,4 +1,4 @@
-//! `tapjoint blind-check`: how often the diagnosis is right on tests whose effect it is not told.
+//! `tapjoint blind-check`: the success rate of the diagnosis on tests with an unknown effect.
 
 use super::Outcome;
 use super::input::{TestFile, read_test};
@@ -28,18 +28,18 @@ use tapjoint::study::blind_check::{
     parse_truths, render_rows, rows, score,
 };
 
-/// Draw virtual tests with an effect withheld, diagnose each without the answer, score.
+/// Measure how often the diagnosis is right, on virtual tests with an unknown effect.
 ///
-/// Each test has five recordings (two sensors, three tap positions, one sensor moved, two levels).
-/// The truths are sealed by a SHA-256 that is printed first; the diagnosis sees recordings and
-/// descriptions alone. With --folder, tests made elsewhere are diagnosed and scored.
+/// Each test has five recordings: two sensors, three tap positions, one moved sensor, two levels. The
+/// SHA-256 of the true effects is printed before the diagnosis begins. The diagnosis gets recordings and
+/// descriptions only. With --folder, existing tests are diagnosed and scored.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint blind-check --cases 100 --seed 7\n  tapjoint blind-check --folder tests --truth truth.json"
 )]
 pub(super) struct BlindCheckArguments {
-    /// Number of virtual tests: ten nineteenths with one effect, five with none, two with something
-    /// outside the catalogue, two with two effects
+    /// Number of virtual tests. Of 19 tests, 10 have one effect, 5 none, 2 two effects, and 2 an effect
+    /// outside the catalogue
     #[arg(
         long,
         value_name = "N",
@@ -48,10 +48,10 @@ pub(super) struct BlindCheckArguments {
         conflicts_with = "folder"
     )]
     cases: usize,
-    /// One recording with one sensor and five modes instead of five recordings
+    /// Use one recording with one sensor and five modes instead of five recordings
     #[arg(long, conflicts_with = "folder")]
     one_recording: bool,
-    /// Noise of the responses below their root mean square (dB)
+    /// Ratio of the responses' rms to the rms of their noise (dB)
     #[arg(
         long,
         value_name = "DB",
@@ -59,7 +59,7 @@ pub(super) struct BlindCheckArguments {
         conflicts_with = "folder"
     )]
     noise: f64,
-    /// Largest standard deviation of the joint's drift between recordings (relative)
+    /// Largest standard deviation of the joint's relative drift between recordings
     #[arg(
         long,
         value_name = "S",
@@ -67,16 +67,16 @@ pub(super) struct BlindCheckArguments {
         conflicts_with = "folder"
     )]
     drift: f64,
-    /// Folder of tests made elsewhere, each a folder with test.toml and recordings
+    /// Folder of existing tests, each a folder with test.toml and recordings
     #[arg(long, value_name = "DIR", requires = "truth")]
     folder: Option<PathBuf>,
-    /// What was planted in them: JSON list of {"name", "effects", "params"}, and if that is known
-    /// "detectable" and "refutable" (true or false), as --keep writes them; parameters of two effects
-    /// in braces, {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}
+    /// True effects of the existing tests, as --keep writes them. JSON list of {"name", "effects", "params"},
+    /// with "detectable" and "refutable" (true or false) if known. Parameters of two effects stand in
+    /// braces: {"sensor-mass": {"mass": 0.008}, "length": {"relative": 0.01}}
     #[arg(long, value_name = "FILE", requires = "folder")]
     truth: Option<PathBuf>,
-    /// Keep the drawn tests in this folder, each with its recordings and its description, and beside them
-    /// their truth.json: to look at, or for --folder; a new folder, or that of earlier kept tests
+    /// Keep the drawn tests in this folder, with recordings, descriptions and truth.json. The folder must
+    /// be new or hold tests that were kept earlier
     #[arg(long, value_name = "DIR", conflicts_with = "folder")]
     keep: Option<PathBuf>,
     /// Folder of the results
@@ -117,8 +117,7 @@ impl BlindCheckArguments {
             bail!("--noise {}: give decibels from 0 to 200", self.noise);
         }
         // The proportions of 300, 150, 60 and 60.
-        let share = |part: usize| (self.cases * part + 9) / 19;
-        let (nulls, outside, pairs) = (share(5), share(2), share(2));
+        let [nulls, outside, pairs] = [5, 2, 2].map(|part| (self.cases * part + 9) / 19);
         Ok(Campaign {
             singles: self.cases.saturating_sub(nulls + outside + pairs),
             nulls,
@@ -153,13 +152,11 @@ pub(super) fn run(
     let scores = score(&cases);
     let conduct = conduct.mutated(&cases, seed);
     terminal.say(&render_rows(&rows(&scores, conduct.extent)))?;
-    let percent =
-        |share: Option<f64>| share.map_or("-".to_owned(), |p| format!("{:.0} %", 100.0 * p));
+    let [shuffled, always_scale] = [conduct.shuffled, conduct.always_scale]
+        .map(|share| share.map_or("-".to_owned(), |p| format!("{:.0} %", 100.0 * p)));
     terminal.say(&format!(
-        "\nFirst group right by answers dealt out to other tests: {}; by always\n\
-         answering one common factor: {}. Files renamed: {}.",
-        percent(conduct.shuffled),
-        percent(conduct.always_scale),
+        "\nFirst group right by answers dealt out to other tests: {shuffled}; by always\n\
+         answering one common factor: {always_scale}. Files renamed: {}.",
         match conduct.renamed {
             0 => "in no test".to_owned(),
             tests => format!("same answers ({tests} tests)"),
@@ -174,7 +171,7 @@ pub(super) fn run(
     Ok(Outcome::Answered)
 }
 
-/// Draws, seals, records, diagnoses, opens.
+/// Draws tests, seals their true effects, records and diagnoses them.
 fn drawn(
     campaign: &Campaign,
     keep: Option<&Path>,
@@ -187,7 +184,7 @@ fn drawn(
         .into_par_iter()
         .map(|index| campaign.draw(index))
         .collect::<Result<Vec<_>, _>>()?;
-    // What could be noticed at all is part of the truth, and takes a while.
+    // The detection limits are part of the truth, and take a while.
     let done = AtomicUsize::new(0);
     let truths = tests
         .par_iter()
@@ -213,8 +210,7 @@ fn drawn(
             let name = &test.truth.name;
             let case = match kept.as_ref().zip(keep) {
                 Some((kept, shown)) => {
-                    let folders = (kept.place_of(name), shown.join(name));
-                    diagnose_recorded(&recorded, truth, (&folders.0, &folders.1))?
+                    diagnose_recorded(&recorded, truth, &kept.place_of(name), &shown.join(name))?
                 }
                 None => diagnose_in_passing(&recorded, truth)?,
             };
@@ -239,10 +235,10 @@ fn drawn(
     Ok((diagnosed, conduct))
 }
 
-/// How many tests are diagnosed again under other names.
+/// Number of tests that are diagnosed again under other names.
 const AGAIN: usize = 3;
 
-/// The first tests again under other names: the answers must not change. Returns how many there were.
+/// Diagnoses the first tests again under other names: the answers must not change. Returns their number.
 fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
     for (test, (_, answer)) in tests.iter().zip(cases).take(AGAIN) {
         let mut recorded = test.record()?;
@@ -268,22 +264,22 @@ fn check_names(tests: &[DrawnTest], cases: &[Case]) -> anyhow::Result<usize> {
 
 fn diagnose_in_passing(recorded: &RecordedTest, truth: &Truth) -> anyhow::Result<Case> {
     let folder = tempfile::tempdir().context("no temporary folder can be made")?;
-    diagnose_recorded(recorded, truth, (folder.path(), folder.path()))
+    diagnose_recorded(recorded, truth, folder.path(), folder.path())
 }
 
-/// Writes a test into a folder of its own, and diagnoses what stands there. Errors say where it was to
-/// appear, `shown`.
+/// Writes a test into a folder of its own, and diagnoses it from there. Errors name the folder `shown`.
 fn diagnose_recorded(
     recorded: &RecordedTest,
     truth: &Truth,
-    (folder, shown): (&Path, &Path),
+    folder: &Path,
+    shown: &Path,
 ) -> anyhow::Result<Case> {
-    let failed = |path: PathBuf| move |cause| OutputError::Failed { path, cause };
-    let write = |name: &str, bytes: &[u8]| {
-        fs::write(folder.join(name), bytes).map_err(failed(shown.join(name)))
-    };
-    fs::create_dir_all(folder).map_err(failed(shown.to_owned()))?;
-    write("test.toml", recorded.description.as_bytes())?;
+    fs::create_dir_all(folder).map_err(|cause| OutputError::Failed {
+        path: shown.to_owned(),
+        cause,
+    })?;
+    let description = recorded.description.as_bytes().to_vec();
+    let mut files = vec![("test.toml", description)];
     for recording in &recorded.recordings {
         let mut bytes = Vec::new();
         encode_wav(
@@ -293,13 +289,19 @@ fn diagnose_recorded(
             &recording.channels,
             WavFormat::Pcm24,
         )?;
-        write(&recording.file, &bytes)?;
+        files.push((&recording.file, bytes));
+    }
+    for (name, bytes) in files {
+        fs::write(folder.join(name), bytes).map_err(|cause| OutputError::Failed {
+            path: shown.join(name),
+            cause,
+        })?;
     }
     let test = TestDescription::parse(&recorded.description, "test.toml")?;
     Ok(case_of(&test, folder, truth))
 }
 
-/// A test that cannot be analysed or diagnosed has no answer, which is counted apart.
+/// Diagnoses a test. A test that cannot be analysed has no answer, which is counted separately.
 fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
     let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::none(), |d| Answer::of(&d));
     (truth.clone(), answer)
@@ -311,7 +313,7 @@ fn diagnosis_of(test: &TestDescription, folder: &Path) -> anyhow::Result<Diagnos
     Ok(diagnose_test(test, &analysis, &GapSettings::default())?)
 }
 
-/// Tests made elsewhere: those that both the folder and the truth file know.
+/// Diagnoses existing tests: those that both the folder and the truth file have.
 fn elsewhere(
     folder: &Path,
     truth: &Path,
@@ -330,7 +332,7 @@ fn elsewhere(
         let path = folder.join(&truth.name).join("test.toml");
         if !path.is_file() {
             bail!(
-                "{}: not there, but {name} speaks of the test \"{}\"; each test is a folder of that \
+                "{}: is missing, but {name} names the test \"{}\"; each test is a folder of that \
                  name with a test.toml",
                 path.display(),
                 truth.name
@@ -339,12 +341,12 @@ fn elsewhere(
     }
     for unlisted in unlisted(folder, &truths) {
         terminal.warn(&format!(
-            "{}: {name} does not speak of this test, and it is left out",
+            "{}: {name} does not name this test, so it is left out",
             folder.join(unlisted).display()
         ));
     }
     let done = AtomicUsize::new(0);
-    // Descriptions have warnings, which are told in the order of the file.
+    // Warnings of the descriptions appear in the order of the file.
     let read: Vec<anyhow::Result<TestFile>> = truths
         .iter()
         .map(|truth| read_test(&folder.join(&truth.name).join("test.toml"), terminal))
@@ -352,7 +354,10 @@ fn elsewhere(
     let answers: Vec<anyhow::Result<Answer>> = read
         .into_par_iter()
         .map(|file| {
-            let answer = file.and_then(|file| answer_elsewhere(&file));
+            let answer = file.and_then(|file| {
+                file.check_recordings()?;
+                Ok(Answer::of(&diagnosis_of(&file.test, &file.folder)?))
+            });
             terminal.count(
                 "tests diagnosed",
                 done.fetch_add(1, Ordering::Relaxed) + 1,
@@ -361,11 +366,11 @@ fn elsewhere(
             answer
         })
         .collect();
-    // What is wrong with one keeps the others from nothing.
+    // An error in one test does not stop the others.
     let cases = truths.into_iter().zip(answers).map(|(truth, answer)| {
         let answer = answer.unwrap_or_else(|error| {
             terminal.warn(&format!(
-                "the test \"{}\" could not be diagnosed, and counts as that: {error:#}",
+                "the test \"{}\" could not be diagnosed, and counts as not diagnosed: {error:#}",
                 truth.name
             ));
             Answer::none()
@@ -380,7 +385,7 @@ fn elsewhere(
     Ok((cases, conduct))
 }
 
-/// Folders with a test of which the truths do not speak, in order.
+/// Returns the folders with a test that the truths do not name, in order.
 fn unlisted(folder: &Path, truths: &[Truth]) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let mut names: Vec<String> = entries
@@ -392,14 +397,8 @@ fn unlisted(folder: &Path, truths: &[Truth]) -> Vec<String> {
     names
 }
 
-/// What the program answers to one test made elsewhere.
-fn answer_elsewhere(file: &TestFile) -> anyhow::Result<Answer> {
-    file.check_recordings()?;
-    Ok(Answer::of(&diagnosis_of(&file.test, &file.folder)?))
-}
-
-/// The first of the tests made elsewhere again, with their recordings under other names, as far as these can be
-/// exchanged. Returns how many there were.
+/// Diagnoses the first existing tests again, with their recordings under other names. Tests whose names
+/// cannot be exchanged are skipped. Returns the number of diagnosed tests.
 fn check_names_elsewhere(
     folder: &Path,
     cases: &[Case],
@@ -431,8 +430,10 @@ fn check_names_elsewhere(
     Ok(again)
 }
 
-/// A copy of a test with its recordings under other names; `None` where it has no recordings, one lies in another
-/// folder, or the description names one in a way that cannot be exchanged.
+/// Returns a copy of a test with its recordings under other names.
+///
+/// `None` if it has no recordings, one lies in another folder, or the description names one in a form that
+/// cannot be exchanged.
 fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
     let Ok(text) = fs::read_to_string(folder.join("test.toml")) else {
         return Ok(None);
@@ -440,10 +441,19 @@ fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
     let Ok(test) = TestDescription::parse(&text, "test.toml") else {
         return Ok(None);
     };
-    let Some(names) = new_names(&test, folder) else {
-        return Ok(None);
-    };
-    let Some(text) = exchanged(&text, &test, &names) else {
+    // The new names are in another order than the files.
+    let mut names = BTreeMap::new();
+    for (number, recording) in test.recordings.iter().rev().enumerate() {
+        let ending = recording.file.extension().unwrap_or_default();
+        let (Some(file), Some(ending)) = (recording.file.to_str(), ending.to_str()) else {
+            return Ok(None);
+        };
+        if !folder.join(file).is_file() || recording.file.components().count() > 1 {
+            return Ok(None);
+        }
+        names.insert(file.to_owned(), format!("renamed-{number:04}.{ending}"));
+    }
+    let Some(text) = exchanged(&text, &test, &names).filter(|_| !names.is_empty()) else {
         return Ok(None);
     };
     let copy = tempfile::tempdir().context("no temporary folder can be made")?;
@@ -454,23 +464,8 @@ fn renamed(folder: &Path) -> anyhow::Result<Option<tempfile::TempDir>> {
     Ok(Some(copy))
 }
 
-/// A new name for each file, in another order than theirs; `None` without files, or where one is not in this folder.
-fn new_names(test: &TestDescription, folder: &Path) -> Option<BTreeMap<String, String>> {
-    let mut names = BTreeMap::new();
-    for (number, recording) in test.recordings.iter().rev().enumerate() {
-        let place = folder.join(&recording.file);
-        if !place.is_file() || recording.file.components().count() > 1 {
-            return None;
-        }
-        let file = recording.file.to_str()?.to_owned();
-        let ending = place.extension().unwrap_or_default().to_str()?;
-        names.insert(file, format!("renamed-{number:04}.{ending}"));
-    }
-    (!names.is_empty()).then_some(names)
-}
-
-/// The description with the new names in double or single quotation marks; `None` where it then names another file
-/// still, which it wrote in another way.
+/// Returns the description with the new names, in double or single quotation marks. `None` if it still names an
+/// old file, which it spells in another way.
 fn exchanged(
     text: &str,
     test: &TestDescription,

@@ -1,187 +1,119 @@
-//! Choices that the command line names, and what they stand for in the library.
+//! Options that take one of a few words.
 
-use clap::ValueEnum;
-use tapjoint::description::{JointKind, ReadBy, SensorKind, WindowKind};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use tapjoint::description::{
+    ASSEMBLIES, Assembly, FORMS, READINGS, ReadBy, ResponseForm, SENSOR_KINDS, SensorKind, WINDOWS,
+    WindowKind,
+};
 use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
-use tapjoint::recording::ResponseForm;
 use tapjoint::spectral::FrfEstimator;
 
-/// Kinds of structure, as the command line names them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum KindArgument {
-    /// A beam held at one end
-    Cantilever,
-    /// Two beams joined end to end, free otherwise
-    Lap,
-    /// A free beam
-    Free,
+/// Returns the parser of an option that takes one of these words, each with its help.
+pub(super) fn words<T: Copy + Send + Sync + 'static, const N: usize>(
+    table: [(&'static str, T); N],
+    help: [&'static str; N],
+) -> impl TypedValueParser<Value = T> {
+    let known = table.iter().zip(help);
+    let known = known.map(|((word, _), help)| PossibleValue::new(*word).help(help));
+    PossibleValuesParser::new(known.collect::<Vec<_>>()).try_map(move |given: String| {
+        let found = table.iter().find(|(word, _)| *word == given);
+        found.map(|(_, value)| *value).ok_or("an unknown word")
+    })
 }
 
-impl From<KindArgument> for JointKind {
-    fn from(kind: KindArgument) -> Self {
-        match kind {
-            KindArgument::Cantilever => Self::Cantilever,
-            KindArgument::Lap => Self::Lap,
-            KindArgument::Free => Self::Free,
-        }
-    }
+pub(super) fn assembly() -> impl TypedValueParser<Value = Assembly> {
+    let help = [
+        "A beam held at one end",
+        "Two beams joined end to end, free otherwise",
+        "A free beam",
+    ];
+    words(ASSEMBLIES, help)
 }
 
-/// Windows, as the command line names them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum WindowArgument {
-    /// None
-    Rectangular,
-    /// For steady signals, not for taps
-    Hann,
-    /// Decaying, for taps that ring longer than the block
-    Exponential,
+pub(super) fn window() -> impl TypedValueParser<Value = WindowKind> {
+    let help = [
+        "No window",
+        "For steady signals, not for taps",
+        "A decaying window, for taps that ring longer than the block",
+    ];
+    words(WINDOWS, help)
 }
 
-impl From<WindowArgument> for WindowKind {
-    fn from(window: WindowArgument) -> Self {
-        match window {
-            WindowArgument::Rectangular => Self::Rectangular,
-            WindowArgument::Hann => Self::Hann,
-            WindowArgument::Exponential => Self::Exponential,
-        }
-    }
+pub(super) fn reading() -> impl TypedValueParser<Value = ReadBy> {
+    let help = [
+        "Fit the decay of the taps, with a standard deviation",
+        "Interpolate between the spectral lines about each peak",
+        "Take the highest spectral line, with the half-line bound",
+    ];
+    words(READINGS, help)
 }
 
-/// Estimators of frequency response functions, as the command line names them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(super) enum EstimatorArgument {
-    /// Gfx/Gff: right where only the response is noisy
-    #[default]
-    H1,
-    /// Gxx/Gxf: right where only the force is noisy
-    H2,
-    /// Total least squares: between the two
-    Hv,
+pub(super) fn sensor_kind() -> impl TypedValueParser<Value = SensorKind> {
+    let help = [
+        "Accelerometer, m/s2",
+        "Velocity, m/s",
+        "Displacement, m",
+        "Microphone, Pa",
+    ];
+    words(SENSOR_KINDS, help)
 }
 
-impl From<EstimatorArgument> for FrfEstimator {
-    fn from(estimator: EstimatorArgument) -> Self {
-        match estimator {
-            EstimatorArgument::H1 => Self::H1,
-            EstimatorArgument::H2 => Self::H2,
-            EstimatorArgument::Hv => Self::Hv,
-        }
-    }
+pub(super) fn response_form() -> impl TypedValueParser<Value = ResponseForm> {
+    let help = [
+        "Acceleration per force, (m/s2)/N",
+        "Velocity per force, (m/s)/N",
+        "Displacement per force, m/N",
+    ];
+    words(FORMS, help)
 }
 
-/// Forms of frequency response functions, as the command line names them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum FormArgument {
-    /// Acceleration per force, (m/s2)/N
-    Accelerance,
-    /// Velocity per force, (m/s)/N
-    Mobility,
-    /// Displacement per force, m/N
-    Receptance,
+pub(super) fn estimator() -> impl TypedValueParser<Value = FrfEstimator> {
+    let estimators = [
+        ("h1", FrfEstimator::H1),
+        ("h2", FrfEstimator::H2),
+        ("hv", FrfEstimator::Hv),
+    ];
+    let help = [
+        "Gfx/Gff: correct if only the response is noisy",
+        "Gxx/Gxf: correct if only the force is noisy",
+        "Total least squares: between the two",
+    ];
+    words(estimators, help)
 }
 
-impl From<FormArgument> for ResponseForm {
-    fn from(form: FormArgument) -> Self {
-        match form {
-            FormArgument::Accelerance => Self::Accelerance,
-            FormArgument::Mobility => Self::Mobility,
-            FormArgument::Receptance => Self::Receptance,
-        }
-    }
+const PAIRS_HELP: &str =
+    "Only the multi-linear regression over pairs of modes (Euler beam, without sensor masses)";
+
+pub(super) fn method() -> impl TypedValueParser<Value = EstimateMethod> {
+    let methods = EstimateMethod::ALL.map(|method| (method.name(), method));
+    let help = [
+        "Least squares on the frequencies; the pair regression is shown beside it",
+        PAIRS_HELP,
+    ];
+    words(methods, help)
 }
 
-/// Kinds of sensor, as the command line names them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum SensorArgument {
-    /// Accelerometer, m/s2
-    Acceleration,
-    /// Velocity, m/s
-    Velocity,
-    /// Displacement, m
-    Displacement,
-    /// Microphone, Pa
-    Sound,
+/// Returns the parser of a choice of estimates to perturb. The last of them is the main estimate.
+pub(super) fn perturbed_methods() -> impl TypedValueParser<Value = &'static [EstimateMethod]> {
+    use EstimateMethod::{Consistent, Pairs};
+    let methods: [(_, &'static [_]); 3] = [
+        ("both", &[Pairs, Consistent]),
+        ("consistent", &[Consistent]),
+        ("pairs", &[Pairs]),
+    ];
+    let help = [
+        "Both estimates, side by side",
+        "Only the least squares on the frequencies",
+        PAIRS_HELP,
+    ];
+    words(methods, help)
 }
 
-impl From<SensorArgument> for SensorKind {
-    fn from(kind: SensorArgument) -> Self {
-        match kind {
-            SensorArgument::Acceleration => Self::Acceleration,
-            SensorArgument::Velocity => Self::Velocity,
-            SensorArgument::Displacement => Self::Displacement,
-            SensorArgument::Sound => Self::Sound,
-        }
-    }
-}
-
-/// How frequencies are read, as the command line names it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(super) enum ReadingArgument {
-    /// By a fit of the decays, with a standard deviation
-    #[default]
-    Fit,
-    /// Between the lines about each peak
-    Interpolated,
-    /// On the spectral line, with the half-line bound
-    Line,
-}
-
-impl From<ReadingArgument> for ReadBy {
-    fn from(reading: ReadingArgument) -> Self {
-        match reading {
-            ReadingArgument::Fit => Self::Fit,
-            ReadingArgument::Interpolated => Self::Interpolated,
-            ReadingArgument::Line => Self::Line,
-        }
-    }
-}
-
-/// How the joint is estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(super) enum MethodArgument {
-    /// Least squares on the frequencies themselves, the pair regression beside it
-    #[default]
-    Consistent,
-    /// The multi-linear regression over pairs of modes alone (Euler beam, sensor masses neglected)
-    Pairs,
-}
-
-/// Which estimates are perturbed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(super) enum MethodsArgument {
-    /// Both methods, side by side
-    #[default]
-    Both,
-    /// Least squares on the frequencies themselves
-    Consistent,
-    /// The multi-linear regression over pairs of modes alone (Euler beam, sensor masses neglected)
-    Pairs,
-}
-
-impl MethodsArgument {
-    /// The main estimate, and the methods to perturb.
-    pub(super) fn settings(self) -> IdentifySettings {
-        let (consistent, pairs) = (EstimateMethod::Consistent, EstimateMethod::Pairs);
-        let (method, perturbed) = match self {
-            Self::Both => (consistent, vec![pairs, consistent]),
-            Self::Consistent => (consistent, vec![consistent]),
-            Self::Pairs => (pairs, vec![pairs]),
-        };
-        IdentifySettings {
-            method,
-            perturbed,
-            ..IdentifySettings::default()
-        }
-    }
-}
-
-impl MethodArgument {
-    /// In the analysis's terms.
-    pub(super) fn method(self) -> EstimateMethod {
-        match self {
-            MethodArgument::Consistent => EstimateMethod::Consistent,
-            MethodArgument::Pairs => EstimateMethod::Pairs,
-        }
+/// Returns the settings that estimate and perturb by these methods.
+pub(super) fn perturbed_by(methods: &[EstimateMethod]) -> IdentifySettings {
+    IdentifySettings {
+        method: methods.last().copied().unwrap_or_default(),
+        perturbed: methods.to_vec(),
+        ..IdentifySettings::default()
     }
 }

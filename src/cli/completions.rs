@@ -1,4 +1,4 @@
-//! `tapjoint completions`: what makes a shell complete commands and options.
+//! `tapjoint completions`: scripts that let a shell complete commands and options.
 
 use super::Outcome;
 use super::terminal::Terminal;
@@ -11,7 +11,7 @@ use clap_complete::{Shell, generate};
     after_help = "Example:\n  tapjoint completions bash > ~/.local/share/bash-completion/completions/tapjoint"
 )]
 pub(super) struct CompletionsArguments {
-    /// The shell
+    /// Shell
     #[arg(value_enum)]
     shell: Shell,
 }

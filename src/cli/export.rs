@@ -1,4 +1,4 @@
-//! `tapjoint export`: the beam with its identified joint for a finite-element program.
+//! `tapjoint export`: the beam with its joint as input of a finite-element program.
 
 use super::Outcome;
 use super::input::{TestFile, read_model};
@@ -24,32 +24,32 @@ use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, JointStiffness};
 use tapjoint::study::updated_model::described_structure;
 
-/// Write the updated beam with its joint for a finite-element program.
+/// Write the beam with its joint as input of a finite-element program.
 ///
-/// The joint is estimated from the test's data, or taken from a report that was made of it; where it is
-/// known, that is written. Springs with cross coupling are the inverse of the joint's compliance. Of a model
-/// with effects, as `run` and `diagnose --model` write it, masses, springs, dimensions and cracks are written.
+/// The joint is estimated from the test's data, or taken from an earlier report. A joint that TEST gives
+/// is written as it is. Springs with cross coupling are the inverse of the joint's compliance. Of a
+/// model with effects, masses, springs, dimensions and cracks are written.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint export test.toml --format nastran --out joint.bdf\n  tapjoint export test.toml --report test-report/report.json --format abaqus > joint.inp\n  tapjoint export test-report/updated-model.toml --out model.bdf"
 )]
 pub(super) struct ExportArguments {
-    /// A test description (.toml)
+    /// Test description (.toml)
     #[arg(value_name = "TEST")]
     test: PathBuf,
-    /// Format
+    /// Format of the file
     #[arg(long, value_enum, default_value_t)]
     format: DeckFormat,
-    /// Take joint and beam from this report.json instead of estimating them; recordings are then not
+    /// Take joint and beam from this report.json instead of estimating them. Recordings are then not
     /// read
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Write into this file; default: print
+    /// Write into this file; default: standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// Predicted frequencies at the head of a deck where the report predicts none.
+/// Number of predicted frequencies at the head of a deck, if the report predicts none.
 const USUAL_MODES: usize = 6;
 
 /// Formats of finite-element input.
@@ -64,11 +64,7 @@ enum DeckFormat {
 
 pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let file = read_model(&arguments.test, &terminal)?;
-    let output = arguments
-        .out
-        .as_deref()
-        .map(OutputFile::prepare)
-        .transpose()?;
+    let output = OutputFile::prepare_optional(arguments.out.as_deref())?;
     let deck = match file.test.effects.is_empty() {
         true => deck_of_test(&file, arguments.report.as_deref(), &terminal)?,
         false => deck_of_model(&file, arguments.report.as_deref())?,
@@ -96,7 +92,7 @@ pub(super) fn run(arguments: &ExportArguments, terminal: Terminal) -> anyhow::Re
     Ok(Outcome::Answered)
 }
 
-/// The deck of a test whose joint is estimated or reported.
+/// Returns the deck of a test, whose joint is estimated or reported.
 fn deck_of_test(
     file: &TestFile,
     report: Option<&Path>,
@@ -116,7 +112,7 @@ fn deck_of_test(
     Ok(source.and_then(|source| deck_of(&file.test.name, &source)))
 }
 
-/// The deck of a description with effects, which is a model already: its joint is the described one.
+/// Returns the deck of a description with effects, which is a model already: its joint is the described one.
 fn deck_of_model(
     file: &TestFile,
     report: Option<&Path>,
@@ -146,7 +142,7 @@ fn deck_of_model(
     ))
 }
 
-/// The joint of the test's own data.
+/// Estimates the joint from the test's own data.
 fn estimated(
     file: &TestFile,
     terminal: &Terminal,
@@ -163,10 +159,10 @@ fn estimated(
     }))
 }
 
-/// How a sentence on the misfit begins.
+/// Beginning of a sentence on the misfit.
 const MISSES: &str = "the model misses";
 
-/// How far the model of a report misses the frequencies, if it does, and the limits of its joint.
+/// Returns the misfit of a report's model, if it has one, and the limits of its joint.
 fn doubts_of(report: &Value) -> Vec<String> {
     let warnings = report["warnings"].as_array().into_iter().flatten();
     let texts = warnings
@@ -179,40 +175,35 @@ fn doubts_of(report: &Value) -> Vec<String> {
     misfit.map(str::to_owned).chain(limits).collect()
 }
 
-/// The limits of all stiffnesses: those that are scaled by the misfit, and those that are not.
+/// Returns the limits of all stiffnesses, those that are scaled by the misfit first.
 fn all_limits(estimate: &Value) -> Vec<String> {
-    let units = [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")];
-    let is_scaled = |key: &str| {
-        let ends = ["low_scaled", "high_scaled"];
-        ends.iter().any(|end| estimate[key][*end].is_number())
-    };
-    let ways = [
-        (true, " scaled by the misfit", ["low_scaled", "high_scaled"]),
-        (false, "", ["low", "high"]),
-    ];
-    let of = |(scaled, how, ends): (bool, &str, [&str; 2])| {
-        let own = units.iter().filter(|(key, _)| is_scaled(key) == scaled);
-        let all: Vec<String> = own
-            .filter_map(|(key, unit)| limits(&estimate[*key], (key, unit), ends))
-            .collect();
-        (!all.is_empty()).then(|| format!("95 % limits{how}: {}", all.join(", ")))
-    };
-    ways.into_iter().filter_map(of).collect()
+    let mut lines = Vec::new();
+    for (scaled, how, low, high) in [
+        (true, " scaled by the misfit", "low_scaled", "high_scaled"),
+        (false, "", "low", "high"),
+    ] {
+        let mut limits = Vec::new();
+        for (key, unit) in [("kt", "N/m"), ("kr", "N m/rad"), ("ktr", "N/rad")] {
+            let found = &estimate[key];
+            if scaled != (found["low_scaled"].is_number() || found["high_scaled"].is_number()) {
+                continue;
+            }
+            let words = match (found[low].as_f64(), found[high].as_f64()) {
+                (Some(low), Some(high)) => format!("{low:.3e} to {high:.3e}"),
+                (Some(low), None) => format!("above {low:.3e}"),
+                (None, Some(high)) => format!("below {high:.3e}"),
+                (None, None) => continue,
+            };
+            limits.push(format!("{key} {words} {unit}"));
+        }
+        if !limits.is_empty() {
+            lines.push(format!("95 % limits{how}: {}", limits.join(", ")));
+        }
+    }
+    lines
 }
 
-/// "kt 1.590e6 to 1.990e6 N/m"; `None` where nothing bounds it.
-fn limits(found: &Value, (key, unit): (&str, &str), ends: [&str; 2]) -> Option<String> {
-    let [low, high] = ends.map(|end| found[end].as_f64());
-    let words = match (low, high) {
-        (Some(low), Some(high)) => format!("{low:.3e} to {high:.3e}"),
-        (Some(low), None) => format!("above {low:.3e}"),
-        (None, Some(high)) => format!("below {high:.3e}"),
-        (None, None) => return None,
-    };
-    Some(format!("{key} {words} {unit}"))
-}
-
-/// The joint of a report with the beam that belongs to it.
+/// Returns the joint of a report with its beam.
 fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
@@ -221,14 +212,14 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
     let estimate = &report["estimate"];
     let structure = tested_structure(test);
     let beam = reported_beam(estimate, &structure.beam);
-    let joint = reported_joint(estimate, (&structure, &beam)).with_context(|| {
+    let joint = reported_joint(estimate, &structure, &beam).with_context(|| {
         format!(
             "{name}: has no estimate of the joint; give a report with one, or leave --report out"
         )
     })?;
     let sound = joint.check();
     sound.with_context(|| format!("{name}: its joint is not physical"))?;
-    // A closed form has been estimated without masses and unequal halves, and holds their effect.
+    // A closed form was estimated without masses and unequal halves, so it contains their effect.
     let whole = estimate["method"] == "consistent" || structure.known.over(None).is_some();
     let details = structure_details(test, &structure.beam);
     let structure = match whole {
@@ -248,50 +239,59 @@ fn reported(path: &Path, test: &TestDescription) -> anyhow::Result<DeckSource> {
     })
 }
 
-/// The described beam with what the report estimates of it.
+/// Returns the described beam with the properties that the report estimates.
 fn reported_beam(estimate: &Value, described: &Beam) -> Beam {
-    let own = |key: &str| estimate["beam"][key].as_f64();
-    let asked = |key: &str| estimate[key]["value"].as_f64();
-    // A free beam's closed form gives either its modulus or, instead, its density.
-    let closed = estimate["method"] == "free-beam";
-    let density = own("density").or(asked("density").filter(|_| !closed));
-    Beam {
-        length: own("length").unwrap_or(described.length),
-        width: own("width").unwrap_or(described.width),
-        thickness: own("thickness").unwrap_or(described.thickness),
-        modulus: own("modulus")
-            .or(asked("modulus"))
-            .unwrap_or(described.modulus),
-        density: density.unwrap_or(described.density),
-        ..*described
+    let mut beam = *described;
+    if let Some(modulus) = estimate["modulus"]["value"].as_f64() {
+        beam.modulus = modulus;
     }
+    // A free beam's closed form gives its modulus, or else its density, never both.
+    if let Some(density) = estimate["density"]["value"].as_f64()
+        && estimate["method"] != "free-beam"
+    {
+        beam.density = density;
+    }
+    for (key, property) in [
+        ("length", &mut beam.length),
+        ("width", &mut beam.width),
+        ("thickness", &mut beam.thickness),
+        ("modulus", &mut beam.modulus),
+        ("density", &mut beam.density),
+    ] {
+        if let Some(value) = estimate["beam"][key].as_f64() {
+            *property = value;
+        }
+    }
+    beam
 }
 
-/// The joint of a report, non-dimensional by its beam.
+/// Returns the joint of a report, non-dimensional by its beam.
 fn reported_joint(
     estimate: &Value,
-    (structure, beam): (&TestedStructure, &Beam),
+    structure: &TestedStructure,
+    beam: &Beam,
 ) -> Option<JointStiffness> {
     if structure.assembly == Assembly::Free {
         return Some(JointStiffness::FREE);
     }
-    let (units, described) = (
-        StiffnessUnits::of(beam),
-        StiffnessUnits::of(&structure.beam),
-    );
-    // Null instead of a value is a rigid joint, null instead of the quantity an unknown one.
-    let stiffness = |key: &str| match &estimate[key] {
-        Value::Object(found) => match found.get("value")? {
-            Value::Null => Some(f64::INFINITY),
-            value => value.as_f64(),
-        },
-        _ => None,
-    };
+    let units = StiffnessUnits::of(beam);
+    let described = StiffnessUnits::of(&structure.beam);
     let known = &structure.known;
-    let cross = stiffness("ktr").or(known.cross_compliance.map(|c| described.ktr / c));
+    let kt = reported_stiffness(estimate, "kt").or(known.kx.map(|kx| kx * described.kt))?;
+    let kr = reported_stiffness(estimate, "kr").or(known.ky.map(|ky| ky * described.kr))?;
+    let ktr =
+        reported_stiffness(estimate, "ktr").or(known.cross_compliance.map(|c| described.ktr / c));
     Some(JointStiffness {
-        kx: stiffness("kt").or(known.kx.map(|kx| kx * described.kt))? / units.kt,
-        ky: stiffness("kr").or(known.ky.map(|ky| ky * described.kr))? / units.kr,
-        cross_compliance: cross.map_or(0.0, |ktr| units.ktr / ktr),
+        kx: kt / units.kt,
+        ky: kr / units.kr,
+        cross_compliance: ktr.map_or(0.0, |ktr| units.ktr / ktr),
     })
+}
+
+/// Returns a stiffness of a report. A value of null is a rigid joint, a quantity of null an unknown one.
+fn reported_stiffness(estimate: &Value, key: &str) -> Option<f64> {
+    match estimate[key].as_object()?.get("value")? {
+        Value::Null => Some(f64::INFINITY),
+        value => value.as_f64(),
+    }
 }

@@ -1,190 +1,82 @@
 //! `tapjoint frf`: frequency response functions of a recording with a hammer, or of a test.
 
 use super::Outcome;
-use super::arguments::{Band, ChannelScale, RecordingArguments, block_size};
-use super::bare::{BareSettings, analyse, holds_functions, refuse_given, wire};
-use super::choices::{EstimatorArgument, FormArgument, SensorArgument, WindowArgument};
-use super::input::{TestFile, check_file, is_description, read_test};
+use super::arguments::{RecordingArguments, SpectrumSettings, channel_scale};
+use super::bare::{analyse, holds_functions, refuse_given};
+use super::choices::{estimator, response_form, sensor_kind};
+use super::input::{TestFile, check_file, is_description, read_test, stem};
 use super::output::OutputFile;
 use super::overwrite::Expanded;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tapjoint::description::{ChannelRef, TestDescription, WindowKind};
-use tapjoint::pipeline::{Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_wired};
-use tapjoint::recording::UffFormat;
+use tapjoint::description::{ChannelRef, ReadBy, ResponseForm, SensorKind, TestDescription};
+use tapjoint::pipeline::{
+    Analysis, Frf, FrfSettings, IdentifySettings, Response, Wiring, frfs_of, run_wired, si_unit,
+};
+use tapjoint::recording::{Recording, RecordingError, UffFormat};
 use tapjoint::report::{
     frf_document, frf_figure, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
 };
+use tapjoint::spectral::FrfEstimator;
 
-/// Frequency response functions (H1, H2, Hv) with coherence and random error.
+/// Compute frequency response functions (H1, H2, Hv) with coherence and random error.
 ///
-/// Of a bare recording name the hammer's channel; of a test description every recording is taken as
-/// described. The form follows from the sensor (acceleration: accelerance) unless another is asked
-/// for. Where nobody states units, results are per unit of the file.
+/// For a bare recording, give the hammer's channel with --hammer. A test description says itself how
+/// its recordings are read. The form follows from the sensor: an accelerometer gives accelerance.
+/// Results are in units of the file where no units or scales are given.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint frf taps.wav --hammer 1 --scale-hammer 500 --scale-sensor 2000 --png frf.png\n  tapjoint frf test.toml --form receptance --csv frf.csv"
 )]
 pub(super) struct FrfArguments {
-    /// A recording (WAV, CSV, UFF58), frequency response functions (UFF58 or text) or a test description (.toml)
+    /// Recording (WAV, CSV, UFF58), frequency response functions (UFF58, text) or test description (.toml)
     #[arg(value_name = "FILE")]
     file: PathBuf,
     #[command(flatten)]
     recording: RecordingArguments,
-    /// Channel of a sensor, its number or name; may be given several times; default: all but the
-    /// hammer's
+    /// Channel of a sensor, by number or name; repeat it for more sensors; default: all channels but
+    /// the hammer's
     #[arg(long, value_name = "CH")]
     sensor: Vec<ChannelRef>,
-    /// N per unit of the file (integer WAV: full scale = 1)
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    scale_hammer: Option<ChannelScale>,
-    /// SI units per unit of the file, one for all sensors or one for each, separated by commas
+    /// Force in N per unit of the file (integer WAV: full scale = 1)
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = channel_scale)]
+    scale_hammer: Option<f64>,
+    /// SI units per unit of the file: one number for all sensors, or one for each
     #[arg(
         long,
         value_name = "S,...",
         value_delimiter = ',',
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = channel_scale
     )]
-    scale_sensor: Vec<ChannelScale>,
-    /// What scaled sensors sense; default: acceleration
-    #[arg(long, value_enum, value_name = "KIND", requires = "scale_sensor")]
-    sensor_kind: Option<SensorArgument>,
-    /// Block size (samples); default: what fits the shortest tap
-    #[arg(long, value_name = "N", value_parser = block_size())]
-    block: Option<usize>,
-    /// Zoom band (Hz); default: 0 to sample rate/2.56
-    #[arg(long, value_name = "LO:HI")]
-    zoom: Option<Band>,
-    /// Window; default: rectangular where the taps ring down to 1 % in the block, else exponential
-    #[arg(long, value_enum, value_name = "W")]
-    window: Option<WindowArgument>,
-    /// The estimator of table, picture and JSON; CSV has all, the picture the others faintly
-    #[arg(long, value_enum, value_name = "E", default_value_t)]
-    estimator: EstimatorArgument,
-    /// The form of the functions; default: as measured
-    #[arg(long, value_enum, value_name = "FORM")]
-    form: Option<FormArgument>,
-    /// Draw magnitude, phase and coherence into this file, SVG where its name ends in .svg; of several recordings one file each,
-    /// named NAME-RECORDING with the same ending
+    scale_sensor: Vec<f64>,
+    /// Quantity that the scaled sensors measure; default: acceleration
+    #[arg(long, value_name = "KIND", requires = "scale_sensor", value_parser = sensor_kind())]
+    sensor_kind: Option<SensorKind>,
+    #[command(flatten)]
+    spectrum: SpectrumSettings,
+    /// Estimator shown in table, picture and JSON. The CSV file has all estimators; the picture shows
+    /// the others faintly
+    #[arg(long, value_name = "E", default_value = "h1", value_parser = estimator())]
+    estimator: FrfEstimator,
+    /// Form of the functions; default: as measured
+    #[arg(long, value_name = "FORM", value_parser = response_form())]
+    form: Option<ResponseForm>,
+    /// Draw magnitude, phase and coherence into this file (PNG, or SVG if its name ends in .svg). For
+    /// several recordings the files are named NAME-RECORDING
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
     /// Write all functions into this file, one row for each line
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the functions and coherences as a universal file, datasets 58 (text)
+    /// Write functions and coherences as a universal file, datasets 58 (text)
     #[arg(long, value_name = "FILE")]
     uff58: Option<PathBuf>,
-    /// The same as datasets 58b (binary: every bit is kept)
+    /// Write functions and coherences as a universal file, datasets 58b (binary, without rounding)
     #[arg(long, value_name = "FILE")]
     uff58b: Option<PathBuf>,
-}
-
-/// What is to be transformed.
-enum Subject {
-    Test(Box<TestFile>),
-    Recording(Box<ChannelRef>),
-    /// Functions that an analyser has computed.
-    Functions,
-}
-
-/// The arguments, checked, and every output shown to be writable.
-struct Request {
-    subject: Subject,
-    settings: FrfSettings,
-    /// One for each recording, or none.
-    pngs: Vec<OutputFile>,
-    csv: Option<OutputFile>,
-    /// Universal files with their formats.
-    universal: Vec<(OutputFile, UffFormat)>,
-}
-
-fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Request> {
-    let (subject, stems) = if is_description(&arguments.file) {
-        let file = described(arguments, terminal)?;
-        let stems = stems(&file.test);
-        (Subject::Test(Box::new(file)), stems)
-    } else {
-        check_file(&arguments.file)?;
-        (bare_subject(arguments)?, vec![stem(&arguments.file)])
-    };
-    let pngs = match &arguments.png {
-        Some(png) => picture_files(png, &stems)
-            .iter()
-            .map(|path| OutputFile::prepare(path))
-            .collect::<Result<_, _>>()?,
-        None => Vec::new(),
-    };
-    let csv = arguments.csv.as_deref().map(OutputFile::prepare);
-    let wanted = [
-        (&arguments.uff58, UffFormat::Ascii),
-        (&arguments.uff58b, UffFormat::Binary),
-    ];
-    let universal = wanted
-        .into_iter()
-        .filter_map(|(path, format)| Some((path.as_deref()?, format)))
-        .map(|(path, format)| Ok((OutputFile::prepare(path)?, format)))
-        .collect::<anyhow::Result<_>>()?;
-    Ok(Request {
-        subject,
-        settings: FrfSettings {
-            estimator: arguments.estimator.into(),
-            form: arguments.form.map(Into::into),
-        },
-        pngs,
-        csv: csv.transpose()?,
-        universal,
-    })
-}
-
-/// A bare recording needs the hammer's channel; a file of functions has no channels.
-fn bare_subject(arguments: &FrfArguments) -> anyhow::Result<Subject> {
-    if let Some(hammer) = arguments.recording.hammer.clone() {
-        return Ok(Subject::Recording(Box::new(hammer)));
-    }
-    if !holds_functions(&arguments.file, &arguments.recording)? {
-        bail!(
-            "{}: a frequency response function needs the force; name the hammer's channel with --hammer CH, or give a test description",
-            arguments.file.display()
-        );
-    }
-    let given = [
-        ("--sensor", !arguments.sensor.is_empty()),
-        ("--scale-hammer", arguments.scale_hammer.is_some()),
-        ("--scale-sensor", !arguments.scale_sensor.is_empty()),
-    ];
-    refuse_given(&arguments.file, &given)?;
-    Ok(Subject::Functions)
-}
-
-/// The description, which says itself what the arguments for bare recordings would.
-fn described(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<TestFile> {
-    let bare = &arguments.recording;
-    let given = [
-        ("--hammer", bare.hammer.is_some()),
-        ("--sample-rate", bare.sample_rate.is_some()),
-        ("--sensor", !arguments.sensor.is_empty()),
-        ("--scale-hammer", arguments.scale_hammer.is_some()),
-        ("--scale-sensor", !arguments.scale_sensor.is_empty()),
-        ("--block", arguments.block.is_some()),
-        ("--zoom", arguments.zoom.is_some()),
-        ("--window", arguments.window.is_some()),
-    ];
-    if let Some((name, _)) = given.iter().find(|(_, given)| *given) {
-        bail!(
-            "{name} is for bare recordings; a test description says it itself: `channel`, `scale`, `sample_rate`, `band`, `block`, `window`"
-        );
-    }
-    let file = read_test(&arguments.file, terminal)?;
-    if file.test.recordings.is_empty() {
-        bail!(
-            "{}: there are no [[recording]] tables, and frequencies alone make no frequency response function",
-            file.name
-        );
-    }
-    file.check_recordings()?;
-    Ok(file)
 }
 
 impl FrfArguments {
@@ -198,109 +90,129 @@ impl FrfArguments {
     }
 }
 
+/// Source of the functions.
+enum Subject {
+    Test(Box<TestFile>),
+    /// A bare recording with the hammer's channel.
+    Recording(ChannelRef),
+    /// Functions that an analyser has computed.
+    Functions,
+}
+
+/// Checks the arguments and finds the kind of source.
+fn resolve(arguments: &FrfArguments, terminal: &Terminal) -> anyhow::Result<Subject> {
+    let (file, bare) = (&arguments.file, &arguments.recording);
+    let own_options = [
+        ("--sensor", !arguments.sensor.is_empty()),
+        ("--scale-hammer", arguments.scale_hammer.is_some()),
+        ("--scale-sensor", !arguments.scale_sensor.is_empty()),
+    ];
+    if is_description(file) {
+        let described = [
+            ("--hammer", bare.hammer.is_some()),
+            ("--sample-rate", bare.sample_rate.is_some()),
+            ("--block", arguments.spectrum.block.is_some()),
+            ("--zoom", arguments.spectrum.zoom.is_some()),
+            ("--window", arguments.spectrum.window.is_some()),
+        ];
+        let given = described.iter().chain(&own_options);
+        if let Some((name, _)) = given.into_iter().find(|(_, given)| *given) {
+            bail!(
+                "{name} is for bare recordings; a test description says it itself: `channel`, `scale`, `sample_rate`, `band`, `block`, `window`"
+            );
+        }
+        let file = read_test(file, terminal)?;
+        if file.test.recordings.is_empty() {
+            bail!(
+                "{}: there are no [[recording]] tables, and frequencies alone make no frequency response function",
+                file.name
+            );
+        }
+        file.check_recordings()?;
+        return Ok(Subject::Test(Box::new(file)));
+    }
+    check_file(file)?;
+    if let Some(hammer) = &bare.hammer {
+        return Ok(Subject::Recording(hammer.clone()));
+    }
+    if !holds_functions(file, bare)? {
+        bail!(
+            "{}: a frequency response function needs the force; name the hammer's channel with --hammer CH, or give a test description",
+            file.display()
+        );
+    }
+    refuse_given(file, &own_options)?;
+    Ok(Subject::Functions)
+}
+
 fn stems(test: &TestDescription) -> Vec<String> {
     let recordings = test.recordings.iter();
     recordings.map(|recording| stem(&recording.file)).collect()
 }
 
-fn stem(file: &Path) -> String {
-    let stem = file.file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
-}
-
-/// The picture's file, or of several recordings one for each, none twice.
+/// Returns the picture's file, or one file for each of several recordings, with different names.
 fn picture_files(png: &Path, stems: &[String]) -> Vec<PathBuf> {
     if stems.len() == 1 {
         return vec![png.to_owned()];
     }
     let name = stem(png);
-    let ending = png.extension().unwrap_or_default().to_string_lossy();
-    let ending = if ending.is_empty() {
-        "png".into()
-    } else {
-        ending
+    let ending = match png.extension().unwrap_or_default().to_string_lossy() {
+        ending if ending.is_empty() => "png".into(),
+        ending => ending,
     };
-    let numbered = |(index, stem): (usize, &String)| {
+    let mut files = Vec::new();
+    for (index, stem) in stems.iter().enumerate() {
         let before = stems.iter().take(index).filter(|other| *other == stem);
-        match before.count() {
+        files.push(png.with_file_name(match before.count() {
             0 => format!("{name}-{stem}.{ending}"),
             others => format!("{name}-{stem}-{}.{ending}", others + 1),
-        }
-    };
-    let names = stems.iter().enumerate().map(numbered);
-    names.map(|name| png.with_file_name(name)).collect()
+        }));
+    }
+    files
 }
 
 pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let request = resolve(arguments, &terminal)?;
-    let analysis = match &request.subject {
+    let subject = resolve(arguments, &terminal)?;
+    let stems = match &subject {
+        Subject::Test(file) => stems(&file.test),
+        Subject::Recording(_) | Subject::Functions => vec![stem(&arguments.file)],
+    };
+    let png = arguments.png.iter();
+    let pictures = png
+        .flat_map(|png| picture_files(png, &stems))
+        .map(|path| OutputFile::prepare(&path))
+        .collect::<Result<Vec<_>, _>>()?;
+    // A universal file has a format.
+    let outputs = [
+        (&arguments.csv, None),
+        (&arguments.uff58, Some(UffFormat::Ascii)),
+        (&arguments.uff58b, Some(UffFormat::Binary)),
+    ];
+    let outputs = outputs
+        .into_iter()
+        .filter_map(|(path, format)| Some((path.as_deref()?, format)))
+        .map(|(path, format)| Ok((OutputFile::prepare(path)?, format)))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let analysis = match &subject {
         Subject::Test(file) => file.analyse(&IdentifySettings::unperturbed())?,
-        Subject::Recording(hammer) => bare(arguments, hammer)?,
+        Subject::Recording(hammer) => analyse_recording(arguments, hammer)?,
         Subject::Functions => analyse(
             &arguments.file,
             &arguments.recording,
-            &BareSettings {
-                block: arguments.block,
-                band: arguments.zoom.map(|band| (band.low, band.high)),
-                window: arguments.window.map(WindowKind::from),
-                ..BareSettings::default()
-            },
+            &arguments.spectrum,
+            ReadBy::default(),
         )?,
+    };
+    let settings = FrfSettings {
+        estimator: arguments.estimator,
+        form: arguments.form,
     };
     let frfs: Vec<Vec<Frf>> = analysis
         .recordings
         .iter()
-        .map(|recording| frfs_of(recording, &request.settings))
+        .map(|recording| frfs_of(recording, &settings))
         .collect::<Result<_, _>>()?;
-    let all: Vec<Frf> = frfs.iter().flatten().cloned().collect();
-    write_pictures(request.pngs, &analysis, &frfs, &terminal)?;
-    if let Some(file) = request.csv {
-        if all.is_empty() {
-            terminal.warn("no tap was accepted, so there is no function to write");
-        } else {
-            file.write(render_frf_csv(&all)?.as_bytes())?;
-        }
-    }
-    for (file, format) in request.universal {
-        if all.is_empty() {
-            terminal.warn("no tap was accepted, so there is no function to write");
-        } else {
-            file.write(&render_frf_uff(&all, format)?)?;
-        }
-    }
-    let document = frf_document(&analysis, &all);
-    terminal.say(&render_text(&document))?;
-    terminal.write_document(&document)?;
-    Ok(if all.is_empty() {
-        Outcome::NoAnswer
-    } else {
-        Outcome::Answered
-    })
-}
-
-fn bare(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::Result<Analysis> {
-    let recording = arguments.recording.open(&arguments.file)?;
-    let scales: Vec<f64> = arguments.scale_sensor.iter().map(|scale| scale.0).collect();
-    let (recording, wiring) = wire(
-        recording,
-        (hammer, arguments.scale_hammer.map(|scale| scale.0)),
-        (&arguments.sensor, &scales),
-        arguments.sensor_kind.map(Into::into),
-    )?;
-    Ok(run_wired(recording, &wiring, |settings| {
-        settings.block = arguments.block;
-        settings.band = arguments.zoom.map(|band| (band.low, band.high));
-        settings.window = arguments.window.map(WindowKind::from);
-    })?)
-}
-
-fn write_pictures(
-    files: Vec<OutputFile>,
-    analysis: &Analysis,
-    frfs: &[Vec<Frf>],
-    terminal: &Terminal,
-) -> anyhow::Result<()> {
-    for (file, (recording, frfs)) in files.into_iter().zip(analysis.recordings.iter().zip(frfs)) {
+    for ((file, recording), frfs) in pictures.into_iter().zip(&analysis.recordings).zip(&frfs) {
         match render_frf_picture(&frf_figure(recording, frfs), file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
@@ -309,7 +221,114 @@ fn write_pictures(
             )),
         }
     }
-    Ok(())
+    let all = frfs.concat();
+    for (file, format) in outputs {
+        match format {
+            _ if all.is_empty() => {
+                terminal.warn("no tap was accepted, so there is no function to write");
+            }
+            None => file.write(render_frf_csv(&all)?.as_bytes())?,
+            Some(format) => file.write(&render_frf_uff(&all, format)?)?,
+        }
+    }
+    let document = frf_document(&analysis, &all);
+    terminal.say(&render_text(&document))?;
+    terminal.write_document(&document)?;
+    Ok(match all.is_empty() {
+        true => Outcome::NoAnswer,
+        false => Outcome::Answered,
+    })
+}
+
+/// Analyses a bare recording with a hammer: finds the sensors' channels and scales them.
+///
+/// # Errors
+/// Channels that do not exist or are named twice, scales that do not fit them, an impossible analysis.
+fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::Result<Analysis> {
+    let mut recording = arguments.recording.open(&arguments.file)?;
+    let hammer = channel_index(&recording, hammer)?;
+    let channels = sensor_channels(&recording, hammer, &arguments.sensor)?;
+    let scales = &arguments.scale_sensor;
+    if !matches!(scales.len(), 0 | 1) && scales.len() != channels.len() {
+        bail!(
+            "--scale-sensor has {} numbers for {} sensors; give one for all, or one for each",
+            scales.len(),
+            channels.len()
+        );
+    }
+    let hammer_unit = match arguments.scale_hammer {
+        Some(scale) => {
+            recording.set_scale(hammer, scale)?;
+            Some("N".to_owned())
+        }
+        None => {
+            let info = recording.channels().get(hammer);
+            info.and_then(|info| info.unit.clone())
+        }
+    };
+    let mut responses = Vec::with_capacity(channels.len());
+    for (place, channel) in channels.into_iter().enumerate() {
+        let info = recording.channels().get(channel);
+        let mut response = Response {
+            name: info
+                .and_then(|info| info.name.clone())
+                .unwrap_or_else(|| format!("channel {}", channel + 1)),
+            kind: None,
+            unit: info.and_then(|info| info.unit.clone()),
+        };
+        if let Some(scale) = scales.get(place).or(scales.first()) {
+            recording.set_scale(channel, *scale)?;
+            let kind = arguments.sensor_kind.unwrap_or(SensorKind::Acceleration);
+            response.kind = Some(kind);
+            response.unit = Some(si_unit(kind).to_owned());
+        }
+        responses.push((channel, response));
+    }
+    let wiring = Wiring {
+        hammer,
+        hammer_unit,
+        responses,
+    };
+    Ok(run_wired(recording, &wiring, |measure| {
+        arguments.spectrum.apply(measure);
+    })?)
+}
+
+fn channel_index(recording: &Recording, channel: &ChannelRef) -> Result<usize, RecordingError> {
+    match channel {
+        ChannelRef::Number(number) => recording.channel_by_number(*number),
+        ChannelRef::Name(name) => recording.channel_by_name(name),
+    }
+}
+
+/// Returns the channels of the sensors; without any, all channels but the hammer's.
+fn sensor_channels(
+    recording: &Recording,
+    hammer: usize,
+    sensors: &[ChannelRef],
+) -> anyhow::Result<Vec<usize>> {
+    let mut channels: Vec<usize> = Vec::new();
+    for sensor in sensors {
+        let channel = channel_index(recording, sensor)?;
+        if channel == hammer || channels.contains(&channel) {
+            bail!(
+                "{}: channel {sensor} is named twice; give the hammer and every sensor a channel of its own",
+                recording.name()
+            );
+        }
+        channels.push(channel);
+    }
+    if sensors.is_empty() {
+        let all = 0..recording.channels().len();
+        channels = all.filter(|&channel| channel != hammer).collect();
+    }
+    if channels.is_empty() {
+        bail!(
+            "{}: there is no channel beside the hammer's, and without a response no frequency response function",
+            recording.name()
+        );
+    }
+    Ok(channels)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Help that lists the commands by what one wants to do.
+//! Help that lists the commands by task.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, CommandFactory};
@@ -14,19 +14,19 @@ const TASKS: &[(&str, &[&str])] = &[
         "The joint",
         &["identify", "predict", "perturb", "resolution", "export"],
     ),
-    ("What the model misses", &["plan", "diagnose"]),
+    ("Effects that the model lacks", &["plan", "diagnose"]),
     ("Virtual tests", &["simulate", "blind-check", "reproduce"]),
     (OTHER, &["completions", "man", "help"]),
 ];
 const OTHER: &str = "The program itself";
 
-/// Where the command list stands among the other parts of the help.
+/// The parts of the help before and after the command list.
 const PARTS: (&str, &str) = (
     "{about-with-newline}\n{usage-heading} {usage}\n",
     "\nOptions:\n{options}{after-help}",
 );
 
-/// The command line with its commands listed by task.
+/// Returns the command line with its commands listed by task.
 pub(super) fn grouped<C: CommandFactory>() -> Command {
     let mut command = C::command();
     // Building adds `help` to the commands.
@@ -36,15 +36,16 @@ pub(super) fn grouped<C: CommandFactory>() -> Command {
     C::command().help_template(template)
 }
 
-/// The commands, a heading for each task.
+/// Returns the commands, under a heading for each task.
 fn command_list(command: &Command) -> String {
     let named: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
     let width = named.iter().map(|name| name.len()).max().unwrap_or(0);
     let mut text = String::new();
     for (task, members) in TASKS {
-        let others = named
-            .iter()
-            .filter(|name| *task == OTHER && !has_task(name));
+        let others = named.iter().filter(|name| {
+            let mut known = TASKS.iter().flat_map(|(_, members)| members.iter());
+            *task == OTHER && known.all(|member| member != *name)
+        });
         let listed = members
             .iter()
             .filter(|member| named.contains(member))
@@ -60,11 +61,7 @@ fn command_list(command: &Command) -> String {
     text
 }
 
-fn has_task(name: &str) -> bool {
-    TASKS.iter().any(|(_, members)| members.contains(&name))
-}
-
-/// First sentence of a command's description, as far as 80 columns take it.
+/// Returns the first sentence of a command's description, cut to 80 columns.
 fn summary(command: &Command) -> String {
     const ROOM: usize = 64;
     let about = command
@@ -80,8 +77,8 @@ fn summary(command: &Command) -> String {
     format!("{} ...", kept[..end].trim_end_matches([',', ':']))
 }
 
-/// What helps with a wrong command line, where clap knows no better: the nearest command, or how several files are
-/// taken together.
+/// Adds a suggestion to the error of a wrong command line where clap has none: the nearest command, or a
+/// description for several files.
 pub(super) fn with_suggestion(error: clap::Error, command: &Command) -> clap::Error {
     match error.kind() {
         ErrorKind::UnknownArgument => with_description(error),
@@ -89,23 +86,21 @@ pub(super) fn with_suggestion(error: clap::Error, command: &Command) -> clap::Er
     }
 }
 
-/// Commands take one file, and `*.wav` gives them many.
+/// Suggests a description for several files: commands take one file, and `*.wav` gives many.
 fn with_description(mut error: clap::Error) -> clap::Error {
-    let is_file = |value: &ContextValue| match value {
-        ContextValue::String(name) => std::path::Path::new(name).is_file(),
-        _ => false,
-    };
-    if error.get(ContextKind::InvalidArg).is_some_and(is_file) {
-        let tip = "one file at a time; recordings of one test belong in a description, which \
-                   `tapjoint init *.wav > test.toml` begins";
+    if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg)
+        && std::path::Path::new(name).is_file()
+    {
+        let tip = "give one file; for several recordings of one test write a description, \
+                   which `tapjoint init *.wav > test.toml` begins";
         let tip = ContextValue::StyledStrs(vec![tip.into()]);
         error.insert(ContextKind::Suggested, tip);
     }
     error
 }
 
-/// Names the nearest command where clap found none near enough: two letters changed places are the
-/// commonest slip, and count as one change here.
+/// Suggests the nearest command where clap finds none. Two exchanged letters are the most frequent typing
+/// error, and count as one change here.
 fn with_nearest(mut error: clap::Error, command: &Command) -> clap::Error {
     const MOST_CHANGES: usize = 2;
     let known = error.get(ContextKind::SuggestedSubcommand).is_some();

@@ -1,8 +1,8 @@
 //! `tapjoint identify`: joint stiffness from natural frequencies alone.
 
 use super::Outcome;
-use super::arguments::{FrequencyList, HalfLines};
-use super::choices::MethodArgument;
+use super::arguments::{Numbers, frequencies, half_lines};
+use super::choices::method;
 use super::input::{TestFile, read_test};
 use super::run::outcome;
 use super::terminal::Terminal;
@@ -10,7 +10,7 @@ use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::MeasuredFrequencies;
-use tapjoint::pipeline::IdentifySettings;
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings};
 use tapjoint::report::{document_of, render_text};
 
 /// Estimate joint stiffness from natural frequencies alone.
@@ -19,34 +19,34 @@ use tapjoint::report::{document_of, render_text};
     after_help = "Examples:\n  tapjoint identify test.toml\n  tapjoint identify test.toml --frequencies 17,118,335.6,628.8,994.5 --half-line 0.125"
 )]
 pub(super) struct IdentifyArguments {
-    /// A test description (.toml)
+    /// Test description (.toml)
     #[arg(value_name = "TEST")]
     test: PathBuf,
     #[command(flatten)]
     frequencies: FrequencyArguments,
-    /// How to estimate
-    #[arg(long, value_enum, default_value_t)]
-    method: MethodArgument,
+    /// Method of the estimate
+    #[arg(long, default_value = "consistent", value_parser = method())]
+    method: EstimateMethod,
 }
 
 /// Frequencies on the command line.
 #[derive(Debug, Args)]
 pub(super) struct FrequencyArguments {
-    /// Natural frequencies of modes 1, 2, ... (Hz); they replace what TEST says, its bounds included
-    #[arg(long, value_name = "HZ,HZ,...", allow_negative_numbers = true)]
-    frequencies: Option<FrequencyList>,
-    /// Half of the line spacing, one number or one for each frequency (Hz)
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
-    half_line: Option<HalfLines>,
+    /// Natural frequencies of modes 1, 2, ... (Hz). They replace the data of TEST and their bounds
+    #[arg(long, value_name = "HZ,HZ,...", allow_negative_numbers = true, value_parser = frequencies)]
+    frequencies: Option<Numbers>,
+    /// Half of the line spacing (Hz): one number, or one for each frequency
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = half_lines)]
+    half_line: Option<Numbers>,
 }
 
 impl FrequencyArguments {
-    /// Puts what the command line says in the place of what the description says.
+    /// Replaces the description's frequencies and bounds by those of the command line.
     ///
     /// # Errors
-    /// As many half lines as frequencies, or one, are needed; and half lines need frequencies.
+    /// Half lines without frequencies, or neither one nor as many half lines as frequencies.
     pub(super) fn apply(&self, file: &mut TestFile) -> anyhow::Result<()> {
-        if let Some(FrequencyList(frequencies)) = &self.frequencies {
+        if let Some(frequencies) = &self.frequencies {
             file.test.recordings.clear();
             file.test.measured = Some(MeasuredFrequencies {
                 frequencies: frequencies.clone(),
@@ -56,7 +56,7 @@ impl FrequencyArguments {
                 scatter: None,
             });
         }
-        let Some(HalfLines(half_lines)) = &self.half_line else {
+        let Some(half_lines) = &self.half_line else {
             return Ok(());
         };
         let Some(measured) = &mut file.test.measured else {
@@ -79,8 +79,8 @@ impl FrequencyArguments {
     }
 }
 
-/// Reads the description, puts the command line's frequencies into it, and makes sure that there
-/// is something to analyse.
+/// Reads the description, puts the command line's frequencies into it, and checks that there is
+/// something to analyse.
 pub(super) fn resolve(
     test: &std::path::Path,
     frequencies: &FrequencyArguments,
@@ -96,7 +96,7 @@ pub(super) fn resolve(
 pub(super) fn run(arguments: &IdentifyArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let file = resolve(&arguments.test, &arguments.frequencies, &terminal)?;
     let analysis = file.analyse(&IdentifySettings {
-        method: arguments.method.method(),
+        method: arguments.method,
         ..IdentifySettings::unperturbed()
     })?;
     let document = document_of(&analysis);

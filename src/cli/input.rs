@@ -10,24 +10,24 @@ use tapjoint::pipeline::{Analysis, IdentifySettings, PipelineError, run_test};
 /// A test description and where it was found.
 #[derive(Debug)]
 pub(super) struct TestFile {
-    /// What it says.
+    /// The description.
     pub(super) test: TestDescription,
     /// The file, as the user named it.
     pub(super) name: String,
-    /// The folder in which its recordings are looked for.
+    /// The folder of its recordings.
     pub(super) folder: PathBuf,
 }
 
-/// Reads a test description and passes its warnings on.
+/// Reads a test description without effects, and passes its warnings on.
 ///
 /// # Errors
-/// The file cannot be read, is no UTF-8 text, or is no valid description.
+/// Those of [`read_model`], and a described effect.
 pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let file = read_model(path, terminal)?;
     if let Some(effect) = file.test.effects.first() {
         bail!(
-            "{}:{}: [[effect]] belongs to models that are predicted or simulated with; this command takes \
-             tests, whose effects are yet to be found; remove it",
+            "{}:{}: this command does not take a description with [[effect]]; remove it, or use `tapjoint predict` \
+             or `tapjoint simulate`",
             file.name,
             effect.line
         );
@@ -35,10 +35,10 @@ pub(super) fn read_test(path: &Path, terminal: &Terminal) -> anyhow::Result<Test
     Ok(file)
 }
 
-/// The same where effects may be described.
+/// Reads a test description that may have effects, and passes its warnings on.
 ///
 /// # Errors
-/// As [`read_test`].
+/// The file cannot be read, is no UTF-8 text, or is no valid description.
 pub(super) fn read_model(path: &Path, terminal: &Terminal) -> anyhow::Result<TestFile> {
     let name = path.display().to_string();
     let remedy = "give the path of a test description; `tapjoint init` prints one";
@@ -69,7 +69,7 @@ impl TestFile {
         run_test(&self.test, (&self.folder, &self.name), settings)
     }
 
-    /// The path of a recording that the description names.
+    /// Returns the path of a recording that the description names.
     pub(super) fn path_of(&self, file: &Path) -> PathBuf {
         self.folder.join(file)
     }
@@ -77,7 +77,7 @@ impl TestFile {
     /// Makes sure that every recording can be opened, before any work.
     ///
     /// # Errors
-    /// The first that cannot, with its line in the description.
+    /// The first recording that cannot be opened, with its line in the description.
     pub(super) fn check_recordings(&self) -> anyhow::Result<()> {
         for recording in &self.test.recordings {
             let path = self.path_of(&recording.file);
@@ -91,7 +91,7 @@ impl TestFile {
 /// Makes sure that a file named on the command line can be opened.
 ///
 /// # Errors
-/// It cannot; the message says what the system says.
+/// The file cannot be opened; the message holds the system's reason.
 pub(super) fn check_file(path: &Path) -> anyhow::Result<()> {
     let readable = readable_file(path).map_err(|cause| anyhow!(cause));
     readable.with_context(|| format!("{}: cannot be read", path.display()))
@@ -111,7 +111,7 @@ fn readable_file(path: &Path) -> Result<(), String> {
     }
 }
 
-/// The file beside the missing one whose name is most like it, of one or two letters mistyped.
+/// Returns the file beside the missing one whose name differs least, in at most two letters.
 fn like_in_folder(path: &Path) -> Option<String> {
     const LETTERS: usize = 2;
     let wanted = path.file_name()?.to_string_lossy().into_owned();
@@ -127,8 +127,19 @@ fn like_in_folder(path: &Path) -> Option<String> {
     near.into_iter().next().map(|(_, name)| name)
 }
 
-/// Whether a file is a test description rather than a recording: by its name, because a
-/// recording may be any text.
+/// Returns the file's name without its folder.
+pub(super) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Returns the file's name without folder and ending.
+pub(super) fn stem(path: &Path) -> String {
+    let stem = path.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
+}
+
+/// Returns true for a test description, by the name: a recording may be any text.
 pub(super) fn is_description(path: &Path) -> bool {
     path.extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))

@@ -1,30 +1,30 @@
-//! `tapjoint inspect`: what is in a recording.
+//! `tapjoint inspect`: the contents of recordings.
 
 use super::Outcome;
 use super::arguments::RecordingArguments;
-use super::input::check_file;
+use super::input::{check_file, file_name};
 use super::terminal::Terminal;
 use anyhow::ensure;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tapjoint::pipeline::{inspect_bare, together};
 use tapjoint::recording::{UniversalFile, is_universal_file, list_datasets};
 use tapjoint::report::{datasets_of, inspection_of, render_text};
 
-/// More samples than this, over all time series of a universal file, are only listed: reading them
-/// takes longer than one waits for a look.
+/// Most samples of a universal file that are read, over all its time series. Reading more takes too long
+/// for a quick look, so they are only listed.
 const MOST_SAMPLES: u64 = 50_000_000;
 
-/// Show what is in recordings: channels, rate, length, clipping, DC, taps found, what is wrong
-/// with them.
+/// Show the contents and the quality of recordings: channels, sample rate, length, clipping, offset and
+/// taps.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint inspect taps.wav --hammer 1")]
 pub(super) struct InspectArguments {
-    /// Recordings (WAV, CSV, UFF 58); of universal files the datasets are listed as well
+    /// Recordings (WAV, CSV, UFF58). The datasets of universal files are listed as well
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Only list the datasets of universal files by their headers, fast however large they are; done
-    /// without asking where time series have more than 50 million samples
+    /// Only list the datasets of universal files by their headers. This is fast for files of any size,
+    /// and automatic beyond 50 million samples
     #[arg(long)]
     headers: bool,
     #[command(flatten)]
@@ -32,34 +32,36 @@ pub(super) struct InspectArguments {
 }
 
 pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    arguments
-        .files
-        .iter()
-        .try_for_each(|file| check_file(file))?;
+    for file in &arguments.files {
+        check_file(file)?;
+    }
     let (mut recordings, mut datasets) = (Vec::new(), Vec::new());
     for file in &arguments.files {
-        let listed = list(file, arguments.headers)?;
-        let samples = listed.as_ref().map(time_samples);
-        if let Some(listed) = listed.iter().find(|l| l.functions().next().is_none()) {
-            let (file, found) = (file.display(), listed.contents());
-            terminal.warn(&format!(
-                "{file}: holds no function (dataset 58), only {found}"
-            ));
-        }
-        datasets.extend(
-            listed
-                .iter()
-                .flat_map(|listed| datasets_of(&shown(file), listed)),
-        );
-        if arguments.headers || samples == Some(0) {
-            continue;
-        }
-        if let Some(samples) = samples.filter(|samples| *samples > MOST_SAMPLES) {
-            terminal.warn(&format!(
-                "{}: {samples} samples by the headers: only these are listed; `tapjoint spectrum` reads the file",
-                file.display()
-            ));
-            continue;
+        let shown = file.display();
+        if is_universal_file(file)? {
+            let listed = list_datasets(file)?;
+            if listed.functions().next().is_none() {
+                let found = listed.contents();
+                terminal.warn(&format!(
+                    "{shown}: holds no function (dataset 58), only {found}"
+                ));
+            }
+            datasets.extend(datasets_of(&file_name(file), &listed));
+            let samples = time_samples(&listed);
+            if arguments.headers || samples == 0 {
+                continue;
+            }
+            if samples > MOST_SAMPLES {
+                terminal.warn(&format!(
+                    "{shown}: {samples} samples by the headers: only these are listed; `tapjoint spectrum` reads the file"
+                ));
+                continue;
+            }
+        } else {
+            ensure!(
+                !arguments.headers,
+                "{shown}: --headers lists the datasets of universal files, and this is none; leave --headers out"
+            );
         }
         let recording = arguments.recording.open(file)?;
         recordings.push(inspect_bare(
@@ -86,30 +88,11 @@ pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::R
     })
 }
 
-/// The datasets of a universal file; `None` for other files.
-fn list(file: &Path, headers: bool) -> anyhow::Result<Option<UniversalFile>> {
-    if is_universal_file(file)? {
-        return Ok(Some(list_datasets(file)?));
-    }
-    ensure!(
-        !headers,
-        "{}: --headers lists the datasets of universal files, and this is none; leave --headers out",
-        file.display()
-    );
-    Ok(None)
-}
-
-/// Samples of all time series, by the headers; a promise of more than a sample a byte is none.
+/// Returns the number of samples of all time series, by the headers. A file has at most one sample a byte.
 fn time_samples(file: &UniversalFile) -> u64 {
     let series = file
         .functions()
         .filter(|(_, function)| function.is_time_series());
     let samples = series.map(|(dataset, function)| function.points.min(dataset.bytes));
     samples.fold(0, u64::saturating_add)
-}
-
-/// The file as tables name it.
-fn shown(file: &Path) -> String {
-    let name = file.file_name().unwrap_or(file.as_os_str());
-    name.to_string_lossy().into_owned()
 }

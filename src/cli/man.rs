@@ -9,14 +9,14 @@ use clap::{Args, Command};
 use clap_mangen::Man;
 use std::path::PathBuf;
 
-/// Print the manual page of the program or of a command, or write all pages into a folder.
+/// Print a manual page, or write all manual pages into a folder.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  tapjoint man run > tapjoint-run.1\n  tapjoint man --out man1")]
 pub(super) struct ManArguments {
-    /// A command; default: the program
+    /// Command; default: the program itself
     #[arg(value_name = "COMMAND")]
     command: Option<String>,
-    /// Write every page into this folder
+    /// Write all pages into this folder
     #[arg(long, value_name = "DIR", conflicts_with = "command")]
     out: Option<PathBuf>,
 }
@@ -24,12 +24,12 @@ pub(super) struct ManArguments {
 impl ManArguments {
     /// Returns the pages of `--out`.
     pub(super) fn expanded(&self, command: &mut Command) -> Vec<Expanded> {
-        command.build();
-        let pages = |folder: &PathBuf| {
-            let names = with_pages(command).map(file_name);
-            ("out", names.map(|name| folder.join(name)).collect())
+        let Some(folder) = &self.out else {
+            return Vec::new();
         };
-        self.out.iter().map(pages).collect()
+        command.build();
+        let pages = with_pages(command).map(|page| folder.join(file_name(page)));
+        vec![("out", pages.collect())]
     }
 }
 
@@ -41,14 +41,16 @@ pub(super) fn run(
     command.build();
     let written = match &arguments.out {
         Some(folder) => {
-            let pages = pages(&command)?;
             let output = OutputFolder::prepare(folder)?;
-            for (name, page) in &pages {
-                output.add(name, page)?;
+            let mut names = Vec::new();
+            for found in with_pages(&command) {
+                let name = file_name(found);
+                output.add(&name, &page(found)?)?;
+                names.push(name);
             }
             let folder = output.publish(terminal.files())?;
-            terminal.say(&format!("{} pages in {}", pages.len(), folder.display()))?;
-            serde_json::json!({ "pages": pages.iter().map(|(name, _)| name).collect::<Vec<_>>() })
+            terminal.say(&format!("{} pages in {}", names.len(), folder.display()))?;
+            serde_json::json!({ "pages": names })
         }
         None => {
             let page = String::from_utf8(page(chosen(&command, arguments.command.as_deref())?)?)?;
@@ -60,13 +62,7 @@ pub(super) fn run(
     Ok(Outcome::Answered)
 }
 
-/// The page of every command, with its file name; the program's own first.
-fn pages(command: &Command) -> anyhow::Result<Vec<(String, Vec<u8>)>> {
-    with_pages(command)
-        .map(|found| Ok((file_name(found), page(found)?)))
-        .collect()
-}
-
+/// Returns the program and all its commands.
 fn with_pages(command: &Command) -> impl Iterator<Item = &Command> {
     let commands = command
         .get_subcommands()
@@ -80,7 +76,7 @@ fn page(command: &Command) -> anyhow::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// "tapjoint-run.1" for the command `run`.
+/// Returns the name of a page, such as "tapjoint-run.1" for the command `run`.
 fn file_name(command: &Command) -> String {
     let name = command.get_display_name().unwrap_or(command.get_name());
     format!("{name}.1")

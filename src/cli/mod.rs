@@ -1,13 +1,14 @@
 //! The command line: arguments, one file per command, exit codes.
 //!
 //! Each command turns its clap arguments into library types, calls the library, prints and
-//! writes. Exit codes: 0 the question was answered, 1 it has no answer, 2 bad usage or bad input.
+//! writes. Exit codes: 0 = answered, 1 = these data give no answer, 2 = wrong usage or bad input.
 
 mod arguments;
 mod bare;
 mod choices;
 mod help;
 mod input;
+mod laboratory;
 mod output;
 mod overwrite;
 mod signature;
@@ -45,15 +46,15 @@ use terminal::Terminal;
 
 /// From hammer taps to joint stiffness.
 ///
-/// Takes recordings of hammer taps on a beam (or frequencies read elsewhere), finds the natural
-/// frequencies with their resolution bounds, and estimates the stiffness of the joint that holds
-/// the beam.
+/// Finds the natural frequencies of a beam in recordings of hammer taps, with their resolution bounds.
+/// Estimates the stiffness of the joint that holds the beam, and diagnoses the effects that the model
+/// lacks. Natural frequencies measured elsewhere can replace the recordings.
 #[derive(Debug, Parser)]
 #[command(
     name = "tapjoint",
     version,
-    after_help = "Begin with `tapjoint init > test.toml`, edit it, then `tapjoint run test.toml`.\n\
-                  Exit codes: 0 answered, 1 the question has no answer, 2 bad usage or bad input."
+    after_help = "Start with `tapjoint init > test.toml`. Edit this file, then run `tapjoint run test.toml`.\n\
+                  Exit codes: 0 = answered, 1 = these data give no answer, 2 = wrong usage or bad input."
 )]
 struct CommandLine {
     #[command(subcommand)]
@@ -83,16 +84,16 @@ enum Command {
     Simulate(Box<simulate::SimulateArguments>),
 }
 
-/// What a command came to, when nothing went wrong.
+/// Outcome of a command that ran without an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Outcome {
     /// The question was answered: exit code 0.
     Answered,
-    /// The question has no answer, and what was found has been written: exit code 1.
+    /// The question has no answer, and the findings have been written: exit code 1.
     NoAnswer,
 }
 
-/// Reads the arguments, runs the command, reports errors; the exit code says how it went.
+/// Reads the arguments, runs the command, reports errors, and returns the exit code.
 pub(super) fn main() -> ExitCode {
     let parsed = help::grouped::<CommandLine>()
         .try_get_matches()
@@ -101,7 +102,7 @@ pub(super) fn main() -> ExitCode {
         Ok(parsed) => parsed,
         Err(usage) => {
             let usage = help::with_suggestion(usage, &CommandLine::command());
-            // Help that nobody reads to its end (`tapjoint --help | head`) is no error.
+            // Help whose reader stops early (`tapjoint --help | head`) is no error.
             let _ = usage.print();
             return ExitCode::from(u8::try_from(usage.exit_code()).unwrap_or(2));
         }
@@ -161,11 +162,11 @@ fn files_of(line: &CommandLine, matches: &ArgMatches) -> Files {
     let Some((_, own)) = matches.subcommand() else {
         return Files::default();
     };
-    let path_of = |id| own.try_get_one::<PathBuf>(id).ok().flatten();
-    let description = path_of("test").or(path_of("file").filter(|path| is_description(path)));
+    let [test, file] = ["test", "file"].map(|id| own.try_get_one::<PathBuf>(id).ok().flatten());
+    let description = test.or(file.filter(|path| is_description(path)));
     let test = description.and_then(|path| described(path));
     let expanded = line.command.expanded(test.as_ref());
-    // The recordings of a virtual test are made, not read.
+    // `simulate` writes the recordings that the description names.
     let read = description.map(PathBuf::as_path).zip(test.as_ref());
     let read = read.filter(|_| !matches!(line.command, Command::Simulate(_)));
     Files::of(own, read, expanded)
@@ -185,7 +186,7 @@ impl Command {
     }
 }
 
-/// Whether somebody stopped reading what we print, as `head` does.
+/// Returns true if the reader of the output has closed it, as `head` does.
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause

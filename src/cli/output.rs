@@ -18,27 +18,27 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 /// Beginning of the names of everything temporary.
 const PREFIX: &str = ".tapjoint-";
 
-/// Why an output cannot be written.
+/// An output that cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum OutputError {
     /// The folder is missing, or nothing may be created in it.
     #[error("{}: cannot be written: {cause}; choose another place, or make {} a folder that you may write to", path.display(), folder.display())]
     NotWritable {
-        /// What was to be written.
+        /// The output.
         path: PathBuf,
-        /// The folder that refuses.
+        /// The folder of the output.
         folder: PathBuf,
-        /// What the system says.
+        /// The system's error.
         cause: io::Error,
     },
     /// A file was wanted and a folder is there, or the other way round.
-    #[error("{}: is {found}, {wanted} is wanted; choose another name", path.display())]
+    #[error("{}: is {found}, but {wanted} is needed; choose another name", path.display())]
     WrongKind {
-        /// What was to be written.
+        /// The output.
         path: PathBuf,
-        /// What is there.
+        /// The kind that is there.
         found: &'static str,
-        /// What should be.
+        /// The kind that is wanted.
         wanted: &'static str,
     },
     /// A file that must not be overwritten.
@@ -47,15 +47,15 @@ pub(super) enum OutputError {
         /// That file.
         path: PathBuf,
     },
-    /// Leftovers of an earlier run that stay beside what is new.
+    /// Files of an earlier run that stay beside the new ones.
     #[error(
-        "{}: left by an earlier run, and cannot be removed: {cause}; what is new is written, so remove by hand what is old",
+        "{}: left by an earlier run, and cannot be removed: {cause}; the new files are written, so remove the old ones by hand",
         listed(paths)
     )]
     Leftovers {
         /// These files.
         paths: Vec<PathBuf>,
-        /// What the system says of the first.
+        /// The system's error for the first file.
         cause: io::Error,
     },
     /// A folder that the program did not fill.
@@ -70,9 +70,9 @@ pub(super) enum OutputError {
     /// Writing failed on the way; nothing half-written is left.
     #[error("{}: could not be written: {cause}; nothing was changed there", path.display())]
     Failed {
-        /// What was to be written.
+        /// The output.
         path: PathBuf,
-        /// What the system says.
+        /// The system's error.
         cause: io::Error,
     },
 }
@@ -93,19 +93,22 @@ enum Target {
 }
 
 impl OutputFile {
-    /// Makes sure that `path` can be written, without touching it.
+    /// Checks that the file of an option can be written, if the option is given.
     ///
     /// # Errors
-    /// [`OutputError`] when it cannot.
+    /// [`OutputError`] if it cannot be written.
+    pub(super) fn prepare_optional(path: Option<&Path>) -> Result<Option<Self>, OutputError> {
+        path.map(Self::prepare).transpose()
+    }
+
+    /// Checks that `path` can be written, without touching it.
+    ///
+    /// # Errors
+    /// [`OutputError`] if it cannot be written.
     pub(super) fn prepare(path: &Path) -> Result<Self, OutputError> {
         // A link stays a link: what it points to is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let folder = folder_of(&path);
-        let refuse = |cause| OutputError::NotWritable {
-            path: path.clone(),
-            folder: folder.to_owned(),
-            cause: without_path(cause),
-        };
         let target = match fs::metadata(&path) {
             Ok(found) if found.is_dir() => {
                 return Err(OutputError::WrongKind {
@@ -115,21 +118,28 @@ impl OutputFile {
                 });
             }
             Ok(found) if !found.is_file() => {
-                Target::Direct(File::options().write(true).open(&path).map_err(refuse)?)
+                let device = File::options().write(true).open(&path);
+                device.map(Target::Direct)
             }
             Ok(found) if found.permissions().readonly() => {
                 return Err(OutputError::ReadOnly { path });
             }
-            _ => Target::Aside(
-                builder(PREFIX, READABLE_FILE)
-                    .tempfile_in(folder)
-                    .map_err(refuse)?,
-            ),
+            _ => {
+                let file = builder(READABLE_FILE).tempfile_in(folder);
+                file.map(Target::Aside)
+            }
         };
-        Ok(Self { path, target })
+        match target {
+            Ok(target) => Ok(Self { path, target }),
+            Err(cause) => Err(OutputError::NotWritable {
+                folder: folder.to_owned(),
+                path,
+                cause: without_path(cause),
+            }),
+        }
     }
 
-    /// What a picture in this file should be, by its name.
+    /// Returns the format of a picture in this file, by its name.
     pub(super) fn picture_format(&self) -> PictureFormat {
         PictureFormat::of(&self.path)
     }
@@ -137,7 +147,7 @@ impl OutputFile {
     /// Writes the whole file and puts it in its place.
     ///
     /// # Errors
-    /// [`OutputError::Failed`]; what was there before is then still there.
+    /// [`OutputError::Failed`]; the earlier file is then still there.
     pub(super) fn write(self, bytes: &[u8]) -> Result<(), OutputError> {
         let path = self.path;
         let bytes: &[u8] = &signed(bytes);
@@ -160,10 +170,10 @@ pub(super) struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Makes sure that the folder can be made or written to.
+    /// Checks that the folder can be made or written to.
     ///
     /// # Errors
-    /// [`OutputError`] when it cannot.
+    /// [`OutputError`] if it cannot.
     pub(super) fn prepare(path: &Path) -> Result<Self, OutputError> {
         // The nearest folder that exists: the output folder itself, or the one it will grow in.
         let existing = path
@@ -179,7 +189,7 @@ impl OutputFolder {
                 wanted: "a folder",
             });
         }
-        let staging = builder(PREFIX, READABLE_FOLDER)
+        let staging = builder(READABLE_FOLDER)
             .tempdir_in(existing)
             .map_err(|cause| OutputError::NotWritable {
                 path: path.to_owned(),
@@ -192,10 +202,10 @@ impl OutputFolder {
         })
     }
 
-    /// Prepares a folder that is new, empty, or has a list of what the program made in it; with `force` any.
+    /// Prepares a folder that is new, empty, or was filled by the program; with `force` any folder.
     ///
     /// # Errors
-    /// [`OutputError`] when it cannot.
+    /// [`OutputError`] if it cannot be written, or was not made by the program.
     pub(super) fn prepare_own(path: &Path, force: bool) -> Result<Self, OutputError> {
         let is_empty = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
         if path.exists() && !is_empty && !force && !path.join(CHECKSUMS).is_file() {
@@ -206,10 +216,10 @@ impl OutputFolder {
         Self::prepare(path)
     }
 
-    /// Adds a file to what will appear in the folder.
+    /// Adds a file to the folder.
     ///
     /// # Errors
-    /// [`OutputError::Failed`] when it cannot be written.
+    /// [`OutputError::Failed`] if it cannot be written.
     pub(super) fn add(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
         let written = fs::write(self.staging.path().join(name), signed(bytes));
         written.map_err(|cause| OutputError::Failed {
@@ -218,13 +228,13 @@ impl OutputFolder {
         })
     }
 
-    /// Where a file is to be written that is too long to be added in one piece.
+    /// Returns the path for a file that is too long to be added in one piece.
     pub(super) fn place_of(&self, name: &str) -> PathBuf {
         self.staging.path().join(name)
     }
 
-    /// Moves everything into its place, and says where that is. Files in the folder are replaced only
-    /// where `files` allows it.
+    /// Moves everything into its place and returns the folder. Files in the folder are replaced only if
+    /// `files` allows it.
     ///
     /// # Errors
     /// [`OutputError::NotReplaced`], and nothing was changed; [`OutputError::Failed`], and every file is
@@ -240,7 +250,8 @@ impl OutputFolder {
         let moved = if self.path.exists() {
             self.move_files()
         } else {
-            self.rename_folder()
+            fs::create_dir_all(folder_of(&self.path))
+                .and_then(|()| fs::rename(self.staging.path(), &self.path))
         };
         match moved {
             Ok(()) => Ok(self.path),
@@ -251,14 +262,15 @@ impl OutputFolder {
         }
     }
 
-    /// The text of a file that the folder already has; `None` where there is none.
+    /// Returns the text of a file that the folder already has; `None` without such a file.
     pub(super) fn earlier(&self, name: &str) -> Option<String> {
         fs::read_to_string(self.path.join(name)).ok()
     }
 
-    /// The same as [`publish`](Self::publish), and then removes those of the `stale` files that were not
-    /// made again. Only files go, never folders. Beside the folder stands what could not be removed: the
-    /// results are there all the same, so that the caller tells of it when it has told of them.
+    /// Moves everything into its place, then removes those of the `stale` files that were not made again.
+    ///
+    /// Only files are removed, never folders. Returns the folder, and an error for the files that could not
+    /// be removed. The results are written all the same, so the caller reports this error last.
     ///
     /// # Errors
     /// [`OutputError::Failed`].
@@ -272,21 +284,21 @@ impl OutputFolder {
             .filter(|name| !self.staging.path().join(name).exists())
             .collect();
         let folder = self.publish(files)?;
-        let is_file =
-            |path: &PathBuf| fs::symlink_metadata(path).is_ok_and(|found| !found.is_dir());
-        let stale = stale.into_iter().map(|name| folder.join(name));
-        let (paths, causes): (Vec<PathBuf>, Vec<io::Error>) = stale
-            .filter(|path| is_file(path) && files.may_remove(path))
-            .filter_map(|path| fs::remove_file(&path).err().map(|cause| (path, cause)))
-            .unzip();
+        let (mut paths, mut causes) = (Vec::new(), Vec::new());
+        for name in stale {
+            let path = folder.join(name);
+            let is_file = fs::symlink_metadata(&path).is_ok_and(|found| !found.is_dir());
+            if !is_file || !files.may_remove(&path) {
+                continue;
+            }
+            if let Err(cause) = fs::remove_file(&path) {
+                paths.push(path);
+                causes.push(cause);
+            }
+        }
         let cause = causes.into_iter().next();
         let left = cause.map(|cause| OutputError::Leftovers { paths, cause });
         Ok((folder, left))
-    }
-
-    fn rename_folder(&self) -> io::Result<()> {
-        fs::create_dir_all(folder_of(&self.path))?;
-        fs::rename(self.staging.path(), &self.path)
     }
 
     fn move_files(&self) -> io::Result<()> {
@@ -298,8 +310,7 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Adds a list of checksums if one of the files cannot show by itself that the program made it. Returns
-    /// the names of all files.
+    /// Adds a list of checksums if a file has no mark of the program. Returns the names of all files.
     fn add_checksums(&self) -> io::Result<Vec<PathBuf>> {
         let staging = self.staging.path();
         let mut names = files_below(staging)?;
@@ -317,7 +328,7 @@ impl OutputFolder {
     }
 }
 
-/// All files in a folder that has a list of what the program made in it; empty for any other folder.
+/// Returns all files of a folder that the program filled; empty for any other folder.
 pub(super) fn files_made_in(folder: &Path) -> Vec<PathBuf> {
     let names = match folder.join(CHECKSUMS).is_file() {
         true => files_below(folder).unwrap_or_default(),
@@ -326,7 +337,7 @@ pub(super) fn files_made_in(folder: &Path) -> Vec<PathBuf> {
     names.iter().map(|name| folder.join(name)).collect()
 }
 
-/// Names of all files in a folder and in the folders below it, as seen from the folder, in order.
+/// Returns the names of all files in a folder and below it, relative to the folder, in order.
 ///
 /// # Errors
 /// A folder cannot be read.
@@ -350,9 +361,9 @@ fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
 const READABLE_FILE: u32 = 0o666;
 const READABLE_FOLDER: u32 = 0o777;
 
-fn builder(prefix: &'static str, mode: u32) -> Builder<'static, 'static> {
+fn builder(mode: u32) -> Builder<'static, 'static> {
     let mut builder = Builder::new();
-    builder.prefix(prefix);
+    builder.prefix(PREFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -363,7 +374,7 @@ fn builder(prefix: &'static str, mode: u32) -> Builder<'static, 'static> {
     builder
 }
 
-/// What the system says, without the temporary name that means nothing to anybody.
+/// Returns the system's error without the temporary name, which tells the user nothing.
 fn without_path(error: io::Error) -> io::Error {
     let inner = error.get_ref().and_then(std::error::Error::source);
     let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
@@ -379,7 +390,7 @@ fn folder_of(path: &Path) -> &Path {
     or_here(path.parent().unwrap_or(Path::new("")))
 }
 
-/// The empty path, which stands for the current folder, spelled out.
+/// Returns the path, and `.` for an empty path.
 fn or_here(path: &Path) -> &Path {
     if path.as_os_str().is_empty() {
         Path::new(".")

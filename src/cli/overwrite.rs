@@ -1,9 +1,9 @@
-//! Which files a command may replace: never one that it reads, never one twice, and none that somebody else
-//! made, unless `--force` is given.
+//! Files that a command may replace: none of its inputs, none twice, and without `--force` none that tapjoint
+//! did not make.
 //!
 //! All files that a command reads and writes are collected from its arguments and from the test description,
-//! and checked before any work. The inputs are found by their type: every path among the arguments that is
-//! no output. So an option that is added to a command counts as an input until it stands in [`OUTPUTS`].
+//! and checked before any work. Every path among the arguments is an input, unless its option stands in
+//! [`OUTPUTS`]. A new option therefore counts as an input until it is added there.
 
 use super::arguments::JsonDestination;
 use super::signature::is_made_here;
@@ -17,7 +17,7 @@ const OUTPUTS: [&str; 8] = [
     "json", "out", "png", "csv", "uff58", "uff58b", "model", "keep",
 ];
 
-/// Why a command must not write where it is to write.
+/// An output that a command must not write.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum OverwriteError {
     /// The command reads this file.
@@ -48,22 +48,22 @@ pub(super) enum OverwriteError {
     },
 }
 
-/// The files that an option writes, where they are not just the one that it names.
+/// An option with all files that it writes.
 pub(super) type Expanded = (&'static str, Vec<PathBuf>);
 
 /// Files that a command reads, and files that it writes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Files {
     inputs: Vec<Place>,
-    /// Options with what they write.
+    /// Options with their files.
     outputs: Vec<(String, PathBuf)>,
-    /// Files that the program did not make may be replaced.
+    /// Replace files that the program did not make, too.
     pub(super) force: bool,
 }
 
 impl Files {
     /// Collects the files of a command: the paths among its arguments, and the recordings that its test
-    /// description names. `expanded` says which options write other files than the one they name.
+    /// description names. `expanded` holds the options that write other files than the one they name.
     pub(super) fn of(
         matches: &ArgMatches,
         test: Option<(&Path, &TestDescription)>,
@@ -100,7 +100,7 @@ impl Files {
     /// Checks all inputs against all outputs.
     ///
     /// # Errors
-    /// An output is an input, two outputs are one file, or a file is in the way that the program did not make.
+    /// An output is an input, two outputs are one file, or an existing file was not made by the program.
     pub(super) fn check(&self) -> Result<(), OverwriteError> {
         let mut before: Vec<(Place, &str)> = Vec::new();
         for (option, path) in &self.outputs {
@@ -120,7 +120,7 @@ impl Files {
         Ok(())
     }
 
-    /// Checks one output: it is no input, and there is no file that the program did not make.
+    /// Checks that one output is no input, and no existing file that the program did not make.
     ///
     /// # Errors
     /// [`OverwriteError::Input`], [`OverwriteError::Foreign`].
@@ -135,7 +135,7 @@ impl Files {
         }
     }
 
-    /// Checks an output once more when it is about to be replaced, for what was not known before the work.
+    /// Checks an output again just before it is replaced, for files that were not known before the work.
     ///
     /// # Errors
     /// Those of [`check_output`](Self::check_output).
@@ -144,7 +144,7 @@ impl Files {
         self.check_output(path, known.map_or("--out", |(option, _)| option))
     }
 
-    /// Returns true for a file of an earlier run that is no input: it may be removed.
+    /// Returns true for a file of an earlier run that is no input, and may be removed.
     pub(super) fn may_remove(&self, path: &Path) -> bool {
         !self.reads(path) && is_free(path)
     }
@@ -154,7 +154,7 @@ impl Files {
     }
 }
 
-/// Returns true where there is no file, an empty one, or one that the program made.
+/// Returns true if there is no file, an empty one, or one that the program made.
 fn is_free(path: &Path) -> bool {
     match fs::metadata(path) {
         Ok(found) => !found.is_file() || found.len() == 0 || is_made_here(path),
@@ -162,7 +162,7 @@ fn is_free(path: &Path) -> bool {
     }
 }
 
-/// Paths that an argument gives; empty for an argument of another type. `init` takes names of recordings.
+/// Returns the paths of an argument; empty for an argument of another type. `init` takes names of recordings.
 fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
     if let Ok(Some(found)) = matches.try_get_many::<PathBuf>(id) {
         return found.cloned().collect();
@@ -176,18 +176,19 @@ fn paths(matches: &ArgMatches, id: &str) -> Vec<PathBuf> {
     }
 }
 
-/// Descriptions and recordings of all tests in a folder of tests.
+/// Returns descriptions and recordings of all tests in a folder of tests.
 fn tests_in(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let tests = entries.map(|entry| entry.path().join("test.toml"));
-    tests
-        .filter(|path| path.is_file())
-        .flat_map(|path| {
-            let recordings =
-                described(&path).map_or_else(Vec::new, |test| recordings_of(&path, &test));
-            recordings.into_iter().chain([path])
-        })
-        .collect()
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path().join("test.toml");
+        if path.is_file() {
+            if let Some(test) = described(&path) {
+                files.extend(recordings_of(&path, &test));
+            }
+            files.push(path);
+        }
+    }
+    files
 }
 
 fn recordings_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
@@ -198,8 +199,8 @@ fn recordings_of(path: &Path, test: &TestDescription) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Reads a test description for the names in it; `None` if it is not one. The command that takes it reads it
-/// again and says what is wrong. A pipe is left alone, because it can be read only once.
+/// Reads a test description for the names in it; `None` if it is not one. The command reads it again and
+/// reports its errors. A pipe is not read, because it can be read only once.
 pub(super) fn described(path: &Path) -> Option<TestDescription> {
     let is_file = fs::metadata(path).is_ok_and(|found| found.is_file());
     if !is_file || path.starts_with("/dev") {
@@ -209,12 +210,12 @@ pub(super) fn described(path: &Path) -> Option<TestDescription> {
     TestDescription::parse(&text, &path.display().to_string()).ok()
 }
 
-/// A file's place, whatever it is called: through links, `..`, and hard links.
+/// A file's place, the same for all its names: through links, `..`, and hard links.
 #[derive(Debug, Clone)]
 struct Place {
     /// The path without links.
     path: PathBuf,
-    /// Device and number of the file on it, if the file exists and the system tells.
+    /// Device and number of the file, if the file exists and the system gives them.
     node: Option<(u64, u64)>,
 }
 
@@ -246,11 +247,10 @@ impl Place {
         same_node || self.path == other.path || self.is_in_other_case(other)
     }
 
-    /// Returns true if the names differ in their case only, in a folder whose file system does not tell case.
+    /// Returns true if the names differ in their case only, and the file system ignores case.
     fn is_in_other_case(&self, other: &Self) -> bool {
-        let text = |place: &Self| place.path.to_string_lossy().into_owned();
-        let (one, two) = (text(self), text(other));
-        if one.to_lowercase() != two.to_lowercase() {
+        let [one, two] = [self, other].map(|place| place.path.to_string_lossy().to_lowercase());
+        if one != two {
             return false;
         }
         let Some(folder) = self.path.parent() else {

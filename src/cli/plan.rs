@@ -1,4 +1,4 @@
-//! `tapjoint plan`: before anything is measured, which effects a test could tell apart.
+//! `tapjoint plan`: the effects that a planned test could distinguish.
 
 use super::Outcome;
 use super::arguments::StiffnessArguments;
@@ -15,21 +15,21 @@ use tapjoint::structure::JointStiffness;
 use tapjoint::study::blind_check::{Conduct, score};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
-/// Before measuring: which effects this test could tell apart.
+/// Show which effects a planned test could distinguish, before anything is measured.
 ///
-/// Recordings, sensors, taps and levels are those of the description; the files need not be there.
-/// Effects of every kind are drawn, observed as planned, and diagnosed; the table counts what came
-/// first. The joint gives way both ways: --kx and --ky must be positive and finite here.
+/// Recordings, sensors, taps and levels are those of the description. The recordings need not exist.
+/// Virtual tests with effects of every kind are drawn, observed as planned, and diagnosed. The table
+/// counts the first answer of each diagnosis. --kx and --ky must be positive and finite here.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint plan test.toml --modes 7 --std 0.02")]
 pub(super) struct PlanArguments {
-    /// A test description (.toml)
+    /// Test description (.toml)
     #[arg(value_name = "TEST")]
     test: PathBuf,
-    /// Tests drawn for each kind of effect
+    /// Number of virtual tests for each kind of effect
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = RangedU64ValueParser::<usize>::new().range(1..=1000))]
     draws: usize,
-    /// Modes that will be observed
+    /// Number of modes that will be observed
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = RangedU64ValueParser::<usize>::new().range(2..=12))]
     modes: usize,
     /// Standard uncertainty of a frequency (%)
@@ -37,13 +37,12 @@ pub(super) struct PlanArguments {
     std: f64,
     #[command(flatten)]
     stiffness: StiffnessArguments,
-    /// Picture of the table; SVG where the name ends in .svg
+    /// Draw the table into this file (PNG, or SVG if its name ends in .svg)
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 }
 
-/// Largest standard uncertainty of a frequency (%): modes of a beam are farther apart, and with more nothing
-/// could be told.
+/// Largest standard uncertainty of a frequency (%). With a larger one no effect could be distinguished.
 const MOST_STD: f64 = 10.0;
 
 pub(super) fn run(
@@ -57,15 +56,11 @@ pub(super) fn run(
         std > 0.0 && std <= MOST_STD,
         "--std {std}: give percent above 0, at most {MOST_STD}"
     );
-    let png = arguments
-        .png
-        .as_deref()
-        .map(OutputFile::prepare)
-        .transpose()?;
+    let png = OutputFile::prepare_optional(arguments.png.as_deref())?;
     let mut test = file.test.clone();
     let joint = planned_joint(&arguments.stiffness, &test)?;
     if joint.is_some() {
-        // It takes the place of the described one.
+        // It replaces the described joint.
         (test.joint.kt, test.joint.kr, test.joint.ktr) = (None, None, None);
     }
     let settings = PlanSettings {
@@ -76,8 +71,10 @@ pub(super) fn run(
         seed,
         ..PlanSettings::default()
     };
-    let progress = |done, of| terminal.count("tests diagnosed", done, of);
-    let cases = judge_plan(&test, &settings, &progress).with_context(|| file.name.clone())?;
+    let cases = judge_plan(&test, &settings, &|done, of| {
+        terminal.count("tests diagnosed", done, of);
+    })
+    .with_context(|| file.name.clone())?;
     terminal.say(&tell_apart(&cases))?;
     if let Some(png) = png {
         let picture = render_confusion_picture(&cases, png.picture_format())?;
@@ -87,7 +84,7 @@ pub(super) fn run(
     Ok(Outcome::Answered)
 }
 
-/// The joint of --kx, --ky and --kz. A test observes a joint that gives way.
+/// Returns the joint of --kx, --ky and --kz, which must be flexible: a test cannot observe a rigid joint.
 fn planned_joint(
     arguments: &StiffnessArguments,
     test: &TestDescription,
@@ -96,7 +93,7 @@ fn planned_joint(
     for (name, value) in joint.iter().flat_map(|j| [("--kx", j.kx), ("--ky", j.ky)]) {
         ensure!(
             value > 0.0 && value.is_finite(),
-            "{name} {value}: give a positive finite number, for the joint of a plan gives way"
+            "{name} {value}: give a positive finite number; a plan needs a flexible joint"
         );
     }
     let coupled = joint.is_some_and(|joint| joint.cross_compliance != 0.0);

@@ -2,7 +2,7 @@
 
 use super::Outcome;
 use super::arguments::StiffnessArguments;
-use super::choices::KindArgument;
+use super::choices::assembly;
 use super::input::{TestFile, read_model};
 use super::terminal::Terminal;
 use super::updated_model::effect_at;
@@ -10,7 +10,6 @@ use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use std::path::PathBuf;
-use tapjoint::description::JointKind;
 use tapjoint::identify::predict_lambdas;
 use tapjoint::pipeline::{TestedStructure, predict_described, structure_details, tested_structure};
 use tapjoint::report::document::{Document, PredictionSection};
@@ -18,18 +17,18 @@ use tapjoint::report::{lambdas_of, prediction_of, render_text};
 use tapjoint::structure::{Assembly, JointStiffness};
 use tapjoint::study::updated_model::described_frequencies;
 
-/// Predict the natural frequencies of a beam with a known joint, in Hz and as lambda.
+/// Predict the natural frequencies of a beam with a known joint.
 ///
-/// Kx = Kt L^3/(E I), Ky = Kr L/(E I), Kz = Ktr L^2/(E I) are non-dimensional. What TEST says of
-/// sensors' masses, of an overlap and of unequal halves is part of the prediction, and so are its
-/// effects, as `run` and `diagnose --model` write them. With --joint instead of TEST there is no beam,
-/// and lambda alone is printed.
+/// The prediction includes the masses of the sensors, an overlap, unequal halves and the effects that
+/// TEST describes. `tapjoint run` and `tapjoint diagnose --model` write such effects. With --joint instead
+/// of TEST there is no beam, and only lambda is printed. The stiffnesses are non-dimensional: Kx =
+/// Kt L^3/(E I), Ky = Kr L/(E I), Kz = Ktr L^2/(E I).
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint predict --joint cantilever --kx 500 --ky 100 --modes 5\n  tapjoint predict test.toml --kx 970.5 --ky 1.251\n  tapjoint predict test-report/updated-model.toml"
 )]
 pub(super) struct PredictArguments {
-    /// A test description (.toml)
+    /// Test description (.toml)
     #[arg(
         value_name = "TEST",
         required_unless_present = "joint",
@@ -37,113 +36,77 @@ pub(super) struct PredictArguments {
     )]
     test: Option<PathBuf>,
     /// Kind of structure, instead of TEST
-    #[arg(long, value_enum, value_name = "KIND")]
-    joint: Option<KindArgument>,
+    #[arg(long, value_name = "KIND", value_parser = assembly())]
+    joint: Option<Assembly>,
     #[command(flatten)]
     stiffness: StiffnessArguments,
-    /// How many modes
+    /// Number of modes
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = RangedU64ValueParser::<usize>::new().range(1..=100))]
     modes: usize,
 }
 
-/// What the frequencies are wanted of.
-#[derive(Debug)]
-enum Subject {
-    /// A described beam.
-    Test(Box<TestFile>),
-    /// No beam, lambda alone.
-    Kind(JointKind),
-}
-
-/// The arguments, checked.
-#[derive(Debug)]
-struct Request {
-    subject: Subject,
-    stiffness: Option<JointStiffness>,
-    modes: usize,
-}
-
-fn resolve(arguments: &PredictArguments, terminal: &Terminal) -> anyhow::Result<Request> {
-    let subject = match (&arguments.test, arguments.joint) {
-        (Some(test), _) => Subject::Test(Box::new(read_model(test, terminal)?)),
-        (None, Some(kind)) => Subject::Kind(kind.into()),
-        (None, None) => bail!("nothing to predict; give a test description, or --joint"),
-    };
-    let kind = match &subject {
-        Subject::Test(file) => file.test.joint.kind,
-        Subject::Kind(kind) => *kind,
-    };
-    let stiffness = arguments.stiffness.given(kind)?;
-    if stiffness.is_none()
-        && matches!(
-            subject,
-            Subject::Kind(JointKind::Cantilever | JointKind::Lap)
-        )
-    {
-        bail!("the joint's stiffness is missing; give --kx and --ky, \"inf\" for no give");
-    }
-    Ok(Request {
-        subject,
-        stiffness,
-        modes: arguments.modes,
-    })
-}
-
 pub(super) fn run(arguments: &PredictArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
-    let request = resolve(arguments, &terminal)?;
-    let document = match &request.subject {
-        Subject::Test(file) if !file.test.effects.is_empty() => {
-            let structure = tested_structure(&file.test);
-            described_joint(&structure, &file.name)?;
-            let document = prediction_of(&file.test.name, &structure, &[]);
-            with_effects((document, &structure), file, &request)?
+    let document = match (&arguments.test, arguments.joint) {
+        (Some(test), _) => {
+            let file = read_model(test, &terminal)?;
+            let given = arguments.stiffness.given(file.test.joint.kind)?;
+            predict(&file, given, arguments.modes)?
         }
-        Subject::Test(file) => {
-            let structure = tested_structure(&file.test);
-            let joint = match request.stiffness {
+        (None, Some(kind)) => {
+            let joint = match arguments.stiffness.given(kind)? {
                 Some(given) => given,
-                None => described_joint(&structure, &file.name)?,
+                None if kind == Assembly::Free => JointStiffness::FREE,
+                None => bail!(
+                    "the joint's stiffness is missing; give --kx and --ky, \"inf\" for no give"
+                ),
             };
-            let details = structure_details(&file.test, &structure.beam);
-            let rows = predict_described(&structure, &details, &joint, request.modes)
-                .with_context(|| file.name.clone())?;
-            prediction_of(&file.test.name, &structure, &rows)
+            lambdas_of(&predict_lambdas(kind, &joint, arguments.modes)?)
         }
-        Subject::Kind(kind) => {
-            let joint = request.stiffness.unwrap_or(JointStiffness::FREE);
-            lambdas_of(&predict_lambdas(assembly(*kind), &joint, request.modes)?)
-        }
+        (None, None) => bail!("nothing to predict; give a test description, or --joint"),
     };
     terminal.say(&render_text(&document))?;
     terminal.write_document(&document)?;
     Ok(Outcome::Answered)
 }
 
-/// The frequencies of a described structure with its sensors and its effects.
-fn with_effects(
-    (mut document, structure): (Document, &TestedStructure),
+/// Predicts the frequencies of a described structure with its sensors and its effects.
+fn predict(
     file: &TestFile,
-    request: &Request,
+    given: Option<JointStiffness>,
+    modes: usize,
 ) -> anyhow::Result<Document> {
-    if request.stiffness.is_some() {
+    let structure = tested_structure(&file.test);
+    if file.test.effects.is_empty() {
+        let joint = match given {
+            Some(given) => given,
+            None => described_joint(&structure, &file.name)?,
+        };
+        let details = structure_details(&file.test, &structure.beam);
+        let rows = predict_described(&structure, &details, &joint, modes)
+            .with_context(|| file.name.clone())?;
+        return Ok(prediction_of(&file.test.name, &structure, &rows));
+    }
+    described_joint(&structure, &file.name)?;
+    if given.is_some() {
         bail!("effects go with the joint they were found with; leave out --kx, --ky and --kz");
     }
-    let frequencies = described_frequencies(&file.test, request.modes)
-        .map_err(|error| effect_at(&file.name, &error))?;
-    let rows = frequencies
-        .iter()
-        .enumerate()
-        .map(|(index, frequency)| PredictionSection {
-            mode: index + 1,
-            predicted: Some(*frequency),
-            lambda: Some(structure.beam.lambda_of(*frequency)),
+    let frequencies =
+        described_frequencies(&file.test, modes).map_err(|error| effect_at(&file.name, &error))?;
+    let rows = (1..)
+        .zip(frequencies)
+        .map(|(mode, frequency)| PredictionSection {
+            mode,
+            predicted: Some(frequency),
+            lambda: Some(structure.beam.lambda_of(frequency)),
             ..PredictionSection::default()
         });
-    document.prediction = Some(rows.collect());
-    Ok(document)
+    Ok(Document {
+        prediction: Some(rows.collect()),
+        ..prediction_of(&file.test.name, &structure, &[])
+    })
 }
 
-/// The joint that the description gives.
+/// Returns the joint that the description gives.
 fn described_joint(structure: &TestedStructure, file: &str) -> anyhow::Result<JointStiffness> {
     if structure.assembly == Assembly::Free {
         return Ok(JointStiffness::FREE);
@@ -153,12 +116,4 @@ fn described_joint(structure: &TestedStructure, file: &str) -> anyhow::Result<Jo
             "{file}: the joint's stiffness is missing; give --kx and --ky, or kt and kr in [joint]"
         )
     })
-}
-
-fn assembly(kind: JointKind) -> Assembly {
-    match kind {
-        JointKind::Cantilever => Assembly::Cantilever,
-        JointKind::Lap => Assembly::Lap,
-        JointKind::Free => Assembly::Free,
-    }
 }

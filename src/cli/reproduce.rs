@@ -1,4 +1,4 @@
-//! `tapjoint reproduce`: the paper's tables beside ours.
+//! `tapjoint reproduce`: the tables of the paper beside the program's numbers.
 
 use super::Outcome;
 use super::terminal::Terminal;
@@ -6,8 +6,9 @@ use clap::Args;
 use tapjoint::report::document::VERSION;
 use tapjoint::study::publication::{render, reproduce};
 
-/// Print every table of the paper (Ingole & Chatterjee) beside our numbers, and mark what does
-/// not reproduce and why.
+/// Print the tables of the paper (Ingole & Chatterjee) beside tapjoint's numbers.
+///
+/// Numbers that differ are marked, with the reason.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint reproduce")]
 pub(super) struct ReproduceArguments {}

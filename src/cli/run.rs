@@ -1,10 +1,10 @@
 //! `tapjoint run`: from recordings to the joint, with a report.
 
 use super::Outcome;
-use super::arguments::RecordingArguments;
-use super::bare::{BareSettings, analyse};
-use super::choices::{MethodsArgument, ReadingArgument};
-use super::input::{TestFile, check_file, is_description, read_test};
+use super::arguments::{RecordingArguments, SpectrumSettings};
+use super::bare::analyse;
+use super::choices::{perturbed_by, perturbed_methods, reading};
+use super::input::{TestFile, check_file, file_name, is_description, read_test, stem};
 use super::output::OutputFolder;
 use super::overwrite::Expanded;
 use super::terminal::Terminal;
@@ -12,61 +12,60 @@ use super::updated_model::add_model;
 use anyhow::bail;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tapjoint::description::TestDescription;
+use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
-use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
+use tapjoint::pipeline::{Analysis, EstimateMethod, IdentifySettings, diagnose_test};
 use tapjoint::report::{
     MODEL_FILE, document_of, earlier_files, figures_of, gap_section, render_run, render_text,
 };
 
-/// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
+/// Analyse a test from its recordings to the joint, and write a report.
 ///
-/// Writes report.html, report.json, parameters.csv, modes.csv, perturbation.csv, the model with what the
-/// diagnosis found (updated-model.toml) and pictures into a folder. What an earlier run left there is
-/// replaced or removed; other files stay.
+/// Finds taps, spectra and modes, estimates the joint stiffness and its uncertainty, and diagnoses what
+/// the model misses. The report folder gets report.html, report.json, CSV files (parameters, modes,
+/// perturbation), pictures and, after a diagnosis, updated-model.toml. Files of an earlier report are
+/// replaced or removed. Other files stay.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  tapjoint run test.toml\n  tapjoint run taps.wav --hammer 1 --out taps-report"
 )]
 pub(super) struct RunArguments {
-    /// A test description (.toml), or a bare recording (WAV, CSV, UFF58; or frequency response
-    /// functions in UFF58 or text)
+    /// Test description (.toml), recording (WAV, CSV, UFF58), or frequency response functions (UFF58,
+    /// text)
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Folder of the report; default: <name>-report beside FILE
+    /// Folder of the report; default: NAME-report beside FILE
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// How frequencies are read; default: as the description says, else fit
-    #[arg(long, value_enum, value_name = "R")]
-    reading: Option<ReadingArgument>,
-    /// Whose estimate is perturbed; with `pairs` the regression is the only estimate
-    #[arg(long, value_enum, value_name = "M", default_value_t)]
-    method: MethodsArgument,
+    /// Way of reading the frequencies; default: that of the description, else fit
+    #[arg(long, value_name = "R", value_parser = reading())]
+    reading: Option<ReadBy>,
+    /// Estimate to perturb. With `pairs` the pair regression is the only estimate
+    #[arg(long, value_name = "M", default_value = "both", value_parser = perturbed_methods())]
+    method: &'static [EstimateMethod],
     #[command(flatten)]
     recording: RecordingArguments,
 }
 
 impl RunArguments {
-    /// The report's folder, for a test of this name.
+    /// Returns the report's folder, for a test of this name.
     fn folder(&self, name: &str) -> PathBuf {
-        let beside = || self.file.with_file_name(report_folder(name));
-        self.out.clone().unwrap_or_else(beside)
+        match &self.out {
+            Some(out) => out.clone(),
+            None => self.file.with_file_name(report_folder(name)),
+        }
     }
 
     /// Returns the files that a report may consist of.
     pub(super) fn expanded(&self, test: Option<&TestDescription>) -> Vec<Expanded> {
         let name = test.map_or_else(|| stem(&self.file), |test| test.name.clone());
         let recordings: Vec<&Path> = match test {
-            Some(test) => test
-                .recordings
-                .iter()
-                .map(|recording| recording.file.as_path())
-                .collect(),
+            Some(test) => test.recordings.iter().map(|one| &*one.file).collect(),
             None => vec![&self.file],
         };
-        let recordings = recordings.iter().filter_map(|file| file.file_name());
         let recordings: Vec<_> = recordings
-            .map(|file| serde_json::json!({ "file": file.to_string_lossy() }))
+            .into_iter()
+            .map(|file| serde_json::json!({ "file": file_name(file) }))
             .collect();
         let report = serde_json::json!({
             "version": 1,
@@ -80,72 +79,39 @@ impl RunArguments {
     }
 }
 
-fn stem(file: &Path) -> String {
-    let stem = file.file_stem().unwrap_or_default();
-    stem.to_string_lossy().into_owned()
-}
-
 /// Monte Carlo samples of the report, as many as its picture shows; `perturb` draws more.
 const SAMPLES: usize = 1000;
 
-/// What is to be run.
-#[derive(Debug)]
-enum Subject {
-    /// A described test.
-    Test(Box<TestFile>),
-    /// A bare recording.
-    Recording(PathBuf),
+/// Reads the description, and checks that options and recordings go with it.
+fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<TestFile> {
+    if arguments.recording.hammer.is_some() || arguments.recording.sample_rate.is_some() {
+        bail!(
+            "--hammer and --sample-rate are for bare recordings; a test description says both: `channel` in [hammer], `sample_rate` in [[recording]]"
+        );
+    }
+    let mut file = read_test(&arguments.file, terminal)?;
+    if let Some(reading) = arguments.reading {
+        file.test.analysis.reading = reading;
+    }
+    file.test.check_has_data(&file.name)?;
+    file.check_recordings()?;
+    Ok(file)
 }
 
-/// The arguments, checked.
-#[derive(Debug)]
-struct Request {
-    subject: Subject,
-    /// Where the report is to appear.
-    output: OutputFolder,
-}
-
-/// Reads the description and checks, before any work, that its recordings can be read and the
-/// report can be written.
-fn resolve(arguments: &RunArguments, terminal: &Terminal) -> anyhow::Result<Request> {
-    let (subject, name) = if is_description(&arguments.file) {
-        if arguments.recording.hammer.is_some() || arguments.recording.sample_rate.is_some() {
-            bail!(
-                "--hammer and --sample-rate are for bare recordings; a test description says both: `channel` in [hammer], `sample_rate` in [[recording]]"
-            );
-        }
-        let mut file = read_test(&arguments.file, terminal)?;
-        if let Some(reading) = arguments.reading {
-            file.test.analysis.reading = reading.into();
-        }
-        file.test.check_has_data(&file.name)?;
-        file.check_recordings()?;
-        let name = file.test.name.clone();
-        (Subject::Test(Box::new(file)), name)
-    } else {
-        check_file(&arguments.file)?;
-        (
-            Subject::Recording(arguments.file.clone()),
-            stem(&arguments.file),
-        )
-    };
-    let output = OutputFolder::prepare(&arguments.folder(&name))?;
-    Ok(Request { subject, output })
-}
-
-/// The folder name that belongs to a test's name. What no file system takes becomes a hyphen.
+/// Returns the folder name for a test's name. Characters that file systems refuse become hyphens.
 fn report_folder(name: &str) -> String {
-    let taken = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
     let name: String = name
         .chars()
-        .map(|c| if taken(c) { '-' } else { c })
+        .map(|c| match c {
+            '/' | '\\' | ':' | '*' | '?' | '"' | '<' | '>' | '|' => '-',
+            c if c.is_control() => '-',
+            c => c,
+        })
         .take(100)
         .collect();
-    let name = name.trim_matches(|c: char| c == '.' || c.is_whitespace());
-    if name.is_empty() {
-        "test-report".to_owned()
-    } else {
-        format!("{name}-report")
+    match name.trim_matches(|c: char| c == '.' || c.is_whitespace()) {
+        "" => "test-report".to_owned(),
+        name => format!("{name}-report"),
     }
 }
 
@@ -154,58 +120,66 @@ pub(super) fn run(
     seed: u64,
     terminal: Terminal,
 ) -> anyhow::Result<Outcome> {
-    let request = resolve(arguments, &terminal)?;
-    let progress = terminal.progress("measuring, fitting and estimating");
-    let analysis = match &request.subject {
-        Subject::Test(file) => file.analyse(&IdentifySettings {
-            monte_carlo: Some((SAMPLES, seed)),
-            ..arguments.method.settings()
-        })?,
-        Subject::Recording(path) => {
-            let settings = BareSettings {
-                reading: arguments.reading.unwrap_or_default().into(),
-                ..BareSettings::default()
-            };
-            analyse(path, &arguments.recording, &settings)?
+    let described = match is_description(&arguments.file) {
+        true => Some(resolve(arguments, &terminal)?),
+        false => None,
+    };
+    let name = match &described {
+        Some(file) => file.test.name.clone(),
+        None => {
+            check_file(&arguments.file)?;
+            stem(&arguments.file)
         }
+    };
+    let output = OutputFolder::prepare(&arguments.folder(&name))?;
+    let progress = terminal.progress("measuring, fitting and estimating");
+    let analysis = match &described {
+        Some(file) => file.analyse(&IdentifySettings {
+            monte_carlo: Some((SAMPLES, seed)),
+            ..perturbed_by(arguments.method)
+        })?,
+        None => analyse(
+            &arguments.file,
+            &arguments.recording,
+            &SpectrumSettings::default(),
+            arguments.reading.unwrap_or_default(),
+        )?,
     };
     let mut document = document_of(&analysis);
     let mut model = None;
-    if let Subject::Test(file) = &request.subject {
+    if let Some(file) = &described {
         let settings = GapSettings {
             seed,
             ..GapSettings::default()
         };
         let diagnosis = diagnose_test(&file.test, &analysis, &settings);
         let mut gap = gap_section(diagnosis.as_ref());
-        model = add_model(
-            &mut gap,
-            (file, Some(MODEL_FILE.to_owned())),
-            (&analysis, diagnosis.as_ref()),
-        );
+        let name = Some(MODEL_FILE.to_owned());
+        model = add_model(&mut gap, file, name, &analysis, diagnosis.as_ref().ok());
         document.gap = Some(gap);
     }
     drop(progress);
     if let Some(model) = model {
-        request.output.add(MODEL_FILE, model.as_bytes())?;
+        output.add(MODEL_FILE, model.as_bytes())?;
     }
     for file in render_run(&document, &figures_of(&analysis))? {
-        request.output.add(&file.name, &file.bytes)?;
+        output.add(&file.name, &file.bytes)?;
     }
-    // Where the folder holds an earlier run's report, what this run does not make again would belong to
-    // nothing. Other commands write a report.json alone.
-    let page = request.output.earlier("report.html");
-    let earlier = page.and(request.output.earlier("report.json"));
+    // Only a folder with a page holds an earlier report: other commands write a report.json alone.
+    let page = output.earlier("report.html");
+    let earlier = page.and(output.earlier("report.json"));
     let stale = earlier.map_or_else(Vec::new, |report| earlier_files(&report));
-    let (folder, left) = request.output.publish_without(&stale, terminal.files())?;
+    let (folder, left) = output.publish_without(&stale, terminal.files())?;
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;
     left.map_or_else(|| Ok(outcome(&analysis)), |left| Err(left.into()))
 }
 
-/// A test is answered when there is an estimate, or a prediction (from known stiffnesses) beside a
-/// measured mode; a bare recording when there is a mode.
+/// Returns the outcome of an analysis.
+///
+/// A test is answered by an estimate, or by a prediction (from known stiffnesses) beside a measured mode.
+/// A bare recording is answered by a mode.
 pub(super) fn outcome(analysis: &Analysis) -> Outcome {
     let answered = match &analysis.identification {
         Some(found) => {

@@ -1,4 +1,4 @@
-//! How the program knows a file that it made: by what the file holds, or by a list of checksums beside it.
+//! Marks of files that the program made: in the file, or in a list of checksums beside it.
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -47,32 +47,30 @@ const PAGE_TITLE: &str = " – tapjoint report</title>";
 /// Words in the comment at the head of a deck.
 const DECK_HEAD: &str = ": beam with its joint, written by tapjoint";
 
-/// Bytes at the beginning and at the end of a file that are looked at.
+/// Bytes that are read at the beginning and at the end of a file.
 const LOOKED_AT: u64 = 4096;
 
 /// Returns the file's content with a mark of the program, where the format has a place for one and does not
 /// name the program yet: PNG, SVG and universal files.
 pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let with = |at: usize, mark: &[u8]| {
-        let (before, after) = bytes.split_at(at);
-        Cow::Owned([before, mark, after].concat())
-    };
-    if bytes.starts_with(PNG) && bytes.len() > PNG_HEADER_END {
-        with(PNG_HEADER_END, PNG_SOFTWARE)
+    let (place, mark) = if bytes.starts_with(PNG) && bytes.len() > PNG_HEADER_END {
+        (PNG_HEADER_END, PNG_SOFTWARE)
     } else if bytes.starts_with(b"<svg") {
-        with(bytes.len(), SVG_COMMENT)
+        (bytes.len(), SVG_COMMENT)
     } else if bytes.starts_with(UFF) {
-        with(bytes.len(), UFF_HEADER)
+        (bytes.len(), UFF_HEADER)
     } else {
-        Cow::Borrowed(bytes)
-    }
+        return Cow::Borrowed(bytes);
+    };
+    let (before, after) = bytes.split_at(place);
+    Cow::Owned([before, mark, after].concat())
 }
 
 /// Returns true if the program made this file.
 ///
-/// Where a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the folder above, names the file, the
-/// checksum decides: a file that was changed since is no longer ours. Folders with files that cannot carry a
-/// mark have such a list: those of `simulate` and of `blind-check`. Elsewhere the content decides:
+/// If a list of checksums ([`CHECKSUMS`]) in the file's folder, or in the folder above, names the file, the
+/// checksum decides: a file that has changed since counts as foreign. `simulate` and `blind-check` write such
+/// a list, because their recordings cannot carry a mark. Otherwise the content decides:
 ///
 /// | Format | Mark |
 /// |---|---|
@@ -84,12 +82,15 @@ pub(super) fn signed(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// | CSV | names of the first columns |
 /// | TOML, manual page, deck | first comment |
 ///
-/// A file of any other format, and one that cannot be read, is not ours.
+/// A file of any other format, and a file that cannot be read, counts as foreign.
 pub(super) fn is_made_here(path: &Path) -> bool {
-    match is_listed(path) {
-        Some(unchanged) => unchanged,
-        None => carries_mark(path).unwrap_or(false),
-    }
+    let listed = path.ancestors().skip(1).take(2).find_map(|folder| {
+        let list = fs::read_to_string(folder.join(CHECKSUMS)).ok()?;
+        let name = name_in_list(path.strip_prefix(folder).ok()?);
+        let expected = checksums(&list).remove(&name)?;
+        Some(checksum(path).is_ok_and(|found| found == expected))
+    });
+    listed.unwrap_or_else(|| carries_mark(path).unwrap_or(false))
 }
 
 /// Returns true if the file's content shows that the program made it.
@@ -116,22 +117,19 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
     // The last character of the head may be cut.
     let text = String::from_utf8_lossy(&head);
     Ok(match text.chars().next() {
-        Some('{') => is_document(path)?,
+        // The documents of `--json` and report.json have `version` and `warnings`.
+        Some('{') => serde_json::from_slice::<Value>(&fs::read(path)?)
+            .is_ok_and(|found| found["version"].is_u64() && found["warnings"].is_array()),
         Some('<') if text.starts_with("<svg") => tail.ends_with(SVG_COMMENT),
         Some('<') => text.contains(PAGE_TITLE),
         Some('$' | '*') => is_deck(&text),
-        _ if text.starts_with(PAGE_HEAD) || is_checksum_list(path, &text) => true,
+        _ if text.starts_with(PAGE_HEAD) => true,
+        _ if path.ends_with(CHECKSUMS) && !checksums(&text).is_empty() => true,
         _ => CSV_HEADS
             .iter()
             .chain(&DESCRIPTION_HEADS)
             .any(|begins| text.starts_with(begins)),
     })
-}
-
-/// Returns true for the documents of `--json` and `report.json`, which all have `version` and `warnings`.
-fn is_document(path: &Path) -> io::Result<bool> {
-    let document = serde_json::from_slice::<Value>(&fs::read(path)?);
-    Ok(document.is_ok_and(|found| found["version"].is_u64() && found["warnings"].is_array()))
 }
 
 /// Returns true if the first comment names the program; a long name of the test wraps its lines.
@@ -141,24 +139,9 @@ fn is_deck(text: &str) -> bool {
     words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
 }
 
-fn is_checksum_list(path: &Path, text: &str) -> bool {
-    path.file_name().is_some_and(|name| name == CHECKSUMS) && !checksums(text).is_empty()
-}
-
-/// Returns true for a file that a list names and that has not changed since, false if it has changed; `None` if
-/// no list names it.
-fn is_listed(path: &Path) -> Option<bool> {
-    path.ancestors().skip(1).take(2).find_map(|folder| {
-        let list = fs::read_to_string(folder.join(CHECKSUMS)).ok()?;
-        let name = name_in_list(path.strip_prefix(folder).ok()?);
-        let expected = checksums(&list).remove(&name)?;
-        Some(checksum(path).is_ok_and(|found| found == expected))
-    })
-}
-
-/// Returns the list of checksums of a folder: the earlier one, with those of the new files in their place.
+/// Returns the earlier list of checksums of a folder, updated for the new files.
 ///
-/// `new` holds each file's name in the folder and the place where its content lies now.
+/// `new` holds each file's name in the folder and the present place of its content.
 ///
 /// # Errors
 /// A file cannot be read.
@@ -173,7 +156,7 @@ pub(super) fn checksum_list(earlier: &str, new: &[(PathBuf, PathBuf)]) -> io::Re
         .collect())
 }
 
-/// Checksums by file name; empty if one line has another form.
+/// Returns checksums by file name; empty if one line has another form.
 fn checksums(list: &str) -> BTreeMap<String, String> {
     let lines = list.lines().map(|line| {
         let (sum, name) = line.split_once("  ")?;
@@ -183,7 +166,7 @@ fn checksums(list: &str) -> BTreeMap<String, String> {
     lines.collect::<Option<_>>().unwrap_or_default()
 }
 
-/// A file's name with slashes, on every system.
+/// Returns a file's name with slashes, on every system.
 fn name_in_list(name: &Path) -> String {
     let parts = name
         .components()

@@ -1,4 +1,4 @@
-//! What goes to standard output and standard error, and to `--json`.
+//! Output to standard output, standard error and `--json`.
 
 use super::arguments::{CommonArguments, JsonDestination};
 use super::output::OutputFile;
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use tapjoint::report::text::wrapped;
 use tapjoint::report::{document::Document, render_json, render_readings, render_stages};
 
-/// Where a command's words go.
+/// Destinations of a command's output.
 #[derive(Debug)]
 pub(super) struct Terminal {
     files: Files,
@@ -20,7 +20,7 @@ pub(super) struct Terminal {
     verbose: u8,
 }
 
-/// Where the JSON document goes; a file is opened before any work.
+/// Destination of the JSON document. A file is opened before any work.
 #[derive(Debug)]
 enum Json {
     StandardOutput,
@@ -28,8 +28,7 @@ enum Json {
 }
 
 impl Terminal {
-    /// Opens what `--json` names, so that a folder without write permission is found out before
-    /// any work.
+    /// Opens the file of `--json`, so that a missing permission is found before any work.
     pub(super) fn new(common: &CommonArguments, files: Files) -> anyhow::Result<Self> {
         let json = match &common.json {
             None => None,
@@ -44,24 +43,26 @@ impl Terminal {
         })
     }
 
-    /// The files that the command reads and writes.
+    /// Returns the files that the command reads and writes.
     pub(super) fn files(&self) -> &Files {
         &self.files
     }
 
-    /// Prints an answer, unless it was asked to be quiet or standard output belongs to JSON.
+    /// Prints an answer, unless `--quiet` is given or JSON goes to standard output.
     pub(super) fn say(&self, text: &str) -> io::Result<()> {
         if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
             return Ok(());
         }
-        if io::stdout().is_terminal() && colours_wanted() {
+        // Any value of NO_COLOR (no-color.org) turns colours off, and so does a terminal without them.
+        let unwanted = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let dumb = std::env::var_os("TERM").is_some_and(|term| term == "dumb");
+        if io::stdout().is_terminal() && !unwanted && !dumb {
             return print(&coloured(text));
         }
         print(text)
     }
 
-    /// Prints what has to be said before the work begins, or else was not said: on standard error where standard output
-    /// belongs to JSON or is to stay quiet.
+    /// Prints a text that must appear before the work begins: on standard error if `say` would not print it.
     pub(super) fn seal(&self, text: &str) -> io::Result<()> {
         if self.quiet || matches!(self.json, Some(Json::StandardOutput)) {
             let _ = writeln!(io::stderr(), "{text}");
@@ -69,13 +70,13 @@ impl Terminal {
         self.say(text)
     }
 
-    /// Shows on standard error that work goes on, if that is a terminal; until the answer is dropped.
+    /// Shows on a terminal that the work goes on, until the returned value is dropped.
     pub(super) fn progress(&self, doing: &'static str) -> Option<Progress> {
         (!self.quiet && io::stderr().is_terminal()).then(|| Progress::start(doing))
     }
 
-    /// Prints a warning on standard error, unless it was asked to be quiet. A standard error that
-    /// cannot be written to is nothing that could be reported.
+    /// Prints a warning on standard error, unless `--quiet` is given. If standard error cannot be written
+    /// to, there is no way to report it.
     pub(super) fn warn(&self, text: &str) {
         if self.quiet {
             return;
@@ -91,44 +92,37 @@ impl Terminal {
         let _ = write!(error, "{shown}");
     }
 
-    /// Shows how far a long task is, on a terminal only; of a thousand steps every tenth.
+    /// Shows the progress of a long task on a terminal, at every percent.
     pub(super) fn count(&self, doing: &str, done: usize, of: usize) {
         let mut error = io::stderr();
-        let percent = |done: usize| 100 * done / of.max(1);
-        let same = percent(done) == percent(done.saturating_sub(1));
-        if self.quiet || same || !error.is_terminal() {
+        let [now, before] = [done, done.saturating_sub(1)].map(|steps| 100 * steps / of.max(1));
+        if self.quiet || now == before || !error.is_terminal() {
             return;
         }
         let end = if done == of { "\n" } else { "" };
         let _ = write!(error, "\r{done} of {of} {doing}{end}");
     }
 
-    /// Tells on standard error what each stage used, and twice asked also every tap and peak.
-    fn tell(&self, document: &Document) {
-        if self.quiet {
-            return;
-        }
+    /// Writes a report's document to the destination of `--json`. With `--verbose`, first prints on standard
+    /// error what each stage used. Call it last.
+    pub(super) fn write_document(self, document: &Document) -> anyhow::Result<()> {
+        let verbose = if self.quiet { 0 } else { self.verbose };
         let mut error = io::stderr();
-        if self.verbose > 0 {
+        if verbose > 0 {
             let _ = write!(error, "{}", render_stages(document));
         }
-        if self.verbose > 1 {
+        if verbose > 1 {
             let _ = write!(error, "{}", render_readings(document));
         }
-    }
-
-    /// Writes a report's document to where `--json` says, if it says anything. Call it last.
-    pub(super) fn write_document(self, document: &Document) -> anyhow::Result<()> {
-        self.tell(document);
         if self.json.is_none() {
             return Ok(());
         }
-        // The very text of report.json: reading numbers back could move their last digit.
+        // The very text of report.json: reading numbers back could change their last digit.
         self.write_text(&render_json(document)?)
     }
 
-    /// Writes what is no report's document to where `--json` says, if it says anything, with the keys that all
-    /// documents have. Call it last.
+    /// Writes another document to the destination of `--json`, with the keys that all documents have. Call it
+    /// last.
     pub(super) fn write_json(self, document: &serde_json::Value) -> anyhow::Result<()> {
         let mut whole = document.clone();
         if let Some(keys) = whole.as_object_mut() {
@@ -150,14 +144,7 @@ impl Terminal {
     }
 }
 
-/// Whether colours are welcome: NO_COLOR (no-color.org) set to anything says no, and so does a
-/// terminal that calls itself dumb.
-fn colours_wanted() -> bool {
-    let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    !set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
-}
-
-/// The text with its headings bold and its warnings yellow.
+/// Returns the text with bold headings and yellow warnings.
 fn coloured(text: &str) -> String {
     const BOLD: &str = "\u{1b}[1m";
     const YELLOW: &str = "\u{1b}[33m";
@@ -187,8 +174,7 @@ fn print(text: &str) -> io::Result<()> {
     out.flush()
 }
 
-/// Prints `error: ...` on standard error, with those causes that the message does not already
-/// tell.
+/// Prints `error: ...` on standard error, with the causes that the message does not contain yet.
 pub(super) fn print_error(error: &anyhow::Error) {
     let mut text = error.to_string();
     for cause in error.chain().skip(1) {
@@ -201,13 +187,13 @@ pub(super) fn print_error(error: &anyhow::Error) {
     let _ = writeln!(io::stderr(), "error: {text}");
 }
 
-/// Nothing is said of what is done by then.
+/// Time before the line appears: shorter work shows nothing.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Time between two pictures of the line.
 const BEAT: Duration = Duration::from_millis(120);
 const TURN: [char; 10] = ['⠋', '⠙', '⠹', '⠸', '⠼', '⠴', '⠦', '⠧', '⠇', '⠏'];
 
-/// The line; it vanishes when this is dropped.
+/// The line that shows progress. It disappears when this value is dropped.
 #[derive(Debug)]
 pub(super) struct Progress {
     end: Option<Sender<()>>,
@@ -215,7 +201,6 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Begins to watch the clock.
     fn start(doing: &'static str) -> Self {
         let (end, ended) = channel();
         Self {
@@ -227,36 +212,31 @@ impl Progress {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        // The channel's other end hears that this one is gone.
+        // The thread ends when the channel is closed.
         self.end.take();
         if let Some(thread) = self.thread.take() {
-            // A line that could not be drawn is no reason to fail.
+            // A failure to draw the line does not matter.
             let _ = thread.join();
         }
     }
 }
 
+/// Draws the line until the channel is closed.
 fn show(doing: &str, ended: &Receiver<()>) {
     let start = Instant::now();
-    let goes_on = |time| ended.recv_timeout(time) == Err(RecvTimeoutError::Timeout);
-    if !goes_on(PATIENCE) {
-        return;
+    let mut error = io::stderr();
+    let mut signs = TURN.iter().cycle();
+    let mut pause = PATIENCE;
+    while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
+        let sign = signs.next().unwrap_or(&' ');
+        let seconds = start.elapsed().as_secs();
+        let _ = write!(error, "\r{sign} {doing}, {seconds} s");
+        let _ = error.flush();
+        pause = BEAT;
     }
-    let mut beat = 0;
-    loop {
-        let sign = TURN[beat % TURN.len()];
-        let _ = write!(
-            io::stderr(),
-            "\r{sign} {doing}, {} s",
-            start.elapsed().as_secs()
-        );
-        let _ = io::stderr().flush();
-        beat += 1;
-        if !goes_on(BEAT) {
-            break;
-        }
+    if pause == BEAT {
+        let _ = write!(error, "\r\u{1b}[K");
     }
-    let _ = write!(io::stderr(), "\r\u{1b}[K");
 }
 
 #[cfg(test)]

@@ -1,15 +1,15 @@
-//! The model with what a diagnosis found, for report.json and as a file.
+//! The model with the diagnosed effects, for report.json and as a file.
 
 use super::input::TestFile;
 use anyhow::anyhow;
 use tapjoint::description::TestDescription;
-use tapjoint::gap::{Diagnosis, GapError};
+use tapjoint::gap::Diagnosis;
 use tapjoint::pipeline::Analysis;
 use tapjoint::report::MODEL_FILE;
 use tapjoint::report::document::{GapSection, UpdatedModelSection};
 use tapjoint::study::updated_model::{DescribedEffectError, described_frequencies, updated_model};
 
-/// "FILE:LINE: what is wrong with the effect that is described there", or with the structure of the file.
+/// Returns the error of a described effect with its file and line.
 pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Error {
     match error.line {
         Some(line) => anyhow!("{file}:{line}: {}", error.cause),
@@ -17,16 +17,18 @@ pub(super) fn effect_at(file: &str, error: &DescribedEffectError) -> anyhow::Err
     }
 }
 
-/// Adds the model that a diagnosis makes of the described one to the section of report.json, and returns its
-/// text, which is written under `name` if that is given; `None` where there is no such model.
+/// Adds the model with the diagnosed effects to a section of report.json, and returns its text; `None` without
+/// such a model. `name` is the name of the file that will hold the text.
 pub(super) fn add_model(
     gap: &mut GapSection,
-    (file, name): (&TestFile, Option<String>),
-    (analysis, diagnosis): (&Analysis, Result<&Diagnosis, &GapError>),
+    file: &TestFile,
+    name: Option<String>,
+    analysis: &Analysis,
+    diagnosis: Option<&Diagnosis>,
 ) -> Option<String> {
-    let model = updated_model(&file.test, diagnosis.ok()?)?;
+    let model = updated_model(&file.test, diagnosis?)?;
     let highest = analysis.modes.iter().filter_map(|mode| mode.mode).max()?;
-    // Read back, so that report.json holds what the file gives.
+    // The text is read back, so that report.json holds the frequencies of the file.
     let written = TestDescription::parse(&model.text, MODEL_FILE).ok()?;
     let frequencies = described_frequencies(&written, highest).ok()?;
     gap.updated_model = Some(UpdatedModelSection {

@@ -9,9 +9,7 @@ use tapjoint_beam::StructureError;
 use tapjoint_beam::effects::SensorPlace;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
-use tapjoint_description::described::{
-    coupling, described_beam, described_specimen,
-};
+use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after

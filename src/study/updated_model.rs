@@ -8,9 +8,7 @@ use tapjoint_beam::effects::{
     Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply,
 };
 use tapjoint_beam::specimen::{Mesh, PointMass};
-use tapjoint_description::{
-    Assembly, SensorDescription, SensorKind, TestDescription,
-};
+use tapjoint_description::{Assembly, SensorDescription, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use tapjoint_identify::observation::effective_share;
 use toml::Value;

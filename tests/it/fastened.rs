@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tapjoint::described::described_specimen;
-use tapjoint::description::{PointMass, TestDescription};
+use tapjoint::description::TestDescription;
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     GapSettings, Nominal, TestPlan, Verdict, diagnose, nominal_chi_square, observe,

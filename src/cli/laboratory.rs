@@ -1,7 +1,8 @@
-//! Options of the laboratory.
+//! Options of the laboratory that records a virtual test.
 
+use super::choices::words;
 use anyhow::bail;
-use clap::builder::RangedU64ValueParser;
+use clap::builder::{RangedU64ValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::simulate::{AntiAlias, Damping, Laboratory, Tip};
@@ -10,32 +11,32 @@ use tapjoint::simulate::{AntiAlias, Damping, Laboratory, Tip};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Laboratory")]
 pub(super) struct LaboratoryArguments {
-    /// Nothing that disturbs: no noise, scatter, errors, and no filter but the one against aliasing;
-    /// the other options still count
+    /// Leave out all disturbances: noise, scatter, errors, and all filters but the anti-alias filter. The
+    /// other options still apply
     #[arg(long)]
     ideal: bool,
-    /// Leave out parts of the laboratory, separated by commas
+    /// Leave out parts of the laboratory
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,...")]
     without: Vec<Part>,
-    /// Taps in each recording; default: 5
+    /// Number of taps in each recording; default: 5
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=100_000))]
     taps: Option<usize>,
-    /// Length of each recording (s); default: what the taps need to ring down
+    /// Length of each recording (s); default: long enough for the taps to ring down
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<f64>,
-    /// Sample rate (Hz); default: the lowest usual one that covers the band
+    /// Sample rate (Hz); default: the lowest usual rate that covers the band
     #[arg(long, value_name = "HZ", value_parser = sample_rate)]
     rate: Option<u32>,
-    /// Bits of a sample, 32 for floating point; default: 24
+    /// Bits of a sample, 32 = floating point; default: 24
     #[arg(long, value_name = "N", value_parser = ["16", "24", "32"])]
     bits: Option<String>,
     /// Tip of the hammer; default: the softest that excites the band
-    #[arg(long, value_enum)]
-    tip: Option<TipArgument>,
-    /// Peak force of a tap (N), which each recording's `level` multiplies; default: 20
+    #[arg(long, value_parser = tip())]
+    tip: Option<Tip>,
+    /// Peak force of a tap (N), multiplied by each recording's `level`; default: 20
     #[arg(long, value_name = "N", value_parser = force)]
     level: Option<f64>,
-    /// Noise of sensors and hammer, in multiples of that of good ones; default: 1
+    /// Noise of sensors and hammer relative to that of good ones; default: 1
     #[arg(long, value_name = "X")]
     noise: Option<f64>,
     /// Share of the taps that strike twice; default: 0
@@ -47,20 +48,20 @@ pub(super) struct LaboratoryArguments {
     /// Quiet time before the first tap (s); default: 0.5
     #[arg(long, value_name = "S", value_parser = seconds)]
     lead: Option<f64>,
-    /// Error of the recorder's clock, positive = frequencies read high; default: 5e-6
+    /// Relative error of the recorder's clock, positive = frequencies are read too high; default: 5e-6
     #[arg(long, value_name = "X", value_parser = ratio, allow_negative_numbers = true)]
     clock_error: Option<f64>,
-    /// Resonance of an accelerometer on its mounting (Hz); default: 18000
+    /// Resonance frequency of a mounted accelerometer (Hz); default: 18000
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     mounting: Option<f64>,
-    /// Frequency of the mains (Hz); default: 50
+    /// Mains frequency (Hz); default: 50
     #[arg(long, value_name = "HZ", value_parser = frequency)]
     mains: Option<f64>,
-    /// Damping ratio of each mode, separated by commas, the last one for all beyond; default:
+    /// Damping ratio of each mode. The last one applies to all higher modes; default:
     /// 0.4%,0.3%,0.25%,0.2%
     #[arg(long, value_name = "Z,...", value_delimiter = ',', value_parser = ratio, conflicts_with = "rayleigh")]
     damping: Vec<f64>,
-    /// Damping in proportion to mass (1/s) and stiffness (s), instead of --damping
+    /// Damping proportional to mass (1/s) and stiffness (s), instead of --damping
     #[arg(long, value_name = "MASS,STIFFNESS", value_delimiter = ',')]
     rayleigh: Vec<f64>,
 }
@@ -92,19 +93,20 @@ enum Part {
     Suspension,
 }
 
-/// Tips, as the command line names them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum TipArgument {
-    /// 0.3 ms, to 3.3 kHz
-    Steel,
-    /// 1.4 ms, to 1 kHz
-    Nylon,
-    /// 5 ms, to 290 Hz
-    Rubber,
+fn tip() -> impl TypedValueParser<Value = Tip> {
+    let tips = [
+        ("steel", Tip::Steel),
+        ("nylon", Tip::Nylon),
+        ("rubber", Tip::Rubber),
+    ];
+    words(
+        tips,
+        ["0.3 ms, to 3.3 kHz", "1.4 ms, to 1 kHz", "5 ms, to 290 Hz"],
+    )
 }
 
 impl LaboratoryArguments {
-    /// The laboratory.
+    /// Returns the laboratory with these options.
     pub(super) fn resolve(&self) -> anyhow::Result<Laboratory> {
         let mut laboratory = if self.ideal {
             Laboratory::ideal()
@@ -115,7 +117,12 @@ impl LaboratoryArguments {
             part.leave_out(&mut laboratory);
         }
         self.set_hammer(&mut laboratory)?;
-        self.set_recorder(&mut laboratory)?;
+        laboratory.recorder.sample_rate = self.rate;
+        if let Some(bits) = &self.bits {
+            laboratory.recorder.bits = bits.parse()?;
+        }
+        set(&mut laboratory.recorder.clock_error, self.clock_error);
+        set(&mut laboratory.recorder.mains, self.mains);
         set(&mut laboratory.sensors.noise, self.noise);
         set(&mut laboratory.sensors.mounting_resonance, self.mounting);
         if !self.damping.is_empty() {
@@ -141,7 +148,7 @@ impl LaboratoryArguments {
         set(&mut hammer.peak_force, self.level);
         set(&mut hammer.double_hits, self.double_hits);
         set(&mut hammer.weak_hits, self.weak_hits);
-        hammer.tip = self.tip.map(Tip::from);
+        hammer.tip = self.tip;
         if let Some(seconds) = self.seconds {
             let interval = (seconds - hammer.lead) / hammer.taps as f64;
             // A tap needs room for its pulse and some of what rings.
@@ -155,17 +162,6 @@ impl LaboratoryArguments {
             }
             hammer.interval = Some(interval);
         }
-        Ok(())
-    }
-
-    fn set_recorder(&self, laboratory: &mut Laboratory) -> anyhow::Result<()> {
-        let recorder = &mut laboratory.recorder;
-        recorder.sample_rate = self.rate;
-        if let Some(bits) = &self.bits {
-            recorder.bits = bits.parse()?;
-        }
-        set(&mut recorder.clock_error, self.clock_error);
-        set(&mut recorder.mains, self.mains);
         Ok(())
     }
 }
@@ -204,16 +200,6 @@ impl Part {
     }
 }
 
-impl From<TipArgument> for Tip {
-    fn from(tip: TipArgument) -> Self {
-        match tip {
-            TipArgument::Steel => Self::Steel,
-            TipArgument::Nylon => Self::Nylon,
-            TipArgument::Rubber => Self::Rubber,
-        }
-    }
-}
-
 fn quantity(text: &str, dimension: Dimension) -> Result<f64, String> {
     parse_quantity(text, dimension).map_err(|error| error.to_string())
 }
@@ -230,7 +216,7 @@ fn frequency(text: &str) -> Result<f64, String> {
     quantity(text, Dimension::Frequency)
 }
 
-/// No test lasts longer than a day.
+/// Parses a time of at most a day.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.trim().trim_end_matches('s').trim().parse::<f64>() {
         Ok(value) if (0.0..=86_400.0).contains(&value) => Ok(value),

@@ -1,11 +1,11 @@
 //! Estimate a joint from frequencies: `cargo run --example estimate`
 
 use std::path::Path;
-use tapjoint::description::{JointKind, TestDescription, runnable_template};
+use tapjoint::description::{Assembly, TestDescription, runnable_template};
 use tapjoint::pipeline::{IdentifySettings, run_test};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let text = runnable_template(JointKind::Cantilever);
+    let text = runnable_template(Assembly::Cantilever);
     let test = TestDescription::parse(&text, "test.toml")?;
     let analysis = run_test(
         &test,

@@ -4,7 +4,7 @@
 #   scripts/check.sh
 #
 # Needs a Rust toolchain with rustfmt and clippy and a C linker; no system library. Tests on real
-# recordings run when TAPJOINT_DATA names the folder that holds them, and are skipped otherwise.
+# recordings run when TAPJOINT_DATA names the folder that holds them, and are ignored otherwise.
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -52,9 +52,13 @@ require_tools
 step 'formatting' cargo fmt --check
 step 'no system fonts' no_system_fonts
 step 'clippy' cargo clippy --locked --all-targets -- -D warnings
-step 'tests' cargo test --locked
+if [ -n "${TAPJOINT_DATA:-}" ]; then
+    step 'tests, real recordings included' cargo test --locked -- --include-ignored
+    data=" (real recordings included)"
+else
+    step 'tests' cargo test --locked
+    data=" (tests on real recordings ignored: TAPJOINT_DATA is not set)"
+fi
 RUSTDOCFLAGS="-D warnings" step 'documentation' cargo doc --locked --no-deps
 
-data=" (tests on real recordings skipped: TAPJOINT_DATA is not set)"
-[ -z "${TAPJOINT_DATA:-}" ] || data=" (real recordings included)"
 printf '\ncheck: PASSED%s\n' "$data"

@@ -1,7 +1,6 @@
 //! Arguments that several commands share, and the parsers of their values.
 
 use super::choices::window;
-use super::input::file_name;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
@@ -80,7 +79,7 @@ impl FromStr for JsonDestination {
     }
 }
 
-/// How to read a recording that no test description describes.
+/// Options for reading a bare recording.
 #[derive(Debug, Args)]
 pub(super) struct RecordingArguments {
     /// Channel of the hammer: its number, counted from 1, or the name of a CSV column; default: none,
@@ -100,7 +99,8 @@ impl RecordingArguments {
         };
         let recording = Recording::open(path, &settings)?;
         // Errors name the whole path, tables the file.
-        Ok(recording.renamed(file_name(path)))
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Ok(recording.renamed(name.to_string_lossy()))
     }
 }
 

@@ -168,7 +168,7 @@ fn doubts_of(report: &Value) -> Vec<String> {
     let texts = warnings
         .filter(|warning| warning["code"] == "misfit")
         .filter_map(|warning| warning["text"].as_str());
-    // What follows are limits of non-dimensional stiffnesses.
+    // The text goes on with limits of non-dimensional stiffnesses.
     let misfit = texts.filter_map(|text| text.split(';').next());
     let misfit = misfit.filter(|text| text.starts_with(MISSES));
     let limits = all_limits(&report["estimate"]);

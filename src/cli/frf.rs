@@ -212,15 +212,7 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         .iter()
         .map(|recording| frfs_of(recording, &settings))
         .collect::<Result<_, _>>()?;
-    for ((file, recording), frfs) in pictures.into_iter().zip(&analysis.recordings).zip(&frfs) {
-        match render_frf_picture(&frf_figure(recording, frfs), file.picture_format())? {
-            Some(bytes) => file.write(&bytes)?,
-            None => terminal.warn(&format!(
-                "{}: no tap was accepted, so there is no function to draw",
-                recording.file
-            )),
-        }
-    }
+    write_pictures(pictures, &analysis, &frfs, &terminal)?;
     let all = frfs.concat();
     for (file, format) in outputs {
         match format {
@@ -238,6 +230,24 @@ pub(super) fn run(arguments: &FrfArguments, terminal: Terminal) -> anyhow::Resul
         true => Outcome::NoAnswer,
         false => Outcome::Answered,
     })
+}
+
+fn write_pictures(
+    files: Vec<OutputFile>,
+    analysis: &Analysis,
+    frfs: &[Vec<Frf>],
+    terminal: &Terminal,
+) -> anyhow::Result<()> {
+    for ((file, recording), frfs) in files.into_iter().zip(&analysis.recordings).zip(frfs) {
+        match render_frf_picture(&frf_figure(recording, frfs), file.picture_format())? {
+            Some(bytes) => file.write(&bytes)?,
+            None => terminal.warn(&format!(
+                "{}: no tap was accepted, so there is no function to draw",
+                recording.file
+            )),
+        }
+    }
+    Ok(())
 }
 
 /// Analyses a bare recording with a hammer: finds the sensors' channels and scales them.

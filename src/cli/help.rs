@@ -77,17 +77,13 @@ fn summary(command: &Command) -> String {
     format!("{} ...", kept[..end].trim_end_matches([',', ':']))
 }
 
-/// Adds a suggestion to the error of a wrong command line where clap has none: the nearest command, or a
-/// description for several files.
-pub(super) fn with_suggestion(error: clap::Error, command: &Command) -> clap::Error {
-    match error.kind() {
-        ErrorKind::UnknownArgument => with_description(error),
-        _ => with_nearest(error, command),
+/// Adds a suggestion to the error of a wrong command line where clap has none.
+///
+/// Commands take one file, and `*.wav` gives many: a description takes them all.
+pub(super) fn with_suggestion(mut error: clap::Error, command: &Command) -> clap::Error {
+    if error.kind() != ErrorKind::UnknownArgument {
+        return with_nearest(error, command);
     }
-}
-
-/// Suggests a description for several files: commands take one file, and `*.wav` gives many.
-fn with_description(mut error: clap::Error) -> clap::Error {
     if let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg)
         && std::path::Path::new(name).is_file()
     {

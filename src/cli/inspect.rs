@@ -8,7 +8,7 @@ use anyhow::ensure;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::pipeline::{inspect_bare, together};
-use tapjoint::recording::{UniversalFile, is_universal_file, list_datasets};
+use tapjoint::recording::{is_universal_file, list_datasets};
 use tapjoint::report::{datasets_of, inspection_of, render_text};
 
 /// Most samples of a universal file that are read, over all its time series. Reading more takes too long
@@ -47,7 +47,13 @@ pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::R
                 ));
             }
             datasets.extend(datasets_of(&file_name(file), &listed));
-            let samples = time_samples(&listed);
+            // By the headers; a file has at most one sample a byte.
+            let series = listed
+                .functions()
+                .filter(|(_, function)| function.is_time_series());
+            let samples = series
+                .map(|(dataset, function)| function.points.min(dataset.bytes))
+                .fold(0, u64::saturating_add);
             if arguments.headers || samples == 0 {
                 continue;
             }
@@ -86,13 +92,4 @@ pub(super) fn run(arguments: &InspectArguments, terminal: Terminal) -> anyhow::R
     } else {
         Outcome::NoAnswer
     })
-}
-
-/// Returns the number of samples of all time series, by the headers. A file has at most one sample a byte.
-fn time_samples(file: &UniversalFile) -> u64 {
-    let series = file
-        .functions()
-        .filter(|(_, function)| function.is_time_series());
-    let samples = series.map(|(dataset, function)| function.points.min(dataset.bytes));
-    samples.fold(0, u64::saturating_add)
 }

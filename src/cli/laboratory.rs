@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use tapjoint::quantity::{Dimension, parse_quantity};
 use tapjoint::simulate::{AntiAlias, Damping, Laboratory, Tip};
 
-/// How the test is carried out. Defaults are those of a decent laboratory; the command prints them.
+/// Settings of a virtual test. The defaults are those of a good laboratory; the command prints them.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Laboratory")]
 pub(super) struct LaboratoryArguments {

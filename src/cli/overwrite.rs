@@ -25,7 +25,7 @@ pub(super) enum OverwriteError {
     Input {
         /// The output as it was named.
         path: PathBuf,
-        /// Its option.
+        /// Option of this output.
         option: String,
     },
     /// Two outputs are one file.
@@ -43,7 +43,7 @@ pub(super) enum OverwriteError {
     Foreign {
         /// The output as it was named.
         path: PathBuf,
-        /// Its option.
+        /// Option of this output.
         option: String,
     },
 }

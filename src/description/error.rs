@@ -1,20 +1,18 @@
-//! What can be wrong with a test description, and what is merely odd.
+//! Errors and warnings of a test description.
 
 use std::fmt;
 use tapjoint_numerics::quantity::QuantityError;
 
-/// Why a test description cannot be used. Displays as
-/// `FILE:LINE: what is wrong, what is allowed, what to do`.
+/// An error in a test description. Displays as `FILE:LINE: problem, allowed values, remedy`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescriptionError {
     /// The file, as the caller named it.
     pub file: String,
     /// The line, counted from 1.
     pub line: usize,
-    /// Path of the key, such as `beam.length` or `sensor[2].position`; empty where no key is to
-    /// blame.
+    /// Path of the key, such as `beam.length` or `sensor[2].position`; empty without a key.
     pub key: String,
-    /// What is wrong there.
+    /// The problem there.
     pub problem: Box<DescriptionProblem>,
 }
 
@@ -32,41 +30,41 @@ impl fmt::Display for DescriptionError {
 
 impl std::error::Error for DescriptionError {}
 
-/// The kinds of problems, each with what is needed to mend it.
+/// Kinds of problems, each with the data of its message.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DescriptionProblem {
     /// The text is not TOML.
     #[error("not valid TOML: {message}; {remedy}")]
     Syntax {
-        /// What the TOML reader says.
+        /// Message of the TOML reader.
         message: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// Nobody knows this key.
+    /// An unknown key.
     #[error("unknown key; {suggestion}known keys of {table}: {}", .known.join(", "))]
     UnknownKey {
-        /// The table it stands in.
+        /// The key's table.
         table: &'static str,
-        /// What may have been meant.
+        /// Suggested key.
         suggestion: Suggestion,
-        /// The keys this table has.
+        /// All keys of this table.
         known: &'static [&'static str],
     },
-    /// A key without which nothing can be done.
+    /// A missing key.
     #[error("missing; {wanted} is needed, such as `{example}`")]
     Missing {
-        /// What is wanted.
+        /// Wanted value.
         wanted: &'static str,
-        /// How it may look.
+        /// Example.
         example: &'static str,
     },
-    /// Not the kind of value that belongs here.
+    /// A value of the wrong kind.
     #[error("{found} stands here; wanted: {wanted}")]
     WrongType {
-        /// What stands there.
+        /// Kind of the value.
         found: &'static str,
-        /// What is wanted, with an example.
+        /// Wanted kind, with an example.
         wanted: String,
     },
     /// A number with a unit that cannot be understood.
@@ -75,29 +73,29 @@ pub enum DescriptionProblem {
     /// Infinite or not a number.
     #[error("{text} is not a finite number; write a finite one, or leave the key out")]
     NotFinite {
-        /// What stands there.
+        /// The value.
         text: String,
     },
-    /// A value that cannot be.
+    /// A value outside its limits.
     #[error("{} is impossible; allowed: {allowed}; {remedy}", with_unit(*value, unit))]
     OutOfRange {
         /// The value, SI.
         value: f64,
-        /// Its unit.
+        /// Unit of the value.
         unit: &'static str,
-        /// The allowed range in words.
+        /// Allowed range in words.
         allowed: String,
-        /// What to do.
+        /// Remedy.
         remedy: String,
     },
-    /// None of the words that are known here.
+    /// An unknown word.
     #[error("\"{value}\" is not known here; allowed: {}{}", quoted(allowed), did_you_mean(.nearest))]
     UnknownChoice {
         /// The word.
         value: String,
         /// The known words.
         allowed: Vec<&'static str>,
-        /// The one that resembles it.
+        /// The most similar one.
         nearest: Option<String>,
     },
     /// No sensor of this name.
@@ -107,35 +105,35 @@ pub enum DescriptionProblem {
         name: String,
         /// The sensors there are.
         known: Vec<String>,
-        /// The one that resembles it.
+        /// The most similar one.
         nearest: Option<String>,
     },
-    /// The same name or channel twice.
+    /// A name or channel that is used twice.
     #[error("{value} is already taken in line {first_line}; {remedy}")]
     Duplicate {
-        /// What is used twice.
+        /// The repeated value.
         value: String,
-        /// Where it is used first.
+        /// Line of its first use.
         first_line: usize,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// Two things that exclude each other.
+    /// Two values that exclude each other.
     #[error("{reason}; {remedy}")]
     Conflict {
-        /// Why they exclude each other.
+        /// Reason.
         reason: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A list of the wrong length.
     #[error("{found} values stand here; allowed: {allowed}; {remedy}")]
     Count {
-        /// How many stand there.
+        /// Number of values.
         found: usize,
-        /// How many are wanted.
+        /// Wanted number.
         allowed: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A list that does not ascend.
@@ -145,11 +143,11 @@ pub enum DescriptionProblem {
         number(*previous)
     )]
     NotAscending {
-        /// Where in the list, counted from 1.
+        /// Place in the list, counted from 1.
         position: usize,
-        /// The value there.
+        /// Value at this place.
         value: f64,
-        /// The value before it.
+        /// Value before it.
         previous: f64,
     },
     /// A recording that cannot be opened.
@@ -157,9 +155,9 @@ pub enum DescriptionProblem {
         "{path} cannot be read: {cause}; name a file that exists, seen from the folder of this description"
     )]
     UnreadableFile {
-        /// Where it was looked for.
+        /// Path of the file.
         path: String,
-        /// What the system says.
+        /// The system's reason.
         cause: String,
     },
     /// Neither recordings nor frequencies.
@@ -169,19 +167,19 @@ pub enum DescriptionProblem {
     NothingToAnalyse,
 }
 
-/// What may have been meant by an unknown key.
+/// A suggestion for an unknown key.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Suggestion {
-    /// A key of the same table that resembles it.
+    /// A similar key of the same table.
     Nearest(&'static str),
-    /// The key exists, in other tables.
+    /// The key exists in other tables.
     BelongsInto {
-        /// The key as it is spelled there.
+        /// The key as these tables spell it.
         key: &'static str,
         /// Those tables.
         tables: Vec<&'static str>,
     },
-    /// Nothing resembles it.
+    /// No similar key.
     Nothing,
 }
 
@@ -197,7 +195,7 @@ impl fmt::Display for Suggestion {
     }
 }
 
-/// Something odd that does not keep a description from being used.
+/// A doubt about a description that can still be used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescriptionWarning {
     /// The file, as the caller named it.
@@ -206,7 +204,7 @@ pub struct DescriptionWarning {
     pub line: usize,
     /// Path of the key.
     pub key: String,
-    /// What is odd.
+    /// The doubt.
     pub doubt: Doubt,
 }
 
@@ -220,25 +218,25 @@ impl fmt::Display for DescriptionWarning {
     }
 }
 
-/// The kinds of oddities.
+/// Kinds of doubts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
-    /// Possible, but far from what tests are made of.
+    /// Possible, but unusual.
     Implausible {
         /// The value, SI.
         value: f64,
-        /// Its unit.
+        /// Unit of the value.
         unit: &'static str,
-        /// What is usual.
+        /// Usual range.
         usual: String,
-        /// What may have been meant.
+        /// Question to the user.
         question: &'static str,
     },
-    /// A mass whose place nobody said.
+    /// A mass without a position.
     Unplaced,
-    /// Has no effect where it stands.
+    /// A value without effect.
     NoMeaning {
-        /// Why.
+        /// Reason.
         reason: &'static str,
     },
 }
@@ -259,16 +257,16 @@ impl fmt::Display for Doubt {
                 )
             }
             Self::Unplaced => out.write_str(
-                "acts where the sensor sits, and `position` is missing: the diagnosis tries places along the beam, \
-                 prediction and estimate leave the mass out where no place is said; add `position` (m along the beam) if it is known",
+                "has no `position`: the diagnosis tries places along the beam, prediction and estimate leave the mass out; \
+                 add `position` (m along the beam) if it is known",
             ),
             Self::NoMeaning { reason } => write!(out, "has no effect; {reason}"),
         }
     }
 }
 
-/// A number as people write it: ten significant digits at most, which hides the last-digit
-/// noise of a unit conversion, and an exponent only where the zeros would be hard to count.
+/// Returns a number with at most ten significant digits, which hides the rounding of unit conversions.
+/// Very small and very large numbers have an exponent.
 pub(super) fn number(value: f64) -> String {
     let rounded = format!("{value:.9e}").parse().unwrap_or(value);
     let size = f64::abs(rounded);
@@ -279,13 +277,13 @@ pub(super) fn number(value: f64) -> String {
     }
 }
 
-/// A number and its unit.
+/// Returns a number with its unit.
 pub(super) fn with_unit(value: f64, unit: &str) -> String {
     format!("{} {unit}", number(value)).trim_end().to_owned()
 }
 
-/// A message quotes what stands in the file, whatever that is: line breaks and control characters
-/// are escaped, and what is longer than anybody reads is cut.
+/// Returns a message on one line. It may quote any text of the file, so line breaks and control characters
+/// are escaped, and a very long message is cut.
 fn on_one_line(text: &str) -> String {
     const LONGEST: usize = 1000;
     let mut line = String::with_capacity(text.len().min(LONGEST));
@@ -302,7 +300,7 @@ fn on_one_line(text: &str) -> String {
     line
 }
 
-fn quoted(words: &[&str]) -> String {
+fn quoted(words: &[impl fmt::Display]) -> String {
     words
         .iter()
         .map(|word| format!("\"{word}\""))
@@ -317,12 +315,8 @@ fn did_you_mean(nearest: &Option<String>) -> String {
 }
 
 fn sensor_list(known: &[String]) -> String {
-    if known.is_empty() {
-        return "none is declared; add a [[sensor]] of that name".to_owned();
+    match known {
+        [] => "none is declared; add a [[sensor]] of that name".to_owned(),
+        known => quoted(known),
     }
-    known
-        .iter()
-        .map(|name| format!("\"{name}\""))
-        .collect::<Vec<_>>()
-        .join(", ")
 }

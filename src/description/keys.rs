@@ -1,12 +1,12 @@
-//! The keys a test description knows, and the one that was probably meant.
+//! Keys of a test description, and suggestions for unknown keys.
 
 use super::error::Suggestion;
 
 /// A table and its keys.
 pub(super) struct KnownTable {
-    /// As messages call it.
+    /// Name in messages.
     pub(super) header: &'static str,
-    /// Its keys, in the order in which people write them.
+    /// Keys, in the usual order.
     pub(super) keys: &'static [&'static str],
 }
 
@@ -109,7 +109,7 @@ pub(super) const ANALYSIS: KnownTable = KnownTable {
     ],
 };
 
-/// Not among [`ALL`]: half of its keys are those of other tables.
+/// Not in [`ALL`], because many of its keys also belong to other tables.
 pub(super) const EFFECT: KnownTable = KnownTable {
     header: "[[effect]]",
     keys: &[
@@ -137,7 +137,7 @@ const ALL: [&KnownTable; 12] = [
     &MEASURED, &ANALYSIS,
 ];
 
-/// What the field also calls these keys; no spelling distance leads from "rho" to "density".
+/// Other usual names of keys, which differ too much to be found by spelling.
 const SYNONYMS: [(&str, &str); 20] = [
     ("l", "length"),
     ("b", "width"),
@@ -161,8 +161,8 @@ const SYNONYMS: [(&str, &str); 20] = [
     ("name", "id"),
 ];
 
-/// What an unknown `key` of `table` may have been meant to be: a similar key of that table, else
-/// the same or a similar key of another.
+/// Suggests a key for an unknown `key` of `table`: a similar key of that table, else the same or a similar
+/// key of another table.
 pub(super) fn suggest(key: &str, table: &'static KnownTable) -> Suggestion {
     let lower = key.to_lowercase().replace('-', "_");
     if let Some(found) = table.keys.iter().find(|known| **known == lower) {
@@ -196,29 +196,27 @@ fn elsewhere(key: &str) -> Option<Suggestion> {
     Some(Suggestion::BelongsInto { key, tables })
 }
 
-/// The known word most like `word`, when one is like it at all.
+/// Returns the known word that is most similar to `word`, if one is similar.
 ///
-/// Two measures, because people err in two ways: a slip of the finger is one or two
-/// Damerau-Levenshtein edits away (at most a third of the word), an abbreviation shares its
-/// beginning, which Jaro-Winkler rewards (0.88 admits "freq" for "frequencies" and keeps
-/// unrelated short words out).
+/// There are two measures. A typing error is one or two Damerau-Levenshtein edits, at most a third of the
+/// word. An abbreviation has the same beginning, which Jaro-Winkler rewards: 0.88 accepts "freq" for
+/// "frequencies" and refuses unrelated short words.
 pub(super) fn nearest<'w>(word: &str, known: impl Iterator<Item = &'w str>) -> Option<&'w str> {
-    // Words far longer than any key are not worth a quadratic comparison.
+    // The comparison is quadratic, and no key is this long.
     if word.chars().count() > 64 {
         return None;
     }
-    let resembles = |candidate: &str| {
+    let mut best: Option<(f64, &str)> = None;
+    for candidate in known {
         let edits = strsim::damerau_levenshtein(word, candidate);
-        edits <= 2 && 3 * edits <= candidate.chars().count()
-            || strsim::jaro_winkler(word, candidate) >= 0.88
-    };
-    let score = |candidate: &str| {
-        strsim::normalized_damerau_levenshtein(word, candidate)
-            + strsim::jaro_winkler(word, candidate)
-    };
-    known
-        .filter(|candidate| resembles(candidate))
-        .map(|candidate| (score(candidate), candidate))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, candidate)| candidate)
+        let likeness = strsim::jaro_winkler(word, candidate);
+        if (edits > 2 || 3 * edits > candidate.chars().count()) && likeness < 0.88 {
+            continue;
+        }
+        let score = strsim::normalized_damerau_levenshtein(word, candidate) + likeness;
+        if best.is_none_or(|(highest, _)| score >= highest) {
+            best = Some((score, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate)
 }

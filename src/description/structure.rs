@@ -211,7 +211,7 @@ const MODELS: [(&str, Option<JointModel>); 3] = [
     ("none", None),
 ];
 
-/// A stiffer joint cannot be told from a rigid one in double precision.
+/// In double precision a stiffer joint equals a rigid one.
 const STIFFNESS_LIMIT: f64 = 1e18;
 const STIFFNESS: Limits = Limits::between(
     0.0,

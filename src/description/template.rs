@@ -1,12 +1,12 @@
-//! The commented `test.toml` that a new test begins with.
+//! The commented `test.toml` for a new test.
 
 use super::Assembly;
 
 const HEAD: &str = r#"# Test description for tapjoint. Replace the values by those of your test, then: tapjoint run test.toml
 #
-# A bare number is SI; a text may carry a unit: "423 mm", "207 GPa", "24 g", "2 %".
+# A bare number is in SI units. A text may have a unit: "423 mm", "207 GPa", "24 g", "2 %".
 # Positions are measured along the beam, in m, from @ORIGIN@.
-# Lines such as `# key = value` show what holds when the key is left out, or an example of it.
+# Lines such as `# key = value` show the default of a key, or an example of it.
 
 name = "@NAME@"                # default: the name of this file; the report goes to <name>-report
 
@@ -56,12 +56,12 @@ const RECORDING: &str = "[[recording]]                  # once for each file; th
 const INSTRUMENTS: &str = r#"
 [hammer]                       # remove this table for a test without an instrumented hammer
 channel = 1                    # 1-based, not counting a time column; or the name of a CSV column
-# scale = 1.0                  # N per unit of the file, default 1 or the unit in the CSV header; integer WAV: full scale = 1
+# scale = 1.0                  # N per unit of the file, default: 1, or the unit in the CSV header; integer WAV: full scale = 1
 #   sensitivity = "2.25 mV/N" instead of scale for files in volts
 
 [[sensor]]                     # once for each sensor
 name = "A"
-channel = 2                    # default: the CSV column called like the sensor
+channel = 2                    # default: the CSV column with the sensor's name
 # scale = 1.0                  # m/s2 per unit of the file (m/s, m, Pa by kind), default as above; negative: mounted the other way
 #   sensitivity = "100 mV/g" instead of scale for files in volts
 position = 0.338               # m
@@ -71,7 +71,7 @@ position = 0.338               # m
 [[recording]]                  # once for each file; the same file may be read in several bands
 file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this file
 # tap = 0.04                   # m, where the hammer strikes, default: not known
-# level = 1                    # how hard it is struck beside the others, for `tapjoint simulate` alone, default: 1
+# level = 1                    # force of the taps relative to the other recordings, only for `tapjoint simulate`, default: 1
 # band = [0, 200]              # Hz, zoom band, default: 0 to sample rate/2.56
 # block = 2048                 # samples, block/2.56 lines are shown; default: what fits the shortest tap
 # at = { A = 0.20 }            # m, sensors moved for this recording, default: none
@@ -82,7 +82,7 @@ file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this
 # date = 2024-05-17            # carried to the outputs, default: none
 #   form = "accelerance" | "mobility" | "receptance" and sensor = "A" where the file holds a frequency response function
 
-#   Or, instead of all [[recording]] tables, natural frequencies that were read elsewhere:
+#   Or, instead of all [[recording]] tables, natural frequencies that were measured elsewhere:
 # [measured]
 # frequencies = [17, 118, 335.625, 628.75, 994.5]   # Hz, ascending
 # modes = [1, 2, 3, 4, 5]      # default 1..n; gaps allowed
@@ -92,22 +92,22 @@ file = "taps.wav"              # WAV, CSV or UFF58, seen from the folder of this
 [analysis]
 # window = "exponential"       # "rectangular" | "hann" | "exponential"; default: rectangular where the tap rings down to 1 % in the block, else exponential
 # reading = "fit"              # how frequencies are read: "fit" (default) | "interpolated" | "line", the paper's way
-# fit_modes = 4                # the first so many modes enter the estimate, default: all
+# fit_modes = 4                # number of modes that enter the estimate, from the first, default: all
 # weights = "measured"         # "measured" (default where uncertainties are known) | "relative": equal relative weights
-# sensor_mass = true           # whether the sensors' masses enter the model, default: true
+# sensor_mass = true           # the sensors' masses enter the model, default: true
 "#;
 
-const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\", and \"ktr\" with model = \"3p\"\n";
-const FIT_LAP: &str = "# fit = [\"kt\", \"kr\"]           # what is estimated, default: the joint's stiffnesses; also \"modulus\", \"density\"\n";
+const FIT_JOINT: &str = "# fit = [\"kt\", \"kr\"]           # estimated quantities, default: the joint's stiffnesses; also \"modulus\", \"density\", and \"ktr\" with model = \"3p\"\n";
+const FIT_LAP: &str = "# fit = [\"kt\", \"kr\"]           # estimated quantities, default: the joint's stiffnesses; also \"modulus\", \"density\"\n";
 const FIT_FREE: &str =
-    "# fit = [\"modulus\"]            # what is estimated, default: modulus; also \"density\"\n";
+    "# fit = [\"modulus\"]            # estimated quantities, default: modulus; also \"density\"\n";
 
-/// What a template says of the frequencies that stand in for a test's own.
-const STAND_IN: &str = "#   Frequencies that stand in for yours, so that this file runs as it is. Fill in [[recording]] above\n\
-                        #   and remove this table, or write frequencies here that were read elsewhere:";
+/// Comment of a template on its example frequencies.
+const STAND_IN: &str = "#   Example frequencies, so that this file runs unchanged. Fill in [[recording]] above and remove this\n\
+                        #   table, or write here the natural frequencies that were measured elsewhere:";
 
-/// A template that runs as it stands: frequencies stand in for the recordings, whose table is there
-/// but commented out.
+/// Returns a template that runs unchanged: it holds example frequencies, and the table of the recordings is
+/// commented out.
 pub fn runnable_template(kind: Assembly) -> String {
     let frequencies = match kind {
         Assembly::Cantilever => "[16.625, 115.25, 323.125, 601.125, 949.25]",
@@ -133,7 +133,7 @@ pub fn runnable_template(kind: Assembly) -> String {
     lines.map(|line| line + "\n").collect()
 }
 
-/// A template that reads these recordings, a table for each.
+/// Returns a template with a table for each of these recordings.
 pub fn template_of(kind: Assembly, files: &[String]) -> String {
     let tables: Vec<String> = files
         .iter()
@@ -143,7 +143,7 @@ pub fn template_of(kind: Assembly, files: &[String]) -> String {
     let Some((head, rest)) = text.split_once(RECORDING) else {
         return text;
     };
-    // The first file takes the place of the example, whose comments stay; the others follow it.
+    // The first file replaces the example, whose comments stay. The others follow it.
     let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
     let rest = rest.split_once('\n').map_or("", |(_, rest)| rest);
     let [first, others @ ..] = tables.as_slice() else {
@@ -154,8 +154,8 @@ pub fn template_of(kind: Assembly, files: &[String]) -> String {
     format!("{head}{first}{comments}\n{others}\n{tail}")
 }
 
-/// A commented test description: every key with its default and unit. It parses as it stands;
-/// replace its numbers by those of the test.
+/// Returns a commented test description: every key with its default and unit. It is valid unchanged; its
+/// values are examples.
 pub fn template(kind: Assembly) -> String {
     let (name, origin, beam, joint, fit) = match kind {
         Assembly::Cantilever => (

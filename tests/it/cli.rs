@@ -183,7 +183,7 @@ fn regress_bad_usage_is_explained() {
         // `run *` where files are.
         (
             &["run", "test.toml", "test.toml"],
-            &["unexpected argument 'test.toml'", "tip: one file at a time"],
+            &["unexpected argument 'test.toml'", "tip: give one file"],
         ),
         (&["inspect", "a.wav", "--hammer", "0"], &["count from 1"]),
         (&["predict"], &["required"]),

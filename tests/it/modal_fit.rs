@@ -90,10 +90,9 @@ fn recover_modal_constants_with_their_signs() {
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_a_free_beam_by_an_analyser_has_its_four_modes() {
-    let Some(folder) = crate::shared::data("modelab_freefree_beam") else {
-        return;
-    };
+    let folder = crate::shared::data("modelab_freefree_beam");
     let (mut frequencies, mut columns) = (Vec::new(), Vec::new());
     for (sensor, name) in ["Hxysv00001.txt", "Hxysv00005.txt"].iter().enumerate() {
         let bytes = std::fs::read(folder.join(name)).unwrap();

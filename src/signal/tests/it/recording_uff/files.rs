@@ -7,21 +7,20 @@ use tapjoint_signal::recording::{
 use super::{data, function, open, samples};
 use crate::recording::assert_message;
 
-fn message(name: &str) -> Option<String> {
-    let path = data(name)?;
+fn message(name: &str) -> String {
+    let path = data(name);
     let message = open(&path).expect_err(name).to_string();
     let file = path.file_name().unwrap().to_string_lossy().into_owned();
-    Some(message[message.find(&file).unwrap()..].to_owned())
+    message[message.find(&file).unwrap()..].to_owned()
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_each_case_is_the_same_as_text_and_in_binary() {
     for case in 1..=8 {
         let name = |form: &str| format!("ufffiles_jl_uff/dataset58_case{case}_{form}.unv");
-        let (Some(text), Some(binary)) = (data(&name("ascii")), data(&name("binary"))) else {
-            return;
-        };
-        let (text, binary) = (function(&text, 1), function(&binary, 1));
+        let text = function(&data(&name("ascii")), 1);
+        let binary = function(&data(&name("binary")), 1);
         let points = if [1, 2, 5, 6].contains(&case) {
             1602
         } else {
@@ -57,16 +56,14 @@ fn val_each_case_is_the_same_as_text_and_in_binary() {
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_a_microphone_as_text_and_in_binary() {
     let names = [
         "pyuff_uff/Sample_UFF58_ascii.uff",
         "pyuff_uff/Sample_UFF58b_bin.uff",
     ];
-    let [Some(text), Some(binary)] = names.map(data) else {
-        return;
-    };
     let [text, binary] =
-        [text, binary].map(|path| open(&path).unwrap_or_else(|error| panic!("{error}")));
+        names.map(|name| open(&data(name)).unwrap_or_else(|error| panic!("{error}")));
     for recording in [&text, &binary] {
         assert_eq!(
             (recording.frames(), recording.sample_rate()),
@@ -88,10 +85,9 @@ fn val_a_microphone_as_text_and_in_binary() {
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_four_accelerometers() {
-    let Some(path) = data("pyuff_uff/MPSTD#Set001_2024_10_08_10_27_07.uff") else {
-        return;
-    };
+    let path = data("pyuff_uff/MPSTD#Set001_2024_10_08_10_27_07.uff");
     let recording = open(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(
         (recording.frames(), recording.sample_rate()),
@@ -127,10 +123,9 @@ fn val_four_accelerometers() {
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_truncated_padded_and_run_together() {
-    let Some(path) = data("pyuff_uff/dataset_milestone_in_header.uff") else {
-        return;
-    };
+    let path = data("pyuff_uff/dataset_milestone_in_header.uff");
     let recording = open(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(recording.frames(), 42);
     assert!(
@@ -164,7 +159,7 @@ fn val_truncated_padded_and_run_together() {
         ),
     ];
     for (name, frames, rate, channel, unit) in cases {
-        let path = data(name).unwrap();
+        let path = data(name);
         let recording = open(&path).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(
             (recording.frames(), recording.sample_rate()),
@@ -178,26 +173,24 @@ fn val_truncated_padded_and_run_together() {
             "{name}"
         );
     }
-    let force = open(&data("ufffiles_jl_uff/dataset58_time.unv").unwrap()).unwrap();
+    let force = open(&data("ufffiles_jl_uff/dataset58_time.unv")).unwrap();
     // Published: 114.833 N, six digits.
     assert!((force.channels()[0].health.peak - 114.833).abs() < 5e-4);
-    let together = open(&data("ufffiles_jl_uff/dataset58_nospacing.uff").unwrap()).unwrap();
+    let together = open(&data("ufffiles_jl_uff/dataset58_nospacing.uff")).unwrap();
     assert_eq!(
         samples(&together)[0][..3],
         [-3.09944e-4, -2.74181e-4, -0.001_156_33]
     );
-    let acceleration =
-        open(&data("pyuff_uff/time-history-not-all-columns-filled.uff").unwrap()).unwrap();
+    let acceleration = open(&data("pyuff_uff/time-history-not-all-columns-filled.uff")).unwrap();
     assert_eq!(samples(&acceleration)[0][12], -5.84096);
-    let sine = open(&data("pyuff_uff/binary8byte.uff").unwrap()).unwrap();
+    let sine = open(&data("pyuff_uff/binary8byte.uff")).unwrap();
     assert_eq!(sine.channels()[0].scale, 9.806_65);
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_files_without_time_series_say_what_they_hold() {
-    let Some(text) = message("pyuff_uff/TestLab 161 164 18 15 82.uff") else {
-        return;
-    };
+    let text = message("pyuff_uff/TestLab 161 164 18 15 82.uff");
     assert_message(
         &text,
         "TestLab 161 164 18 15 82.uff: holds no function (dataset 58), only",
@@ -223,16 +216,15 @@ fn val_files_without_time_series_say_what_they_hold() {
         ),
     ];
     for (name, part) in cases {
-        let text = message(name).unwrap();
+        let text = message(name);
         assert!(text.contains(part), "{text}");
     }
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_functions_that_are_only_listed() {
-    let Some(path) = data("pyuff_uff/sample_dataset58_psd.uff") else {
-        return;
-    };
+    let path = data("pyuff_uff/sample_dataset58_psd.uff");
     let listed = list_datasets(&path).unwrap_or_else(|error| panic!("{error}"));
     let (_, header) = listed.functions().next().expect("a function");
     assert_eq!(
@@ -244,7 +236,7 @@ fn val_functions_that_are_only_listed() {
     let values = function(&path, 1);
     let abscissa = values.abscissa.expect("a stored abscissa");
     assert_eq!((abscissa[3200], values.real[1]), (3200.0, 1.255_863e-6));
-    let path = data("ufffiles_jl_uff/dataset58_coh.unv").unwrap();
+    let path = data("ufffiles_jl_uff/dataset58_coh.unv");
     assert_eq!(function(&path, 1).real.len(), 1600);
 }
 
@@ -252,11 +244,10 @@ fn val_functions_that_are_only_listed() {
 const PEAKS: [f64; 6] = [81.4, 140.67, 175.06, 239.27, 376.2, 463.9];
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_a_hammer_test_and_its_resonances() {
-    let Some(path) = data("ufffiles_jl_uff/dataset58_FRF.unv") else {
-        return;
-    };
-    let utf = data("ufffiles_jl_uff/dataset58_FRF_UTF.unv").unwrap();
+    let path = data("ufffiles_jl_uff/dataset58_FRF.unv");
+    let utf = data("ufffiles_jl_uff/dataset58_FRF_UTF.unv");
     for path in [path, utf] {
         let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(
@@ -283,10 +274,9 @@ fn val_a_hammer_test_and_its_resonances() {
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_other_responses() {
-    let Some(path) = data("pyuff_uff/non_ascii_header.uff") else {
-        return;
-    };
+    let path = data("pyuff_uff/non_ascii_header.uff");
     let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!((found.lines, found.spacing), (6, 25.0 / 128.0));
     let only = &found.responses[0];
@@ -298,7 +288,7 @@ fn val_other_responses() {
         only.values[5],
         num_complex::Complex64::new(3.75037, 2.93363)
     );
-    let path = data("ufffiles_jl_uff/dataset58_ufb.ufb").unwrap();
+    let path = data("ufffiles_jl_uff/dataset58_ufb.ufb");
     let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
     let names: Vec<_> = found.responses.iter().map(|r| r.name.as_str()).collect();
     assert_eq!(names, ["1:+X / 22:+X", "1:+Y / 22:+X"]);
@@ -311,11 +301,10 @@ fn val_other_responses() {
 }
 
 #[test]
+#[ignore = "needs TAPJOINT_DATA"]
 fn val_an_analysers_text_and_its_resonances() {
     for name in ["Hxysv00001", "Hxysv00005"] {
-        let Some(path) = data(&format!("modelab_freefree_beam/{name}.txt")) else {
-            return;
-        };
+        let path = data(&format!("modelab_freefree_beam/{name}.txt"));
         let found = open_frequency_responses(&path).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!((found.lines, found.first_frequency), (51_201, 0.0));
         assert!(

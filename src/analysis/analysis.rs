@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_identify::consistent::ConsistentEstimate;
+use tapjoint_identify::observation::UNPAIRED;
 use tapjoint_identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
 use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
 use tapjoint_signal::modal::ModeReading;
@@ -156,10 +157,44 @@ pub struct ModeResult {
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.
     pub recording: Option<String>,
-    /// What a peak that is no mode is.
-    pub label: Option<String>,
     /// Non-dimensional frequency of an Euler beam (1), where there is a beam.
     pub lambda: Option<f64>,
+}
+
+impl ModeResult {
+    /// A resonance as this recording reads it, without a number.
+    pub(super) fn of(reading: ModeReading, recording: &str) -> Self {
+        ModeResult {
+            mode: None,
+            frequency: reading.frequency,
+            half_line: Some(reading.half_line),
+            std: reading.std,
+            between: None,
+            recording: Some(recording.to_owned()),
+            lambda: None,
+            reading: Some(reading),
+        }
+    }
+
+    /// Returns true unless its reading says that it is no mode.
+    pub(super) fn may_be_mode(&self) -> bool {
+        let reading = self.reading.as_ref();
+        reading.is_none_or(|reading| reading.label.is_none())
+    }
+
+    /// Returns true for a resonance that got no number.
+    pub(super) fn is_unpaired(&self) -> bool {
+        self.mode.is_none() && self.may_be_mode()
+    }
+
+    /// Words for a peak that is no mode: "mains 50 Hz", "unpaired"; `None` for a mode.
+    pub fn label(&self) -> Option<String> {
+        let label = self.reading.as_ref().and_then(|reading| reading.label);
+        match self.mode {
+            Some(_) => None,
+            None => Some(label.map_or(UNPAIRED.to_owned(), |label| label.to_string())),
+        }
+    }
 }
 
 impl Identification {
@@ -279,7 +314,19 @@ pub struct BetweenRecordings {
 }
 
 impl RecordingResult {
-    /// How a mode changes with its amplitude, where it is beyond the uncertainty and large enough to matter.
+    /// Its own readings of resonances, ascending; none without spectra.
+    pub fn readings(&self) -> &[ModeReading] {
+        let spectra = self.measurement.spectra.as_ref();
+        spectra.map_or(&[], |spectra| &spectra.readings)
+    }
+
+    /// Frequencies (Hz) between which it was searched for resonances; `None` without spectra.
+    pub(super) fn looked_at(&self) -> Option<(f64, f64)> {
+        let lines = self.measurement.spectra.as_ref()?.averages.lines;
+        Some((lines.low, lines.high))
+    }
+
+    /// Change of a mode with its amplitude, where it is beyond the uncertainty and large enough to matter.
     pub fn amplitude_change(&self, reading: &ModeReading) -> Option<AmplitudeChange> {
         let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
         let change = AmplitudeChange::of(curve)?;

@@ -1,23 +1,26 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::analysis::{
-    Analysis, BoundPerturbation, Estimate, EstimateMethod, Identification, ModeResult, Perturbation,
+    Analysis, BetweenRecordings, BoundPerturbation, Estimate, EstimateMethod, Identification,
+    ModeResult, Perturbation,
 };
-use super::between_recordings::scatter;
+use super::between_recordings::common_share;
 use super::doubts;
-use super::structure::{StructureDetails, TestedStructure, estimator, predicted_specimen};
+use super::structure::{
+    StructureDetails, TestedStructure, frequencies_of, jointed, predicted_specimen,
+};
 use super::warning::Warning;
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::Beam;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
-use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
+use tapjoint_identify::consistent::ConsistentEstimator;
 use tapjoint_identify::perturbation::{
     average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates, spans_of,
 };
 use tapjoint_identify::{
     Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PairsModel, PredictedMode,
-    Stiffnesses, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
+    Stiffnesses, compare, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
 };
 
 /// How the joint is identified.
@@ -82,13 +85,26 @@ pub fn identify(
         .take(settings.fit_modes.unwrap_or(usize::MAX))
         .collect();
     let mut warnings = Vec::new();
-    let (consistent, refused) = match settings.method {
-        EstimateMethod::Pairs => (None, None),
-        EstimateMethod::Consistent => split(consistently(structure, &settings.details, &used)),
+    let (mut estimator, mut consistent, mut refused) = (None, None, None);
+    if settings.method == EstimateMethod::Consistent {
+        let found = super::structure::estimator(structure, &settings.details, &used);
+        match found.and_then(|found| found.estimate().map(|estimate| (found, estimate))) {
+            Ok((found, estimate)) => {
+                estimator = Some(found);
+                consistent = Some(Box::new(estimate));
+            }
+            Err(error) => refused = Some(error.to_string()),
+        }
+    }
+    let closed = match structure.regression {
+        Some(model) => estimate_joint(model, &structure.beam, &used)
+            .map(|joint| Estimate::Joint(Box::new(joint))),
+        None => estimate_modulus(structure.theory, &structure.beam, &used).map(Estimate::FreeBeam),
     };
-    let (estimator, consistent) = consistent.unzip();
-    let consistent = consistent.map(Box::new);
-    let (estimate, missing) = split(estimate(structure, &used));
+    let (estimate, missing) = match closed {
+        Ok(found) => (Some(found), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
     if let Some(reason) = refused.as_ref().filter(|_| estimate.is_some()) {
         warnings.push(doubts::of_fallback(structure, reason));
     }
@@ -96,10 +112,16 @@ pub fn identify(
         warnings.extend(doubts::of_consistent(found, modes));
     }
     if let Some(Estimate::Joint(joint)) = &estimate {
-        let told = |doubt: &&Doubt| {
-            consistent.is_none() || !matches!(doubt, Doubt::CouplingNotEstablished)
-        };
-        warnings.extend(joint.doubts.iter().filter(told).map(of_doubt));
+        for doubt in &joint.doubts {
+            warnings.extend(match doubt {
+                Doubt::Closure { closure } => Some(Warning::Closure { closure: *closure }),
+                Doubt::CouplingNotEstablished if consistent.is_some() => None,
+                Doubt::CouplingNotEstablished => Some(Warning::CouplingNotEstablished),
+                other => Some(Warning::UnphysicalEstimate {
+                    what: other.to_string(),
+                }),
+            });
+        }
     }
     let reason = match (&consistent, &estimate) {
         (Some(_), _) => None,
@@ -112,14 +134,15 @@ pub fn identify(
         reason,
         prediction: Vec::new(),
         predicted: None,
-        perturbations: perturbations(structure, estimator.as_ref(), (modes, &used), settings),
+        perturbations: perturbations(structure, estimator.as_ref(), modes, &used, settings),
     };
     // An estimate that no joint can have has its warning already; it predicts nothing.
-    match prediction(structure, &found, (&measured, &used), settings) {
-        Ok((prediction, predicted)) => {
+    match prediction(structure, &found, &measured, &used, settings) {
+        Ok(Some((prediction, predicted))) => {
             found.prediction = prediction;
-            found.predicted = predicted;
+            found.predicted = Some(predicted);
         }
+        Ok(None) => {}
         Err(error) => {
             warnings.extend(found.consistent.as_ref().map(|_| Warning::Estimate {
                 code: "no-prediction",
@@ -137,59 +160,35 @@ pub fn identify(
 /// feels the joint most would count least. What no repetition shows, `floor` (1), is added to
 /// every one that was read here.
 pub(super) fn measured_modes(modes: &[ModeResult], floor: f64) -> Vec<MeasuredMode> {
-    let scatter = scatter(modes);
-    let share = |mode: &ModeResult| match mode.reading {
-        Some(_) => scatter.hypot(floor),
-        None => scatter,
-    };
-    modes
-        .iter()
-        .filter_map(|mode| {
-            Some(MeasuredMode {
-                mode: mode.mode?,
-                frequency: mode.frequency,
-                std: mode.std.map(|std| std.hypot(share(mode) * mode.frequency)),
-            })
-        })
-        .collect()
-}
-
-fn consistently(
-    structure: &TestedStructure,
-    details: &StructureDetails,
-    used: &[MeasuredMode],
-) -> Result<(ConsistentEstimator, ConsistentEstimate), IdentifyError> {
-    let estimator = estimator(structure, details, used)?;
-    let estimate = estimator.estimate()?;
-    Ok((estimator, estimate))
-}
-
-fn estimate(structure: &TestedStructure, used: &[MeasuredMode]) -> Result<Estimate, IdentifyError> {
-    match structure.regression {
-        Some(model) => estimate_joint(model, &structure.beam, used)
-            .map(|joint| Estimate::Joint(Box::new(joint))),
-        None => estimate_modulus(structure.theory, &structure.beam, used).map(Estimate::FreeBeam),
+    let between: Vec<BetweenRecordings> = modes.iter().filter_map(|mode| mode.between).collect();
+    let scatter = common_share(&between);
+    let mut measured = Vec::with_capacity(modes.len());
+    for mode in modes {
+        let Some(number) = mode.mode else { continue };
+        let share = match mode.reading {
+            Some(_) => scatter.hypot(floor),
+            None => scatter,
+        };
+        measured.push(MeasuredMode {
+            mode: number,
+            frequency: mode.frequency,
+            std: mode.std.map(|std| std.hypot(share * mode.frequency)),
+        });
     }
-}
-
-/// A result, or the reason why there is none.
-fn split<T>(result: Result<T, IdentifyError>) -> (Option<T>, Option<String>) {
-    match result {
-        Ok(found) => (Some(found), None),
-        Err(error) => (None, Some(error.to_string())),
-    }
+    measured
 }
 
 /// Frequencies of the estimated beam and joint beside the measured ones, and the structure that has them;
-/// nothing where no joint is known.
+/// `None` where no joint is known.
 fn prediction(
     structure: &TestedStructure,
     found: &Identification,
-    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
+    measured: &[MeasuredMode],
+    used: &[MeasuredMode],
     settings: &IdentifySettings,
-) -> Result<(Vec<PredictedMode>, Option<Specimen>), IdentifyError> {
+) -> Result<Option<(Vec<PredictedMode>, Specimen)>, IdentifyError> {
     let Some((beam, joint)) = found.beam_and_joint(structure) else {
-        return Ok((Vec::new(), None));
+        return Ok(None);
     };
     let used = if found.is_answered() { used } else { &[] };
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
@@ -199,14 +198,15 @@ fn prediction(
         settings.method == EstimateMethod::Consistent && found.predicts_with_details(structure);
     let plain = StructureDetails::default();
     let details = if detailed { &settings.details } else { &plain };
-    let held = (&beam, &joint);
     let rows = if detailed {
-        super::structure::predict(structure, details, held, beside, count)?
+        let there = jointed(structure, details).with_beam(&beam);
+        compare(&beam, &frequencies_of(&there, &joint, count)?, beside)
     } else {
         let held = (structure.assembly, &joint);
         predict(structure.theory, &beam, held, beside, count)?
     };
-    Ok((rows, Some(predicted_specimen(structure, details, held))))
+    let specimen = predicted_specimen(structure, details, &beam, &joint);
+    Ok(Some((rows, specimen)))
 }
 
 /// The largest notable misfit of those beyond three standard deviations of their reading. A coarse
@@ -227,16 +227,6 @@ fn misfit(prediction: &[PredictedMode], measured: &[MeasuredMode]) -> Option<War
         error_percent,
         deviations,
     })
-}
-
-fn of_doubt(doubt: &Doubt) -> Warning {
-    match doubt {
-        Doubt::Closure { closure } => Warning::Closure { closure: *closure },
-        Doubt::CouplingNotEstablished => Warning::CouplingNotEstablished,
-        other => Warning::UnphysicalEstimate {
-            what: other.to_string(),
-        },
-    }
 }
 
 /// Points along the beam: enough for five half waves between two of them to look smooth.
@@ -270,20 +260,21 @@ pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
         return Vec::new();
     };
     let positions = positions(&specimen.body);
-    let shape = |mode: usize| {
+    let mut shapes = Vec::with_capacity(modes.len());
+    for (mode, &frequency) in modes.frequencies().iter().enumerate() {
         let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
         let raw: Vec<f64> = raw.collect();
         // A free end is no node, so that its sign fixes that of the shape.
         let sign = raw.last().map_or(1.0, |tip| 1f64.copysign(*tip));
         let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs())) * sign;
-        SampledShape {
+        shapes.push(SampledShape {
             mode: mode + 1,
-            frequency: modes.frequencies()[mode],
+            frequency,
             positions: positions.iter().map(|(x, _)| *x).collect(),
             displacements: raw.iter().map(|value| value / largest).collect(),
-        }
-    };
-    (0..modes.len()).map(shape).collect()
+        });
+    }
+    shapes
 }
 
 /// Places along all beams (m), and where the model is asked for each: a hair inside the beam that is
@@ -296,9 +287,10 @@ fn positions(body: &Body) -> Vec<(f64, f64)> {
     let mut all = Vec::new();
     for beam in beams {
         let end = start + beam.length;
-        let share = |point: usize| point as f64 / (points - 1) as f64;
-        let places = (0..points).map(|point| start + share(point) * beam.length);
-        all.extend(places.map(|x| (x, x.clamp(start + hair, end - hair))));
+        for point in 0..points {
+            let x = start + point as f64 / (points - 1) as f64 * beam.length;
+            all.push((x, x.clamp(start + hair, end - hair)));
+        }
         start = end;
     }
     all
@@ -306,22 +298,26 @@ fn positions(body: &Body) -> Vec<(f64, f64)> {
 
 /// Perturbs what is asked for and can be: first the pair regression, then the consistent estimate.
 /// Neither a free beam nor a joint of which no spring is estimated has anything to perturb.
-pub(super) fn perturbations(
+fn perturbations(
     structure: &TestedStructure,
     consistent: Option<&ConsistentEstimator>,
-    (modes, used): (&[ModeResult], &[MeasuredMode]),
+    modes: &[ModeResult],
+    used: &[MeasuredMode],
     settings: &IdentifySettings,
 ) -> Vec<Perturbation> {
     let frequencies = Frequencies::new(modes, used);
-    let asked = |method: EstimateMethod| settings.perturbed.contains(&method);
-    let pairs = structure
-        .regression
-        .filter(|_| asked(EstimateMethod::Pairs))
-        .and_then(|model| of_pairs(model, &structure.beam, &frequencies, settings));
-    let consistent = consistent
-        .filter(|_| asked(EstimateMethod::Consistent))
-        .and_then(|estimator| of_consistent(estimator, &frequencies, settings));
-    pairs.into_iter().chain(consistent).collect()
+    let mut found = Vec::new();
+    if let Some(model) = structure.regression
+        && settings.perturbed.contains(&EstimateMethod::Pairs)
+    {
+        found.extend(of_pairs(model, &structure.beam, &frequencies, settings));
+    }
+    if let Some(estimator) = consistent
+        && settings.perturbed.contains(&EstimateMethod::Consistent)
+    {
+        found.extend(of_consistent(estimator, &frequencies, settings));
+    }
+    found
 }
 
 /// The frequencies that enter the estimate, with what is known of their errors.
@@ -336,14 +332,14 @@ struct Frequencies {
 
 impl Frequencies {
     fn new(modes: &[ModeResult], used: &[MeasuredMode]) -> Self {
-        let half_line = |measured: &MeasuredMode| {
-            let listed = modes.iter().find(|mode| mode.mode == Some(measured.mode));
-            listed?.half_line
-        };
+        let listed = used.iter().map(|measured| {
+            let mut modes = modes.iter();
+            modes.find(|mode| mode.mode == Some(measured.mode))
+        });
         Self {
             numbers: used.iter().map(|mode| mode.mode).collect(),
             values: used.iter().map(|mode| mode.frequency).collect(),
-            bounds: used.iter().map(half_line).collect(),
+            bounds: listed.map(|mode| mode?.half_line).collect(),
             stds: used.iter().map(|mode| mode.std).collect(),
         }
     }
@@ -357,18 +353,12 @@ fn of_pairs(
 ) -> Option<Perturbation> {
     let estimator = pairs_estimator(model, beam, &frequencies.numbers).ok()?;
     let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
-    let random = random.and_then(|(repetitions, stds)| {
-        monte_carlo(
-            &frequencies.values,
-            stds,
-            repetitions.0,
-            repetitions.1,
-            &estimator,
-        )
-        .ok()
+    let random = random.and_then(|((samples, seed), stds)| {
+        monte_carlo(&frequencies.values, stds, samples, seed, &estimator).ok()
     });
     perturbation(
-        (EstimateMethod::Pairs, random),
+        EstimateMethod::Pairs,
+        random,
         frequencies,
         settings,
         estimator,
@@ -390,7 +380,8 @@ fn of_consistent(
         Some(found.joint)
     });
     perturbation(
-        (EstimateMethod::Consistent, random),
+        EstimateMethod::Consistent,
+        random,
         frequencies,
         settings,
         estimator.stiffnesses_near(&near),
@@ -398,38 +389,32 @@ fn of_consistent(
 }
 
 fn perturbation(
-    (method, random): (EstimateMethod, Option<MonteCarlo>),
+    method: EstimateMethod,
+    random: Option<MonteCarlo>,
     frequencies: &Frequencies,
     settings: &IdentifySettings,
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
 ) -> Option<Perturbation> {
     let nominal = estimator(&frequencies.values)?;
     let uniform = perturb_uniformly(&frequencies.values, &settings.percents, &estimator);
-    let bounds = frequencies.bounds.as_deref();
+    // The estimate under each mode's own bound.
+    let bounds = frequencies.bounds.as_deref().map(|bounds| {
+        let patterns = sign_pattern_estimates(&frequencies.values, bounds, &estimator).ok();
+        let spans = patterns.as_deref();
+        BoundPerturbation {
+            modes: frequencies.numbers.clone(),
+            bounds: bounds.to_vec(),
+            spans: spans.map(|found| spans_of(Some(nominal), found)),
+            cloud: patterns.into_iter().flatten().flatten().collect(),
+            sensitivities: mode_sensitivities(&frequencies.values, bounds, &estimator)
+                .unwrap_or_default(),
+        }
+    });
     Some(Perturbation {
         method,
         averages: average_errors(&nominal, &uniform),
         uniform,
-        bounds: bounds.map(|bounds| of_bounds((nominal, bounds), frequencies, &estimator)),
+        bounds,
         random,
     })
-}
-
-/// The estimate under each mode's own bound.
-fn of_bounds(
-    (nominal, bounds): (Stiffnesses, &[f64]),
-    frequencies: &Frequencies,
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
-) -> BoundPerturbation {
-    let patterns = sign_pattern_estimates(&frequencies.values, bounds, &estimator).ok();
-    let sensitivities = mode_sensitivities(&frequencies.values, bounds, &estimator);
-    BoundPerturbation {
-        modes: frequencies.numbers.clone(),
-        bounds: bounds.to_vec(),
-        spans: patterns
-            .as_ref()
-            .map(|found| spans_of(Some(nominal), found)),
-        cloud: patterns.into_iter().flatten().flatten().collect(),
-        sensitivities: sensitivities.unwrap_or_default(),
-    }
 }

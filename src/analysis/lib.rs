@@ -31,25 +31,24 @@ use std::path::Path;
 use rayon::prelude::*;
 
 pub use amplitude::AmplitudeChange;
-pub use analysis::PipelineError;
 pub use analysis::{
     Analysis, BetweenRecordings, BoundPerturbation, CloseUp, Conditions, Estimate, EstimateMethod,
-    Identification, ModeResult, Overview, Perturbation, RecordingResult, Response,
+    Identification, ModeResult, Overview, Perturbation, PipelineError, RecordingResult, Response,
 };
 pub use checks::together;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use modes::{modes_of_measured, modes_of_recordings};
-pub use observations::observations;
-pub use observations::{diagnose_test, nominal, nominal_with};
-pub use recordings::{FunctionSettings, run_functions};
-pub use recordings::{Wiring, run_wired};
-pub use recordings::{inspect_bare, measure_bare, si_unit};
-pub use structure::{KnownJoint, TestedStructure, tested_structure};
+use modes::{number_loaded, set_aside};
+pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
+use recordings::measure_described;
+pub use recordings::{
+    FunctionSettings, Wiring, inspect_bare, measure_bare, run_functions, run_wired, si_unit,
+};
 pub use structure::{
-    StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
-    structure_details,
+    KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
+    predict_described, structure_details, tested_structure,
 };
 pub use warning::Warning;
 
@@ -74,36 +73,37 @@ pub fn run_test(
     let structure = tested_structure(test);
     let details = structure_details(test, &structure.beam);
     // In parallel, but collected in the description's order, so that of several errors the first is told.
-    let mut recordings = test
-        .recordings
-        .par_iter()
-        .map(|recording| recordings::measure_described(test, recording, place))
-        .collect::<Vec<Result<_, _>>>()
-        .into_iter()
-        .collect::<Result<Vec<_>, _>>()?;
-    let mut warnings: Vec<Warning> = test
-        .warnings
-        .iter()
-        .map(|warning| Warning::Description {
-            text: warning.to_string(),
-        })
+    let (folder, test_file) = place;
+    let measured = test.recordings.par_iter();
+    let measured: Vec<Result<_, _>> = measured
+        .map(|recording| measure_described(test, recording, folder, test_file))
         .collect();
-    warnings.extend(
-        recordings
-            .iter()
-            .flat_map(|r| r.measurement.warnings.iter().cloned()),
-    );
+    let mut recordings: Vec<RecordingResult> = measured.into_iter().collect::<Result<_, _>>()?;
+    let doubts = test.warnings.iter().map(|warning| Warning::Description {
+        text: warning.to_string(),
+    });
+    let mut warnings: Vec<Warning> = doubts.collect();
+    for recording in &recordings {
+        warnings.extend_from_slice(&recording.measurement.warnings);
+    }
     let mut aside = vec![None; recordings.len()];
     let modes = match &test.measured {
         Some(measured) => modes_of_measured(measured, &structure),
         None => {
-            aside = modes::set_aside(test, &recordings);
-            let reference = modes::reference_configuration(&aside);
-            let known = (&structure, &details);
-            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
+            aside = set_aside(test, &recordings);
+            let mut reference: Vec<usize> = (0..recordings.len()).collect();
+            reference.retain(|&index| aside[index].is_none());
+            let (modes, doubts) =
+                modes_of_recordings(&mut recordings, &reference, &structure, &details);
             warnings.extend(doubts);
-            warnings.extend(modes::number_loaded(&mut recordings, &found, test, known));
-            found
+            warnings.extend(number_loaded(
+                &mut recordings,
+                &modes,
+                test,
+                &structure,
+                &details,
+            ));
+            modes
         }
     };
     warnings.extend(checks::of_amplitude(&recordings));

@@ -119,11 +119,11 @@ pub fn measure(
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
     // The band is judged before anything is read: it is the user's typing, not the data.
-    let fits = |problem| MeasureError::Spectral {
+    let trial = lines_for(settings, recording.sample_rate(), recording.duration());
+    let trial = trial.map_err(|problem| MeasureError::Spectral {
         file: recording.name().to_string(),
         problem,
-    };
-    let trial = lines_for(settings, recording.sample_rate(), recording.duration()).map_err(fits)?;
+    })?;
     let mut tap_settings = settings.taps;
     tap_settings.wanted = settings
         .block
@@ -212,10 +212,12 @@ pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
 }
 
 /// Doubts about a recording's spectra.
-pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
+fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let rings = |decay: &DecayCheck| decay.remaining > RUNG_DOWN && decay.remaining > decay.noise;
-    if let Some(decay) = spectra.decay.filter(rings) {
+    if let Some(decay) = spectra.decay
+        && decay.remaining > RUNG_DOWN
+        && decay.remaining > decay.noise
+    {
         warnings.push(Warning::NotRungDown {
             file: file.to_string(),
             remaining: decay.remaining,
@@ -273,10 +275,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Samples of all channels in a range of frames, each channel's mean taken out.
-    pub(super) fn read(
-        &self,
-        range: std::ops::Range<u64>,
-    ) -> Result<Vec<Vec<f64>>, RecordingError> {
+    fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
         let mut channels = self.recording.read_channels(&self.channels, range)?;
         for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
             let mean = self.recording.mean(channel);
@@ -314,7 +313,12 @@ impl<'a> Stage<'a> {
     pub(super) fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
         let quiet = self.quiet()?;
         let checks = self.decay_checks(&quiet)?;
-        let decay = slowest_decay(&checks);
+        // The slowest of the decays that stand above their noise; of none, the slowest of all.
+        let slowest = checks.iter().copied().max_by(|a, b| {
+            let above = (a.remaining > a.noise).cmp(&(b.remaining > b.noise));
+            above.then(a.remaining.total_cmp(&b.remaining))
+        });
+        let decay = slowest.unwrap_or(DecayCheck::NOTHING);
         let window = match self.settings.window {
             None => choose_window(&checks, self.lines.duration),
             Some(WindowKind::Rectangular) => Window::Rectangular,
@@ -406,12 +410,16 @@ impl<'a> Stage<'a> {
             let responses = transforms.split_off(usize::from(self.has_force));
             averager.add(transforms.first().map(Vec::as_slice), &responses);
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
+                // Time zero is moved to the trigger: the slope that the quiet before it puts on the phase is no
+                // background that a fit of few lines could follow.
                 let delay = tap.time - tap.record.start as f64 / rate;
-                kept.extend(
-                    responses
-                        .into_iter()
-                        .map(|x| self.timed_from_trigger(x, delay)),
-                );
+                for mut transform in responses {
+                    for (line, value) in transform.iter_mut().enumerate() {
+                        let turn = TAU * self.lines.frequency(line) * delay;
+                        *value *= Complex64::from_polar(1.0, turn);
+                    }
+                    kept.push(transform);
+                }
             }
         }
         // At least one tap was accepted, or there would be no axis.
@@ -419,16 +427,6 @@ impl<'a> Stage<'a> {
             .finish()
             .unwrap_or_else(|| AveragedSpectra::empty(self.lines));
         Ok((averages, kept))
-    }
-
-    /// A transform with its time zero at the trigger, `delay` (s) into the record: the slope that the
-    /// quiet before it puts on the phase is no background that a fit of few lines could follow.
-    fn timed_from_trigger(&self, mut transform: Vec<Complex64>, delay: f64) -> Vec<Complex64> {
-        for (line, value) in transform.iter_mut().enumerate() {
-            let turn = TAU * self.lines.frequency(line) * delay;
-            *value *= Complex64::from_polar(1.0, turn);
-        }
-        transform
     }
 
     /// Peaks of the composite level over all sensors, read and labelled.
@@ -462,71 +460,45 @@ impl<'a> Stage<'a> {
             .collect();
         let mut readings = read_peaks(&level, &spectra, &peaks, window);
         for (reading, peak) in readings.iter_mut().zip(&peaks) {
-            let gap = |force: &Vec<f64>| is_force_gap(force, &level, peak.index);
-            if averages.force.as_ref().is_some_and(gap) {
+            let force = averages.force.as_deref();
+            if force.is_some_and(|force| is_force_gap(force, &level.level_db, peak.index)) {
                 reading.label = Some(PeakLabel::ForceGap);
             }
-            if let Some(label) =
-                quiet.mains_label(peak.index, averages, window, &self.settings.mains)
-            {
-                *reading = as_mains(reading, self.lines.frequency(peak.index), label);
+            let mains = &self.settings.mains;
+            if let Some(label) = quiet.mains_label(peak.index, averages, window, mains) {
+                // A mains line keeps its line reading and loses what only a resonance has.
+                reading.line_frequency = self.lines.frequency(peak.index);
+                reading.interpolated = None;
+                reading.bound = None;
+                reading.damping_ratio = None;
+                reading.damping_std = None;
+                reading.label = Some(label);
+                reading.prefer(ReadBy::Line);
             }
         }
         readings
     }
 }
 
-/// The slowest of the decays that stand above their noise; of none, the slowest of all.
-fn slowest_decay(checks: &[DecayCheck]) -> DecayCheck {
-    let above = |check: &DecayCheck| check.remaining > check.noise;
-    checks
-        .iter()
-        .copied()
-        .max_by(|a, b| {
-            above(a)
-                .cmp(&above(b))
-                .then(a.remaining.total_cmp(&b.remaining))
-        })
-        .unwrap_or(DecayCheck::NOTHING)
-}
-
 /// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
 /// each). Taps beyond it are left out of them.
 pub(super) const MOST_KEPT: usize = 1 << 24;
 
-/// Whether a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
+/// Returns true if a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
 /// resonates, so the quotient's peak is the force's doing. The force on the peak is compared with that
-/// on its flanks, where the level has fallen by 6 dB.
-fn is_force_gap(force: &[f64], level: &CompositeLevel, peak: usize) -> bool {
-    let foot = level.level_db[peak] - 6.0;
-    let fallen = |line: &usize| level.level_db.get(*line).is_some_and(|&l| l < foot);
-    let left = (0..peak)
-        .rev()
-        .find(fallen)
-        .and_then(|line| force.get(line));
-    let right = (peak..level.level_db.len())
-        .find(fallen)
-        .and_then(|line| force.get(line));
+/// on its flanks, where the level (dB) has fallen by 6 dB.
+fn is_force_gap(force: &[f64], level: &[f64], peak: usize) -> bool {
+    let foot = level[peak] - 6.0;
+    let left = level[..peak].iter().rposition(|&level| level < foot);
+    let right = level[peak..].iter().position(|&level| level < foot);
+    let (Some(left), Some(right)) = (left, right) else {
+        return false;
+    };
     // A gap is lower than either flank; a force that merely falls off is lower than one.
-    match (left, right) {
+    match (force.get(left), force.get(peak + right)) {
         (Some(&left), Some(&right)) => force[peak] < 0.6 * left.min(right),
         _ => false,
     }
-}
-
-/// A mains line keeps its line reading and loses what only a resonance has.
-fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> ModeReading {
-    let mut reading = ModeReading {
-        line_frequency,
-        interpolated: None,
-        bound: None,
-        damping_ratio: None,
-        damping_std: None,
-        label: Some(label),
-        ..reading.clone()
-    };
-    reading.prefer(ReadBy::Line);
-    reading
 }
 
 /// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
@@ -550,8 +522,10 @@ impl FreeDecays {
     /// Reads the decays; `None` where they are too short for a fit.
     pub fn read(stage: &Stage<'_>) -> Result<Option<Self>, RecordingError> {
         let taps: Vec<&Tap> = stage.taps.accepted().collect();
-        let left = |tap: &&Tap| (tap.record.start + stage.gate).saturating_sub(stage.begin(tap));
-        let shortest = taps.iter().map(left).min().unwrap_or(0);
+        let lengths = taps
+            .iter()
+            .map(|tap| (tap.record.start + stage.gate).saturating_sub(stage.begin(tap)));
+        let shortest = lengths.min().unwrap_or(0);
         let samples = match largest_smooth_block(shortest as usize) {
             Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
             _ => return Ok(None),
@@ -561,8 +535,13 @@ impl FreeDecays {
         let mut forces = Vec::new();
         for (number, tap) in taps.into_iter().take(most.max(1)).enumerate() {
             let (decay, force) = stage.decay(tap, samples)?;
+            forces.extend(force.map(|samples| TapForce {
+                tap: number,
+                start: -(samples.len() as f64) / decay.sample_rate,
+                samples,
+                sample_rate: decay.sample_rate,
+            }));
             decays.push(decay);
-            forces.extend(force.map(|samples| stage.tap_force(number, samples)));
         }
         Ok(transformed(stage, samples, decays, forces).ok())
     }
@@ -616,7 +595,12 @@ fn transformed(
     }
     let mut pulses = FreeDecayCollector::new(rate, samples, &band)?;
     for force in &forces {
-        pulses.add_tap(&[wrapped(&force.samples, samples)])?;
+        // The force before time zero stands at the end of the block: on multiples of rate/block a transform
+        // cannot tell a time from one a block later.
+        let kept = force.samples.len().min(samples);
+        let mut block = vec![0.0; samples - kept];
+        block.extend_from_slice(&force.samples[force.samples.len() - kept..]);
+        pulses.add_tap(&[block])?;
     }
     let force_columns = if forces.is_empty() {
         Vec::new()
@@ -629,15 +613,6 @@ fn transformed(
         decays,
         force_columns,
     })
-}
-
-/// What came before time zero, at the end of the block: on multiples of rate/block a transform cannot
-/// tell a time from one a block later.
-fn wrapped(before: &[f64], block: usize) -> Vec<f64> {
-    let kept = before.len().min(block);
-    let mut samples = vec![0.0; block];
-    samples[block - kept..].copy_from_slice(&before[before.len() - kept..]);
-    samples
 }
 
 impl Stage<'_> {
@@ -680,16 +655,6 @@ impl Stage<'_> {
                 .collect(),
         };
         Ok((decay, force))
-    }
-
-    fn tap_force(&self, tap: usize, samples: Vec<f64>) -> TapForce {
-        let sample_rate = self.recording.sample_rate();
-        TapForce {
-            tap,
-            start: -(samples.len() as f64) / sample_rate,
-            samples,
-            sample_rate,
-        }
     }
 }
 

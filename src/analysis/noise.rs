@@ -64,9 +64,11 @@ impl Quiet {
     /// What the noise of the force channel leaves in the transforms of its windowed pulses (N s), on
     /// each line; `None` without a hammer, or where the stretch is too short to tell.
     pub fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
-        let power = noise_power(self.force.clone()?, self.sample_rate, lines)?;
-        let amplitude = |power: f64| (power * self.force_window).sqrt();
-        Some(power.into_iter().map(amplitude).collect())
+        let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
+        for value in &mut noise {
+            *value = (*value * self.force_window).sqrt();
+        }
+        Some(noise)
     }
 
     /// The label of a peak on line `index` that is hum, judged on the response in which it is
@@ -81,10 +83,9 @@ impl Quiet {
         let lines = &averages.lines;
         let frequency = lines.frequency(index);
         near_mains(frequency, lines.half_line(), settings)?;
-        let strength =
-            |s: &usize| averages.responses[*s][index] / averages.responses[*s].iter().sum::<f64>();
-        let strongest =
-            (0..averages.responses.len()).max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
+        let shares = averages.responses.iter();
+        let shares = shares.map(|x| x[index] / x.iter().sum::<f64>()).enumerate();
+        let (strongest, _) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let (sum, _) = self.window_sums(window);
         let within = 2.0 * averages.responses[strongest][index] * self.sample_rate / sum;
         let samples = self.responses.get(strongest)?;

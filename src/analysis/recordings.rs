@@ -6,19 +6,21 @@ use super::analysis::{
 };
 use super::checks::{judge, of_amplitude, together};
 use super::fits::{Candidates, stabilisation};
+use super::frf::form_of_kind;
 use super::measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 use super::modes::modes_of_bare;
 use super::warning::Warning;
 use num_complex::Complex64;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 use tapjoint_description::described::fastened_masses;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, FrfForm, ReadBy, RecordingDescription, Scale, SensorDescription,
-    SensorKind, TestDescription,
+    ChannelPlace, ChannelRef, FrfForm, ReadBy, RecordingDescription, Scale, SensorKind,
+    TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
-use tapjoint_signal::modal::{CompositeLevel, ModeReading, PeakSettings, find_peaks, read_peaks};
+use tapjoint_signal::modal::{CompositeLevel, PeakSettings, find_peaks, read_peaks};
 use tapjoint_signal::recording::{
     Format, FrequencyResponses, ReadSettings, Recording, RecordingError, ResponseForm,
     open_frequency_responses,
@@ -26,45 +28,74 @@ use tapjoint_signal::recording::{
 use tapjoint_signal::spectral::{
     AveragedSpectra, DISPLAY_RATIO, LEAST_BLOCK, Lines, SpectralError, Window,
 };
-use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{TapSettings, TapSource, Taps, find_taps};
 
 /// Pieces of the overview of a recording over time: two for each pixel of a usual picture.
 const OVERVIEW_PIECES: u64 = 2400;
 
-/// Opens and measures one recording of a described test.
+/// Opens and measures one recording of a described test, `test_file`, whose recordings lie in `folder`.
 pub(super) fn measure_described(
     test: &TestDescription,
     description: &RecordingDescription,
-    (folder, test_file): (&Path, &str),
+    folder: &Path,
+    test_file: &str,
 ) -> Result<RecordingResult, PipelineError> {
     let file = description.file.display().to_string();
     if let Some(form) = description.form {
-        return described_functions(test, description, (folder, form));
+        let mut functions = open_frequency_responses(&folder.join(&description.file))?;
+        functions.file = file;
+        let mut sensor = description.sensor.clone();
+        if let ([one], None) = (test.sensors.as_slice(), &sensor) {
+            sensor = Some(one.name.clone());
+        }
+        let settings = FunctionSettings {
+            form: Some(form_of_description(form)),
+            sensor,
+            band: description.band,
+            reading: test.analysis.reading,
+        };
+        let mut result = measure_functions(&functions, &settings)?;
+        result.conditions = conditions(test, description);
+        return Ok(result);
     }
     if test.sensors.is_empty() {
         return Err(PipelineError::NoSensors {
             file: test_file.to_string(),
         });
     }
-    let (recording, source) = open_described(test, description, (folder, test_file))?;
-    let mut settings = MeasureSettings::new(source);
+    let read = ReadSettings {
+        sample_rate: description.sample_rate,
+    };
+    let mut recording = Recording::open(&folder.join(&description.file), &read)?;
+    let mut hammer_index = None;
+    if let Some(hammer) = &test.hammer {
+        let found = channel(&mut recording, &hammer.channel, hammer.scale);
+        hammer_index = Some(found.map_err(|problem| at(problem, test_file, &hammer.place))?);
+    }
+    let (mut channels, mut responses, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
+    for sensor in &test.sensors {
+        let found = channel(&mut recording, &sensor.channel, sensor.scale);
+        channels.push(found.map_err(|problem| at(problem, test_file, &sensor.place))?);
+        responses.push(Response {
+            name: sensor.name.clone(),
+            kind: Some(sensor.kind),
+            unit: Some(si_unit(sensor.kind).to_string()),
+        });
+        kinds.push(form_of_kind(sensor.kind));
+    }
+    let mut settings = MeasureSettings::new(source(hammer_index, channels.clone()));
     settings.band = description.band;
     settings.block = description.block;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
-    settings.kinds = response_kinds(test);
-    let responses = test
-        .sensors
-        .iter()
-        .map(|sensor| Response {
-            name: sensor.name.clone(),
-            kind: Some(sensor.kind),
-            unit: Some(si_unit(sensor.kind).to_string()),
-        })
-        .collect();
-    let hammer_unit = test.hammer.as_ref().map(|_| "N".to_string());
-    let units = described_units(test, &settings.source);
-    let placed = |error| match error {
+    // The hammer's force makes modal constants of the responses.
+    settings.kinds = hammer_index.map_or(Vec::new(), |_| kinds);
+    let named = Named {
+        hammer_unit: hammer_index.map(|_| "N".to_string()),
+        responses,
+    };
+    let finished = finish(recording.renamed(file), settings, named);
+    let mut result = finished.map_err(|error| match error {
         PipelineError::Measure(MeasureError::Spectral { file, problem }) => {
             PipelineError::Setting {
                 file: test_file.to_string(),
@@ -74,106 +105,44 @@ pub(super) fn measure_described(
             }
         }
         other => other,
-    };
-    let mut result =
-        finish(recording.renamed(file), settings, (hammer_unit, responses)).map_err(placed)?;
+    })?;
     result.conditions = conditions(test, description);
+    let units = result
+        .responses
+        .iter()
+        .map(|response| response.unit.clone());
+    let mut units: Vec<(usize, Option<String>)> = channels.into_iter().zip(units).collect();
+    units.extend(hammer_index.map(|channel| (channel, Some("N".to_string()))));
     for (channel, unit) in units {
         if let Some(info) = result.channels.get_mut(channel) {
-            info.unit.get_or_insert_with(|| unit.to_string());
+            info.unit = info.unit.take().or(unit);
         }
     }
     Ok(result)
 }
 
-/// Opens and reads a described file of frequency response functions.
-fn described_functions(
-    test: &TestDescription,
-    description: &RecordingDescription,
-    (folder, form): (&Path, FrfForm),
-) -> Result<RecordingResult, PipelineError> {
-    let mut functions = open_frequency_responses(&folder.join(&description.file))?;
-    functions.file = description.file.display().to_string();
-    let only = |sensors: &[SensorDescription]| match sensors {
-        [one] => Some(one.name.clone()),
-        _ => None,
-    };
-    let settings = FunctionSettings {
-        form: Some(form_of_description(form)),
-        sensor: description.sensor.clone().or_else(|| only(&test.sensors)),
-        band: description.band,
-        reading: test.analysis.reading,
-    };
-    let mut result = measure_functions(&functions, &settings)?;
-    result.conditions = conditions(test, description);
-    Ok(result)
-}
-
-/// What the sensors measure, where the hammer's force makes modal constants of it.
-fn response_kinds(test: &TestDescription) -> Vec<Option<ResponseForm>> {
-    let kind = |sensor: &SensorDescription| match sensor.kind {
-        SensorKind::Acceleration => Some(ResponseForm::Accelerance),
-        SensorKind::Velocity => Some(ResponseForm::Mobility),
-        SensorKind::Displacement => Some(ResponseForm::Receptance),
-        SensorKind::Sound => None,
-    };
-    match &test.hammer {
-        Some(_) => test.sensors.iter().map(kind).collect(),
-        None => Vec::new(),
+/// The error about a channel, with its place in the description.
+fn at(problem: RecordingError, test_file: &str, place: &ChannelPlace) -> PipelineError {
+    PipelineError::Channel {
+        file: test_file.to_string(),
+        line: place.line,
+        key: place.key.clone(),
+        problem: Box::new(problem),
     }
 }
 
-/// The unit that the description gives to each channel's values.
-fn described_units(test: &TestDescription, source: &TapSource) -> Vec<(usize, &'static str)> {
-    let (hammer, responses) = match source {
-        TapSource::Hammer { channel, responses } => (Some((*channel, "N")), responses),
-        TapSource::Responses(responses) => (None, responses),
-    };
-    let sensors = test.sensors.iter().map(|sensor| si_unit(sensor.kind));
-    hammer
-        .into_iter()
-        .chain(responses.iter().copied().zip(sensors))
-        .collect()
-}
-
-/// Opens a described recording, scales its channels, and says which of them are what.
-fn open_described(
-    test: &TestDescription,
-    description: &RecordingDescription,
-    (folder, test_file): (&Path, &str),
-) -> Result<(Recording, TapSource), PipelineError> {
-    let settings = ReadSettings {
-        sample_rate: description.sample_rate,
-    };
-    let mut recording = Recording::open(&folder.join(&description.file), &settings)?;
-    let mut find = |reference: &ChannelRef, scale: Option<Scale>, place: &ChannelPlace| {
-        channel(&mut recording, reference, scale).map_err(|problem| PipelineError::Channel {
-            file: test_file.to_string(),
-            line: place.line,
-            key: place.key.clone(),
-            problem: Box::new(problem),
-        })
-    };
-    let hammer = match &test.hammer {
-        Some(hammer) => Some(find(&hammer.channel, hammer.scale, &hammer.place)?),
-        None => None,
-    };
-    let mut channels = Vec::with_capacity(test.sensors.len());
-    for sensor in &test.sensors {
-        channels.push(find(&sensor.channel, sensor.scale, &sensor.place)?);
-    }
-    Ok((recording, source(hammer, channels)))
-}
-
-/// What the description says of the circumstances of a recording.
+/// Circumstances of a recording, as described.
 fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
-    let place =
-        |sensor: &SensorDescription| Some((sensor.name.clone(), description.place_of(sensor)?));
-    let mass = |sensor: &SensorDescription| Some((sensor.name.clone(), sensor.mass?));
+    let (mut positions, mut masses) = (BTreeMap::new(), BTreeMap::new());
+    for sensor in &test.sensors {
+        let name = || sensor.name.clone();
+        positions.extend(description.place_of(sensor).map(|place| (name(), place)));
+        masses.extend(sensor.mass.map(|mass| (name(), mass)));
+    }
     Conditions {
         tap: description.tap,
-        sensor_positions: test.sensors.iter().filter_map(place).collect(),
-        sensor_masses: test.sensors.iter().filter_map(mass).collect(),
+        sensor_positions: positions,
+        sensor_masses: masses,
         masses: fastened_masses(description),
         torque: description.torque,
         temperature: description.temperature,
@@ -202,10 +171,14 @@ pub fn measure_bare(
     Ok(result)
 }
 
-/// Unit of the hammer channel, where there is one, and the responses.
-type Named = (Option<String>, Vec<Response>);
+/// Channels as a description or the file names them.
+struct Named {
+    /// Unit of the hammer channel, where there is one.
+    hammer_unit: Option<String>,
+    responses: Vec<Response>,
+}
 
-/// Where taps are looked for in a bare recording, and what the file says of its channels.
+/// Channels of a bare recording in which taps are searched, with the names and units that the file gives.
 fn bare_source(
     recording: &Recording,
     hammer: Option<&ChannelRef>,
@@ -213,25 +186,25 @@ fn bare_source(
     let hammer = hammer
         .map(|reference| channel_index(recording, reference))
         .transpose()?;
-    let channels: Vec<usize> = (0..recording.channels().len())
-        .filter(|&c| Some(c) != hammer)
-        .collect();
-    let named = bare_channels(recording, hammer, &channels);
+    let (mut channels, mut responses, mut hammer_unit) = (Vec::new(), Vec::new(), None);
+    for (channel, info) in recording.channels().iter().enumerate() {
+        if Some(channel) == hammer {
+            hammer_unit.clone_from(&info.unit);
+            continue;
+        }
+        let name = info.name.clone();
+        channels.push(channel);
+        responses.push(Response {
+            name: name.unwrap_or_else(|| format!("channel {}", channel + 1)),
+            kind: None,
+            unit: info.unit.clone(),
+        });
+    }
+    let named = Named {
+        hammer_unit,
+        responses,
+    };
     Ok((source(hammer, channels), named))
-}
-
-/// Unit of the hammer channel, and the responses with what the file says of them.
-fn bare_channels(recording: &Recording, hammer: Option<usize>, channels: &[usize]) -> Named {
-    let info = |channel: usize| recording.channels().get(channel);
-    let responses = channels.iter().map(|&channel| Response {
-        name: info(channel)
-            .and_then(|info| info.name.clone())
-            .unwrap_or_else(|| format!("channel {}", channel + 1)),
-        kind: None,
-        unit: info(channel).and_then(|info| info.unit.clone()),
-    });
-    let hammer = hammer.and_then(info).and_then(|info| info.unit.clone());
-    (hammer, responses.collect())
 }
 
 /// Finds the taps of a recording and goes no further: what is in it and what is wrong with it.
@@ -291,7 +264,8 @@ fn channel(
     Ok(index)
 }
 
-pub(super) fn finish(
+/// Measures a recording whose channels are known.
+fn finish(
     recording: Recording,
     settings: MeasureSettings,
     named: Named,
@@ -303,15 +277,19 @@ pub(super) fn finish(
 fn result(
     recording: &Recording,
     settings: &MeasureSettings,
-    (hammer_unit, responses): Named,
+    named: Named,
     measurement: Measurement,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
-    let readings = measurement
-        .spectra
-        .as_ref()
-        .map_or(0, |spectra| spectra.readings.len());
+    let spectra = measurement.spectra.as_ref();
+    let readings = spectra.map_or(0, |spectra| spectra.readings.len());
     let has_hammer = matches!(settings.source, TapSource::Hammer { .. });
+    let responses = named.responses;
+    // Without a hammer the unit that all responses have.
+    let common_unit = responses.first().and_then(|first| {
+        let same = responses.iter().all(|other| other.unit == first.unit);
+        first.unit.clone().filter(|_| same)
+    });
     Ok(RecordingResult {
         file: recording.name().to_string(),
         format: recording.format(),
@@ -321,9 +299,9 @@ fn result(
         has_hammer,
         conditions: Conditions::default(),
         tap_unit: if has_hammer {
-            hammer_unit
+            named.hammer_unit
         } else {
-            common_unit(&responses)
+            common_unit
         },
         responses,
         band: settings.band,
@@ -334,13 +312,6 @@ fn result(
         measurement,
         mode_numbers: vec![None; readings],
     })
-}
-
-/// The unit that all responses have.
-fn common_unit(responses: &[Response]) -> Option<String> {
-    let first = responses.first()?;
-    let same = responses.iter().all(|other| other.unit == first.unit);
-    first.unit.clone().filter(|_| same)
 }
 
 /// The SI unit of what a sensor senses.
@@ -376,14 +347,13 @@ fn overview(recording: &Recording, channel: usize) -> Result<Overview, Recording
     })
 }
 
-/// A channel that is taken for a response, though its name says that it is the hammer's.
-pub(super) fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
-    let is_hammers = |name: &str| {
+/// The warning about a channel that is taken for a response, though its name says that it is the hammer's.
+fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
+    let mut names = recording.responses.iter().map(|response| &response.name);
+    let name = names.find(|name| {
         let name = name.to_lowercase();
         name.contains("hammer") || name.contains("force")
-    };
-    let mut names = recording.responses.iter().map(|response| &response.name);
-    let name = names.find(|name| is_hammers(name))?;
+    })?;
     let argument = match name.contains(char::is_whitespace) {
         true => format!("\"{name}\""),
         false => name.clone(),
@@ -424,22 +394,32 @@ pub fn run_functions(
 }
 
 /// Reads the resonances of frequency response functions.
-pub(super) fn measure_functions(
+fn measure_functions(
     functions: &FrequencyResponses,
     settings: &FunctionSettings,
 ) -> Result<RecordingResult, PipelineError> {
-    let fits = |problem| PipelineError::Functions {
+    let axis = axis(functions, settings.band);
+    let (first, lines) = axis.map_err(|problem| PipelineError::Functions {
         file: functions.file.clone(),
         problem,
-    };
-    let (first, lines) = axis(functions, settings.band).map_err(fits)?;
-    let values: Vec<Vec<Complex64>> = functions
-        .responses
-        .iter()
-        .map(|response| response.values[first..first + lines.points()].to_vec())
-        .collect();
-    let responses = responses(functions, settings);
-    let spectra = spectra(lines, values, (functions, settings));
+    })?;
+    let (mut responses, mut forms, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    for response in &functions.responses {
+        let form = settings.form.or(response.form);
+        let sensor = settings.sensor.as_ref();
+        responses.push(Response {
+            name: sensor.unwrap_or(&response.name).clone(),
+            kind: form.map(|form| match form {
+                ResponseForm::Accelerance => SensorKind::Acceleration,
+                ResponseForm::Mobility => SensorKind::Velocity,
+                ResponseForm::Receptance => SensorKind::Displacement,
+            }),
+            unit: form.map(|form| form.response_unit().to_string()),
+        });
+        forms.push(form);
+        values.push(response.values[first..first + lines.points()].to_vec());
+    }
+    let spectra = spectra_of_functions(lines, values, &forms, settings.reading);
     let warnings = functions.warnings.iter().map(|warning| Warning::Recording {
         code: warning.code(),
         file: functions.file.clone(),
@@ -505,29 +485,12 @@ fn axis(
     Ok((first, lines))
 }
 
-fn responses(functions: &FrequencyResponses, settings: &FunctionSettings) -> Vec<Response> {
-    let one = |response: &tapjoint_signal::recording::FrequencyResponse| {
-        let form = settings.form.or(response.form);
-        Response {
-            name: settings
-                .sensor
-                .clone()
-                .unwrap_or_else(|| response.name.clone()),
-            kind: form.map(|form| match form {
-                ResponseForm::Accelerance => SensorKind::Acceleration,
-                ResponseForm::Mobility => SensorKind::Velocity,
-                ResponseForm::Receptance => SensorKind::Displacement,
-            }),
-            unit: form.map(|form| form.response_unit().to_string()),
-        }
-    };
-    functions.responses.iter().map(one).collect()
-}
-
-fn spectra(
+/// Reads the resonances of functions, each with its form where it is known.
+fn spectra_of_functions(
     lines: Lines,
     values: Vec<Vec<Complex64>>,
-    (functions, settings): (&FrequencyResponses, &FunctionSettings),
+    forms: &[Option<ResponseForm>],
+    wanted: ReadBy,
 ) -> MeasuredSpectra {
     let powers: Vec<Vec<f64>> = values
         .iter()
@@ -538,17 +501,33 @@ fn spectra(
     let peaks = find_peaks(&level, &PeakSettings::default());
     let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
     let stabilisation = stabilisation(lines.low, lines.spacing, &columns);
-    if let Some(data) = modal_data(&lines, &values) {
+    // The fit takes the functions without the line at 0 Hz.
+    let first_fitted = usize::from(lines.low <= 0.0);
+    let basis = Basis::FrequencyResponse {
+        resolution: lines.resolution(),
+    };
+    let fitted = values.iter().enumerate().map(|(sensor, values)| Column {
+        tap: 0,
+        sensor,
+        values: values[first_fitted..].to_vec(),
+    });
+    let frequencies = lines.frequencies().split_off(first_fitted);
+    if let Ok(data) = ModalData::new(basis, frequencies, fitted.collect()) {
         let candidates = Candidates {
             lines: &lines,
             data: &data,
             stabilisation: &stabilisation,
         };
         candidates.fit(&mut readings);
-        add_constants(&mut readings, (functions, settings));
+        // There are modal constants where the form of every function is known.
+        if let Some(forms) = forms.iter().copied().collect::<Option<Vec<ResponseForm>>>() {
+            for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {
+                fit.constants = modal_constants_of_frf(&fit.mode, &forms);
+            }
+        }
     }
     for reading in &mut readings {
-        reading.prefer(settings.reading);
+        reading.prefer(wanted);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     MeasuredSpectra {
@@ -564,38 +543,8 @@ fn spectra(
     }
 }
 
-/// The functions without the line at 0 Hz; `None` where they cannot be fitted.
-fn modal_data(lines: &Lines, values: &[Vec<Complex64>]) -> Option<ModalData> {
-    let first = usize::from(lines.low <= 0.0);
-    let basis = Basis::FrequencyResponse {
-        resolution: lines.resolution(),
-    };
-    let columns = values.iter().enumerate().map(|(sensor, values)| Column {
-        tap: 0,
-        sensor,
-        values: values[first..].to_vec(),
-    });
-    let frequencies = lines.frequencies().split_off(first);
-    ModalData::new(basis, frequencies, columns.collect()).ok()
-}
-
-/// Modal constants, where the form of every function is known.
-fn add_constants(
-    readings: &mut [ModeReading],
-    (functions, settings): (&FrequencyResponses, &FunctionSettings),
-) {
-    let forms = functions.responses.iter();
-    let forms: Option<Vec<ResponseForm>> = forms
-        .map(|response| settings.form.or(response.form))
-        .collect();
-    let Some(forms) = forms else { return };
-    for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {
-        fit.constants = modal_constants_of_frf(&fit.mode, &forms);
-    }
-}
-
 /// The form that a description states.
-pub(super) fn form_of_description(form: FrfForm) -> ResponseForm {
+fn form_of_description(form: FrfForm) -> ResponseForm {
     match form {
         FrfForm::Accelerance => ResponseForm::Accelerance,
         FrfForm::Mobility => ResponseForm::Mobility,
@@ -610,8 +559,8 @@ const AFTER: f64 = 30e-3;
 /// Shown after a second hit (s): its pulse.
 const AFTER_SECOND: f64 = 10e-3;
 
-/// One for each tap.
-pub(super) fn close_ups(
+/// The samples about each tap.
+fn close_ups(
     recording: &Recording,
     source: &TapSource,
     taps: &Taps,
@@ -620,33 +569,31 @@ pub(super) fn close_ups(
         TapSource::Hammer { channel, responses } => (Some(*channel), responses),
         TapSource::Responses(responses) => (None, responses),
     };
-    let channels = (force, responses.first().copied());
-    let shown = |tap: &Tap| {
-        let second = tap.second_hit.map(|second| second.delay + AFTER_SECOND);
-        (tap.time, second.map_or(AFTER, |second| second.max(AFTER)))
-    };
-    let all = taps.taps.iter().map(shown);
-    all.map(|about| close_up(recording, channels, about))
-        .collect()
-}
-
-fn close_up(
-    recording: &Recording,
-    (force, response): (Option<usize>, Option<usize>),
-    (time, after): (f64, f64),
-) -> Result<CloseUp, RecordingError> {
     let rate = recording.sample_rate();
-    let first = ((time - BEFORE) * rate).round().max(0.0) as u64;
-    let last = ((time + after) * rate).round().max(0.0) as u64;
-    let read = |channel| samples(recording, channel, first..last);
-    Ok(CloseUp {
-        start: first as f64 / rate - time,
-        step: 1.0 / rate,
-        force: force.map(read).transpose()?,
-        response: response.map(read).transpose()?,
-    })
+    let mut all = Vec::with_capacity(taps.taps.len());
+    for tap in &taps.taps {
+        let second = tap.second_hit.map(|second| second.delay + AFTER_SECOND);
+        let after = second.map_or(AFTER, |second| second.max(AFTER));
+        let first = ((tap.time - BEFORE) * rate).round().max(0.0) as u64;
+        let last = ((tap.time + after) * rate).round().max(0.0) as u64;
+        let (mut of_force, mut of_response) = (None, None);
+        if let Some(channel) = force {
+            of_force = Some(samples(recording, channel, first..last)?);
+        }
+        if let Some(&channel) = responses.first() {
+            of_response = Some(samples(recording, channel, first..last)?);
+        }
+        all.push(CloseUp {
+            start: first as f64 / rate - tap.time,
+            step: 1.0 / rate,
+            force: of_force,
+            response: of_response,
+        });
+    }
+    Ok(all)
 }
 
+/// Samples of a channel, its mean taken out.
 fn samples(
     recording: &Recording,
     channel: usize,
@@ -678,21 +625,23 @@ pub fn run_wired(
     wiring: &Wiring,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    let (channels, responses): (Vec<usize>, Vec<Response>) =
-        wiring.responses.iter().cloned().unzip();
+    let responses = wiring.responses.iter();
+    let (channels, responses): (Vec<usize>, Vec<Response>) = responses.cloned().unzip();
     let mut settings = MeasureSettings::new(TapSource::Hammer {
         channel: wiring.hammer,
-        responses: channels.clone(),
+        responses: channels,
     });
     adjust(&mut settings);
-    let units = responses.iter().map(|response| response.unit.clone());
-    let units: Vec<Option<String>> = units.collect();
-    let named = (wiring.hammer_unit.clone(), responses);
+    let named = Named {
+        hammer_unit: wiring.hammer_unit.clone(),
+        responses,
+    };
     let mut result = finish(recording, settings, named)?;
-    let stated = channels.into_iter().zip(units);
-    for (channel, unit) in stated.chain([(wiring.hammer, wiring.hammer_unit.clone())]) {
+    let stated = wiring.responses.iter();
+    let stated = stated.map(|(channel, response)| (*channel, &response.unit));
+    for (channel, unit) in stated.chain([(wiring.hammer, &wiring.hammer_unit)]) {
         if let Some(info) = result.channels.get_mut(channel) {
-            info.unit = unit;
+            info.unit.clone_from(unit);
         }
     }
     Ok(analysis_of(result))
@@ -721,7 +670,7 @@ pub(super) fn analysis_of(mut recording: RecordingResult) -> Analysis {
 mod tests {
     use super::*;
     use tapjoint_signal::recording::Channel;
-    use tapjoint_signal::taps::SecondHit;
+    use tapjoint_signal::taps::{SecondHit, Tap};
 
     #[test]
     fn limit_a_close_up_ends_where_the_recording_does() {
@@ -732,18 +681,8 @@ mod tests {
         };
         let channels = vec![channel(0.0), channel(500.0)];
         let recording = Recording::from_samples("taps", 1000.0, channels).expect("samples");
-        let found =
-            |time: f64| close_up(&recording, (Some(0), Some(1)), (time, AFTER)).expect("samples");
-        let lengths = [0.001, 0.050, 0.090].map(|time| found(time).force.map(|force| force.len()));
-        assert_eq!(lengths, [Some(31), Some(32), Some(12)]);
-        let middle = found(0.050);
-        assert!((middle.start + 0.002).abs() < 1e-12, "{}", middle.start);
-        // Of both channels the same frames, each less its mean.
-        assert_eq!(middle.force, middle.response);
-        assert_eq!(middle.force.map(|force| force[0]), Some(48.0 - 49.5));
-        // As far as a second hit, which is why a tap is rejected.
-        let hit = |second_hit| Tap {
-            time: 0.010,
+        let hit = |time, second_hit| Tap {
+            time,
             peak: 1.0,
             pulse_end: None,
             record: 0..100,
@@ -755,15 +694,30 @@ mod tests {
             ratio: 0.6,
         };
         let taps = Taps {
-            taps: vec![hit(None), hit(Some(far))],
+            taps: vec![
+                hit(0.001, None),
+                hit(0.050, None),
+                hit(0.090, None),
+                // As far as a second hit, which is why a tap is rejected.
+                hit(0.010, Some(far)),
+            ],
             noise: 0.0,
             remarks: Vec::new(),
         };
-        let all = close_ups(&recording, &TapSource::Responses(vec![0]), &taps).expect("samples");
-        let lengths: Vec<_> = all
-            .iter()
-            .map(|one| one.response.as_ref().map(Vec::len))
-            .collect();
-        assert_eq!(lengths, [Some(32), Some(47)]);
+        let source = TapSource::Hammer {
+            channel: 0,
+            responses: vec![1],
+        };
+        let all = close_ups(&recording, &source, &taps).expect("samples");
+        let forces: Vec<&Vec<f64>> = all.iter().flat_map(|one| &one.force).collect();
+        let lengths: Vec<usize> = forces.iter().map(|force| force.len()).collect();
+        assert_eq!(lengths, [31, 32, 12, 47]);
+        assert!((all[1].start + 0.002).abs() < 1e-12, "{}", all[1].start);
+        // Of both channels the same frames, each less its mean.
+        assert_eq!(all[1].force, all[1].response);
+        assert_eq!(forces[1][0], 48.0 - 49.5);
+        let alone = close_ups(&recording, &TapSource::Responses(vec![0]), &taps).expect("samples");
+        assert!(alone.iter().all(|one| one.force.is_none()));
+        assert_eq!(alone[3].response.as_ref(), Some(forces[3]));
     }
 }

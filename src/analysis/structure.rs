@@ -7,8 +7,7 @@ use tapjoint_description::described::{
     assembly_of, described_beam, fastened_masses, lap_layout, stiffness_of,
 };
 use tapjoint_description::{
-    FitParameter, JointKind, JointModel, KnownStiffness, RecordingDescription, SensorKind,
-    TestDescription, Weights,
+    FitParameter, JointKind, JointModel, RecordingDescription, SensorKind, TestDescription, Weights,
 };
 use tapjoint_identify::consistent::{
     BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
@@ -65,6 +64,7 @@ impl KnownJoint {
 /// The structure that a test description describes.
 pub fn tested_structure(test: &TestDescription) -> TestedStructure {
     let beam = described_beam(test);
+    let units = StiffnessUnits::of(&beam);
     TestedStructure {
         beam,
         assembly: assembly_of(test.joint.kind),
@@ -75,18 +75,14 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
             (JointKind::Cantilever, JointModel::TwoParameter) => Some(PairsModel::TwoParameter),
             (JointKind::Cantilever, JointModel::ThreeParameter) => Some(PairsModel::ThreeParameter),
         },
-        known: known_joint(test, &beam),
-    }
-}
-
-fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
-    let units = StiffnessUnits::of(beam);
-    let in_units =
-        |known: Option<KnownStiffness>, unit: f64| known.map(|known| stiffness_of(known) / unit);
-    KnownJoint {
-        kx: in_units(test.joint.kt, units.kt),
-        ky: in_units(test.joint.kr, units.kr),
-        cross_compliance: in_units(test.joint.ktr, units.ktr).map(f64::recip),
+        known: KnownJoint {
+            kx: test.joint.kt.map(|kt| stiffness_of(kt) / units.kt),
+            ky: test.joint.kr.map(|kr| stiffness_of(kr) / units.kr),
+            cross_compliance: test
+                .joint
+                .ktr
+                .map(|ktr| (stiffness_of(ktr) / units.ktr).recip()),
+        },
     }
 }
 
@@ -111,16 +107,15 @@ pub struct StructureDetails {
 /// The details of a described test.
 pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetails {
     let tolerance = &test.beam.tolerance;
-    let relative = |std: Option<f64>, value: f64| std.map(|std| std / value);
     StructureDetails {
         lap: lap_layout(test),
         masses: masses_in(test, test.recordings.first()),
         tolerances: BeamTolerances {
-            length: relative(tolerance.length, beam.length),
-            width: relative(tolerance.width, beam.width),
-            thickness: relative(tolerance.thickness, beam.thickness),
-            modulus: relative(tolerance.modulus, beam.modulus),
-            density: relative(tolerance.density, beam.density),
+            length: tolerance.length.map(|std| std / beam.length),
+            width: tolerance.width.map(|std| std / beam.width),
+            thickness: tolerance.thickness.map(|std| std / beam.thickness),
+            modulus: tolerance.modulus.map(|std| std / beam.modulus),
+            density: tolerance.density.map(|std| std / beam.density),
         },
         fit: test.analysis.fit.clone(),
         weights: test.analysis.weights,
@@ -157,39 +152,29 @@ pub fn jointed(structure: &TestedStructure, details: &StructureDetails) -> Joint
     jointed
 }
 
-/// What of the joint is estimated where the description names nothing: all that is not known.
-fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
-    let known = &structure.known;
-    let joint = match structure.regression {
-        None => return vec![Parameter::Modulus],
-        Some(PairsModel::ThreeParameter) => 3,
-        Some(PairsModel::TwoParameter | PairsModel::Lap) => 2,
-    };
-    [
-        (Parameter::Kt, known.kx),
-        (Parameter::Kr, known.ky),
-        (Parameter::Coupling, known.cross_compliance),
-    ]
-    .into_iter()
-    .take(joint)
-    .filter(|(_, known)| known.is_none())
-    .map(|(parameter, _)| parameter)
-    .collect()
-}
-
-/// What is estimated: what the description names, else all of the joint that is not known.
+/// Parameters that are estimated: those the description names, else all of the joint that are not known.
 pub(super) fn fitted(structure: &TestedStructure, details: &StructureDetails) -> Vec<Parameter> {
-    let parameter = |fit: &FitParameter| match fit {
-        FitParameter::Kt => Parameter::Kt,
-        FitParameter::Kr => Parameter::Kr,
-        FitParameter::Ktr => Parameter::Coupling,
-        FitParameter::Modulus => Parameter::Modulus,
-        FitParameter::Density => Parameter::Density,
-    };
-    match &details.fit {
-        Some(fit) => fit.iter().map(parameter).collect(),
-        None => usual_fit(structure),
+    if let Some(fit) = &details.fit {
+        let named = fit.iter().map(|parameter| match parameter {
+            FitParameter::Kt => Parameter::Kt,
+            FitParameter::Kr => Parameter::Kr,
+            FitParameter::Ktr => Parameter::Coupling,
+            FitParameter::Modulus => Parameter::Modulus,
+            FitParameter::Density => Parameter::Density,
+        });
+        return named.collect();
     }
+    let Some(model) = structure.regression else {
+        return vec![Parameter::Modulus];
+    };
+    let known = &structure.known;
+    let mut fit = Vec::new();
+    fit.extend(known.kx.is_none().then_some(Parameter::Kt));
+    fit.extend(known.ky.is_none().then_some(Parameter::Kr));
+    if model == PairsModel::ThreeParameter && known.cross_compliance.is_none() {
+        fit.push(Parameter::Coupling);
+    }
+    fit
 }
 
 fn settings(
@@ -258,9 +243,9 @@ fn hold_cross_stiffness(
         settings.held.coupling = Some(held);
         let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
         // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
-        let spring = |parameter: Parameter, unit: f64| fit.point[parameter as usize].exp() / unit;
-        let product = spring(Parameter::Kt, units.kt) * spring(Parameter::Kr, units.kr);
-        let next = (cross * product.sqrt()).clamp(-LARGEST, LARGEST);
+        let kx = fit.point[Parameter::Kt as usize].exp() / units.kt;
+        let ky = fit.point[Parameter::Kr as usize].exp() / units.kr;
+        let next = (cross * (kx * ky).sqrt()).clamp(-LARGEST, LARGEST);
         let moved = (next - held).abs();
         held = next;
         if moved.is_nan() || moved <= STILL {
@@ -269,20 +254,6 @@ fn hold_cross_stiffness(
     }
     settings.held.coupling = Some(held);
     Ok(())
-}
-
-/// Frequencies of this beam on this joint with everything that is fastened to it, beside the
-/// measured ones.
-pub(super) fn predict(
-    structure: &TestedStructure,
-    details: &StructureDetails,
-    (beam, joint): (&Beam, &JointStiffness),
-    measured: (&[MeasuredMode], &[usize]),
-    count: usize,
-) -> Result<Vec<PredictedMode>, IdentifyError> {
-    let there = jointed(structure, details).with_beam(beam);
-    let frequencies = frequencies_of(&there, joint, count)?;
-    Ok(compare(beam, &frequencies, measured))
 }
 
 /// Frequencies of the described structure on this joint (non-dimensional), with everything that is
@@ -297,8 +268,9 @@ pub fn predict_described(
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
     joint.check()?;
-    let held = (&structure.beam, joint);
-    predict(structure, details, held, (&[], &[]), count)
+    let there = jointed(structure, details).with_beam(&structure.beam);
+    let frequencies = frequencies_of(&there, joint, count)?;
+    Ok(compare(&structure.beam, &frequencies, (&[], &[])))
 }
 
 /// The first natural frequencies (Hz) of a structure on this joint, non-dimensional by its beam.
@@ -329,7 +301,8 @@ pub fn frequencies_of(
 pub(super) fn predicted_specimen(
     structure: &TestedStructure,
     details: &StructureDetails,
-    (beam, joint): (&Beam, &JointStiffness),
+    beam: &Beam,
+    joint: &JointStiffness,
 ) -> Specimen {
     let there = jointed(structure, details).with_beam(beam);
     let units = StiffnessUnits::of(beam);

@@ -157,10 +157,8 @@ impl Warning {
             Warning::Neglected { .. } => "neglected",
         }
     }
-}
 
-impl Warning {
-    /// Whether it concerns the pair regression alone.
+    /// Returns true if it concerns the pair regression alone.
     pub fn is_of_pairs(&self) -> bool {
         match self {
             Warning::Closure { .. } | Warning::UnphysicalEstimate { .. } => true,
@@ -202,8 +200,7 @@ impl fmt::Display for Warning {
                 others,
             } => {
                 write_not_rung_down(f, file, *remaining, *window)?;
-                let percent = |remaining: f64| format!("{:.1} %", 100.0 * remaining);
-                write_others(f, others, percent)
+                write_others(f, others, 100.0, 1, "%")
             }
             Warning::HannOnTaps { file } => write!(
                 f,
@@ -221,8 +218,7 @@ impl fmt::Display for Warning {
                     "{file}: the peak at {frequency:.2} Hz was there before the tap and is taken for \
                      {label}, not for a mode; check the grounding of the sensor cables"
                 )?;
-                let hertz = |frequency: f64| format!("{frequency:.2} Hz");
-                write_others(f, others, hertz)
+                write_others(f, others, 1.0, 2, "Hz")
             }
             Warning::Unpaired { count, text } => {
                 let belong = if *count == 1 {
@@ -236,30 +232,53 @@ impl fmt::Display for Warning {
                 file,
                 changes,
                 others,
-            } => super::amplitude::write_dependence(f, (file, changes), others),
-            Warning::Misfit { .. }
-            | Warning::Closure { .. }
-            | Warning::CouplingNotEstablished
-            | Warning::UnphysicalEstimate { .. }
-            | Warning::NumberedInOrder => self.write_estimate_doubt(f),
+            } => super::amplitude::write_dependence(f, file, changes, others),
+            Warning::Misfit {
+                mode,
+                error_percent,
+                deviations,
+            } => write_misfit(f, *mode, *error_percent, *deviations),
+            Warning::Closure { closure } => write!(
+                f,
+                "the pair regression does not satisfy its own frequency equation: the product it \
+                 implies differs from the product of its estimates by {:+.0} %; the eliminated product \
+                 is left free by the method, and an error of this size means that the stiffnesses are \
+                 not to be trusted singly",
+                100.0 * closure
+            ),
+            Warning::CouplingNotEstablished => f.write_str(
+                "the interval of the cross coupling contains zero: these frequencies do not show one, \
+                 and Kz has no interval; the two-parameter model may do",
+            ),
+            Warning::UnphysicalEstimate { what } => write!(
+                f,
+                "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
+                 mode, a wrong model or readings too coarse for it are the usual causes"
+            ),
+            Warning::NumberedInOrder => f.write_str(
+                "no peak lies near a natural frequency of the described free beam, so the peaks were \
+                 numbered in ascending order; check the beam's dimensions and modulus",
+            ),
         }
     }
 }
 
-/// " (the same of b.wav: 4.5 %, c.wav: 8.8 %)"; nothing of nothing.
+/// " (the same of b.wav: 4.5 %, c.wav: 8.8 %)": values times `factor` in a unit; nothing without others.
 fn write_others(
     f: &mut fmt::Formatter<'_>,
     others: &[(String, f64)],
-    written: impl Fn(f64) -> String,
+    factor: f64,
+    decimals: usize,
+    unit: &str,
 ) -> fmt::Result {
-    let listed: Vec<String> = others
-        .iter()
-        .map(|(file, value)| format!("{file}: {}", written(*value)))
-        .collect();
-    match listed.is_empty() {
-        true => Ok(()),
-        false => write!(f, " (the same of {})", listed.join(", ")),
+    if others.is_empty() {
+        return Ok(());
     }
+    let mut listed = Vec::with_capacity(others.len());
+    for (file, value) in others {
+        listed.push(format!("{file}: {:.decimals$} {unit}", factor * value));
+    }
+    write!(f, " (the same of {})", listed.join(", "))
 }
 
 fn write_not_rung_down(
@@ -285,39 +304,6 @@ fn write_not_rung_down(
             "readings on lines suffer from it; leave the window to the program, or set the taps farther \
              apart",
         ),
-    }
-}
-
-impl Warning {
-    pub(super) fn write_estimate_doubt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Warning::Misfit {
-                mode,
-                error_percent,
-                deviations,
-            } => write_misfit(f, *mode, *error_percent, *deviations),
-            Warning::Closure { closure } => write!(
-                f,
-                "the pair regression does not satisfy its own frequency equation: the product it \
-                 implies differs from the product of its estimates by {:+.0} %; the eliminated product \
-                 is left free by the method, and an error of this size means that the stiffnesses are \
-                 not to be trusted singly",
-                100.0 * closure
-            ),
-            Warning::CouplingNotEstablished => f.write_str(
-                "the interval of the cross coupling contains zero: these frequencies do not show one, \
-                 and Kz has no interval; the two-parameter model may do",
-            ),
-            Warning::UnphysicalEstimate { what } => write!(
-                f,
-                "the regression's answer is not a joint that can exist: {what}; a missing or an extra \
-                 mode, a wrong model or readings too coarse for it are the usual causes"
-            ),
-            _ => f.write_str(
-                "no peak lies near a natural frequency of the described free beam, so the peaks were \
-                 numbered in ascending order; check the beam's dimensions and modulus",
-            ),
-        }
     }
 }
 

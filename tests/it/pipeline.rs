@@ -84,7 +84,8 @@ fn virtual_test(seed: u64) -> VirtualTest {
     let (modes, _) = modes_of_recordings(
         &mut recordings,
         &[0, 1],
-        (&structure, &StructureDetails::default()),
+        &structure,
+        &StructureDetails::default(),
     );
     let (found, _) = identify(&structure, &modes, &IdentifySettings::default());
     let truth = shapes.iter().map(|shape| shape.frequency).collect();
@@ -494,7 +495,7 @@ fn without_mode_1(
             fit,
             ..StructureDetails::default()
         };
-        let (modes, warnings) = modes_of_recordings(&mut found, &[0], (&structure, &details));
+        let (modes, warnings) = modes_of_recordings(&mut found, &[0], &structure, &details);
         let numbers: Vec<usize> = modes.iter().filter_map(|mode| mode.mode).collect();
         let about = |warning: &Warning| {
             let text = warning.to_string();

@@ -7,32 +7,32 @@ use std::fmt;
 use tapjoint_numerics::stats::median;
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
 
-/// A change of the frequency below this share is not worth a word: 0.01 %, a fifth of the smallest
+/// Smallest relative change of a frequency that is reported: 0.01 %, a fifth of the smallest
 /// change that Ingole & Chatterjee perturb frequencies by.
 const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
-/// The same of the damping: 5 %, about what one repeats of a joint's damping.
+/// Smallest relative change of a damping that is reported: 5 %, about the repeatability of a joint's damping.
 const LEAST_DAMPING_CHANGE: f64 = 0.05;
 /// Bounds of a curve up to this many times their median count as well known.
 const USUAL: f64 = 3.0;
 /// Most modes named in one warning; the findings of the report name them all.
 const MOST_NAMED: usize = 1;
 
-/// What a mode does along its decays: values at the largest and at the smallest amplitude at which its
+/// Change of a mode along its decays: values at the largest and at the smallest amplitude at which its
 /// curve is well known.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudeChange {
     /// Peak amplitude of the strongest sensor (`unit`).
     pub amplitude: [f64; 2],
-    /// Unit of the amplitude; `None` where nobody said.
+    /// Unit of the amplitude; `None` where it is not known.
     pub unit: Option<String>,
     /// Frequency (Hz).
     pub frequency: [f64; 2],
-    /// Its 95 % bounds (Hz).
+    /// 95 % bounds of the frequency (Hz).
     pub frequency_bound: [f64; 2],
     /// Damping ratio.
     #[serde(rename = "damping")]
     pub damping_ratio: [f64; 2],
-    /// Its 95 % bounds.
+    /// 95 % bounds of the damping ratio.
     pub damping_bound: [f64; 2],
 }
 

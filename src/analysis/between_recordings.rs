@@ -1,4 +1,4 @@
-//! How far the recordings of one test are apart, beyond what each frequency's own uncertainty explains.
+//! Scatter between the recordings of one test, beyond each frequency's own uncertainty.
 
 use super::analysis::BetweenRecordings;
 use tapjoint_numerics::stats::chi_square_quantile;

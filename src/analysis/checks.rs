@@ -1,4 +1,4 @@
-//! What speaks against a measurement: checks of good practice, modes that change with amplitude, and doubts of several
+//! Doubts about a measurement: checks of good practice, modes that change with amplitude, and doubts of several
 //! recordings as one.
 
 use super::amplitude::{AmplitudeChange, Way};
@@ -65,7 +65,7 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
     })
 }
 
-/// Whether a reading is a mode: it has a number, or none has.
+/// Returns true if a reading is a mode: it has a number, or no reading has one.
 fn is_mode(recording: &RecordingResult, index: usize) -> bool {
     let numbers = &recording.mode_numbers;
     let own = numbers.get(index).copied().flatten();
@@ -117,7 +117,7 @@ const MOST_PLACES: usize = 6;
 
 /// Doubts of one check as one warning: the worst in full, the others by their places. What the taps' own
 /// reasons and the warnings of the spectra say already is left out.
-pub(crate) fn of_quality(verdicts: &[Verdict]) -> Vec<Warning> {
+fn of_quality(verdicts: &[Verdict]) -> Vec<Warning> {
     let mut checks: Vec<(Check, Vec<&Verdict>)> = Vec::new();
     for verdict in verdicts.iter().filter(|verdict| verdict.is_doubt()) {
         let is_said_elsewhere = match verdict.check {

@@ -1,6 +1,6 @@
 //! Doubts about an estimate: what its numbers show, and what it leaves out of the described test.
 
-use super::analysis::{BetweenRecordings, EstimateMethod, ModeResult};
+use super::analysis::{BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult};
 use super::between_recordings::exceeds_noise;
 use super::structure::TestedStructure;
 use super::warning::Warning;
@@ -9,17 +9,54 @@ use tapjoint_description::{FitParameter, SensorDescription, SensorKind, TestDesc
 use tapjoint_identify::consistent::{
     ConsistentEstimate, EstimatedQuantity, Limit, NOTABLE_MISFIT, Quantity, Verdict,
 };
+use tapjoint_identify::{Doubt, MeasuredMode, PredictedMode};
 use tapjoint_numerics::stats::times;
 
-/// What else may be behind a misfit where modes come from several recordings.
+/// Another possible cause of a misfit where modes come from several recordings.
 const BETWEEN: &str = "; recordings taken one after the other differ by more than \
                        single readings";
-/// What is done about it where there is a joint.
+/// Remedy for it where there is a joint.
 const ALLOWED: &str =
     ": the diagnosis of what is missing allows for a joint that drifts between them";
 
-/// Returns every doubt that the numbers of an estimate raise.
-pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
+/// Doubts that the description itself raises.
+pub(super) fn of_description(test: &TestDescription) -> Vec<Warning> {
+    let warnings = test.warnings.iter().map(|warning| Warning::Description {
+        text: warning.to_string(),
+    });
+    warnings.collect()
+}
+
+/// Doubts about the estimates of all methods.
+pub(super) fn of_estimate(
+    structure: &TestedStructure,
+    found: &Identification,
+    modes: &[ModeResult],
+) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    match (&found.consistent, &found.estimate, &found.reason) {
+        (Some(consistent), ..) => warnings.extend(of_consistent(consistent, modes)),
+        (None, Some(_), Some(reason)) => warnings.push(of_fallback(structure, reason)),
+        _ => {}
+    }
+    let Some(Estimate::Joint(joint)) = &found.estimate else {
+        return warnings;
+    };
+    for doubt in &joint.doubts {
+        warnings.extend(match doubt {
+            Doubt::Closure { closure } => Some(Warning::Closure { closure: *closure }),
+            Doubt::CouplingNotEstablished if found.consistent.is_some() => None,
+            Doubt::CouplingNotEstablished => Some(Warning::CouplingNotEstablished),
+            other => Some(Warning::UnphysicalEstimate {
+                what: other.to_string(),
+            }),
+        });
+    }
+    warnings
+}
+
+/// Returns every doubt that the numbers of a consistent estimate raise.
+fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
     let mut doubts: Vec<(&'static str, String)> = Vec::new();
     if let Some(text) = misfit(found) {
         let between: Vec<BetweenRecordings> =
@@ -79,8 +116,34 @@ pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) ->
     warnings
 }
 
+/// The largest misfit of a prediction that is beyond what a beam's stated dimensions usually leave open in its
+/// frequencies, and beyond three standard deviations of its reading. A coarse reading may miss by more than a sharp one
+/// and mean less.
+pub(super) fn of_prediction(
+    prediction: &[PredictedMode],
+    measured: &[MeasuredMode],
+) -> Option<Warning> {
+    let notable = prediction.iter().filter_map(|mode| {
+        let error_percent = mode
+            .error_percent
+            .filter(|e| e.abs() > 100.0 * NOTABLE_MISFIT)?;
+        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
+        let deviations = reading
+            .std
+            .map(|std| (mode.predicted - reading.frequency) / std);
+        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
+        beyond.then_some((mode.mode, error_percent, deviations))
+    });
+    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    worst.map(|(mode, error_percent, deviations)| Warning::Misfit {
+        mode,
+        error_percent,
+        deviations,
+    })
+}
+
 /// The closed form stands in the place of the consistent estimate.
-pub(super) fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning {
+fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning {
     let closed = match structure.regression {
         Some(_) => "the pair regression",
         None => "the closed form",
@@ -218,8 +281,8 @@ fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 
-/// What estimate and prediction leave out. The pair regression stands beside the consistent
-/// estimate in every report, so that its limits are always told.
+/// Effects that estimate and prediction leave out. The pair regression stands beside the consistent
+/// estimate in every report, so that its limits are always listed.
 pub(super) fn of_neglect(
     test: &TestDescription,
     structure: &TestedStructure,
@@ -244,7 +307,7 @@ pub(super) fn of_neglect(
     warnings
 }
 
-/// What only the pair regression leaves out.
+/// A warning about an effect that only the pair regression leaves out.
 fn by_pairs(text: String) -> Warning {
     Warning::Neglected {
         text,
@@ -252,7 +315,7 @@ fn by_pairs(text: String) -> Warning {
     }
 }
 
-/// What the estimate leaves out, or takes otherwise than may have been meant.
+/// A warning about an effect that the estimate leaves out, or takes in another way than may have been meant.
 fn by_estimate(text: String) -> Warning {
     Warning::Neglected {
         text,
@@ -260,7 +323,7 @@ fn by_estimate(text: String) -> Warning {
     }
 }
 
-/// What the pair regression cannot take into account.
+/// Effects that the pair regression cannot take into account.
 fn of_regression(
     test: &TestDescription,
     structure: &TestedStructure,
@@ -273,7 +336,7 @@ fn of_regression(
                 "the pair regression takes an Euler beam (no shear, no rotary inertia); the consistent \
                  estimate and the prediction include both"
             }
-            EstimateMethod::Pairs => {
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
                 "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
                  includes both, so that its errors show what that neglects"
             }
@@ -285,7 +348,7 @@ fn of_regression(
                 "the pair regression cannot hold a stiffness at its known value and estimates all of \
                  them; the consistent estimate and the prediction use the known ones"
             }
-            EstimateMethod::Pairs => {
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
                 "the pair regression cannot hold a stiffness at its known value: it estimates all of \
                  them, and the prediction uses the known ones"
             }
@@ -303,7 +366,7 @@ fn of_regression(
                 "the pair regression takes two equal halves joined in the middle; the consistent estimate \
                  and the prediction take overlap, position and the right half's own properties into account"
             }
-            EstimateMethod::Pairs => {
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
                 "the lap joint's model takes two equal halves joined in the middle: overlap, position and \
                  different properties of the right half are left out"
             }
@@ -382,7 +445,7 @@ fn of_masses(
     }
 }
 
-/// What is fastened in the reference configuration.
+/// The warning about masses fastened in the reference configuration.
 fn of_fastened(
     test: &TestDescription,
     structure: &TestedStructure,
@@ -407,13 +470,13 @@ fn of_fastened(
         (EstimateMethod::Consistent, Some(_)) => by_pairs(format!(
             "{size} {included} the pair regression beside it neglects it"
         )),
-        (EstimateMethod::Pairs, _) => by_estimate(format!(
+        (EstimateMethod::Pairs | EstimateMethod::FreeBeam, _) => by_estimate(format!(
             "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
         )),
     })
 }
 
-/// A mass (kg) in grams with four significant digits, and no zeros that nobody stated.
+/// Returns a mass (kg) in grams with four significant digits, without trailing zeros.
 fn grams(mass: f64) -> f64 {
     let grams = 1e3 * mass;
     format!("{grams:.3e}").parse().unwrap_or(grams)

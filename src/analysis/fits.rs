@@ -18,7 +18,7 @@ use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
 const MOST_EXTRA: usize = 12;
-/// Two modes whose half-power widths are apart by this factor are told by their frequencies alone.
+/// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
 const APART: f64 = 3.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
 /// whose frequency changes while it rings is fitted by two poles of one shape.
@@ -29,7 +29,7 @@ const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
 
-/// What the polyreference fit over the band found.
+/// Result of the polyreference fit over the band.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stabilisation {
     /// The whole band, then the bands about groups of peaks; empty where nothing could be fitted.
@@ -57,9 +57,9 @@ pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) 
 pub(super) struct Candidates<'a> {
     /// The axis of the peak readings.
     pub lines: &'a Lines,
-    /// What is fitted.
+    /// The spectra that are fitted.
     pub data: &'a ModalData,
-    /// What the polyreference fit found.
+    /// Result of the polyreference fit.
     pub stabilisation: &'a Stabilisation,
 }
 
@@ -137,7 +137,7 @@ impl Candidates<'_> {
         }
     }
 
-    /// Where fits begin: peaks first, each at its own reading or at the mode of the polyreference fit
+    /// Starts of the fits: peaks first, each at its own reading or at the mode of the polyreference fit
     /// beside it; the modes without a peak apart, the clearest first.
     fn starts<'m>(
         &self,

@@ -11,7 +11,7 @@ use tapjoint_description::SensorKind;
 use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::{FrfEstimator, LineQuality, Lines, Window, random_error};
 
-/// How frequency response functions are given.
+/// Form and estimator of frequency response functions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FrfSettings {
     /// The estimator that is meant where one is shown. H1.
@@ -27,11 +27,11 @@ pub struct Frf {
     pub recording: String,
     /// Name of the sensor, or of its channel.
     pub response: String,
-    /// Its form; `None` for sound and where the units are not those of a form.
+    /// Form of the function; `None` for sound and where the units are not those of a form.
     pub form: Option<ResponseForm>,
     /// The form in words: "accelerance", "sound pressure per force", "response per force".
     pub form_words: &'static str,
-    /// Its unit: "(m/s2)/N"; says where a channel has none but the file's.
+    /// Unit of the function: "(m/s2)/N"; words where a channel has none but the file's.
     pub unit: String,
     /// The axis.
     pub lines: Lines,
@@ -60,7 +60,7 @@ pub struct Frf {
 pub struct FrfResonance {
     /// Number of the mode; null for a peak that belongs to none.
     pub mode: Option<usize>,
-    /// What a peak that is no mode is.
+    /// Name of a peak that is no mode: "mains 50 Hz".
     pub label: Option<String>,
     /// Best reading of its frequency (Hz).
     pub frequency: f64,
@@ -75,7 +75,7 @@ pub struct FrfResonance {
     pub quality: LineQuality,
 }
 
-/// What keeps frequency response functions from being given.
+/// Reasons for which there are no frequency response functions.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrfError {
     /// No force was recorded.
@@ -98,9 +98,9 @@ pub enum FrfError {
         recording: String,
         /// The sensor.
         response: String,
-        /// What is measured.
+        /// Unit of the measured function.
         unit: String,
-        /// What was asked for.
+        /// The form that was asked for.
         wanted: &'static str,
     },
 }
@@ -149,6 +149,17 @@ pub fn frfs_of(recording: &RecordingResult, settings: &FrfSettings) -> Result<Ve
     Ok(frfs)
 }
 
+/// The unit of a quotient; a unit that is not stated is not invented.
+fn unit_per_force(response: Option<&str>, force: Option<&str>) -> String {
+    match (response, force) {
+        (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
+        (Some(unit), Some(force)) => format!("{unit}/{force}"),
+        (Some(unit), None) => format!("{unit} per unit of the file"),
+        (None, Some(force)) => format!("unit of the file per {force}"),
+        (None, None) => "per unit of the file".to_string(),
+    }
+}
+
 /// The function of one response, without its resonances.
 fn frf(
     recording: &RecordingResult,
@@ -158,14 +169,7 @@ fn frf(
     settings: &FrfSettings,
 ) -> Result<Frf, FrfError> {
     let force_unit = recording.tap_unit.as_deref();
-    // A unit that is not stated is not invented.
-    let measured_unit = match (response.unit.as_deref(), force_unit) {
-        (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
-        (Some(unit), Some(force)) => format!("{unit}/{force}"),
-        (Some(unit), None) => format!("{unit} per unit of the file"),
-        (None, Some(force)) => format!("unit of the file per {force}"),
-        (None, None) => "per unit of the file".to_string(),
-    };
+    let measured_unit = unit_per_force(response.unit.as_deref(), force_unit);
     let measured = form_of(response, force_unit);
     let form = match (measured, settings.form) {
         (None, Some(wanted)) => {

@@ -1,8 +1,9 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::analysis::{
-    Analysis, BetweenRecordings, BoundPerturbation, Estimate, EstimateMethod, Identification,
-    ModeResult, Perturbation,
+    Analysis, AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification,
+    ModeResult, MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
+    SensitivitySection,
 };
 use super::between_recordings::common_share;
 use super::doubts;
@@ -12,24 +13,23 @@ use super::structure::{
 use super::warning::Warning;
 use schemars::JsonSchema;
 use serde::Serialize;
-use tapjoint_beam::Beam;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
 use tapjoint_identify::consistent::ConsistentEstimator;
 use tapjoint_identify::perturbation::{
     average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates, spans_of,
 };
 use tapjoint_identify::{
-    Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PairsModel, PredictedMode,
-    Stiffnesses, compare, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
+    FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PredictedMode, Spread, Stiffnesses,
+    Uncertain, compare, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
 };
 
-/// How the joint is identified.
+/// Settings of the identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifySettings {
     /// Which estimate is the main one: the consistent one, because it satisfies its own frequency
     /// equation.
     pub method: EstimateMethod,
-    /// What the consistent estimate knows beyond beam and joint; nothing.
+    /// Details of the structure beyond beam and joint; none.
     pub details: StructureDetails,
     /// The first so many modes enter; `None` = all.
     pub fit_modes: Option<usize>,
@@ -68,10 +68,6 @@ impl IdentifySettings {
     }
 }
 
-/// A misfit is worth a warning beyond this error (%): what a beam's stated dimensions usually leave
-/// open in its frequencies.
-const NOTABLE_MISFIT: f64 = 100.0 * tapjoint_identify::consistent::NOTABLE_MISFIT;
-
 /// Estimates the joint from numbered modes, predicts with it and perturbs it.
 pub fn identify(
     structure: &TestedStructure,
@@ -84,7 +80,6 @@ pub fn identify(
         .copied()
         .take(settings.fit_modes.unwrap_or(usize::MAX))
         .collect();
-    let mut warnings = Vec::new();
     let (mut estimator, mut consistent, mut refused) = (None, None, None);
     if settings.method == EstimateMethod::Consistent {
         let found = super::structure::estimator(structure, &settings.details, &used);
@@ -105,24 +100,6 @@ pub fn identify(
         Ok(found) => (Some(found), None),
         Err(error) => (None, Some(error.to_string())),
     };
-    if let Some(reason) = refused.as_ref().filter(|_| estimate.is_some()) {
-        warnings.push(doubts::of_fallback(structure, reason));
-    }
-    if let Some(found) = &consistent {
-        warnings.extend(doubts::of_consistent(found, modes));
-    }
-    if let Some(Estimate::Joint(joint)) = &estimate {
-        for doubt in &joint.doubts {
-            warnings.extend(match doubt {
-                Doubt::Closure { closure } => Some(Warning::Closure { closure: *closure }),
-                Doubt::CouplingNotEstablished if consistent.is_some() => None,
-                Doubt::CouplingNotEstablished => Some(Warning::CouplingNotEstablished),
-                other => Some(Warning::UnphysicalEstimate {
-                    what: other.to_string(),
-                }),
-            });
-        }
-    }
     let reason = match (&consistent, &estimate) {
         (Some(_), _) => None,
         (None, Some(_)) => refused,
@@ -136,6 +113,7 @@ pub fn identify(
         predicted: None,
         perturbations: perturbations(structure, estimator.as_ref(), modes, &used, settings),
     };
+    let mut warnings = doubts::of_estimate(structure, &found, modes);
     // An estimate that no joint can have has its warning already; it predicts nothing.
     match prediction(structure, &found, &measured, &used, settings) {
         Ok(Some((prediction, predicted))) => {
@@ -150,7 +128,7 @@ pub fn identify(
             }));
         }
     }
-    warnings.extend(misfit(&found.prediction, &measured));
+    warnings.extend(doubts::of_prediction(&found.prediction, &measured));
     (found, warnings)
 }
 
@@ -194,8 +172,7 @@ fn prediction(
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
     let beside = (measured, &numbers[..]);
-    let detailed =
-        settings.method == EstimateMethod::Consistent && found.predicts_with_details(structure);
+    let detailed = found.method(structure, settings.method) == EstimateMethod::Consistent;
     let plain = StructureDetails::default();
     let details = if detailed { &settings.details } else { &plain };
     let rows = if detailed {
@@ -207,26 +184,6 @@ fn prediction(
     };
     let specimen = predicted_specimen(structure, details, &beam, &joint);
     Ok(Some((rows, specimen)))
-}
-
-/// The largest notable misfit of those beyond three standard deviations of their reading. A coarse
-/// reading may miss by more than a sharp one and mean less.
-fn misfit(prediction: &[PredictedMode], measured: &[MeasuredMode]) -> Option<Warning> {
-    let notable = prediction.iter().filter_map(|mode| {
-        let error_percent = mode.error_percent.filter(|e| e.abs() > NOTABLE_MISFIT)?;
-        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
-        let deviations = reading
-            .std
-            .map(|std| (mode.predicted - reading.frequency) / std);
-        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
-        beyond.then_some((mode.mode, error_percent, deviations))
-    });
-    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-    worst.map(|(mode, error_percent, deviations)| Warning::Misfit {
-        mode,
-        error_percent,
-        deviations,
-    })
 }
 
 /// Points along the beam: enough for five half waves between two of them to look smooth.
@@ -296,28 +253,104 @@ fn positions(body: &Body) -> Vec<(f64, f64)> {
     all
 }
 
-/// Perturbs what is asked for and can be: first the pair regression, then the consistent estimate.
-/// Neither a free beam nor a joint of which no spring is estimated has anything to perturb.
-fn perturbations(
+/// Perturbs what is asked for and can be. Neither a free beam nor a joint of which no spring is estimated has
+/// anything to perturb.
+pub(super) fn perturbations(
     structure: &TestedStructure,
     consistent: Option<&ConsistentEstimator>,
     modes: &[ModeResult],
     used: &[MeasuredMode],
     settings: &IdentifySettings,
-) -> Vec<Perturbation> {
+) -> Perturbations {
     let frequencies = Frequencies::new(modes, used);
-    let mut found = Vec::new();
+    let percents = &settings.percents;
+    let mut found = Perturbations::default();
     if let Some(model) = structure.regression
         && settings.perturbed.contains(&EstimateMethod::Pairs)
+        && let Ok(estimator) = pairs_estimator(model, &structure.beam, &frequencies.numbers)
     {
-        found.extend(of_pairs(model, &structure.beam, &frequencies, settings));
+        let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
+        let random = random.and_then(|((samples, seed), stds)| {
+            monte_carlo(&frequencies.values, stds, samples, seed, &estimator).ok()
+        });
+        add(
+            &mut found,
+            EstimateMethod::Pairs,
+            random,
+            &frequencies,
+            percents,
+            estimator,
+        );
     }
     if let Some(estimator) = consistent
         && settings.perturbed.contains(&EstimateMethod::Consistent)
+        && estimator.estimates_a_spring()
     {
-        found.extend(of_consistent(estimator, &frequencies, settings));
+        let near = estimator.neighbourhood();
+        // Without the uncertainties of all modes there is nothing to draw from.
+        let random = settings.monte_carlo.and_then(|(samples, seed)| {
+            let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
+            Some(found.joint)
+        });
+        let estimator = estimator.stiffnesses_near(&near);
+        add(
+            &mut found,
+            EstimateMethod::Consistent,
+            random,
+            &frequencies,
+            percents,
+            estimator,
+        );
     }
     found
+}
+
+/// Adds the perturbations of one method, if it has an estimate.
+fn add(
+    found: &mut Perturbations,
+    method: EstimateMethod,
+    random: Option<MonteCarlo>,
+    frequencies: &Frequencies,
+    percents: &[f64],
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
+) {
+    let Some(nominal) = estimator(&frequencies.values) else {
+        return;
+    };
+    let uniform = perturb_uniformly(&frequencies.values, percents, &estimator);
+    let averages = average_errors(&nominal, &uniform).into_iter();
+    found.averages.extend(averages.map(|row| AverageSection {
+        method,
+        percent: row.percent,
+        kx_percent: finite(row.mean_magnitude.kx),
+        ky_percent: finite(row.mean_magnitude.ky),
+        kz_percent: row.mean_magnitude.kz.and_then(finite),
+        kx_of_mean_percent: finite(row.of_mean.kx),
+        ky_of_mean_percent: finite(row.of_mean.ky),
+        kz_of_mean_percent: row.of_mean.kz.and_then(finite),
+    }));
+    found
+        .uniform
+        .extend(uniform.into_iter().map(|row| PerturbationSection {
+            percent: row.percent,
+            method,
+            kx: row.estimate.map(|estimate| estimate.kx),
+            ky: row.estimate.map(|estimate| estimate.ky),
+            kz: row.estimate.and_then(|estimate| estimate.kz),
+        }));
+    found.random.extend(random.map(|random| MonteCarloSection {
+        method,
+        samples: random.samples,
+        failed: random.failed,
+        kx: random.kx.map(interval),
+        ky: random.ky.map(interval),
+        kz: random.kz.map(interval),
+        cloud: cloud(&random.cloud),
+    }));
+    if let Some(bounds) = &frequencies.bounds {
+        let section = under_bounds(method, nominal, frequencies, bounds, estimator);
+        found.spans.push(section);
+    }
 }
 
 /// The frequencies that enter the estimate, with what is known of their errors.
@@ -345,76 +378,68 @@ impl Frequencies {
     }
 }
 
-fn of_pairs(
-    model: PairsModel,
-    beam: &Beam,
-    frequencies: &Frequencies,
-    settings: &IdentifySettings,
-) -> Option<Perturbation> {
-    let estimator = pairs_estimator(model, beam, &frequencies.numbers).ok()?;
-    let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
-    let random = random.and_then(|((samples, seed), stds)| {
-        monte_carlo(&frequencies.values, stds, samples, seed, &estimator).ok()
-    });
-    perturbation(
-        EstimateMethod::Pairs,
-        random,
-        frequencies,
-        settings,
-        estimator,
-    )
-}
-
-fn of_consistent(
-    estimator: &ConsistentEstimator,
-    frequencies: &Frequencies,
-    settings: &IdentifySettings,
-) -> Option<Perturbation> {
-    if !estimator.estimates_a_spring() {
-        return None;
-    }
-    let near = estimator.neighbourhood();
-    // Without the uncertainties of all modes there is nothing to draw from.
-    let random = settings.monte_carlo.and_then(|(samples, seed)| {
-        let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
-        Some(found.joint)
-    });
-    perturbation(
-        EstimateMethod::Consistent,
-        random,
-        frequencies,
-        settings,
-        estimator.stiffnesses_near(&near),
-    )
-}
-
-fn perturbation(
+/// The estimate under each mode's own bound (Hz).
+fn under_bounds(
     method: EstimateMethod,
-    random: Option<MonteCarlo>,
+    nominal: Stiffnesses,
     frequencies: &Frequencies,
-    settings: &IdentifySettings,
+    bounds: &[f64],
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
-) -> Option<Perturbation> {
-    let nominal = estimator(&frequencies.values)?;
-    let uniform = perturb_uniformly(&frequencies.values, &settings.percents, &estimator);
-    // The estimate under each mode's own bound.
-    let bounds = frequencies.bounds.as_deref().map(|bounds| {
-        let patterns = sign_pattern_estimates(&frequencies.values, bounds, &estimator).ok();
-        let spans = patterns.as_deref();
-        BoundPerturbation {
-            modes: frequencies.numbers.clone(),
-            bounds: bounds.to_vec(),
-            spans: spans.map(|found| spans_of(Some(nominal), found)),
-            cloud: patterns.into_iter().flatten().flatten().collect(),
-            sensitivities: mode_sensitivities(&frequencies.values, bounds, &estimator)
-                .unwrap_or_default(),
+) -> ResolutionSpanSection {
+    let sensitivities = mode_sensitivities(&frequencies.values, bounds, &estimator);
+    let sensitivities = sensitivities.unwrap_or_default().into_iter();
+    let sensitivities = sensitivities.map(|row| {
+        let (change, slope) = (row.percent_per_bound, row.percent_per_percent);
+        SensitivitySection {
+            mode: frequencies.numbers[row.index],
+            half_line: bounds[row.index],
+            kx_percent: change.map(|change| change.kx),
+            ky_percent: change.map(|change| change.ky),
+            kz_percent: change.and_then(|change| change.kz),
+            kx_percent_per_percent: slope.map(|slope| slope.kx),
+            ky_percent_per_percent: slope.map(|slope| slope.ky),
+            kz_percent_per_percent: slope.and_then(|slope| slope.kz),
         }
     });
-    Some(Perturbation {
+    let section = ResolutionSpanSection {
         method,
-        averages: average_errors(&nominal, &uniform),
-        uniform,
-        bounds,
-        random,
-    })
+        sensitivity: sensitivities.collect(),
+        ..ResolutionSpanSection::default()
+    };
+    // There are no spans of more modes than can be tried.
+    let Ok(patterns) = sign_pattern_estimates(&frequencies.values, bounds, &estimator) else {
+        return section;
+    };
+    let spans = spans_of(Some(nominal), &patterns);
+    let found: Vec<Stiffnesses> = patterns.into_iter().flatten().collect();
+    ResolutionSpanSection {
+        patterns: spans.patterns,
+        failed: spans.failed,
+        kx: spans.kx.map(|span| [span.low, span.high]),
+        ky: spans.ky.map(|span| [span.low, span.high]),
+        kz: spans.kz.map(|span| [span.low, span.high]),
+        cloud: cloud(&found),
+        ..section
+    }
+}
+
+/// A stiffness that is rigid or held has no relative change.
+fn finite(percent: f64) -> Option<f64> {
+    Some(percent).filter(|percent| percent.is_finite())
+}
+
+fn interval(spread: Spread) -> Uncertain {
+    Uncertain {
+        value: spread.median,
+        low: finite(spread.low),
+        high: finite(spread.high),
+        ..Uncertain::default()
+    }
+}
+
+fn cloud(estimates: &[Stiffnesses]) -> Vec<[f64; 2]> {
+    let estimates = estimates.iter();
+    estimates
+        .map(|estimate| [estimate.kx, estimate.ky])
+        .collect()
 }

@@ -28,21 +28,20 @@ mod warning;
 
 use std::path::Path;
 
-use rayon::prelude::*;
-
 pub use amplitude::AmplitudeChange;
 pub use analysis::{
-    Analysis, BetweenRecordings, BoundPerturbation, CloseUp, Conditions, Estimate, EstimateMethod,
-    Identification, ModeResult, Overview, Perturbation, PipelineError, RecordingResult, Response,
+    Analysis, AverageSection, BetweenRecordings, CloseUp, Conditions, Estimate, EstimateMethod,
+    Identification, ModeResult, MonteCarloSection, Overview, PerturbationSection, Perturbations,
+    PipelineError, RecordingResult, ResolutionSpanSection, Response, SensitivitySection,
 };
 pub use checks::together;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use modes::{modes_of_measured, modes_of_recordings};
-use modes::{number_loaded, set_aside};
+use modes::{modes_of_test, set_aside};
 pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
-use recordings::measure_described;
+use recordings::measure_test;
 pub use recordings::{
     FunctionSettings, Wiring, inspect_bare, measure_bare, run_functions, run_wired, si_unit,
 };
@@ -72,39 +71,19 @@ pub fn run_test(
 ) -> Result<Analysis, PipelineError> {
     let structure = tested_structure(test);
     let details = structure_details(test, &structure.beam);
-    // In parallel, but collected in the description's order, so that of several errors the first is told.
-    let (folder, test_file) = place;
-    let measured = test.recordings.par_iter();
-    let measured: Vec<Result<_, _>> = measured
-        .map(|recording| measure_described(test, recording, folder, test_file))
-        .collect();
-    let mut recordings: Vec<RecordingResult> = measured.into_iter().collect::<Result<_, _>>()?;
-    let doubts = test.warnings.iter().map(|warning| Warning::Description {
-        text: warning.to_string(),
-    });
-    let mut warnings: Vec<Warning> = doubts.collect();
+    let mut recordings = measure_test(test, place.0, place.1)?;
+    let mut warnings = doubts::of_description(test);
     for recording in &recordings {
         warnings.extend_from_slice(&recording.measurement.warnings);
     }
     let mut aside = vec![None; recordings.len()];
-    let modes = match &test.measured {
-        Some(measured) => modes_of_measured(measured, &structure),
-        None => {
-            aside = set_aside(test, &recordings);
-            let mut reference: Vec<usize> = (0..recordings.len()).collect();
-            reference.retain(|&index| aside[index].is_none());
-            let (modes, doubts) =
-                modes_of_recordings(&mut recordings, &reference, &structure, &details);
-            warnings.extend(doubts);
-            warnings.extend(number_loaded(
-                &mut recordings,
-                &modes,
-                test,
-                &structure,
-                &details,
-            ));
-            modes
-        }
+    let modes = if let Some(measured) = &test.measured {
+        modes_of_measured(measured, &structure)
+    } else {
+        aside = set_aside(test, &recordings);
+        let (modes, doubts) = modes_of_test(test, &mut recordings, &aside, &structure, &details);
+        warnings.extend(doubts);
+        modes
     };
     warnings.extend(checks::of_amplitude(&recordings));
     let settings = IdentifySettings {
@@ -113,13 +92,7 @@ pub fn run_test(
         ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
-    let known = structure.known.over(None).is_some();
-    let method = match settings.method {
-        EstimateMethod::Consistent if known || identification.consistent.is_some() => {
-            EstimateMethod::Consistent
-        }
-        _ => EstimateMethod::Pairs,
-    };
+    let method = identification.method(&structure, settings.method);
     warnings.extend(doubts::of_neglect(test, &structure, method));
     warnings.extend(doubts);
     let (verdicts, doubts) = checks::judge(&recordings);

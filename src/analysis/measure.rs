@@ -23,10 +23,10 @@ use tapjoint_signal::spectral::{
 };
 use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
 
-/// How one recording is analysed.
+/// Settings of the measurement of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasureSettings {
-    /// Where taps are looked for; its response channels are the ones analysed.
+    /// Channels in which taps are searched; the responses among them are analysed.
     pub source: TapSource,
     /// Zoom band (Hz); `None` = 0 to rate/2.56.
     pub band: Option<(f64, f64)>,
@@ -34,16 +34,16 @@ pub struct MeasureSettings {
     pub block: Option<usize>,
     /// Window; `None` = by the decay in the record.
     pub window: Option<WindowKind>,
-    /// How natural frequencies are read.
+    /// Way in which natural frequencies are read.
     pub reading: ReadBy,
-    /// What each response measures, for modal constants; `None` where nobody said, or it is no motion in
+    /// Form of each response, for modal constants; `None` where it is not known, or no motion in
     /// SI units over a force in N.
     pub kinds: Vec<Option<ResponseForm>>,
-    /// How taps are judged.
+    /// Limits for taps.
     pub taps: TapSettings,
-    /// What counts as a resonance.
+    /// Limits for resonances.
     pub peaks: PeakSettings,
-    /// What counts as a mains line.
+    /// Limits for mains lines.
     pub mains: MainsSettings,
 }
 
@@ -64,14 +64,14 @@ impl MeasureSettings {
     }
 }
 
-/// What one recording tells.
+/// Taps and spectra of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     /// The taps, accepted and rejected.
     pub taps: Taps,
     /// Averages over the accepted taps and what was read from them; `None` without an accepted tap.
     pub spectra: Option<MeasuredSpectra>,
-    /// What a reader has to know.
+    /// Everything that a reader of the results has to know.
     pub warnings: Vec<Warning>,
 }
 
@@ -86,14 +86,14 @@ pub struct MeasuredSpectra {
     pub decay: Option<DecayCheck>,
     /// Resonances and mains lines, ascending.
     pub readings: Vec<ModeReading>,
-    /// What the noise of the force channel leaves in its windowed transforms, line by line (N s); `None`
+    /// Noise of the force channel in its windowed transforms, line by line (N s); `None`
     /// without a hammer or a quiet stretch before the first tap.
     pub force_noise: Option<Vec<f64>>,
-    /// What the polyreference fit found.
+    /// Result of the polyreference fit.
     pub stabilisation: Stabilisation,
 }
 
-/// What stops a measurement.
+/// Reasons for which a measurement stops.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// The recording could not be read.
@@ -104,7 +104,7 @@ pub enum MeasureError {
     Spectral {
         /// The recording.
         file: String,
-        /// What does not fit.
+        /// The problem.
         problem: SpectralError,
     },
 }
@@ -130,33 +130,25 @@ pub fn measure(
         .map(|_| trial.block as f64 / (DISPLAY_RATIO * (trial.high - trial.low)));
     let taps = find_taps(recording, &settings.source, &tap_settings)?;
     let mut warnings = of_recording(recording, &settings.source, &taps);
-    let Some(shortest) = taps.shortest() else {
-        return Ok(Measurement {
-            taps,
-            spectra: None,
-            warnings,
-        });
-    };
-    let available = shortest as f64 / recording.sample_rate();
-    let lines = match lines_for(settings, recording.sample_rate(), available) {
-        Ok(lines) => lines,
-        // The file would do, but its taps come too soon: data, not typing.
-        Err(problem) => {
-            let file = recording.name().to_string();
-            warnings.push(Warning::TapsTooShort { file, problem });
-            return Ok(Measurement {
-                taps,
-                spectra: None,
-                warnings,
-            });
+    let mut spectra = None;
+    if let Some(shortest) = taps.shortest() {
+        let available = shortest as f64 / recording.sample_rate();
+        match lines_for(settings, recording.sample_rate(), available) {
+            Ok(lines) => {
+                let found = Stage::new(recording, settings, &taps, lines).spectra()?;
+                warnings.extend(of_spectra(recording.name(), &found));
+                spectra = Some(found);
+            }
+            // The file would do, but its taps come too soon: data, not typing.
+            Err(problem) => warnings.push(Warning::TapsTooShort {
+                file: recording.name().to_string(),
+                problem,
+            }),
         }
-    };
-    let stage = Stage::new(recording, settings, &taps, lines);
-    let spectra = stage.spectra()?;
-    warnings.extend(of_spectra(recording.name(), &spectra));
+    }
     Ok(Measurement {
         taps,
-        spectra: Some(spectra),
+        spectra,
         warnings,
     })
 }
@@ -243,21 +235,21 @@ fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
     warnings
 }
 
-/// What every step of one recording's measurement needs.
-pub(super) struct Stage<'a> {
-    pub(super) recording: &'a Recording,
-    pub(super) settings: &'a MeasureSettings,
-    pub(super) taps: &'a Taps,
-    pub(super) lines: Lines,
+/// Data that every step of one recording's measurement needs.
+struct Stage<'a> {
+    recording: &'a Recording,
+    settings: &'a MeasureSettings,
+    taps: &'a Taps,
+    lines: Lines,
     /// Force first, where there is one, then the responses.
-    pub(super) channels: Vec<usize>,
-    pub(super) has_force: bool,
+    channels: Vec<usize>,
+    has_force: bool,
     /// Frames of a block.
-    pub(super) gate: u64,
+    gate: u64,
 }
 
 impl<'a> Stage<'a> {
-    pub(super) fn new(
+    fn new(
         recording: &'a Recording,
         settings: &'a MeasureSettings,
         taps: &'a Taps,
@@ -310,7 +302,7 @@ impl<'a> Stage<'a> {
         })
     }
 
-    pub(super) fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
+    fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
         let quiet = self.quiet()?;
         let checks = self.decay_checks(&quiet)?;
         // The slowest of the decays that stand above their noise; of none, the slowest of all.
@@ -482,7 +474,7 @@ impl<'a> Stage<'a> {
 
 /// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
 /// each). Taps beyond it are left out of them.
-pub(super) const MOST_KEPT: usize = 1 << 24;
+const MOST_KEPT: usize = 1 << 24;
 
 /// Returns true if a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
 /// resonates, so the quotient's peak is the force's doing. The force on the peak is compared with that
@@ -503,11 +495,11 @@ fn is_force_gap(force: &[f64], level: &[f64], peak: usize) -> bool {
 
 /// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
 const AFTER_TRIGGER: f64 = 5e-3;
-/// Fewest samples of a decay that is worth a fit: some 16 lines for a mode and what surrounds it.
+/// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
 const LEAST_SAMPLES: u64 = 64;
 
 /// Decays of all taps, and what of them is fitted.
-pub(super) struct FreeDecays {
+struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
     pub data: ModalData,
     /// Force of each tap; empty without a hammer.
@@ -546,7 +538,7 @@ impl FreeDecays {
         Ok(transformed(stage, samples, decays, forces).ok())
     }
 
-    /// What the polyreference fit reads, each column on the same lines: with a hammer the response of
+    /// Columns of the polyreference fit, all on the same lines: with a hammer the response of
     /// every sensor to the force, H = sum conj(F) X/sum |F|^2 over the taps; without one every tap's
     /// transforms.
     pub fn functions(&self) -> Vec<Vec<Complex64>> {
@@ -660,11 +652,7 @@ impl Stage<'_> {
 
 /// Adds to the fits what needs the decays themselves: modal constants, and frequency and damping against
 /// amplitude.
-pub(super) fn complete(
-    readings: &mut [ModeReading],
-    decays: &FreeDecays,
-    kinds: &[Option<ResponseForm>],
-) {
+fn complete(readings: &mut [ModeReading], decays: &FreeDecays, kinds: &[Option<ResponseForm>]) {
     let fitted: Vec<&mut FittedReading> = readings
         .iter_mut()
         .filter_map(|reading| reading.fit.as_deref_mut())

@@ -34,12 +34,12 @@ const FREE_BEAM_RANGE: f64 = 0.2;
 /// of a usual bar.
 const FREE_BEAM_TOLERANCE: f64 = 0.04;
 
-/// What another sensor position or tap level moves a frequency at most, relative: 24 g at the end of a
+/// Largest relative change of a frequency by another sensor position or tap level: 24 g at the end of a
 /// usual bar are 3 %, a joint that softens by 15 % at the hardest tap 4 %. Bending modes are farther
 /// apart.
 const OTHER_CONFIGURATION: f64 = 0.05;
 
-/// So many modes of a free beam are looked for.
+/// Number of modes of a free beam among which peaks are numbered.
 const FREE_BEAM_MODES: usize = 30;
 
 /// Returns how each recording differs from the first, so that it is left out of the list of modes; `None` where it
@@ -87,6 +87,22 @@ fn median_force(recording: &RecordingResult) -> Option<f64> {
         .collect();
     peaks.sort_by(f64::total_cmp);
     peaks.get(peaks.len() / 2).copied()
+}
+
+/// Merges and numbers the readings of the recordings that are not set `aside`, and numbers the readings of all others.
+pub(super) fn modes_of_test(
+    test: &TestDescription,
+    recordings: &mut [RecordingResult],
+    aside: &[Option<String>],
+    structure: &TestedStructure,
+    details: &StructureDetails,
+) -> (Vec<ModeResult>, Vec<Warning>) {
+    let mut reference: Vec<usize> = (0..recordings.len()).collect();
+    reference.retain(|&index| aside[index].is_none());
+    let (modes, mut warnings) = modes_of_recordings(recordings, &reference, structure, details);
+    let doubts = number_loaded(recordings, &modes, test, structure, details);
+    warnings.extend(doubts);
+    (modes, warnings)
 }
 
 /// Merges the readings of the `reference` recordings and numbers them; every recording's own
@@ -499,7 +515,7 @@ fn words(numbering: &Numbering, peaks: &[MeasuredPeak]) -> String {
 /// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
 /// which these masses take the reference configuration's modes. Where that is not known they lose the numbers
 /// that their neighbours of the reference gave them: a heavy mass takes a mode to another's place.
-pub(super) fn number_loaded(
+fn number_loaded(
     recordings: &mut [RecordingResult],
     modes: &[ModeResult],
     test: &TestDescription,

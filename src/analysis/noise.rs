@@ -61,7 +61,7 @@ impl Quiet {
             .collect()
     }
 
-    /// What the noise of the force channel leaves in the transforms of its windowed pulses (N s), on
+    /// Noise of the force channel in the transforms of its windowed pulses (N s), on
     /// each line; `None` without a hammer, or where the stretch is too short to tell.
     pub fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
         let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
@@ -105,7 +105,7 @@ impl Quiet {
     }
 }
 
-/// Where the pulse of a tap lies in its record (samples): zero before `start`, unity for `length`
+/// Window about the pulse of a tap in its record (samples): zero before `start`, unity for `length`
 /// from there, a taper of the pulse's own length after it.
 #[derive(Clone, Copy)]
 pub(super) struct PulseWindow {

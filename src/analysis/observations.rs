@@ -191,16 +191,16 @@ fn extra_peaks(recording: &RecordingResult) -> Vec<ExtraPeak> {
     peaks
 }
 
-/// What each of length, thickness, modulus and density adds to the uncertainty of all frequencies where
+/// Share of each of length, thickness, modulus and density in the uncertainty of all frequencies, where
 /// its own is not stated (1): all four together 0.2 %, as [`GapSettings::scale_std`].
 const USUAL_SHARE: f64 = 0.001;
 
-/// Where the search for the joint begins if the frequencies gave no estimate: Kx and Ky (1) of the
+/// Start of the search for the joint if the frequencies gave no estimate: Kx and Ky (1) of the
 /// bolted cantilever of Ingole & Chatterjee.
 const USUAL_JOINT: [f64; 2] = [1400.0, 4.8];
 /// Stiffnesses beyond this (1) hold a beam like a wall; a search that begins further out does not move.
 const STIFFEST_START: f64 = 1e5;
-/// Where a usual stiffness would make the coupling with the described Ktr stronger than a joint can have, the
+/// Start of the coupling (1) where a usual stiffness would make it, with the described Ktr, stronger than a joint can have: the
 /// search begins here (1): the end of what the diagnosis searches.
 const STRONGEST_START: f64 = 0.95;
 
@@ -255,7 +255,7 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
     }
 }
 
-/// Where the search for the joint begins: known stiffnesses, else those found, else usual ones; and the
+/// Start of the search for the joint: known stiffnesses, else those found, else usual ones; and the
 /// coupling, where the joint's model has one.
 fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
     if test.joint.kind == JointKind::Free {

@@ -80,7 +80,7 @@ impl<'a> ModeSeen<'a> {
         }
     }
 
-    /// Whether its frequency is that of these taps, and not of the whole recording.
+    /// Returns true if its frequency is that of these taps, and not of the whole recording.
     pub fn is_of_taps(&self) -> bool {
         !self.frequency.taps.is_empty()
     }
@@ -324,18 +324,18 @@ fn ratios(
 /// little.
 const SCATTER_LEVEL: f64 = 0.05;
 /// Fewer taps say nothing of their scatter.
-pub(super) const LEAST_TAPS: usize = 3;
+const LEAST_TAPS: usize = 3;
 /// With more degrees of freedom than this Student's t is as good as normal: 2 % wider at 100.
 const KNOWN: f64 = 100.0;
 
-/// What repeated taps say of one quantity.
+/// One quantity by repeated taps.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
     /// Number of the tap, its value and that value's standard uncertainty from noise.
     pub taps: Vec<(usize, f64, f64)>,
-    /// What the noise alone says of all of them.
+    /// Value with the uncertainty by noise alone.
     pub by_noise: Observed,
-    /// Whether they scatter more than that.
+    /// True if the taps scatter more than noise explains.
     pub scattered: bool,
 }
 
@@ -520,9 +520,9 @@ fn unit_deviations(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// What the hammer's noise leaves in a ratio to its force (1, relative).
+/// Error of a ratio to the force by the hammer's noise (1, relative).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ForceNoise {
+struct ForceNoise {
     /// At random: it shows in the scatter of the taps as well.
     random: f64,
     /// In common.
@@ -530,12 +530,12 @@ pub(super) struct ForceNoise {
 }
 
 impl ForceNoise {
-    pub(super) const NONE: ForceNoise = ForceNoise {
+    const NONE: ForceNoise = ForceNoise {
         random: 0.0,
         common: 0.0,
     };
 
-    /// Of n taps: r/sqrt(2 n), the half of the noise's power that is in phase, and r^2, by which the mean square of a
+    /// The error for n taps: r/sqrt(2 n), the half of the noise's power that is in phase, and r^2, by which the mean square of a
     /// noisy force is too large. r is the noise over the force without it, whose root mean squares are given (N s).
     ///
     /// `None` where there is no more than noise.
@@ -549,7 +549,7 @@ impl ForceNoise {
     }
 
     /// The standard uncertainty of a value with that of its taps.
-    pub(super) fn added_to(self, std: f64, value: f64) -> f64 {
+    fn added_to(self, std: f64, value: f64) -> f64 {
         std.max(self.random * value.abs())
             .hypot(self.common * value)
     }

@@ -11,6 +11,7 @@ use super::measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement
 use super::modes::modes_of_bare;
 use super::warning::Warning;
 use num_complex::Complex64;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
@@ -33,16 +34,30 @@ use tapjoint_signal::taps::{TapSettings, TapSource, Taps, find_taps};
 /// Pieces of the overview of a recording over time: two for each pixel of a usual picture.
 const OVERVIEW_PIECES: u64 = 2400;
 
-/// Opens and measures one recording of a described test, `test_file`, whose recordings lie in `folder`.
-pub(super) fn measure_described(
+/// Opens and measures the recordings of a described test, `test_file`, which lie in `folder`.
+pub(super) fn measure_test(
+    test: &TestDescription,
+    folder: &Path,
+    test_file: &str,
+) -> Result<Vec<RecordingResult>, PipelineError> {
+    // In parallel, but collected in the description's order, so that of several errors the first is reported.
+    let recordings = test.recordings.par_iter();
+    let results: Vec<Result<_, _>> = recordings
+        .map(|recording| measure_described(test, recording, folder, test_file))
+        .collect();
+    results.into_iter().collect()
+}
+
+fn measure_described(
     test: &TestDescription,
     description: &RecordingDescription,
     folder: &Path,
     test_file: &str,
 ) -> Result<RecordingResult, PipelineError> {
+    let path = folder.join(&description.file);
     let file = description.file.display().to_string();
     if let Some(form) = description.form {
-        let mut functions = open_frequency_responses(&folder.join(&description.file))?;
+        let mut functions = open_frequency_responses(&path)?;
         functions.file = file;
         let mut sensor = description.sensor.clone();
         if let ([one], None) = (test.sensors.as_slice(), &sensor) {
@@ -58,43 +73,27 @@ pub(super) fn measure_described(
         result.conditions = conditions(test, description);
         return Ok(result);
     }
+    let read = ReadSettings {
+        sample_rate: description.sample_rate,
+    };
     if test.sensors.is_empty() {
         return Err(PipelineError::NoSensors {
             file: test_file.to_string(),
         });
     }
-    let read = ReadSettings {
-        sample_rate: description.sample_rate,
-    };
-    let mut recording = Recording::open(&folder.join(&description.file), &read)?;
-    let mut hammer_index = None;
-    if let Some(hammer) = &test.hammer {
-        let found = channel(&mut recording, &hammer.channel, hammer.scale);
-        hammer_index = Some(found.map_err(|problem| at(problem, test_file, &hammer.place))?);
-    }
-    let (mut channels, mut responses, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
-    for sensor in &test.sensors {
-        let found = channel(&mut recording, &sensor.channel, sensor.scale);
-        channels.push(found.map_err(|problem| at(problem, test_file, &sensor.place))?);
-        responses.push(Response {
-            name: sensor.name.clone(),
-            kind: Some(sensor.kind),
-            unit: Some(si_unit(sensor.kind).to_string()),
-        });
-        kinds.push(form_of_kind(sensor.kind));
-    }
-    let mut settings = MeasureSettings::new(source(hammer_index, channels.clone()));
+    let mut recording = Recording::open(&path, &read)?;
+    let wiring = described_wiring(test, &mut recording, test_file)?;
+    let mut settings = MeasureSettings::new(wiring.source());
     settings.band = description.band;
     settings.block = description.block;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
-    // The hammer's force makes modal constants of the responses.
-    settings.kinds = hammer_index.map_or(Vec::new(), |_| kinds);
-    let named = Named {
-        hammer_unit: hammer_index.map(|_| "N".to_string()),
-        responses,
-    };
-    let finished = finish(recording.renamed(file), settings, named);
+    if wiring.hammer.is_some() {
+        // The hammer's force makes modal constants of the responses.
+        let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
+        settings.kinds = kinds.collect();
+    }
+    let finished = finish(recording.renamed(file), settings, &wiring);
     let mut result = finished.map_err(|error| match error {
         PipelineError::Measure(MeasureError::Spectral { file, problem }) => {
             PipelineError::Setting {
@@ -107,18 +106,41 @@ pub(super) fn measure_described(
         other => other,
     })?;
     result.conditions = conditions(test, description);
-    let units = result
-        .responses
-        .iter()
-        .map(|response| response.unit.clone());
-    let mut units: Vec<(usize, Option<String>)> = channels.into_iter().zip(units).collect();
-    units.extend(hammer_index.map(|channel| (channel, Some("N".to_string()))));
-    for (channel, unit) in units {
-        if let Some(info) = result.channels.get_mut(channel) {
-            info.unit = info.unit.take().or(unit);
+    for (channel, unit) in wiring.units() {
+        if let Some(info) = result
+            .channels
+            .get_mut(channel)
+            .filter(|info| info.unit.is_none())
+        {
+            info.unit.clone_from(unit);
         }
     }
     Ok(result)
+}
+
+/// Finds and scales the described channels of a recording.
+fn described_wiring(
+    test: &TestDescription,
+    recording: &mut Recording,
+    test_file: &str,
+) -> Result<Wiring, PipelineError> {
+    let mut wiring = Wiring::default();
+    if let Some(hammer) = &test.hammer {
+        let found = channel(recording, &hammer.channel, hammer.scale);
+        wiring.hammer = Some(found.map_err(|problem| at(problem, test_file, &hammer.place))?);
+        wiring.hammer_unit = Some("N".to_string());
+    }
+    for sensor in &test.sensors {
+        let found = channel(recording, &sensor.channel, sensor.scale);
+        let channel = found.map_err(|problem| at(problem, test_file, &sensor.place))?;
+        let response = Response {
+            name: sensor.name.clone(),
+            kind: Some(sensor.kind),
+            unit: Some(si_unit(sensor.kind).to_string()),
+        };
+        wiring.responses.push((channel, response));
+    }
+    Ok(wiring)
 }
 
 /// The error about a channel, with its place in the description.
@@ -135,9 +157,12 @@ fn at(problem: RecordingError, test_file: &str, place: &ChannelPlace) -> Pipelin
 fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
     let (mut positions, mut masses) = (BTreeMap::new(), BTreeMap::new());
     for sensor in &test.sensors {
-        let name = || sensor.name.clone();
-        positions.extend(description.place_of(sensor).map(|place| (name(), place)));
-        masses.extend(sensor.mass.map(|mass| (name(), mass)));
+        if let Some(place) = description.place_of(sensor) {
+            positions.insert(sensor.name.clone(), place);
+        }
+        if let Some(mass) = sensor.mass {
+            masses.insert(sensor.name.clone(), mass);
+        }
     }
     Conditions {
         tap: description.tap,
@@ -160,10 +185,10 @@ pub fn measure_bare(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<RecordingResult, PipelineError> {
-    let (source, named) = bare_source(&recording, hammer)?;
-    let mut settings = MeasureSettings::new(source);
+    let wiring = bare_wiring(&recording, hammer)?;
+    let mut settings = MeasureSettings::new(wiring.source());
     adjust(&mut settings);
-    let mut result = finish(recording, settings, named)?;
+    let mut result = finish(recording, settings, &wiring)?;
     if hammer.is_none() {
         let forgotten = of_hammer_by_name(&result);
         result.measurement.warnings.extend(forgotten);
@@ -171,40 +196,29 @@ pub fn measure_bare(
     Ok(result)
 }
 
-/// Channels as a description or the file names them.
-struct Named {
-    /// Unit of the hammer channel, where there is one.
-    hammer_unit: Option<String>,
-    responses: Vec<Response>,
-}
-
-/// Channels of a bare recording in which taps are searched, with the names and units that the file gives.
-fn bare_source(
+/// The channels of a bare recording, with the names and units that the file gives.
+fn bare_wiring(
     recording: &Recording,
     hammer: Option<&ChannelRef>,
-) -> Result<(TapSource, Named), RecordingError> {
-    let hammer = hammer
-        .map(|reference| channel_index(recording, reference))
-        .transpose()?;
-    let (mut channels, mut responses, mut hammer_unit) = (Vec::new(), Vec::new(), None);
+) -> Result<Wiring, RecordingError> {
+    let mut wiring = Wiring::default();
+    if let Some(reference) = hammer {
+        wiring.hammer = Some(channel_index(recording, reference)?);
+    }
     for (channel, info) in recording.channels().iter().enumerate() {
-        if Some(channel) == hammer {
-            hammer_unit.clone_from(&info.unit);
+        if Some(channel) == wiring.hammer {
+            wiring.hammer_unit.clone_from(&info.unit);
             continue;
         }
         let name = info.name.clone();
-        channels.push(channel);
-        responses.push(Response {
+        let response = Response {
             name: name.unwrap_or_else(|| format!("channel {}", channel + 1)),
             kind: None,
             unit: info.unit.clone(),
-        });
+        };
+        wiring.responses.push((channel, response));
     }
-    let named = Named {
-        hammer_unit,
-        responses,
-    };
-    Ok((source(hammer, channels), named))
+    Ok(wiring)
 }
 
 /// Finds the taps of a recording and goes no further: what is in it and what is wrong with it.
@@ -215,7 +229,8 @@ pub fn inspect_bare(
     recording: Recording,
     hammer: Option<&ChannelRef>,
 ) -> Result<RecordingResult, PipelineError> {
-    let (source, named) = bare_source(&recording, hammer)?;
+    let wiring = bare_wiring(&recording, hammer)?;
+    let source = wiring.source();
     let taps = find_taps(&recording, &source, &TapSettings::default())?;
     let warnings = super::measure::of_recording(&recording, &source, &taps);
     let measurement = Measurement {
@@ -223,19 +238,8 @@ pub fn inspect_bare(
         spectra: None,
         warnings,
     };
-    result(
-        &recording,
-        &MeasureSettings::new(source),
-        named,
-        measurement,
-    )
-}
-
-fn source(hammer: Option<usize>, responses: Vec<usize>) -> TapSource {
-    match hammer {
-        Some(channel) => TapSource::Hammer { channel, responses },
-        None => TapSource::Responses(responses),
-    }
+    let settings = MeasureSettings::new(source);
+    result(&recording, &settings, &wiring, measurement)
 }
 
 fn channel_index(recording: &Recording, reference: &ChannelRef) -> Result<usize, RecordingError> {
@@ -268,23 +272,23 @@ fn channel(
 fn finish(
     recording: Recording,
     settings: MeasureSettings,
-    named: Named,
+    wiring: &Wiring,
 ) -> Result<RecordingResult, PipelineError> {
     let measurement = measure(&recording, &settings)?;
-    result(&recording, &settings, named, measurement)
+    result(&recording, &settings, wiring, measurement)
 }
 
 fn result(
     recording: &Recording,
     settings: &MeasureSettings,
-    named: Named,
+    wiring: &Wiring,
     measurement: Measurement,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
     let spectra = measurement.spectra.as_ref();
     let readings = spectra.map_or(0, |spectra| spectra.readings.len());
-    let has_hammer = matches!(settings.source, TapSource::Hammer { .. });
-    let responses = named.responses;
+    let responses = wiring.responses.iter();
+    let responses: Vec<Response> = responses.map(|(_, response)| response.clone()).collect();
     // Without a hammer the unit that all responses have.
     let common_unit = responses.first().and_then(|first| {
         let same = responses.iter().all(|other| other.unit == first.unit);
@@ -296,12 +300,11 @@ fn result(
         sample_rate: Some(recording.sample_rate()),
         seconds: Some(recording.duration()),
         channels: recording.channels().to_vec(),
-        has_hammer,
+        has_hammer: wiring.hammer.is_some(),
         conditions: Conditions::default(),
-        tap_unit: if has_hammer {
-            named.hammer_unit
-        } else {
-            common_unit
+        tap_unit: match wiring.hammer {
+            Some(_) => wiring.hammer_unit.clone(),
+            None => common_unit,
         },
         responses,
         band: settings.band,
@@ -369,7 +372,7 @@ fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
     })
 }
 
-/// What is known of a file of frequency response functions beside its numbers.
+/// Settings for a file of frequency response functions.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FunctionSettings {
     /// Form of all functions; `None` = what the file says.
@@ -378,7 +381,7 @@ pub struct FunctionSettings {
     pub sensor: Option<String>,
     /// Band to be analysed (Hz); `None` = all lines.
     pub band: Option<(f64, f64)>,
-    /// How natural frequencies are read.
+    /// Way in which natural frequencies are read.
     pub reading: ReadBy,
 }
 
@@ -604,18 +607,36 @@ fn samples(
     Ok(samples.into_iter().map(|value| value - mean).collect())
 }
 
-/// What the channels of a bare recording are; the recording carries their scales already.
-#[derive(Debug, Clone, PartialEq)]
+/// The channels of hammer and responses; the recording carries their scales already.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Wiring {
-    /// Channel of the hammer (0-based).
-    pub hammer: usize,
-    /// Unit of the force; `None` = the file's, whatever that is.
+    /// Channel of the hammer (0-based); `None` without one.
+    pub hammer: Option<usize>,
+    /// Unit of the force; `None` where it is not known.
     pub hammer_unit: Option<String>,
     /// Channels of the responses (0-based), each with what is known of it.
     pub responses: Vec<(usize, Response)>,
 }
 
-/// Takes a bare recording with a hammer as far as it goes: taps, spectra, readings. `adjust` may
+impl Wiring {
+    /// The channels in which taps are searched.
+    fn source(&self) -> TapSource {
+        let responses = self.responses.iter().map(|(channel, _)| *channel).collect();
+        match self.hammer {
+            Some(channel) => TapSource::Hammer { channel, responses },
+            None => TapSource::Responses(responses),
+        }
+    }
+
+    /// Every channel with its unit.
+    fn units(&self) -> impl Iterator<Item = (usize, &Option<String>)> {
+        let responses = self.responses.iter();
+        let responses = responses.map(|(channel, response)| (*channel, &response.unit));
+        responses.chain(self.hammer.map(|hammer| (hammer, &self.hammer_unit)))
+    }
+}
+
+/// Takes a bare recording with known channels as far as it goes: taps, spectra, readings. `adjust` may
 /// change the defaults of the measurement.
 ///
 /// # Errors
@@ -625,21 +646,10 @@ pub fn run_wired(
     wiring: &Wiring,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    let responses = wiring.responses.iter();
-    let (channels, responses): (Vec<usize>, Vec<Response>) = responses.cloned().unzip();
-    let mut settings = MeasureSettings::new(TapSource::Hammer {
-        channel: wiring.hammer,
-        responses: channels,
-    });
+    let mut settings = MeasureSettings::new(wiring.source());
     adjust(&mut settings);
-    let named = Named {
-        hammer_unit: wiring.hammer_unit.clone(),
-        responses,
-    };
-    let mut result = finish(recording, settings, named)?;
-    let stated = wiring.responses.iter();
-    let stated = stated.map(|(channel, response)| (*channel, &response.unit));
-    for (channel, unit) in stated.chain([(wiring.hammer, &wiring.hammer_unit)]) {
+    let mut result = finish(recording, settings, wiring)?;
+    for (channel, unit) in wiring.units() {
         if let Some(info) = result.channels.get_mut(channel) {
             info.unit.clone_from(unit);
         }

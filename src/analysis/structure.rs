@@ -21,7 +21,7 @@ use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
 pub struct TestedStructure {
     /// The beam.
     pub beam: Beam,
-    /// How it is held.
+    /// Kind of structure.
     pub assembly: Assembly,
     /// Beam theory of the prediction.
     pub theory: BeamTheory,
@@ -43,7 +43,7 @@ pub struct KnownJoint {
 }
 
 impl KnownJoint {
-    /// Whether anything is known.
+    /// Returns true if any stiffness is known.
     pub fn any(&self) -> bool {
         self.kx.is_some() || self.ky.is_some() || self.cross_compliance.is_some()
     }
@@ -89,16 +89,16 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
 /// A spring stated as absent (1): below every stiffness that a frequency feels, and with a logarithm.
 pub(super) const NO_SPRING: f64 = 1e-9;
 
-/// What the consistent estimate knows beyond the plain beam with its joint.
+/// Details of the structure beyond the plain beam with its joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StructureDetails {
-    /// Where a lap joint's halves differ from two equal pieces.
+    /// Differences of a lap joint's halves from two equal pieces.
     pub lap: LapLayout,
     /// Masses (kg) of the sensors, where they sit in the reference configuration, and what is fastened there.
     pub masses: Vec<PointMass>,
     /// Relative standard uncertainties of the beam's properties.
     pub tolerances: BeamTolerances,
-    /// What is estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
+    /// Parameters that are estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
     pub fit: Option<Vec<FitParameter>>,
     /// Weights; `None` = measured where every uncertainty is known.
     pub weights: Option<Weights>,
@@ -122,7 +122,7 @@ pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetail
     }
 }
 
-/// What is known to sit on the beam in a recording: sensors whose mass and place are known, and what is
+/// Masses on the beam in a recording: sensors whose mass and place are known, and what is
 /// fastened. A microphone loads nothing.
 pub(super) fn masses_in(
     test: &TestDescription,

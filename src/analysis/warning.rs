@@ -15,35 +15,35 @@ pub enum Warning {
         code: &'static str,
         /// The recording.
         file: String,
-        /// What happened, why, what helps.
+        /// Event, likely cause and remedy.
         text: String,
     },
     /// A check of good practice that raises a doubt.
     Quality {
         /// Short code of the check.
         code: &'static str,
-        /// What happened, why, what helps.
+        /// Event, likely cause and remedy.
         text: String,
     },
     /// Something about the test description.
     Description {
-        /// What happened, why, what helps.
+        /// Event, likely cause and remedy.
         text: String,
     },
     /// Taps were rejected.
     RejectedTaps {
         /// The recording.
         file: String,
-        /// How many.
+        /// Number of them.
         rejected: usize,
-        /// Of how many.
+        /// Number of all taps.
         total: usize,
     },
     /// The accepted taps are too short for any spectrum.
     TapsTooShort {
         /// The recording.
         file: String,
-        /// What does not fit.
+        /// The problem.
         problem: SpectralError,
     },
     /// Only one tap was averaged.
@@ -71,9 +71,9 @@ pub enum Warning {
     Mains {
         /// The recording.
         file: String,
-        /// Where (Hz).
+        /// Frequency of the peak (Hz).
         frequency: f64,
-        /// What it is.
+        /// Kind of peak.
         label: PeakLabel,
         /// Other such peaks: recording, and where (Hz).
         others: Vec<(String, f64)>,
@@ -98,14 +98,14 @@ pub enum Warning {
     NumberedInOrder,
     /// Peaks were left without a mode.
     Unpaired {
-        /// How many.
+        /// Number of them.
         count: usize,
         /// Why.
         text: String,
     },
     /// The regression left something that no joint can have.
     UnphysicalEstimate {
-        /// What is wrong with it.
+        /// The problem.
         what: String,
     },
     /// The model with the estimated joint misses the measurement.
@@ -121,14 +121,14 @@ pub enum Warning {
     Estimate {
         /// Short code of the limit.
         code: &'static str,
-        /// What happened, why, what helps.
+        /// Event, likely cause and remedy.
         text: String,
     },
     /// Something the method leaves out.
     Neglected {
-        /// What and with what effect.
+        /// The effect and its consequence.
         text: String,
-        /// Whether only the pair regression leaves it out.
+        /// True if only the pair regression leaves it out.
         of_pairs: bool,
     },
 }

@@ -156,7 +156,7 @@ pub(super) fn wire(
         responses.push((channel, response));
     }
     let wiring = Wiring {
-        hammer,
+        hammer: Some(hammer),
         hammer_unit,
         responses,
     };

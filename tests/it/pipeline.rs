@@ -9,8 +9,8 @@ use tapjoint::identify::consistent::{FrequencyModel, JointedStructure, LapLayout
 use tapjoint::identify::{PairsModel, Stiffnesses};
 use tapjoint::pipeline::{
     Analysis, Estimate, EstimateMethod, Identification, IdentifySettings, KnownJoint, ModeResult,
-    Perturbation, StructureDetails, TestedStructure, Warning, identify, measure_bare,
-    modes_of_recordings, run_test,
+    StructureDetails, TestedStructure, Warning, identify, measure_bare, modes_of_recordings,
+    run_test,
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
@@ -182,19 +182,11 @@ fn stiffnesses(test: &VirtualTest) -> Stiffnesses {
 }
 
 fn span_holds_the_truth(test: &VirtualTest) -> bool {
-    let of_pairs = |p: &&Perturbation| p.method == EstimateMethod::Pairs;
-    let bounds = test
-        .found
-        .perturbations
-        .iter()
-        .find(of_pairs)
-        .unwrap()
-        .bounds
-        .as_ref()
-        .unwrap();
-    let spans = bounds.spans.unwrap();
-    let (kx, ky) = (spans.kx.unwrap(), spans.ky.unwrap());
-    (kx.low..=kx.high).contains(&KX) && (ky.low..=ky.high).contains(&KY)
+    let mut spans = test.found.perturbations.spans.iter();
+    let spans = spans.find(|spans| spans.method == EstimateMethod::Pairs);
+    let spans = spans.unwrap();
+    let ([kx_low, kx_high], [ky_low, ky_high]) = (spans.kx.unwrap(), spans.ky.unwrap());
+    (kx_low..=kx_high).contains(&KX) && (ky_low..=ky_high).contains(&KY)
 }
 
 #[test]

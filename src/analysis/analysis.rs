@@ -454,14 +454,6 @@ pub enum PipelineError {
     /// A recording could not be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// A band that does not fit a file of frequency response functions.
-    #[error("{file}: {problem}")]
-    Functions {
-        /// The recording.
-        file: String,
-        /// The problem.
-        problem: SpectralError,
-    },
     /// A band or block of the description that does not fit its recording.
     #[error("{file}:{line}: {recording}: {problem}")]
     Setting {

@@ -138,12 +138,9 @@ fn of_quality(verdicts: &[Verdict]) -> Vec<Warning> {
             None => checks.push((verdict.check, vec![verdict])),
         }
     }
-    let warnings = checks.iter().filter_map(|(check, doubts)| {
-        Some(Warning::Quality {
-            code: check.code(),
-            text: words(doubts)?,
-        })
-    });
+    let warnings = checks
+        .iter()
+        .filter_map(|(check, doubts)| Some(Warning::new(check.code(), words(doubts)?)));
     warnings.collect()
 }
 
@@ -431,9 +428,7 @@ mod tests {
             label: PeakLabel::Mains(frequency),
             others: Vec::new(),
         };
-        let alone = Warning::SingleTap {
-            file: "a.wav".to_owned(),
-        };
+        let alone = Warning::single_tap("a.wav");
         let all = vec![
             rings("a.wav", 0.04),
             hum("a.wav", 50.0),

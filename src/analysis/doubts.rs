@@ -21,10 +21,10 @@ const ALLOWED: &str =
 
 /// Doubts that the description itself raises.
 pub(super) fn of_description(test: &TestDescription) -> Vec<Warning> {
-    let warnings = test.warnings.iter().map(|warning| Warning::Description {
-        text: warning.to_string(),
-    });
-    warnings.collect()
+    let doubts = test.warnings.iter();
+    doubts
+        .map(|doubt| Warning::new("description", doubt.to_string()))
+        .collect()
 }
 
 /// Doubts about the estimates of all methods.
@@ -44,12 +44,10 @@ pub(super) fn of_estimate(
     };
     for doubt in &joint.doubts {
         warnings.extend(match doubt {
-            Doubt::Closure { closure } => Some(Warning::Closure { closure: *closure }),
+            Doubt::Closure { closure } => Some(Warning::closure(*closure)),
             Doubt::CouplingNotEstablished if found.consistent.is_some() => None,
-            Doubt::CouplingNotEstablished => Some(Warning::CouplingNotEstablished),
-            other => Some(Warning::UnphysicalEstimate {
-                what: other.to_string(),
-            }),
+            Doubt::CouplingNotEstablished => Some(Warning::coupling_not_established()),
+            other => Some(Warning::unphysical(other)),
         });
     }
     warnings
@@ -57,7 +55,7 @@ pub(super) fn of_estimate(
 
 /// Returns every doubt that the numbers of a consistent estimate raise.
 fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
-    let mut doubts: Vec<(&'static str, String)> = Vec::new();
+    let mut warnings = Vec::new();
     if let Some(text) = misfit(found) {
         let between: Vec<BetweenRecordings> =
             modes.iter().filter_map(|mode| mode.between).collect();
@@ -66,18 +64,18 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
             (true, false) => BETWEEN.to_owned(),
             (true, true) => format!("{BETWEEN}{ALLOWED}"),
         };
-        doubts.push(("misfit", text + &drift));
+        warnings.push(Warning::new("misfit", text + &drift));
     }
     if found.goodness.verdict == Verdict::Untestable {
-        doubts.push(("untestable", found.goodness.words()));
+        warnings.push(Warning::new("untestable", found.goodness.words()));
     }
     for text in found.quantities.iter().filter_map(open_end) {
-        doubts.push(("at-limit", text));
+        warnings.push(Warning::new("at-limit", text));
     }
     // Of one parameter alone the open end says the same.
     let several = found.fit.len() > 1;
     for flat in found.identifiability.flat.iter().filter(|_| several) {
-        doubts.push(("flat-direction", flat.words.clone()));
+        warnings.push(Warning::new("flat-direction", flat.words.clone()));
     }
     // A valley whose frequencies are off by more than a beam's dimensions leave open is none to doubt.
     let most = 100.0 * NOTABLE_MISFIT;
@@ -95,23 +93,19 @@ fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warnin
             other.rms_percent,
             values.join(", ")
         );
-        doubts.push(("other-minimum", text));
+        warnings.push(Warning::new("other-minimum", text));
     }
     if !found.stop.converged() {
         let text = "the search for the best joint ended before it stood still; its values are not the best ones";
-        doubts.push(("not-converged", text.to_owned()));
+        warnings.push(Warning::new("not-converged", text.to_owned()));
     }
-    let doubts = doubts.into_iter();
-    let mut warnings: Vec<Warning> = doubts
-        .map(|(code, text)| Warning::Estimate { code, text })
-        .collect();
     // The interval of a fitted coupling that contains zero.
     let coupling = found.quantity(Quantity::Coupling);
     if coupling.is_some_and(|coupling| {
         let interval = coupling.low.zip(coupling.high);
         coupling.std.is_some() && interval.is_none_or(|(low, high)| low * high <= 0.0)
     }) {
-        warnings.push(Warning::CouplingNotEstablished);
+        warnings.push(Warning::coupling_not_established());
     }
     warnings
 }
@@ -135,11 +129,7 @@ pub(super) fn of_prediction(
         beyond.then_some((mode.mode, error_percent, deviations))
     });
     let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-    worst.map(|(mode, error_percent, deviations)| Warning::Misfit {
-        mode,
-        error_percent,
-        deviations,
-    })
+    worst.map(|(mode, error_percent, deviations)| Warning::misfit(mode, error_percent, deviations))
 }
 
 /// The closed form stands in the place of the consistent estimate.
@@ -156,10 +146,7 @@ fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning {
     } else {
         format!("no consistent estimate: {reason}; {closed} stands in its place")
     };
-    Warning::Estimate {
-        code: "fallback",
-        text,
-    }
+    Warning::new("fallback", text)
 }
 
 /// Returns true if a joint's stiffness was estimated, as of every structure but a free beam.
@@ -283,7 +270,7 @@ fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
 
 /// Effects that estimate and prediction leave out. The pair regression stands beside the consistent
 /// estimate in every report, so that its limits are always listed.
-pub(super) fn of_neglect(
+pub(super) fn neglected_effects(
     test: &TestDescription,
     structure: &TestedStructure,
     method: EstimateMethod,
@@ -294,33 +281,21 @@ pub(super) fn of_neglect(
     warnings.extend(of_fastened(test, structure, method));
     if structure.regression.is_some() {
         let texts = of_regression(test, structure, method);
-        warnings.extend(texts.into_iter().map(|text| by_pairs(text.to_owned())));
+        warnings.extend(texts.into_iter().map(|text| Warning::neglected(text, true)));
     }
     let analysis = &test.analysis;
     if consistent {
-        warnings.extend(of_fit(test, structure).into_iter().map(by_estimate));
+        warnings.extend(
+            of_fit(test, structure)
+                .into_iter()
+                .map(|text| Warning::neglected(text, false)),
+        );
     } else if analysis.fit.is_some() || analysis.weights.is_some() {
         let text = "`fit` and `weights` belong to the consistent estimate: the pair regression estimates all \
                     stiffnesses of its model and weighs all pairs alike";
-        warnings.push(by_pairs(text.to_owned()));
+        warnings.push(Warning::neglected(text, true));
     }
     warnings
-}
-
-/// A warning about an effect that only the pair regression leaves out.
-fn by_pairs(text: String) -> Warning {
-    Warning::Neglected {
-        text,
-        of_pairs: true,
-    }
-}
-
-/// A warning about an effect that the estimate leaves out, or takes in another way than may have been meant.
-fn by_estimate(text: String) -> Warning {
-    Warning::Neglected {
-        text,
-        of_pairs: false,
-    }
 }
 
 /// Effects that the pair regression cannot take into account.
@@ -430,18 +405,28 @@ fn of_masses(
     let mut loading = loading.iter();
     let unplaced = loading.any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
     match (included, unplaced, structure.regression) {
-        (true, true, _) => Some(by_estimate(format!(
-            "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
-        ))),
-        (true, false, None) => Some(by_estimate(format!(
-            "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
-        ))),
-        (true, false, Some(_)) => Some(by_pairs(format!(
-            "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
-        ))),
-        (false, ..) => Some(by_estimate(format!(
-            "{size} is in neither the estimate nor the prediction; {lowers}"
-        ))),
+        (true, true, _) => Some(Warning::neglected(
+            format!(
+                "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
+            ),
+            false,
+        )),
+        (true, false, None) => Some(Warning::neglected(
+            format!(
+                "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
+            ),
+            false,
+        )),
+        (true, false, Some(_)) => Some(Warning::neglected(
+            format!(
+                "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
+            ),
+            true,
+        )),
+        (false, ..) => Some(Warning::neglected(
+            format!("{size} is in neither the estimate nor the prediction; {lowers}"),
+            false,
+        )),
     }
 }
 
@@ -464,15 +449,20 @@ fn of_fastened(
     );
     let included = "is in the prediction and the consistent estimate;";
     Some(match (method, structure.regression) {
-        (EstimateMethod::Consistent, None) => by_estimate(format!(
-            "{size} {included} the closed form beside it neglects it"
-        )),
-        (EstimateMethod::Consistent, Some(_)) => by_pairs(format!(
-            "{size} {included} the pair regression beside it neglects it"
-        )),
-        (EstimateMethod::Pairs | EstimateMethod::FreeBeam, _) => by_estimate(format!(
-            "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
-        )),
+        (EstimateMethod::Consistent, None) => Warning::neglected(
+            format!("{size} {included} the closed form beside it neglects it"),
+            false,
+        ),
+        (EstimateMethod::Consistent, Some(_)) => Warning::neglected(
+            format!("{size} {included} the pair regression beside it neglects it"),
+            true,
+        ),
+        (EstimateMethod::Pairs | EstimateMethod::FreeBeam, _) => Warning::neglected(
+            format!(
+                "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
+            ),
+            false,
+        ),
     })
 }
 

@@ -122,10 +122,10 @@ pub fn identify(
         }
         Ok(None) => {}
         Err(error) => {
-            warnings.extend(found.consistent.as_ref().map(|_| Warning::Estimate {
-                code: "no-prediction",
-                text: format!("the estimated joint cannot be predicted with: {error}"),
-            }));
+            let text = format!("the estimated joint cannot be predicted with: {error}");
+            if found.consistent.is_some() {
+                warnings.push(Warning::new("no-prediction", text));
+            }
         }
     }
     warnings.extend(doubts::of_prediction(&found.prediction, &measured));

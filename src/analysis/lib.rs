@@ -93,7 +93,7 @@ pub fn run_test(
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
     let method = identification.method(&structure, settings.method);
-    warnings.extend(doubts::of_neglect(test, &structure, method));
+    warnings.extend(doubts::neglected_effects(test, &structure, method));
     warnings.extend(doubts);
     let (verdicts, doubts) = checks::judge(&recordings);
     warnings.extend(doubts);

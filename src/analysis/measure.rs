@@ -1,7 +1,7 @@
 //! Measuring one recording: taps, averaged spectra, free decays, readings.
 
 use super::fits::{Candidates, Stabilisation, stabilisation};
-use super::noise::{PulseWindow, Quiet, pulse_window, remove_offset};
+use super::noise::{PreTriggerNoise, PulseWindow, pulse_window, remove_offset};
 use super::warning::Warning;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -140,10 +140,7 @@ pub fn measure(
                 spectra = Some(found);
             }
             // The file would do, but its taps come too soon: data, not typing.
-            Err(problem) => warnings.push(Warning::TapsTooShort {
-                file: recording.name().to_string(),
-                problem,
-            }),
+            Err(problem) => warnings.push(Warning::taps_too_short(recording.name(), &problem)),
         }
     }
     Ok(Measurement {
@@ -173,32 +170,21 @@ fn lines_for(
 
 /// Doubts about a recording and its taps.
 pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
-    let file = recording.name().to_string();
-    let mut warnings: Vec<Warning> = recording
-        .warnings()
-        .iter()
-        .map(|warning| Warning::Recording {
-            code: warning.code(),
-            file: file.clone(),
-            text: warning.to_string(),
-        })
-        .collect();
-    warnings.extend(taps.remarks.iter().map(|remark| Warning::Recording {
-        code: "taps",
-        file: file.clone(),
-        text: remark.to_string(),
-    }));
+    let file = recording.name();
+    let mut warnings = Vec::new();
+    for warning in recording.warnings() {
+        warnings.push(Warning::about(file, warning.code(), warning));
+    }
+    for remark in &taps.remarks {
+        warnings.push(Warning::about(file, "taps", remark));
+    }
     let accepted = taps.accepted().count();
     let rejected = taps.taps.len() - accepted;
     if rejected > 0 {
-        warnings.push(Warning::RejectedTaps {
-            file: file.clone(),
-            rejected,
-            total: taps.taps.len(),
-        });
+        warnings.push(Warning::rejected_taps(file, rejected, taps.taps.len()));
     }
     if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
-        warnings.push(Warning::SingleTap { file });
+        warnings.push(Warning::single_tap(file));
     }
     warnings
 }
@@ -218,9 +204,7 @@ fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
         });
     }
     if spectra.window == Window::Hann {
-        warnings.push(Warning::HannOnTaps {
-            file: file.to_string(),
-        });
+        warnings.push(Warning::hann_on_taps(file));
     }
     for reading in &spectra.readings {
         if let Some(label @ PeakLabel::Mains(_)) = reading.label {
@@ -281,7 +265,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The quiet stretch before the first tap, at most a block.
-    fn quiet(&self) -> Result<Quiet, RecordingError> {
+    fn quiet(&self) -> Result<PreTriggerNoise, RecordingError> {
         let quiet = self.taps.quiet();
         let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
         let mut force = self.read(start..quiet.end)?;
@@ -293,7 +277,7 @@ impl<'a> Stage<'a> {
             .filter_map(|tap| pulse_window(tap, rate));
         let energy: f64 = windows.map(PulseWindow::energy).sum();
         let count = self.taps.accepted().count().max(1) as f64;
-        Ok(Quiet {
+        Ok(PreTriggerNoise {
             force: force.pop(),
             responses,
             sample_rate: self.recording.sample_rate(),
@@ -354,7 +338,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The decay of each response inside the band, the largest over the accepted taps.
-    fn decay_checks(&self, quiet: &Quiet) -> Result<Vec<DecayCheck>, RecordingError> {
+    fn decay_checks(&self, quiet: &PreTriggerNoise) -> Result<Vec<DecayCheck>, RecordingError> {
         let rate = self.recording.sample_rate();
         let band = (self.lines.low, self.lines.high);
         let noise: Vec<f64> = quiet
@@ -426,7 +410,7 @@ impl<'a> Stage<'a> {
         &self,
         averages: &AveragedSpectra,
         transforms: &[Vec<Complex64>],
-        quiet: &Quiet,
+        quiet: &PreTriggerNoise,
         window: Window,
     ) -> Vec<ModeReading> {
         let powers: Vec<Vec<f64>> = match &averages.h1 {

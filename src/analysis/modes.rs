@@ -100,7 +100,7 @@ pub(super) fn modes_of_test(
     let mut reference: Vec<usize> = (0..recordings.len()).collect();
     reference.retain(|&index| aside[index].is_none());
     let (modes, mut warnings) = modes_of_recordings(recordings, &reference, structure, details);
-    let doubts = number_loaded(recordings, &modes, test, structure, details);
+    let doubts = pair_mass_loaded(recordings, &modes, test, structure, details);
     warnings.extend(doubts);
     (modes, warnings)
 }
@@ -231,11 +231,10 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
         return apply_numbers(modes, &free, &numbers, text);
     }
     number_in_order(modes);
-    let doubtful = !free.is_empty();
-    doubtful
-        .then_some(Warning::NumberedInOrder)
-        .into_iter()
-        .collect()
+    match free.is_empty() {
+        true => Vec::new(),
+        false => vec![Warning::numbered_in_order()],
+    }
 }
 
 /// Gives the peaks with these indices their numbers; `text` says why some have none.
@@ -249,11 +248,10 @@ fn apply_numbers(
         modes[index].mode = number;
     }
     let count = numbers.iter().filter(|number| number.is_none()).count();
-    let warning = (count > 0).then(|| Warning::Unpaired {
-        count,
-        text: text.to_owned(),
-    });
-    warning.into_iter().collect()
+    match count {
+        0 => Vec::new(),
+        _ => vec![Warning::unpaired(count, text)],
+    }
 }
 
 fn number_in_order(modes: &mut [ModeResult]) {
@@ -464,14 +462,12 @@ fn missing(modes: &[MissingMode]) -> Option<Warning> {
             missing.mode
         ));
     }
-    (!list.is_empty()).then(|| Warning::Estimate {
-        code: "missing-mode",
-        text: format!(
-            "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
-             and measure elsewhere, or from a lower frequency on, to see it",
-            list.join(", ")
-        ),
-    })
+    let text = format!(
+        "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
+         and measure elsewhere, or from a lower frequency on, to see it",
+        list.join(", ")
+    );
+    (!list.is_empty()).then(|| Warning::new("missing-mode", text))
 }
 
 /// The warning about another numbering that explains the peaks comparably.
@@ -491,15 +487,13 @@ fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     } else {
         format!("{:.1} times less probable", 1.0 / times)
     };
-    Some(Warning::Estimate {
-        code: "ambiguous-pairing",
-        text: format!(
-            "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
-             ({odds}); another sensor or tap position, or more modes, would decide",
-            words(chosen, peaks),
-            words(other, peaks),
-        ),
-    })
+    let text = format!(
+        "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
+         ({odds}); another sensor or tap position, or more modes, would decide",
+        words(chosen, peaks),
+        words(other, peaks),
+    );
+    Some(Warning::new("ambiguous-pairing", text))
 }
 
 /// "(1: 17.00 Hz, 3: 335.60 Hz, none: 50.00 Hz)".
@@ -515,7 +509,7 @@ fn words(numbering: &Numbering, peaks: &[MeasuredPeak]) -> String {
 /// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
 /// which these masses take the reference configuration's modes. Where that is not known they lose the numbers
 /// that their neighbours of the reference gave them: a heavy mass takes a mode to another's place.
-fn number_loaded(
+fn pair_mass_loaded(
     recordings: &mut [RecordingResult],
     modes: &[ModeResult],
     test: &TestDescription,
@@ -543,14 +537,10 @@ fn number_loaded(
             recording.mode_numbers = own_numbers(&moved, recording.readings());
         } else {
             recording.mode_numbers.fill(None);
-            warnings.push(Warning::Recording {
-                code: "unnumbered",
-                file: recording.file.clone(),
-                text: "its peaks have no mode numbers: the first recording gives no estimate of the joint, so that \
-                       it is not known where the masses fastened here take the modes; read more modes in the first \
-                       recording, or state kt and kr in [joint]"
-                    .to_owned(),
-            });
+            let text = "its peaks have no mode numbers: the first recording gives no estimate of the joint, so that \
+                        it is not known where the masses fastened here take the modes; read more modes in the first \
+                        recording, or state kt and kr in [joint]";
+            warnings.push(Warning::about(&recording.file, "unnumbered", text));
         }
     }
     warnings

@@ -11,7 +11,7 @@ use tapjoint_signal::spectral::{
 use tapjoint_signal::taps::Tap;
 
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
-pub(super) struct Quiet {
+pub(super) struct PreTriggerNoise {
     /// Force, where there is a hammer.
     pub force: Option<Vec<f64>>,
     /// Responses.
@@ -24,7 +24,7 @@ pub(super) struct Quiet {
     pub force_window: f64,
 }
 
-impl Quiet {
+impl PreTriggerNoise {
     /// Power that noise alone would leave in the averages, per response: of H1 where there is a
     /// hammer, else of the response's transform. `None` where the stretch is too short to tell.
     ///

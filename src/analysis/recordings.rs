@@ -361,15 +361,12 @@ fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
         true => format!("\"{name}\""),
         false => name.clone(),
     };
-    Some(Warning::Recording {
-        code: "hammer-channel",
-        file: recording.file.clone(),
-        text: format!(
-            "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
-             say --hammer {argument}: taps are then judged by their force, and there are frequency \
-             response functions"
-        ),
-    })
+    let text = format!(
+        "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
+         say --hammer {argument}: taps are then judged by their force, and there are frequency \
+         response functions"
+    );
+    Some(Warning::about(&recording.file, "hammer-channel", text))
 }
 
 /// Settings for a file of frequency response functions.
@@ -402,7 +399,7 @@ fn measure_functions(
     settings: &FunctionSettings,
 ) -> Result<RecordingResult, PipelineError> {
     let axis = axis(functions, settings.band);
-    let (first, lines) = axis.map_err(|problem| PipelineError::Functions {
+    let (first, lines) = axis.map_err(|problem| MeasureError::Spectral {
         file: functions.file.clone(),
         problem,
     })?;
@@ -423,11 +420,8 @@ fn measure_functions(
         values.push(response.values[first..first + lines.points()].to_vec());
     }
     let spectra = spectra_of_functions(lines, values, &forms, settings.reading);
-    let warnings = functions.warnings.iter().map(|warning| Warning::Recording {
-        code: warning.code(),
-        file: functions.file.clone(),
-        text: warning.to_string(),
-    });
+    let warnings = functions.warnings.iter();
+    let warnings = warnings.map(|warning| Warning::about(&functions.file, warning.code(), warning));
     Ok(RecordingResult {
         file: functions.file.clone(),
         format: Format::FrequencyResponses,

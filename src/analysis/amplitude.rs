@@ -7,32 +7,32 @@ use std::fmt;
 use tapjoint_numerics::stats::median;
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeReading, AmplitudeVerdict};
 
-/// A change of the frequency below this share is not worth a word: 0.01 %, a fifth of the smallest
+/// Smallest relative change of a frequency that is reported: 0.01 %, a fifth of the smallest
 /// change that Ingole & Chatterjee perturb frequencies by.
 const LEAST_FREQUENCY_CHANGE: f64 = 1e-4;
-/// The same of the damping: 5 %, about what one repeats of a joint's damping.
+/// Smallest relative change of a damping that is reported: 5 %, about the repeatability of a joint's damping.
 const LEAST_DAMPING_CHANGE: f64 = 0.05;
 /// Bounds of a curve up to this many times their median count as well known.
 const USUAL: f64 = 3.0;
 /// Most modes named in one warning; the findings of the report name them all.
 const MOST_NAMED: usize = 1;
 
-/// What a mode does along its decays: values at the largest and at the smallest amplitude at which its
+/// Change of a mode along its decays: values at the largest and at the smallest amplitude at which its
 /// curve is well known.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct AmplitudeChange {
     /// Peak amplitude of the strongest sensor (`unit`).
     pub amplitude: [f64; 2],
-    /// Unit of the amplitude; `None` where nobody said.
+    /// Unit of the amplitude; `None` where it is not known.
     pub unit: Option<String>,
     /// Frequency (Hz).
     pub frequency: [f64; 2],
-    /// Its 95 % bounds (Hz).
+    /// 95 % bounds of the frequency (Hz).
     pub frequency_bound: [f64; 2],
     /// Damping ratio.
     #[serde(rename = "damping")]
     pub damping_ratio: [f64; 2],
-    /// Its 95 % bounds.
+    /// 95 % bounds of the damping ratio.
     pub damping_bound: [f64; 2],
 }
 
@@ -43,7 +43,19 @@ impl AmplitudeChange {
         if curve.verdict != AmplitudeVerdict::Changes {
             return None;
         }
-        let known = well_known(curve);
+        let points = curve.points.iter();
+        let mut known: Vec<AmplitudeReading> = points
+            .filter_map(|point| curve.at_amplitude(point.amplitude))
+            .collect();
+        known.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+        // At a curve's ends a polynomial says little: its bounds there are far beyond the usual ones.
+        let mut frequency_bounds: Vec<f64> = known.iter().map(|r| r.frequency_bound).collect();
+        let mut damping_bounds: Vec<f64> = known.iter().map(|r| r.damping_bound).collect();
+        let most_of_frequency = USUAL * median(&mut frequency_bounds);
+        let most_of_damping = USUAL * median(&mut damping_bounds);
+        known.retain(|reading| {
+            reading.frequency_bound <= most_of_frequency && reading.damping_bound <= most_of_damping
+        });
         let ends = [known.first()?, known.last()?];
         let change = AmplitudeChange {
             amplitude: ends.map(|end| end.amplitude),
@@ -53,43 +65,52 @@ impl AmplitudeChange {
             damping_ratio: ends.map(|end| end.damping_ratio),
             damping_bound: ends.map(|end| end.damping_bound),
         };
-        change.matters().then_some(change)
+        let (frequency, damping) = change.size();
+        let matters = frequency > LEAST_FREQUENCY_CHANGE || damping > LEAST_DAMPING_CHANGE;
+        matters.then_some(change)
     }
 
-    fn matters(&self) -> bool {
-        let beyond = |values: [f64; 2], bounds: [f64; 2], least: f64| {
-            let share = ((values[1] - values[0]) / values[0]).abs();
-            differs(values, bounds) && share > least
-        };
-        beyond(self.frequency, self.frequency_bound, LEAST_FREQUENCY_CHANGE)
-            || beyond(self.damping_ratio, self.damping_bound, LEAST_DAMPING_CHANGE)
+    /// Changes of the frequency and of the damping ratio relative to them; 0 within their bounds. They are
+    /// compared in this order.
+    pub(super) fn size(&self) -> (f64, f64) {
+        (
+            relative_change(self.frequency, self.frequency_bound),
+            relative_change(self.damping_ratio, self.damping_bound),
+        )
+    }
+
+    /// Returns the way in which a mode changes, by the signs of the changes beyond their bounds.
+    pub(super) fn way(&self) -> Way {
+        let frequency = direction(self.frequency, self.frequency_bound);
+        let damping = direction(self.damping_ratio, self.damping_bound);
+        match (frequency, damping) {
+            (Ordering::Greater, _) => Way::Stiffens,
+            (Ordering::Less, Ordering::Less) => Way::Mixed,
+            (Ordering::Equal, Ordering::Less) => Way::Rubs,
+            _ => Way::Slips,
+        }
     }
 }
 
-/// The curve at its points, the largest amplitude first, without those at which its bounds are far
-/// beyond the usual ones: at a curve's ends a polynomial says little.
-fn well_known(curve: &AmplitudeCurve) -> Vec<AmplitudeReading> {
-    let points = curve.points.iter();
-    let mut all: Vec<AmplitudeReading> = points
-        .filter_map(|point| curve.at_amplitude(point.amplitude))
-        .collect();
-    all.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
-    if all.is_empty() {
-        return all;
-    }
-    let usual = |of: fn(&AmplitudeReading) -> f64| {
-        let mut bounds: Vec<f64> = all.iter().map(of).collect();
-        USUAL * median(&mut bounds)
-    };
-    let frequency = usual(|reading| reading.frequency_bound);
-    let damping = usual(|reading| reading.damping_bound);
-    all.retain(|r| r.frequency_bound <= frequency && r.damping_bound <= damping);
-    all
-}
-
-/// Whether two values differ by more than both their bounds.
+/// Returns true if two values differ by more than the sum of their bounds.
 fn differs(values: [f64; 2], bounds: [f64; 2]) -> bool {
     (values[1] - values[0]).abs() > bounds[0] + bounds[1]
+}
+
+/// Change from the first to the second value over the first (1), without its sign; 0 within the bounds.
+fn relative_change(values: [f64; 2], bounds: [f64; 2]) -> f64 {
+    match differs(values, bounds) {
+        true => ((values[1] - values[0]) / values[0]).abs(),
+        false => 0.0,
+    }
+}
+
+/// Order of the first and the second value; equal within the bounds.
+fn direction(values: [f64; 2], bounds: [f64; 2]) -> Ordering {
+    match differs(values, bounds) {
+        true => values[0].total_cmp(&values[1]),
+        false => Ordering::Equal,
+    }
 }
 
 impl fmt::Display for AmplitudeChange {
@@ -97,12 +118,14 @@ impl fmt::Display for AmplitudeChange {
     /// 33 to 2.3 m/s\u{b2}".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = self.unit.as_deref().unwrap_or("of the file's unit");
-        let percent = |ratios: [f64; 2]| ratios.map(|ratio| 100.0 * ratio);
         write!(
             f,
             "{} Hz and its damping {} % as the amplitude falls from {} to {} {}",
             moves(self.frequency, self.frequency_bound),
-            damping_moves(percent(self.damping_ratio), percent(self.damping_bound)),
+            damping_moves(
+                self.damping_ratio.map(|ratio| 100.0 * ratio),
+                self.damping_bound.map(|bound| 100.0 * bound)
+            ),
             two_digits(self.amplitude[0]),
             two_digits(self.amplitude[1]),
             unit.replace("m/s2", "m/s\u{b2}")
@@ -122,7 +145,7 @@ fn moves([first, last]: [f64; 2], bounds: [f64; 2]) -> String {
     format!("{verb} from {first:.decimals$} to {last:.decimals$}")
 }
 
-/// The same of a damping, which is never negative, whatever noise makes of it: "stays below 0.02".
+/// Words for a damping (%), which is never negative, whatever noise makes of it: "stays below 0.02".
 fn damping_moves(values: [f64; 2], bounds: [f64; 2]) -> String {
     if differs(values, bounds) {
         return moves(values.map(|value| value.max(0.0)), bounds);
@@ -135,7 +158,7 @@ fn damping_moves(values: [f64; 2], bounds: [f64; 2]) -> String {
     }
 }
 
-/// Which way a mode goes with the amplitude.
+/// Way in which a mode changes with the amplitude.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
     /// Softer, or more damped, the harder it is driven.
@@ -148,38 +171,8 @@ pub(super) enum Way {
     Mixed,
 }
 
-impl AmplitudeChange {
-    /// Change of the frequency and of the damping ratio as shares of them, 0 within their bounds; compared in this order.
-    pub(super) fn size(&self) -> (f64, f64) {
-        let share = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
-            true => ((values[1] - values[0]) / values[0]).abs(),
-            false => 0.0,
-        };
-        (
-            share(self.frequency, self.frequency_bound),
-            share(self.damping_ratio, self.damping_bound),
-        )
-    }
-
-    /// By the signs of what changes beyond its bounds.
-    pub(super) fn way(&self) -> Way {
-        let sign = |values: [f64; 2], bounds: [f64; 2]| match differs(values, bounds) {
-            true => values[0].total_cmp(&values[1]),
-            false => Ordering::Equal,
-        };
-        let frequency = sign(self.frequency, self.frequency_bound);
-        let damping = sign(self.damping_ratio, self.damping_bound);
-        match (frequency, damping) {
-            (Ordering::Greater, _) => Way::Stiffens,
-            (Ordering::Less, Ordering::Less) => Way::Mixed,
-            (Ordering::Equal, Ordering::Less) => Way::Rubs,
-            _ => Way::Slips,
-        }
-    }
-}
-
 impl Way {
-    /// What makes a mode go so.
+    /// The usual causes of such a change.
     fn cause(self) -> &'static str {
         match self {
             Way::Slips => {
@@ -212,9 +205,11 @@ fn decimals(value: f64) -> usize {
     (1.0 - value.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize
 }
 
+/// Writes the warning about modes of a recording that change in one way, and the other recordings in which modes do so.
 pub(super) fn write_dependence(
     f: &mut fmt::Formatter<'_>,
-    (file, changes): (&str, &[(usize, AmplitudeChange)]),
+    file: &str,
+    changes: &[(usize, AmplitudeChange)],
     others: &[(String, Vec<usize>)],
 ) -> fmt::Result {
     let named: Vec<String> = changes
@@ -232,27 +227,18 @@ pub(super) fn write_dependence(
         };
         write!(f, "; {more} more {modes} with it")?;
     }
-    write_cause(f, changes)?;
+    if let Some((_, first)) = changes.first() {
+        write!(f, "; {}", first.way().cause())?;
+    }
     f.write_str(
         "; a recording at a second tap level would confirm it, and frequencies should be stated with their amplitude, \
          or taken from softer taps",
     )?;
-    let other = |(file, modes): &(String, Vec<usize>)| {
+    for (place, (file, modes)) in others.iter().enumerate() {
+        let begin = if place == 0 { "; the same in" } else { ";" };
         let numbers: Vec<String> = modes.iter().map(usize::to_string).collect();
         let plural = if modes.len() == 1 { "" } else { "s" };
-        format!("{file}: mode{plural} {}", numbers.join(", "))
-    };
-    if others.is_empty() {
-        return Ok(());
+        write!(f, "{begin} {file}: mode{plural} {}", numbers.join(", "))?;
     }
-    let listed: Vec<String> = others.iter().map(other).collect();
-    write!(f, "; the same in {}", listed.join("; "))
-}
-
-/// What makes the modes go as they go.
-fn write_cause(f: &mut fmt::Formatter<'_>, changes: &[(usize, AmplitudeChange)]) -> fmt::Result {
-    match changes.first() {
-        Some((_, first)) => write!(f, "; {}", first.way().cause()),
-        None => Ok(()),
-    }
+    Ok(())
 }

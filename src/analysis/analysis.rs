@@ -1,16 +1,17 @@
-//! What the chain leaves: plain data, for the report and for callers.
+//! Results of the chain: plain data, for the report and for callers.
 
 use super::amplitude::AmplitudeChange;
 use super::measure::{MeasureError, Measurement};
 use super::structure::TestedStructure;
 use super::warning::Warning;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_identify::consistent::ConsistentEstimate;
-use tapjoint_identify::perturbation::{ModeSensitivity, SignPatternSpans, UniformPerturbation};
-use tapjoint_identify::{FreeBeamEstimate, JointEstimate, MonteCarlo, PredictedMode, Stiffnesses};
+use tapjoint_identify::observation::UNPAIRED;
+use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Uncertain};
 use tapjoint_signal::modal::ModeReading;
 use tapjoint_signal::quality::Verdict;
 use tapjoint_signal::recording::{ChannelInfo, Format, RecordingError};
@@ -25,33 +26,35 @@ pub struct Analysis {
     pub structure: Option<TestedStructure>,
     /// The recordings, in the order of the description.
     pub recordings: Vec<RecordingResult>,
-    /// Of each recording how it differs from the first, "8.8 times its tap level", so that modes and estimate leave
+    /// Difference of each recording from the first, "8.8 times its tap level", for which modes and estimate leave
     /// it out; `None` where they do not.
     pub aside: Vec<Option<String>>,
     /// Resonances of the reference configuration, ascending: the first recording and all others
     /// with its sensor positions and tap level.
     pub modes: Vec<ModeResult>,
-    /// What the modes say about the joint; `None` for a bare recording.
+    /// The joint or the material by the modes; `None` for a bare recording.
     pub identification: Option<Identification>,
-    /// How well the test was made: good practice, check by check.
+    /// Quality of the test: good practice, check by check.
     pub verdicts: Vec<Verdict>,
-    /// What a reader has to know.
+    /// Everything that a reader of the results has to know.
     pub warnings: Vec<Warning>,
 }
 
-/// Which estimate is the main one.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+/// Method by which a joint or a beam is estimated.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum EstimateMethod {
     /// Least squares on the frequencies themselves, the closed form beside it.
     #[default]
     Consistent,
-    /// The closed form alone: the pair regression, or of a free beam its modulus.
+    /// The closed form alone: the regression over pairs of modes, or a free beam's.
     Pairs,
+    /// The closed form of a free beam, which stands in results where a joint has the pair regression.
+    FreeBeam,
 }
 
 impl EstimateMethod {
-    /// Both methods.
+    /// The methods that can be asked for.
     pub const ALL: [Self; 2] = [Self::Consistent, Self::Pairs];
 
     /// Name in reports.
@@ -59,6 +62,7 @@ impl EstimateMethod {
         match self {
             Self::Consistent => "consistent",
             Self::Pairs => "pairs",
+            Self::FreeBeam => "free-beam",
         }
     }
 }
@@ -68,7 +72,7 @@ impl EstimateMethod {
 pub struct RecordingResult {
     /// File as the description names it.
     pub file: String,
-    /// What kind of file it is.
+    /// Kind of file.
     pub format: Format,
     /// Sample rate (Hz); `None` of frequency response functions from a file.
     pub sample_rate: Option<f64>,
@@ -76,16 +80,16 @@ pub struct RecordingResult {
     pub seconds: Option<f64>,
     /// Every channel in the file.
     pub channels: Vec<ChannelInfo>,
-    /// Whether there is a hammer channel.
+    /// True if there is a hammer channel.
     pub has_hammer: bool,
     /// Unit of the taps' peaks: the hammer's, or without one that of all responses; `None` where
-    /// nobody said or they differ.
+    /// they are not known or differ.
     pub tap_unit: Option<String>,
     /// The responses analysed.
     pub responses: Vec<Response>,
     /// The analysed zoom band (Hz), where one was asked for.
     pub band: Option<(f64, f64)>,
-    /// What the description says of this recording; empty for a bare one.
+    /// Circumstances as described; empty for a bare recording.
     pub conditions: Conditions,
     /// Taps, spectra, readings.
     pub measurement: Measurement,
@@ -97,13 +101,13 @@ pub struct RecordingResult {
 }
 
 /// Circumstances of a recording that are carried to the outputs as described.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Conditions {
-    /// Where the hammer strikes (m).
+    /// Position of the taps (m).
     pub tap: Option<f64>,
-    /// Where each sensor sits (m), moved ones at their place in this recording.
+    /// Position of each sensor (m); that in this recording of a sensor that was moved.
     pub sensor_positions: BTreeMap<String, f64>,
-    /// What each sensor weighs (kg), of those whose mass is stated.
+    /// Mass of each sensor (kg) whose mass is stated.
     pub sensor_masses: BTreeMap<String, f64>,
     /// Known masses that are fastened to the beam.
     pub masses: Vec<PointMass>,
@@ -120,9 +124,9 @@ pub struct Conditions {
 pub struct Response {
     /// The sensor's name, or the channel's.
     pub name: String,
-    /// What it senses; `None` where nobody said.
+    /// Kind of sensor; `None` where it is not known.
     pub kind: Option<tapjoint_description::SensorKind>,
-    /// The unit of its values; `None` where nobody said.
+    /// Unit of its values; `None` where it is not known.
     pub unit: Option<String>,
 }
 
@@ -150,20 +154,68 @@ pub struct ModeResult {
     pub half_line: Option<f64>,
     /// Standard uncertainty of the best frequency (Hz), where known.
     pub std: Option<f64>,
-    /// How far it scatters between the recordings that were merged; `None` of one recording.
+    /// Scatter between the recordings that were merged; `None` with one recording.
     pub between: Option<BetweenRecordings>,
     /// The reading behind it; `None` for frequencies read elsewhere.
     pub reading: Option<ModeReading>,
     /// File of the recording it was read from.
     pub recording: Option<String>,
-    /// What a peak that is no mode is.
-    pub label: Option<String>,
     /// Non-dimensional frequency of an Euler beam (1), where there is a beam.
     pub lambda: Option<f64>,
 }
 
+impl ModeResult {
+    /// A resonance as this recording reads it, without a number.
+    pub(super) fn of(reading: ModeReading, recording: &str) -> Self {
+        ModeResult {
+            mode: None,
+            frequency: reading.frequency,
+            half_line: Some(reading.half_line),
+            std: reading.std,
+            between: None,
+            recording: Some(recording.to_owned()),
+            lambda: None,
+            reading: Some(reading),
+        }
+    }
+
+    /// Returns true unless its reading says that it is no mode.
+    pub(super) fn may_be_mode(&self) -> bool {
+        let reading = self.reading.as_ref();
+        reading.is_none_or(|reading| reading.label.is_none())
+    }
+
+    /// Returns true for a resonance that got no number.
+    pub(super) fn is_unpaired(&self) -> bool {
+        self.mode.is_none() && self.may_be_mode()
+    }
+
+    /// Words for a peak that is no mode: "mains 50 Hz", "unpaired"; `None` for a mode.
+    pub fn label(&self) -> Option<String> {
+        let label = self.reading.as_ref().and_then(|reading| reading.label);
+        match self.mode {
+            Some(_) => None,
+            None => Some(label.map_or(UNPAIRED.to_owned(), |label| label.to_string())),
+        }
+    }
+}
+
 impl Identification {
-    /// Whether there is an estimate by any method.
+    /// The method that estimate and prediction go by, if `wanted` is asked for: the consistent estimate where there is
+    /// one, or where all stiffnesses are known.
+    pub(super) fn method(
+        &self,
+        structure: &TestedStructure,
+        wanted: EstimateMethod,
+    ) -> EstimateMethod {
+        if wanted == EstimateMethod::Consistent && self.predicts_with_details(structure) {
+            EstimateMethod::Consistent
+        } else {
+            EstimateMethod::Pairs
+        }
+    }
+
+    /// Returns true if there is an estimate by any method.
     pub fn is_answered(&self) -> bool {
         self.consistent.is_some() || self.estimate.is_some()
     }
@@ -190,14 +242,14 @@ impl Identification {
         }
     }
 
-    /// Whether predictions take in what is fastened to the beam and a lap joint's unequal halves: a
+    /// Returns true if predictions take in what is fastened to the beam and a lap joint's unequal halves: a
     /// closed form that was estimated without them has their effect in its stiffnesses already.
     pub fn predicts_with_details(&self, structure: &TestedStructure) -> bool {
         self.consistent.is_some() || structure.known.over(None).is_some()
     }
 }
 
-/// What the modes say about joint or material.
+/// The joint, or the material of a free beam, by the modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
     /// The main estimate: the joint whose frequencies are nearest; `None` where it was not asked for
@@ -211,8 +263,8 @@ pub struct Identification {
     pub prediction: Vec<PredictedMode>,
     /// The structure that the prediction is of; `None` without a joint to predict with.
     pub predicted: Option<Specimen>,
-    /// How errors in the frequencies move the estimate, by each method that has one.
-    pub perturbations: Vec<Perturbation>,
+    /// Estimates under errors of the frequencies, by each method that has one.
+    pub perturbations: Perturbations,
 }
 
 /// An estimate in closed form.
@@ -224,34 +276,126 @@ pub enum Estimate {
     FreeBeam(FreeBeamEstimate),
 }
 
-/// How errors in the frequencies move the joint's estimate.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Perturbation {
-    /// By which method it was estimated.
-    pub method: EstimateMethod,
+/// Estimates under changed frequencies, by each method that has one: first the pair regression, then the consistent
+/// estimate.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Perturbations {
     /// All frequencies up and down by a percentage.
-    pub uniform: Vec<UniformPerturbation>,
-    /// Average errors of the percentages as Ingole & Chatterjee state them.
-    pub averages: Vec<tapjoint_identify::perturbation::AverageError>,
-    /// Under each mode's own bound; `None` where no bounds are known.
-    pub bounds: Option<BoundPerturbation>,
-    /// Under random errors; `None` where no standard deviations are known, or none was asked for.
-    pub random: Option<MonteCarlo>,
+    pub uniform: Vec<PerturbationSection>,
+    /// Average errors of the percentages.
+    pub averages: Vec<AverageSection>,
+    /// Under random errors; empty where no standard deviations are known, or none was asked for.
+    pub random: Vec<MonteCarloSection>,
+    /// Under each mode's own bound; empty where no bounds are known.
+    pub spans: Vec<ResolutionSpanSection>,
 }
 
-/// The estimate under the bounds of the readings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BoundPerturbation {
-    /// Mode numbers.
-    pub modes: Vec<usize>,
-    /// Bound of each (Hz).
-    pub bounds: Vec<f64>,
-    /// Spans over all sign patterns; `None` for more modes than can be tried.
-    pub spans: Option<SignPatternSpans>,
-    /// All estimates over the patterns.
-    pub cloud: Vec<Stiffnesses>,
-    /// Which mode drives which parameter.
-    pub sensitivities: Vec<ModeSensitivity>,
+impl Perturbations {
+    /// Returns true if no estimate was perturbed.
+    pub fn is_empty(&self) -> bool {
+        self.uniform.is_empty() && self.random.is_empty() && self.spans.is_empty()
+    }
+}
+
+/// An estimate from frequencies changed by the same percentage.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct PerturbationSection {
+    /// Change of all frequencies (%), signed.
+    pub percent: f64,
+    /// "pairs" or "consistent".
+    pub method: EstimateMethod,
+    /// Kx.
+    pub kx: Option<f64>,
+    /// Ky.
+    pub ky: Option<f64>,
+    /// Kz.
+    pub kz: Option<f64>,
+}
+
+/// Average errors of +percent and -percent: the mean of their magnitudes, as in table 9 of Ingole &
+/// Chatterjee, and the error of their mean, as in table 14.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct AverageSection {
+    /// "pairs" or "consistent".
+    pub method: EstimateMethod,
+    /// Change of all frequencies (%), its size.
+    pub percent: f64,
+    /// Mean of the magnitudes, of Kx (%).
+    pub kx_percent: Option<f64>,
+    /// Mean of the magnitudes, of Ky (%).
+    pub ky_percent: Option<f64>,
+    /// Mean of the magnitudes, of Kz (%).
+    pub kz_percent: Option<f64>,
+    /// Magnitude of the error of the two estimates' mean (%), as in table 14: smaller, because
+    /// opposite errors cancel. Of Kx.
+    pub kx_of_mean_percent: Option<f64>,
+    /// Magnitude of the error of the mean of Ky (%).
+    pub ky_of_mean_percent: Option<f64>,
+    /// Magnitude of the error of the mean of Kz (%).
+    pub kz_of_mean_percent: Option<f64>,
+}
+
+/// Estimates under random errors of the frequencies: median and 95 % interval.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct MonteCarloSection {
+    /// "pairs" or "consistent".
+    pub method: EstimateMethod,
+    /// Repetitions.
+    pub samples: usize,
+    /// Number of repetitions without an estimate.
+    pub failed: usize,
+    /// Kx.
+    pub kx: Option<Uncertain>,
+    /// Ky.
+    pub ky: Option<Uncertain>,
+    /// Kz.
+    pub kz: Option<Uncertain>,
+    /// The first repetitions' estimates, for a picture: (Kx, Ky).
+    #[serde(skip)]
+    pub cloud: Vec<[f64; 2]>,
+}
+
+/// Spans of the estimate over the bounds of the readings.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ResolutionSpanSection {
+    /// "pairs" or "consistent".
+    pub method: EstimateMethod,
+    /// Number of sign patterns tried.
+    pub patterns: usize,
+    /// Patterns that left no estimate.
+    pub failed: usize,
+    /// Smallest and largest Kx.
+    pub kx: Option<[f64; 2]>,
+    /// Smallest and largest Ky.
+    pub ky: Option<[f64; 2]>,
+    /// Smallest and largest Kz.
+    pub kz: Option<[f64; 2]>,
+    /// All estimates over the patterns, for a picture: (Kx, Ky).
+    #[serde(skip)]
+    pub cloud: Vec<[f64; 2]>,
+    /// Change of each parameter (%) when one mode moves by its own bound.
+    pub sensitivity: Vec<SensitivitySection>,
+}
+
+/// Change of the estimate by one mode's bound.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct SensitivitySection {
+    /// Mode number.
+    pub mode: usize,
+    /// The bound (Hz).
+    pub half_line: f64,
+    /// Change of Kx (%).
+    pub kx_percent: Option<f64>,
+    /// Change of Ky (%).
+    pub ky_percent: Option<f64>,
+    /// Change of Kz (%).
+    pub kz_percent: Option<f64>,
+    /// Change of Kx (%) per change of this frequency (%), for small changes.
+    pub kx_percent_per_percent: Option<f64>,
+    /// Change of Ky (%) per change of this frequency (%).
+    pub ky_percent_per_percent: Option<f64>,
+    /// Change of Kz (%) per change of this frequency (%).
+    pub kz_percent_per_percent: Option<f64>,
 }
 
 /// The samples about a tap.
@@ -272,14 +416,26 @@ pub struct CloseUp {
 pub struct BetweenRecordings {
     /// Variance of its frequency between the recordings, sum (f - mean)^2/(n - 1), over the mean's square (1).
     pub variance: f64,
-    /// What the readings' own standard uncertainties make of that, over the same (1).
+    /// Variance by the readings' own standard uncertainties, over the mean's square (1).
     pub own: f64,
     /// Recordings less one.
     pub freedom: usize,
 }
 
 impl RecordingResult {
-    /// How a mode changes with its amplitude, where it is beyond the uncertainty and large enough to matter.
+    /// Returns the recording's own readings of resonances, ascending; none without spectra.
+    pub fn readings(&self) -> &[ModeReading] {
+        let spectra = self.measurement.spectra.as_ref();
+        spectra.map_or(&[], |spectra| &spectra.readings)
+    }
+
+    /// Frequencies (Hz) between which it was searched for resonances; `None` without spectra.
+    pub(super) fn looked_at(&self) -> Option<(f64, f64)> {
+        let lines = self.measurement.spectra.as_ref()?.averages.lines;
+        Some((lines.low, lines.high))
+    }
+
+    /// Change of a mode with its amplitude, where it is beyond the uncertainty and large enough to matter.
     pub fn amplitude_change(&self, reading: &ModeReading) -> Option<AmplitudeChange> {
         let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
         let change = AmplitudeChange::of(curve)?;
@@ -289,7 +445,7 @@ impl RecordingResult {
     }
 }
 
-/// What stops an analysis.
+/// Reasons for which an analysis stops.
 #[derive(Debug, thiserror::Error)]
 pub enum PipelineError {
     /// A recording could not be read.
@@ -298,24 +454,16 @@ pub enum PipelineError {
     /// A recording could not be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// A band that does not fit a file of frequency response functions.
-    #[error("{file}: {problem}")]
-    Functions {
-        /// The recording.
-        file: String,
-        /// What does not fit.
-        problem: SpectralError,
-    },
     /// A band or block of the description that does not fit its recording.
     #[error("{file}:{line}: {recording}: {problem}")]
     Setting {
         /// The description.
         file: String,
-        /// Its line.
+        /// Line of the description.
         line: usize,
         /// The recording.
         recording: String,
-        /// What does not fit.
+        /// The problem.
         problem: SpectralError,
     },
     /// A channel of the description that its recording does not have, or cannot be told from others, or
@@ -324,11 +472,11 @@ pub enum PipelineError {
     Channel {
         /// The description.
         file: String,
-        /// Its line.
+        /// Line of the description.
         line: usize,
         /// The key: `sensor[2].channel`.
         key: String,
-        /// What the recording has instead.
+        /// The problem, with the channels of the recording.
         problem: Box<RecordingError>,
     },
     /// A description without sensors.

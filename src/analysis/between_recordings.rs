@@ -1,20 +1,10 @@
-//! How far the recordings of one test are apart, beyond what each frequency's own uncertainty explains.
+//! Scatter between the recordings of one test, beyond each frequency's own uncertainty.
 
-use super::analysis::{BetweenRecordings, ModeResult};
+use super::analysis::BetweenRecordings;
 use tapjoint_numerics::stats::chi_square_quantile;
-use tapjoint_signal::modal::ModeReading;
 
-/// From the readings of one mode that have an uncertainty; `None` below two.
-pub(super) fn between(readings: &[ModeReading]) -> Option<BetweenRecordings> {
-    let known = |reading: &ModeReading| {
-        let std = reading.std.filter(|std| *std > 0.0 && std.is_finite())?;
-        Some((reading.frequency, std))
-    };
-    of_known(&readings.iter().filter_map(known).collect::<Vec<_>>())
-}
-
-/// From frequencies and their standard uncertainties.
-fn of_known(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
+/// From the frequencies of one mode and their standard uncertainties; `None` below two.
+pub(super) fn between(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
     let freedom = readings
         .len()
         .checked_sub(1)
@@ -36,20 +26,9 @@ fn of_known(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
 /// freedom each (in the manner of Paule & Mandel 1982, "Consensus values and weighting factors"): a mode that is read coarsely says
 /// little, and one that stands still beside others that do not decides nothing by itself. 0 where there is no more
 /// than noise.
-pub(super) fn scatter(modes: &[ModeResult]) -> f64 {
-    common_share(&of_modes(modes))
-}
-
-/// Halvings of the interval in which the square lies: it is known to 1e-15 of its largest possible value.
-const HALVINGS: usize = 50;
-
-fn common_share(all: &[BetweenRecordings]) -> f64 {
+pub(super) fn common_share(all: &[BetweenRecordings]) -> f64 {
     let freedom: f64 = all.iter().map(|one| one.freedom as f64).sum();
-    let squares = |square: f64| -> f64 {
-        let of = |one: &BetweenRecordings| one.freedom as f64 * one.variance / (one.own + square);
-        all.iter().map(of).sum()
-    };
-    if all.is_empty() || squares(0.0) <= freedom {
+    if all.is_empty() || squares(all, 0.0) <= freedom {
         return 0.0;
     }
     // Without uncertainties of their own the mean variance would be the square: it is no larger.
@@ -61,7 +40,7 @@ fn common_share(all: &[BetweenRecordings]) -> f64 {
     let (mut low, mut high) = (0.0, mean);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if squares(middle) > freedom {
+        if squares(all, middle) > freedom {
             low = middle;
         } else {
             high = middle;
@@ -70,22 +49,24 @@ fn common_share(all: &[BetweenRecordings]) -> f64 {
     high.sqrt()
 }
 
-/// Whether the recordings differ by more than their readings' uncertainty explains. One test in a hundred does so by
-/// chance where that is known and alike in all recordings; of a few taps, several.
-pub(super) fn differ(modes: &[ModeResult]) -> bool {
-    exceeds_noise(&of_modes(modes))
+/// Halvings of the interval in which the square lies: it is known to 1e-15 of its largest possible value.
+const HALVINGS: usize = 50;
+
+/// Sum of the squares over their variances, a common one included.
+fn squares(all: &[BetweenRecordings], common: f64) -> f64 {
+    let modes = all.iter();
+    modes
+        .map(|one| one.freedom as f64 * one.variance / (one.own + common))
+        .sum()
 }
 
-fn exceeds_noise(all: &[BetweenRecordings]) -> bool {
-    let ratios = all
-        .iter()
-        .map(|one| one.freedom as f64 * one.variance / one.own);
+/// Returns true if the recordings differ by more than their readings' uncertainty explains.
+///
+/// One test in a hundred does so by chance where the uncertainty is known and alike in all recordings; of a few taps,
+/// several.
+pub(super) fn exceeds_noise(all: &[BetweenRecordings]) -> bool {
     let freedom: usize = all.iter().map(|one| one.freedom).sum();
-    chi_square_quantile(0.99, freedom as f64).is_some_and(|most| ratios.sum::<f64>() > most)
-}
-
-fn of_modes(modes: &[ModeResult]) -> Vec<BetweenRecordings> {
-    modes.iter().filter_map(|mode| mode.between).collect()
+    chi_square_quantile(0.99, freedom as f64).is_some_and(|most| squares(all, 0.0) > most)
 }
 
 #[cfg(test)]
@@ -105,7 +86,7 @@ mod tests {
                     (random.sample(StandardNormal), random.sample(StandardNormal));
                 (nominal * (1.0 + std * own + share * drift), nominal * std)
             };
-            of_known(&(0..3).map(reading).collect::<Vec<_>>()).unwrap()
+            between(&(0..3).map(reading).collect::<Vec<_>>()).unwrap()
         };
         stds.iter().enumerate().map(of_mode).collect()
     }
@@ -114,8 +95,8 @@ mod tests {
 
     #[test]
     fn limit_one_reading_says_nothing_and_equal_ones_scatter_by_nothing() {
-        assert_eq!(of_known(&[(40.0, 0.1)]), None);
-        let still = of_known(&[(40.0, 0.1), (40.0, 0.1)]).unwrap();
+        assert_eq!(between(&[(40.0, 0.1)]), None);
+        let still = between(&[(40.0, 0.1), (40.0, 0.1)]).unwrap();
         assert_eq!(common_share(&[still]), 0.0);
         assert_eq!(common_share(&[]), 0.0);
         assert!(!exceeds_noise(&[]) && !exceeds_noise(&[still]));
@@ -168,7 +149,7 @@ mod tests {
         let mut all = drawn(&STDS, 1e-3, &mut random);
         let without = common_share(&all);
         for off in [0.0, 0.3] {
-            let coarse = of_known(&[(40.0 - off, 0.4), (40.0 + off, 0.4), (40.0, 0.4)]);
+            let coarse = between(&[(40.0 - off, 0.4), (40.0 + off, 0.4), (40.0, 0.4)]);
             all.push(coarse.unwrap());
             let with = common_share(&all);
             assert!((with / without - 1.0).abs() < 0.1, "{with} for {without}");

@@ -1,4 +1,4 @@
-//! What speaks against a measurement: checks of good practice, modes that change with amplitude, and doubts of several
+//! Doubts about a measurement: checks of good practice, modes that change with amplitude, and doubts of several
 //! recordings as one.
 
 use super::amplitude::{AmplitudeChange, Way};
@@ -41,10 +41,7 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
         .iter()
         .enumerate()
         .filter(|(_, reading)| reading.label.is_none())
-        .map(|(index, reading)| ResonanceEvidence {
-            is_mode: is_mode(recording, index),
-            ..resonance(reading, spectra)
-        })
+        .map(|(index, reading)| resonance(reading, spectra, is_mode(recording, index)))
         .collect();
     let masses = recording.conditions.masses.iter();
     let fastened = masses.map(|mass| (mass.position, mass.mass));
@@ -68,7 +65,7 @@ fn evidence(recording: &RecordingResult) -> Option<RecordingEvidence> {
     })
 }
 
-/// Whether a reading is a mode: it has a number, or none has.
+/// Returns true if a reading is a mode: it has a number, or no reading has one.
 fn is_mode(recording: &RecordingResult, index: usize) -> bool {
     let numbers = &recording.mode_numbers;
     let own = numbers.get(index).copied().flatten();
@@ -77,29 +74,24 @@ fn is_mode(recording: &RecordingResult, index: usize) -> bool {
 
 fn sensors(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<SensorEvidence> {
     let averages = &spectra.averages;
-    let force_unit = recording.tap_unit.as_deref();
-    let sensor = |(index, response): (usize, &super::analysis::Response)| SensorEvidence {
-        name: response.name.clone(),
-        position: recording
-            .conditions
-            .sensor_positions
-            .get(&response.name)
-            .copied(),
-        form: form_of(response, force_unit),
-        frf: averages
-            .h1
-            .as_ref()
-            .and_then(|functions| functions.get(index).cloned()),
-        coherence: averages.coherence(index).map(|values| {
-            let of = |value: Option<f64>| value.unwrap_or(0.0);
-            values.into_iter().map(of).collect()
-        }),
-    };
-    recording.responses.iter().enumerate().map(sensor).collect()
+    let positions = &recording.conditions.sensor_positions;
+    let functions = averages.h1.as_deref().unwrap_or_default();
+    let mut sensors = Vec::with_capacity(recording.responses.len());
+    for (index, response) in recording.responses.iter().enumerate() {
+        let coherence = averages.coherence(index);
+        sensors.push(SensorEvidence {
+            name: response.name.clone(),
+            position: positions.get(&response.name).copied(),
+            form: form_of(response, recording.tap_unit.as_deref()),
+            frf: functions.get(index).cloned(),
+            coherence: coherence.map(|lines| lines.iter().map(|c| c.unwrap_or(0.0)).collect()),
+        });
+    }
+    sensors
 }
 
 /// The window widens every resonance of the spectra, also where the damping was fitted without it.
-fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvidence {
+fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra, is_mode: bool) -> ResonanceEvidence {
     let added = spectra.window.added_decay() / (TAU * reading.frequency);
     let taps = reading
         .fit
@@ -108,7 +100,7 @@ fn resonance(reading: &ModeReading, spectra: &MeasuredSpectra) -> ResonanceEvide
     let mut stds: Vec<f64> = taps.iter().map(|tap| tap.frequency_std).collect();
     ResonanceEvidence {
         frequency: reading.frequency,
-        is_mode: true,
+        is_mode,
         std: reading.std,
         apparent_damping_ratio: reading.damping_ratio.map(|own| own + added),
         damping_from: match reading.fit {
@@ -125,42 +117,40 @@ const MOST_PLACES: usize = 6;
 
 /// Doubts of one check as one warning: the worst in full, the others by their places. What the taps' own
 /// reasons and the warnings of the spectra say already is left out.
-pub(crate) fn of_quality(verdicts: &[Verdict]) -> Vec<Warning> {
+fn of_quality(verdicts: &[Verdict]) -> Vec<Warning> {
     let mut checks: Vec<(Check, Vec<&Verdict>)> = Vec::new();
-    for verdict in verdicts.iter().filter(|v| v.is_doubt() && !is_said(v)) {
+    for verdict in verdicts.iter().filter(|verdict| verdict.is_doubt()) {
+        let is_said_elsewhere = match verdict.check {
+            Check::DoubleHit
+            | Check::Overload
+            | Check::WeakTap
+            | Check::Averages
+            | Check::Decay => true,
+            // The tap was rejected for it.
+            Check::ForceRipple => verdict.outcome == Outcome::Bad,
+            _ => false,
+        };
+        if is_said_elsewhere {
+            continue;
+        }
         match checks.iter_mut().find(|(check, _)| *check == verdict.check) {
             Some((_, doubts)) => doubts.push(verdict),
             None => checks.push((verdict.check, vec![verdict])),
         }
     }
-    let warnings = checks.iter().filter_map(|(check, doubts)| {
-        Some(Warning::Quality {
-            code: check.code(),
-            text: words(doubts)?,
-        })
-    });
+    let warnings = checks
+        .iter()
+        .filter_map(|(check, doubts)| Some(Warning::new(check.code(), words(doubts)?)));
     warnings.collect()
-}
-
-fn is_said(verdict: &Verdict) -> bool {
-    match verdict.check {
-        Check::DoubleHit | Check::Overload | Check::WeakTap | Check::Averages | Check::Decay => {
-            true
-        }
-        // The tap was rejected for it.
-        Check::ForceRipple => verdict.outcome == Outcome::Bad,
-        _ => false,
-    }
 }
 
 /// "rec2.wav, 15.50 Hz: ... (The worst of 3; also 15.51 Hz in rec1.wav, rec3.wav. ...)"; `None` of nothing.
 fn words(doubts: &[&Verdict]) -> Option<String> {
     // The first of equally bad ones.
-    let worse = |a: &&Verdict, b: &&Verdict| {
+    let worst = *doubts.iter().rev().max_by(|a, b| {
         let by_size = a.severity().total_cmp(&b.severity());
         a.outcome.cmp(&b.outcome).then(by_size)
-    };
-    let worst = *doubts.iter().rev().max_by(|a, b| worse(a, b))?;
+    })?;
     if doubts.len() == 1 {
         return Some(worst.to_string());
     }
@@ -180,7 +170,7 @@ fn words(doubts: &[&Verdict]) -> Option<String> {
     ))
 }
 
-/// Where the others are: modes with their recordings, recordings that share their modes together.
+/// Places of the doubts other than the worst: modes with their recordings; modes of the same recordings stand together.
 fn places(doubts: &[&Verdict], worst: &Verdict) -> Vec<String> {
     let mut modes: Vec<Place<'_>> = Vec::new();
     let mut others: Vec<String> = Vec::new();
@@ -195,52 +185,50 @@ fn places(doubts: &[&Verdict], worst: &Verdict) -> Vec<String> {
             continue;
         };
         // Two peaks of one recording are two, however near.
-        let same = modes
-            .iter_mut()
-            .filter(|place| place.is_mode == *is_mode && is_same(place.frequency, *frequency))
-            .find(|place| !place.files.contains(&file.as_str()));
+        let same_mode = QualitySettings::default().same_mode;
+        let same = modes.iter_mut().find(|place| {
+            place.is_mode == *is_mode
+                && (frequency / place.frequencies[0] - 1.0).abs() <= same_mode
+                && !place.files.contains(&file.as_str())
+        });
         match same {
             Some(place) => place.files.push(file),
             None => modes.push(Place {
-                frequency: *frequency,
+                frequencies: vec![*frequency],
                 is_mode: *is_mode,
                 files: vec![file],
             }),
         }
     }
-    modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
-    let mut listed: Vec<(Vec<&str>, bool, Vec<String>)> = Vec::new();
+    modes.sort_by(|a, b| a.frequencies[0].total_cmp(&b.frequencies[0]));
+    let mut listed: Vec<Place<'_>> = Vec::new();
     for place in modes {
-        let frequency = format!("{:.2}", place.frequency);
-        let same = |one: &&mut (Vec<&str>, bool, Vec<String>)| {
-            one.0 == place.files && one.1 == place.is_mode
-        };
-        match listed.iter_mut().find(same) {
-            Some((_, _, frequencies)) => frequencies.push(frequency),
-            None => listed.push((place.files, place.is_mode, vec![frequency])),
+        let mut earlier = listed.iter_mut();
+        match earlier.find(|one| one.files == place.files && one.is_mode == place.is_mode) {
+            Some(one) => one.frequencies.extend(place.frequencies),
+            None => listed.push(place),
         }
     }
-    let modes = listed.into_iter().map(|(files, is_mode, frequencies)| {
-        let what = if is_mode { "" } else { " (no mode)" };
-        format!(
-            "{} Hz{what} in {}",
-            frequencies.join(", "),
-            files.join(", ")
-        )
+    let modes = listed.into_iter().map(|place| {
+        let frequencies: Vec<String> = place
+            .frequencies
+            .iter()
+            .map(|f| format!("{f:.2}"))
+            .collect();
+        let what = if place.is_mode { "" } else { " (no mode)" };
+        let files = place.files.join(", ");
+        format!("{} Hz{what} in {files}", frequencies.join(", "))
     });
     others.dedup();
     modes.chain(others).collect()
 }
 
-/// A mode, or a peak that is none, and the recordings that have it.
+/// Modes, or peaks that are none, of the same recordings.
 struct Place<'a> {
-    frequency: f64,
+    /// Frequencies (Hz), at least one.
+    frequencies: Vec<f64>,
     is_mode: bool,
     files: Vec<&'a str>,
-}
-
-fn is_same(first: f64, second: f64) -> bool {
-    (second / first - 1.0).abs() <= QualitySettings::default().same_mode
 }
 
 /// Warnings that differ in their recording and a number alone become one, in the place of the first.
@@ -295,22 +283,23 @@ fn is_joined(earlier: &mut Warning, later: &Warning) -> bool {
     }
 }
 
-/// One warning for each way in which modes change, with the recording in which they change most.
+/// Returns one warning for each way in which modes change, with the recording in which they change most.
 pub(crate) fn of_amplitude(recordings: &[RecordingResult]) -> Vec<Warning> {
-    let of_recording = |recording: &RecordingResult| {
-        let spectra = recording.measurement.spectra.as_ref()?;
-        let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
+    let mut all = Vec::new();
+    for recording in recordings {
+        let numbered = recording.readings().iter().zip(&recording.mode_numbers);
         let changes: Changes = numbered
             .filter_map(|(reading, &mode)| Some((mode?, recording.amplitude_change(reading)?)))
             .collect();
-        (!changes.is_empty()).then(|| (recording.file.clone(), changes))
-    };
-    by_way(recordings.iter().filter_map(of_recording).collect())
+        all.push((recording.file.clone(), changes));
+    }
+    by_way(all)
 }
 
 /// Numbers of modes, and how each changes.
 type Changes = Vec<(usize, AmplitudeChange)>;
 
+/// Groups the changes of all recordings by their way.
 fn by_way(all: Vec<(String, Changes)>) -> Vec<Warning> {
     let mut groups: Vec<(Way, Vec<(String, Changes)>)> = Vec::new();
     for (file, changes) in all {
@@ -328,40 +317,30 @@ fn by_way(all: Vec<(String, Changes)>) -> Vec<Warning> {
             }
         }
     }
-    let warnings = groups
-        .into_iter()
-        .filter_map(|(_, group)| one_warning(group));
+    let warnings = groups.into_iter().map(|(_, group)| one_warning(group));
     warnings.collect()
 }
 
-/// The recordings whose modes change in one way.
-fn one_warning(mut group: Vec<(String, Changes)>) -> Option<Warning> {
-    let most = |one: &(String, Changes)| {
-        let sizes = one.1.iter().map(|(_, change)| change.size());
-        sizes.fold(
-            (0.0, 0.0),
-            |most: (f64, f64), size| {
-                if size > most { size } else { most }
-            },
-        )
-    };
-    let (mut worst, mut size) = (0, most(group.first()?));
-    for (place, one) in group.iter().enumerate().skip(1) {
-        let own = most(one);
-        if own > size {
-            (worst, size) = (place, own);
+/// The warning about recordings, at least one, whose modes change in one way.
+fn one_warning(mut group: Vec<(String, Changes)>) -> Warning {
+    let (mut worst, mut most) = (0, (0.0, 0.0));
+    for (place, (_, changes)) in group.iter().enumerate() {
+        for (_, change) in changes {
+            if change.size() > most {
+                (worst, most) = (place, change.size());
+            }
         }
     }
     let (file, changes) = group.remove(worst);
-    let modes = |changes: Changes| changes.into_iter().map(|(mode, _)| mode).collect();
-    let others = group
-        .into_iter()
-        .map(|(file, changes)| (file, modes(changes)));
-    Some(Warning::AmplitudeDependent {
+    let others = group.into_iter().map(|(file, changes)| {
+        let modes = changes.into_iter().map(|(mode, _)| mode);
+        (file, modes.collect())
+    });
+    Warning::AmplitudeDependent {
         file,
         changes,
         others: others.collect(),
-    })
+    }
 }
 
 #[cfg(test)]
@@ -370,12 +349,12 @@ mod tests {
     use tapjoint_signal::modal::PeakLabel;
     use tapjoint_signal::spectral::Window;
 
-    fn doubt(check: Check, (file, frequency): (&str, f64), value: f64) -> Verdict {
+    fn doubt(check: Check, place: (&str, f64), value: f64) -> Verdict {
         Verdict {
             check,
             subject: Subject::Mode {
-                file: file.to_owned(),
-                frequency,
+                file: place.0.to_owned(),
+                frequency: place.1,
                 is_mode: true,
             },
             value: Some(value),
@@ -449,9 +428,7 @@ mod tests {
             label: PeakLabel::Mains(frequency),
             others: Vec::new(),
         };
-        let alone = Warning::SingleTap {
-            file: "a.wav".to_owned(),
-        };
+        let alone = Warning::single_tap("a.wav");
         let all = vec![
             rings("a.wav", 0.04),
             hum("a.wav", 50.0),

@@ -1,81 +1,139 @@
 //! Doubts about an estimate: what its numbers show, and what it leaves out of the described test.
 
-use super::analysis::{EstimateMethod, ModeResult};
-use super::between_recordings::differ;
+use super::analysis::{BetweenRecordings, Estimate, EstimateMethod, Identification, ModeResult};
+use super::between_recordings::exceeds_noise;
 use super::structure::TestedStructure;
 use super::warning::Warning;
 use tapjoint_beam::BeamTheory;
-use tapjoint_description::{FitParameter, SensorKind, TestDescription, Weights};
-use tapjoint_identify::consistent::NOTABLE_MISFIT;
+use tapjoint_description::{FitParameter, SensorDescription, SensorKind, TestDescription, Weights};
 use tapjoint_identify::consistent::{
-    ConsistentEstimate, EstimatedQuantity, Limit, Quantity, Verdict,
+    ConsistentEstimate, EstimatedQuantity, Limit, NOTABLE_MISFIT, Quantity, Verdict,
 };
+use tapjoint_identify::{Doubt, MeasuredMode, PredictedMode};
 use tapjoint_numerics::stats::times;
 
-/// What else may be behind a misfit where modes come from several recordings.
+/// Another possible cause of a misfit where modes come from several recordings.
 const BETWEEN: &str = "; recordings taken one after the other differ by more than \
                        single readings";
-/// What is done about it where there is a joint.
+/// Remedy for it where there is a joint.
 const ALLOWED: &str =
     ": the diagnosis of what is missing allows for a joint that drifts between them";
 
-/// Everything that a reader of the estimate has to know.
-pub(super) fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
+/// Doubts that the description itself raises.
+pub(super) fn of_description(test: &TestDescription) -> Vec<Warning> {
+    let doubts = test.warnings.iter();
+    doubts
+        .map(|doubt| Warning::new("description", doubt.to_string()))
+        .collect()
+}
+
+/// Doubts about the estimates of all methods.
+pub(super) fn of_estimate(
+    structure: &TestedStructure,
+    found: &Identification,
+    modes: &[ModeResult],
+) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let mut add =
-        |code: &'static str, text: String| warnings.push(Warning::Estimate { code, text });
-    if let Some(text) = misfit(found) {
-        let drift = match (differ(modes), has_joint(found)) {
-            (false, _) => String::new(),
-            (true, false) => BETWEEN.to_owned(),
-            (true, true) => format!("{BETWEEN}{ALLOWED}"),
-        };
-        add("misfit", text + &drift);
+    match (&found.consistent, &found.estimate, &found.reason) {
+        (Some(consistent), ..) => warnings.extend(of_consistent(consistent, modes)),
+        (None, Some(_), Some(reason)) => warnings.push(of_fallback(structure, reason)),
+        _ => {}
     }
-    if found.goodness.verdict == Verdict::Untestable {
-        add("untestable", found.goodness.words());
-    }
-    for text in found.quantities.iter().filter_map(open_end) {
-        add("at-limit", text);
-    }
-    // Of one parameter alone the open end says the same.
-    let several = found.fit.len() > 1;
-    for flat in found.identifiability.flat.iter().filter(|_| several) {
-        add("flat-direction", flat.words.clone());
-    }
-    // A valley whose frequencies are off by more than a beam's dimensions leave open is none to doubt.
-    let near = |rms_percent: f64| rms_percent < 100.0 * NOTABLE_MISFIT;
-    for other in found.other_minima.iter().filter(|o| near(o.rms_percent)) {
-        let values = other
-            .values
-            .iter()
-            .map(|(q, v)| format!("{} {v:.4e}", q.name()));
-        let values: Vec<String> = values.collect();
-        add(
-            "other-minimum",
-            format!(
-                "another joint comes near the same frequencies, to {:.2} % rms: {}",
-                other.rms_percent,
-                values.join(", ")
-            ),
-        );
-    }
-    if !found.stop.converged() {
-        add(
-            "not-converged",
-            "the search for the best joint ended before it stood still; its values are not the best \
-             ones"
-                .to_owned(),
-        );
-    }
-    if coupling_is_open(found) {
-        warnings.push(Warning::CouplingNotEstablished);
+    let Some(Estimate::Joint(joint)) = &found.estimate else {
+        return warnings;
+    };
+    for doubt in &joint.doubts {
+        warnings.extend(match doubt {
+            Doubt::Closure { closure } => Some(Warning::closure(*closure)),
+            Doubt::CouplingNotEstablished if found.consistent.is_some() => None,
+            Doubt::CouplingNotEstablished => Some(Warning::coupling_not_established()),
+            other => Some(Warning::unphysical(other)),
+        });
     }
     warnings
 }
 
+/// Returns every doubt that the numbers of a consistent estimate raise.
+fn of_consistent(found: &ConsistentEstimate, modes: &[ModeResult]) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if let Some(text) = misfit(found) {
+        let between: Vec<BetweenRecordings> =
+            modes.iter().filter_map(|mode| mode.between).collect();
+        let drift = match (exceeds_noise(&between), has_joint(found)) {
+            (false, _) => String::new(),
+            (true, false) => BETWEEN.to_owned(),
+            (true, true) => format!("{BETWEEN}{ALLOWED}"),
+        };
+        warnings.push(Warning::new("misfit", text + &drift));
+    }
+    if found.goodness.verdict == Verdict::Untestable {
+        warnings.push(Warning::new("untestable", found.goodness.words()));
+    }
+    for text in found.quantities.iter().filter_map(open_end) {
+        warnings.push(Warning::new("at-limit", text));
+    }
+    // Of one parameter alone the open end says the same.
+    let several = found.fit.len() > 1;
+    for flat in found.identifiability.flat.iter().filter(|_| several) {
+        warnings.push(Warning::new("flat-direction", flat.words.clone()));
+    }
+    // A valley whose frequencies are off by more than a beam's dimensions leave open is none to doubt.
+    let most = 100.0 * NOTABLE_MISFIT;
+    for other in found
+        .other_minima
+        .iter()
+        .filter(|other| other.rms_percent < most)
+    {
+        let values = other.values.iter();
+        let values: Vec<String> = values
+            .map(|(q, v)| format!("{} {v:.4e}", q.name()))
+            .collect();
+        let text = format!(
+            "another joint comes near the same frequencies, to {:.2} % rms: {}",
+            other.rms_percent,
+            values.join(", ")
+        );
+        warnings.push(Warning::new("other-minimum", text));
+    }
+    if !found.stop.converged() {
+        let text = "the search for the best joint ended before it stood still; its values are not the best ones";
+        warnings.push(Warning::new("not-converged", text.to_owned()));
+    }
+    // The interval of a fitted coupling that contains zero.
+    let coupling = found.quantity(Quantity::Coupling);
+    if coupling.is_some_and(|coupling| {
+        let interval = coupling.low.zip(coupling.high);
+        coupling.std.is_some() && interval.is_none_or(|(low, high)| low * high <= 0.0)
+    }) {
+        warnings.push(Warning::coupling_not_established());
+    }
+    warnings
+}
+
+/// The largest misfit of a prediction that is beyond what a beam's stated dimensions usually leave open in its
+/// frequencies, and beyond three standard deviations of its reading. A coarse reading may miss by more than a sharp one
+/// and mean less.
+pub(super) fn of_prediction(
+    prediction: &[PredictedMode],
+    measured: &[MeasuredMode],
+) -> Option<Warning> {
+    let notable = prediction.iter().filter_map(|mode| {
+        let error_percent = mode
+            .error_percent
+            .filter(|e| e.abs() > 100.0 * NOTABLE_MISFIT)?;
+        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
+        let deviations = reading
+            .std
+            .map(|std| (mode.predicted - reading.frequency) / std);
+        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
+        beyond.then_some((mode.mode, error_percent, deviations))
+    });
+    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    worst.map(|(mode, error_percent, deviations)| Warning::misfit(mode, error_percent, deviations))
+}
+
 /// The closed form stands in the place of the consistent estimate.
-pub(super) fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning {
+fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning {
     let closed = match structure.regression {
         Some(_) => "the pair regression",
         None => "the closed form",
@@ -88,22 +146,10 @@ pub(super) fn of_fallback(structure: &TestedStructure, reason: &str) -> Warning 
     } else {
         format!("no consistent estimate: {reason}; {closed} stands in its place")
     };
-    Warning::Estimate {
-        code: "fallback",
-        text,
-    }
+    Warning::new("fallback", text)
 }
 
-/// Whether the interval of a fitted coupling contains zero.
-fn coupling_is_open(found: &ConsistentEstimate) -> bool {
-    let coupling = found.quantity(Quantity::Coupling);
-    coupling.is_some_and(|coupling| {
-        let low = coupling.low.zip(coupling.high);
-        coupling.std.is_some() && low.is_none_or(|(low, high)| low * high <= 0.0)
-    })
-}
-
-/// Whether a joint's stiffness was sought: of a free beam its properties alone are.
+/// Returns true if a joint's stiffness was estimated, as of every structure but a free beam.
 fn has_joint(found: &ConsistentEstimate) -> bool {
     [Quantity::Kx, Quantity::Ky]
         .into_iter()
@@ -176,29 +222,25 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     );
     let value = quantity.value.filter(|value| told && *value != 0.0)?;
     let (std, (low, high)) = quantity.std.zip(quantity.scaled)?;
+    // The name as tables write it.
+    let name = match quantity.quantity {
+        Quantity::Kx => "Kx",
+        Quantity::Ky => "Ky",
+        other => other.name(),
+    };
+    let own = Rounded(PERCENT_95 * std / value.abs());
+    let scaled = within(50.0 * (high - low) / value.abs());
     Some(format!(
-        "95 % interval of {} from the frequencies' uncertainty alone \u{b1}{} %, scaled by the misfit {}",
-        symbol(quantity.quantity),
-        Rounded(PERCENT_95 * std / value.abs()),
-        within(50.0 * (high - low) / value.abs())
+        "95 % interval of {name} from the frequencies' uncertainty alone \u{b1}{own} %, scaled by the misfit {scaled}"
     ))
 }
 
-/// A half width (%): one beyond the value itself determines nothing.
+/// Words for the half width (%) of an interval; one beyond the value itself determines nothing.
 fn within(percent: f64) -> String {
     if percent > 100.0 {
         "not determined (beyond \u{b1}100 %)".to_owned()
     } else {
         format!("\u{b1}{} %", Rounded(percent))
-    }
-}
-
-/// As tables write it.
-fn symbol(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Kx => "Kx",
-        Quantity::Ky => "Ky",
-        other => other.name(),
     }
 }
 
@@ -226,9 +268,9 @@ fn open_end(quantity: &EstimatedQuantity) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 
-/// What estimate and prediction leave out. The pair regression stands beside the consistent
-/// estimate in every report, so that its limits are always told.
-pub(super) fn of_neglect(
+/// Effects that estimate and prediction leave out. The pair regression stands beside the consistent
+/// estimate in every report, so that its limits are always listed.
+pub(super) fn neglected_effects(
     test: &TestDescription,
     structure: &TestedStructure,
     method: EstimateMethod,
@@ -239,87 +281,80 @@ pub(super) fn of_neglect(
     warnings.extend(of_fastened(test, structure, method));
     if structure.regression.is_some() {
         let texts = of_regression(test, structure, method);
-        warnings.extend(texts.into_iter().map(by_pairs));
+        warnings.extend(texts.into_iter().map(|text| Warning::neglected(text, true)));
     }
+    let analysis = &test.analysis;
     if consistent {
-        warnings.extend(of_fit(test, structure).into_iter().map(by_estimate));
-    } else {
-        warnings.extend(of_unused_settings(test).map(by_pairs));
+        warnings.extend(
+            of_fit(test, structure)
+                .into_iter()
+                .map(|text| Warning::neglected(text, false)),
+        );
+    } else if analysis.fit.is_some() || analysis.weights.is_some() {
+        let text = "`fit` and `weights` belong to the consistent estimate: the pair regression estimates all \
+                    stiffnesses of its model and weighs all pairs alike";
+        warnings.push(Warning::neglected(text, true));
     }
     warnings
 }
 
-/// What only the pair regression leaves out.
-fn by_pairs(text: String) -> Warning {
-    Warning::Neglected {
-        text,
-        of_pairs: true,
-    }
-}
-
-/// What the estimate leaves out, or takes otherwise than may have been meant.
-fn by_estimate(text: String) -> Warning {
-    Warning::Neglected {
-        text,
-        of_pairs: false,
-    }
-}
-
-/// What the pair regression cannot take into account.
+/// Effects that the pair regression cannot take into account.
 fn of_regression(
     test: &TestDescription,
     structure: &TestedStructure,
     method: EstimateMethod,
-) -> Vec<String> {
-    let consistent = method == EstimateMethod::Consistent;
-    let choose = |with: &str, without: &str| if consistent { with } else { without }.to_owned();
+) -> Vec<&'static str> {
     let mut texts = Vec::new();
     if structure.theory == BeamTheory::Timoshenko {
-        texts.push(choose(
-            "the pair regression takes an Euler beam (no shear, no rotary inertia); the consistent \
-             estimate and the prediction include both",
-            "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
-             includes both, so that its errors show what that neglects",
-        ));
+        texts.push(match method {
+            EstimateMethod::Consistent => {
+                "the pair regression takes an Euler beam (no shear, no rotary inertia); the consistent \
+                 estimate and the prediction include both"
+            }
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
+                "the pair regression takes an Euler beam (no shear, no rotary inertia); the prediction \
+                 includes both, so that its errors show what that neglects"
+            }
+        });
     }
     if structure.known.any() {
-        texts.push(choose(
-            "the pair regression cannot hold a stiffness at its known value and estimates all of \
-             them; the consistent estimate and the prediction use the known ones",
-            "the pair regression cannot hold a stiffness at its known value: it estimates all of \
-             them, and the prediction uses the known ones",
-        ));
+        texts.push(match method {
+            EstimateMethod::Consistent => {
+                "the pair regression cannot hold a stiffness at its known value and estimates all of \
+                 them; the consistent estimate and the prediction use the known ones"
+            }
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
+                "the pair regression cannot hold a stiffness at its known value: it estimates all of \
+                 them, and the prediction uses the known ones"
+            }
+        });
     }
     let joint = &test.joint;
-    if joint.overlap.is_some() || joint.right.is_some() || off_centre(test) {
-        texts.push(choose(
-            "the pair regression takes two equal halves joined in the middle; the consistent estimate \
-             and the prediction take overlap, position and the right half's own properties into account",
-            "the lap joint's model takes two equal halves joined in the middle: overlap, position and \
-             different properties of the right half are left out",
-        ));
+    // A lap joint off the middle by more than a thousandth of the length.
+    let off = joint
+        .position
+        .map(|position| (position - 0.5 * test.beam.length).abs());
+    let off_centre = off.is_some_and(|off| off > 1e-3 * test.beam.length);
+    if joint.overlap.is_some() || joint.right.is_some() || off_centre {
+        texts.push(match method {
+            EstimateMethod::Consistent => {
+                "the pair regression takes two equal halves joined in the middle; the consistent estimate \
+                 and the prediction take overlap, position and the right half's own properties into account"
+            }
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
+                "the lap joint's model takes two equal halves joined in the middle: overlap, position and \
+                 different properties of the right half are left out"
+            }
+        });
     }
     texts
 }
 
-/// What the pair regression alone makes no use of.
-fn of_unused_settings(test: &TestDescription) -> Option<String> {
-    let analysis = &test.analysis;
-    (analysis.fit.is_some() || analysis.weights.is_some()).then(|| {
-        "`fit` and `weights` belong to the consistent estimate: the pair regression estimates all \
-         stiffnesses of its model and weighs all pairs alike"
-            .to_owned()
-    })
-}
-
-/// What `fit` leaves to be rigid, and weights that cannot be had.
+/// Stiffnesses that `fit` leaves rigid, and weights without the uncertainties that they need.
 fn of_fit(test: &TestDescription, structure: &TestedStructure) -> Vec<String> {
     let mut texts = Vec::new();
-    if let Some(fit) = test
-        .analysis
-        .fit
-        .as_ref()
-        .filter(|_| structure.regression.is_some())
+    if let Some(fit) = &test.analysis.fit
+        && structure.regression.is_some()
     {
         let known = &structure.known;
         let springs = [
@@ -354,12 +389,9 @@ fn of_masses(
     structure: &TestedStructure,
     method: EstimateMethod,
 ) -> Option<Warning> {
-    let loading = || {
-        test.sensors
-            .iter()
-            .filter(|sensor| sensor.kind != SensorKind::Sound)
-    };
-    let mass: f64 = loading().filter_map(|sensor| sensor.mass).sum();
+    let mut loading: Vec<&SensorDescription> = test.sensors.iter().collect();
+    loading.retain(|sensor| sensor.kind != SensorKind::Sound);
+    let mass: f64 = loading.iter().filter_map(|sensor| sensor.mass).sum();
     if mass <= 0.0 {
         return None;
     }
@@ -370,24 +402,35 @@ fn of_masses(
     );
     let lowers = "it lowers the measured frequencies and thereby what is estimated from them";
     let included = method == EstimateMethod::Consistent && test.analysis.sensor_mass;
-    let unplaced = loading().any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
+    let mut loading = loading.iter();
+    let unplaced = loading.any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
     match (included, unplaced, structure.regression) {
-        (true, true, _) => Some(by_estimate(format!(
-            "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
-        ))),
-        (true, false, None) => Some(by_estimate(format!(
-            "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
-        ))),
-        (true, false, Some(_)) => Some(by_pairs(format!(
-            "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
-        ))),
-        (false, ..) => Some(by_estimate(format!(
-            "{size} is in neither the estimate nor the prediction; {lowers}"
-        ))),
+        (true, true, _) => Some(Warning::neglected(
+            format!(
+                "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
+            ),
+            false,
+        )),
+        (true, false, None) => Some(Warning::neglected(
+            format!(
+                "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
+            ),
+            false,
+        )),
+        (true, false, Some(_)) => Some(Warning::neglected(
+            format!(
+                "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
+            ),
+            true,
+        )),
+        (false, ..) => Some(Warning::neglected(
+            format!("{size} is in neither the estimate nor the prediction; {lowers}"),
+            false,
+        )),
     }
 }
 
-/// What is fastened in the reference configuration.
+/// The warning about masses fastened in the reference configuration.
 fn of_fastened(
     test: &TestDescription,
     structure: &TestedStructure,
@@ -406,30 +449,27 @@ fn of_fastened(
     );
     let included = "is in the prediction and the consistent estimate;";
     Some(match (method, structure.regression) {
-        (EstimateMethod::Consistent, None) => by_estimate(format!(
-            "{size} {included} the closed form beside it neglects it"
-        )),
-        (EstimateMethod::Consistent, Some(_)) => by_pairs(format!(
-            "{size} {included} the pair regression beside it neglects it"
-        )),
-        (EstimateMethod::Pairs, _) => by_estimate(format!(
-            "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
-        )),
+        (EstimateMethod::Consistent, None) => Warning::neglected(
+            format!("{size} {included} the closed form beside it neglects it"),
+            false,
+        ),
+        (EstimateMethod::Consistent, Some(_)) => Warning::neglected(
+            format!("{size} {included} the pair regression beside it neglects it"),
+            true,
+        ),
+        (EstimateMethod::Pairs | EstimateMethod::FreeBeam, _) => Warning::neglected(
+            format!(
+                "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
+            ),
+            false,
+        ),
     })
 }
 
-/// A mass (kg) in grams with four significant digits, and no zeros that nobody stated.
+/// Returns a mass (kg) in grams with four significant digits, without trailing zeros.
 fn grams(mass: f64) -> f64 {
     let grams = 1e3 * mass;
     format!("{grams:.3e}").parse().unwrap_or(grams)
-}
-
-/// Whether a lap joint sits off the middle by more than a thousandth of the length.
-fn off_centre(test: &TestDescription) -> bool {
-    let middle = 0.5 * test.beam.length;
-    test.joint
-        .position
-        .is_some_and(|position| (position - middle).abs() > 1e-3 * test.beam.length)
 }
 
 #[cfg(test)]
@@ -441,7 +481,6 @@ mod doubts_tests {
         assert_eq!(chance(0.0), "<0.001");
         assert_eq!(chance(3e-7), "<0.001");
         assert_eq!(chance(0.0042), "4.2e-3");
-        assert_eq!(symbol(Quantity::Kx), "Kx");
     }
 
     #[test]

@@ -18,7 +18,7 @@ use tapjoint_signal::spectral::Lines;
 
 /// Most modes that only the polyreference fit proposes and that are tested.
 const MOST_EXTRA: usize = 12;
-/// Two modes whose half-power widths are apart by this factor are told by their frequencies alone.
+/// Two modes whose distance is beyond this multiple of their half-power widths are distinct by their frequencies alone.
 const APART: f64 = 3.0;
 /// Nearer than that, their shapes must differ: a modal assurance criterion below this. A single mode
 /// whose frequency changes while it rings is fitted by two poles of one shape.
@@ -29,7 +29,7 @@ const NEAR_ENDS: (f64, f64) = (5.0, 0.005);
 /// A mode seen by the fit alone stands out of its noise by so many standard deviations of its amplitude.
 const CLEAR_AMPLITUDE: f64 = 5.0;
 
-/// What the polyreference fit over the band found.
+/// Result of the polyreference fit over the band.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stabilisation {
     /// The whole band, then the bands about groups of peaks; empty where nothing could be fitted.
@@ -42,7 +42,8 @@ pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) 
     let found = ResponseMatrix::new(first, spacing, &rows).and_then(|matrix| {
         let default = PolyreferenceSettings::default();
         let settings = PolyreferenceSettings {
-            order: order_for(matrix.points(), default.order),
+            // The order that so many lines bear: a fifth of them, as in a band of its own.
+            order: (matrix.points() / 5).clamp(2, default.order),
             ..default
         };
         find_modes(&matrix, &settings, &SubBandSettings::default())
@@ -52,26 +53,26 @@ pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) 
     }
 }
 
-/// The order that so many lines bear: a fifth of them, as in a band of its own.
-fn order_for(points: usize, most: usize) -> usize {
-    (points / 5).clamp(2, most)
-}
-
-/// What a reading needs beside its fit.
+/// Data of the fit of all modes of one recording.
 pub(super) struct Candidates<'a> {
     /// The axis of the peak readings.
     pub lines: &'a Lines,
-    /// What is fitted.
+    /// The spectra that are fitted.
     pub data: &'a ModalData,
-    /// What the polyreference fit found.
+    /// Result of the polyreference fit.
     pub stabilisation: &'a Stabilisation,
 }
 
 impl Candidates<'_> {
     /// Puts the fits into the readings of the peaks, and adds the modes that make no peak.
     pub fn fit(&self, readings: &mut Vec<ModeReading>) {
+        let labels = readings.iter().filter_map(|reading| reading.label);
+        let mains = labels.filter_map(|label| match label {
+            PeakLabel::Mains(harmonic) => Some(harmonic),
+            _ => None,
+        });
         let settings = FitSettings {
-            steady_lines: readings.iter().filter_map(mains_frequency).collect(),
+            steady_lines: mains.collect(),
             ..FitSettings::default()
         };
         let proposed = all_modes(&self.stabilisation.searches);
@@ -93,12 +94,23 @@ impl Candidates<'_> {
         }
         let (of_peaks, of_added) = fits.split_at(peaks_alone);
         for (index, fit) in peaks.into_iter().zip(of_peaks) {
-            self.adopt(&mut readings[index], fit.as_ref().ok());
-        }
-        for (proposal, fit) in added.into_iter().zip(of_added) {
             if let Ok(fit) = fit {
-                readings.push(self.reading_of(fit.clone(), proposal));
+                self.adopt(&mut readings[index], fit);
             }
+        }
+        // Modes that make no peak.
+        for (proposal, fit) in added.into_iter().zip(of_added) {
+            let Ok(fit) = fit else { continue };
+            let line = self.lines.nearest(fit.frequency.value);
+            readings.push(ModeReading {
+                frequency: fit.frequency.value,
+                source: ReadBy::Fit,
+                interval: (fit.frequency.low, fit.frequency.high),
+                std: Some(fit.frequency.std),
+                above_noise_db: Some(proposal.above_noise_db),
+                fit: Some(Box::new(FittedReading::new(fit.clone()))),
+                ..ModeReading::on_line(self.lines.frequency(line), self.lines.half_line())
+            });
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     }
@@ -114,10 +126,10 @@ impl Candidates<'_> {
         let peaks = starts.len() - added.len();
         loop {
             let fits = fit_modes(self.data, starts, settings);
-            let strays = |fit: &Result<ModeFit, Unfit>| {
-                fit.as_ref().is_ok_and(|fit| !self.may_be_added(fit))
-            };
-            let Some(stray) = fits.iter().skip(peaks).position(strays) else {
+            let mut of_added = fits.iter().skip(peaks);
+            let stray =
+                of_added.position(|fit| fit.as_ref().is_ok_and(|fit| !self.may_be_added(fit)));
+            let Some(stray) = stray else {
                 return fits;
             };
             starts.remove(peaks + stray);
@@ -125,7 +137,7 @@ impl Candidates<'_> {
         }
     }
 
-    /// Where fits begin: peaks first, each at its own reading or at the mode of the polyreference fit
+    /// Starts of the fits: peaks first, each at its own reading or at the mode of the polyreference fit
     /// beside it; the modes without a peak apart, the clearest first.
     fn starts<'m>(
         &self,
@@ -135,10 +147,25 @@ impl Candidates<'_> {
         let mut free: Vec<Option<&PolyreferenceMode>> = proposed.iter().map(Some).collect();
         let (mut starts, mut peaks) = (Vec::new(), Vec::new());
         for (index, reading) in readings.iter().enumerate() {
-            let own = self.take_nearest(reading, &mut free);
+            // The mode that belongs to a peak: the nearest within a line and its half-power width.
+            let mut nearest: Option<(usize, f64)> = None;
+            for (place, mode) in free.iter().enumerate() {
+                let Some(mode) = mode else { continue };
+                let distance = (mode.frequency - reading.frequency).abs();
+                let width = mode.damping_ratio * mode.frequency;
+                if distance <= 2.0 * self.lines.half_line() + width
+                    && nearest.is_none_or(|(_, least)| distance < least)
+                {
+                    nearest = Some((place, distance));
+                }
+            }
+            let own = nearest.and_then(|(place, _)| free[place].take());
             match (reading.label, own) {
-                (None, own) => starts.push(own.map_or(start_of_reading(reading), start_of)),
-                (Some(PeakLabel::NoResonance), Some(own)) => starts.push(start_of(own)),
+                (None, None) => starts.push(PoleStart {
+                    frequency: reading.frequency,
+                    damping_ratio: reading.damping_ratio,
+                }),
+                (None | Some(PeakLabel::NoResonance), Some(own)) => starts.push(start_of(own)),
                 _ => continue,
             }
             peaks.push(index);
@@ -148,76 +175,52 @@ impl Candidates<'_> {
         (starts, peaks, extras)
     }
 
-    /// The mode that belongs to a peak: the nearest within a line and its half-power width.
-    fn take_nearest<'m>(
-        &self,
-        reading: &ModeReading,
-        free: &mut [Option<&'m PolyreferenceMode>],
-    ) -> Option<&'m PolyreferenceMode> {
-        let distance = |mode: &PolyreferenceMode| (mode.frequency - reading.frequency).abs();
-        let reach = |mode: &PolyreferenceMode| {
-            2.0 * self.lines.half_line() + mode.damping_ratio * mode.frequency
-        };
-        free.iter_mut()
-            .filter(|mode| mode.is_some_and(|mode| distance(mode) <= reach(mode)))
-            .min_by(|a, b| {
-                let of = |mode: &Option<&PolyreferenceMode>| mode.map_or(f64::INFINITY, distance);
-                of(a).total_cmp(&of(b))
-            })
-            .and_then(Option::take)
-    }
-
-    /// Whether a natural frequency lies among the lines that were fitted. That of a pole with high damping
-    /// need not: f = |lambda|/2 pi, while the lines hold Im(lambda)/2 pi alone to the band.
-    fn is_within(&self, fit: &ModeFit) -> bool {
-        let lines = self.data.frequencies();
-        let ends = lines.first().zip(lines.last());
-        ends.is_some_and(|(first, last)| (*first..=*last).contains(&fit.frequency.value))
-    }
-
-    /// Whether a fit belongs to the peak on this line (Hz): a damped mode among others peaks beside its frequency, by its
-    /// half-power width at most. What lies farther off is another mode, or none.
-    fn is_at(&self, fit: &ModeFit, line: f64) -> bool {
-        let width = 2.0 * fit.damping_ratio.value * fit.frequency.value;
-        let reach = 2.0 * self.lines.half_line() + width;
-        (fit.frequency.value - line).abs() <= reach
-    }
-
-    /// Whether a fit without a peak may be a mode at all: well within the band, and no more damped than what
-    /// proposes modes lets pass. At the ends of a band poles stand for what lies beyond it.
+    /// Returns true if a fit without a peak may be a mode at all: well within the band, and no more damped than the
+    /// search for modes lets pass. At the ends of a band poles stand for what lies beyond it.
     fn may_be_added(&self, fit: &ModeFit) -> bool {
         let most_damping = PolyreferenceSettings::default().most_damping;
         let lines = self.data.frequencies();
-        let margin = |end: f64| (NEAR_ENDS.0 * self.data.spacing()).max(NEAR_ENDS.1 * end);
-        let ends = lines.first().zip(lines.last());
-        let inside = ends.is_some_and(|(first, last)| {
-            (first + margin(*first)..last - margin(*last)).contains(&fit.frequency.value)
-        });
-        inside && fit.damping_ratio.value < most_damping
+        let Some((first, last)) = lines.first().zip(lines.last()) else {
+            return false;
+        };
+        let margin = NEAR_ENDS.0 * self.data.spacing();
+        let low = first + margin.max(NEAR_ENDS.1 * first);
+        let high = last - margin.max(NEAR_ENDS.1 * last);
+        (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < most_damping
     }
 
-    /// Whether a proposed mode is one: asked for by the data, and no mending of a neighbour's line.
+    /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.
     fn is_mode(&self, test: &ExtraMode, accepted: &[PoleStart]) -> bool {
         let (ExtraVerdict::Needed, Ok(fit)) = (test.verdict, &test.fit) else {
             return false;
         };
-        let width = |frequency: f64, damping: f64| frequency * damping;
-        let own = width(fit.frequency.value, fit.damping_ratio.value);
+        let own = fit.frequency.value * fit.damping_ratio.value;
         let crowded = accepted.iter().any(|other| {
-            let theirs = width(other.frequency, other.damping_ratio.unwrap_or(0.0));
+            let theirs = other.frequency * other.damping_ratio.unwrap_or(0.0);
             (fit.frequency.value - other.frequency).abs() < APART * (own + theirs)
         });
         let unlike = test.likeness.is_some_and(|likeness| likeness < UNLIKE);
         is_clear(fit) && self.may_be_added(fit) && (!crowded || unlike)
     }
 
-    /// The fit of a peak; one that was no clear resonance becomes one where its fit is clear.
-    fn adopt(&self, reading: &mut ModeReading, fit: Option<&ModeFit>) {
-        let of_peak =
-            |fit: &&ModeFit| self.is_within(fit) && self.is_at(fit, reading.line_frequency);
-        let Some(fit) = fit.filter(of_peak) else {
+    /// Takes the fit of a peak, if it belongs to it; a peak that was no clear resonance becomes one where its fit is
+    /// clear.
+    fn adopt(&self, reading: &mut ModeReading, fit: &ModeFit) {
+        // The natural frequency of a pole with high damping may lie outside of the lines that were fitted:
+        // f = |lambda|/2 pi, while the lines hold Im(lambda)/2 pi alone to the band.
+        let lines = self.data.frequencies();
+        let Some((first, last)) = lines.first().zip(lines.last()) else {
             return;
         };
+        // A damped mode among others peaks beside its frequency, by its half-power width at most. What lies farther
+        // off is another mode, or none.
+        let frequency = fit.frequency.value;
+        let width = 2.0 * fit.damping_ratio.value * frequency;
+        let reach = 2.0 * self.lines.half_line() + width;
+        let near = (frequency - reading.line_frequency).abs() <= reach;
+        if !near || !(*first..=*last).contains(&frequency) {
+            return;
+        }
         if reading.label == Some(PeakLabel::NoResonance) {
             if !is_clear(fit) {
                 return;
@@ -225,27 +228,6 @@ impl Candidates<'_> {
             reading.label = None;
         }
         reading.fit = Some(Box::new(FittedReading::new(fit.clone())));
-    }
-
-    /// The reading of a mode that makes no peak.
-    fn reading_of(&self, fit: ModeFit, proposal: &PolyreferenceMode) -> ModeReading {
-        let line = self.lines.nearest(fit.frequency.value);
-        ModeReading {
-            frequency: fit.frequency.value,
-            source: ReadBy::Fit,
-            interval: (fit.frequency.low, fit.frequency.high),
-            std: Some(fit.frequency.std),
-            above_noise_db: Some(proposal.above_noise_db),
-            fit: Some(Box::new(FittedReading::new(fit))),
-            ..ModeReading::on_line(self.lines.frequency(line), self.lines.half_line())
-        }
-    }
-}
-
-fn mains_frequency(reading: &ModeReading) -> Option<f64> {
-    match reading.label {
-        Some(PeakLabel::Mains(harmonic)) => Some(harmonic),
-        _ => None,
     }
 }
 
@@ -256,14 +238,7 @@ fn start_of(mode: &PolyreferenceMode) -> PoleStart {
     }
 }
 
-fn start_of_reading(reading: &ModeReading) -> PoleStart {
-    PoleStart {
-        frequency: reading.frequency,
-        damping_ratio: reading.damping_ratio,
-    }
-}
-
-/// Whether the amplitudes stand out of their standard deviations, and the decay too.
+/// Returns true if the amplitudes stand out of their standard deviations, and the decay too.
 fn is_clear(fit: &ModeFit) -> bool {
     let strongest = fit
         .amplitudes

@@ -2,6 +2,8 @@
 //! error, in the form asked for.
 
 use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::analysis::{RecordingResult, Response};
 use super::measure::MeasuredSpectra;
@@ -9,7 +11,7 @@ use tapjoint_description::SensorKind;
 use tapjoint_signal::recording::ResponseForm;
 use tapjoint_signal::spectral::{FrfEstimator, LineQuality, Lines, Window, random_error};
 
-/// How frequency response functions are given.
+/// Form and estimator of frequency response functions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FrfSettings {
     /// The estimator that is meant where one is shown. H1.
@@ -25,11 +27,11 @@ pub struct Frf {
     pub recording: String,
     /// Name of the sensor, or of its channel.
     pub response: String,
-    /// Its form; `None` for sound and where the units are not those of a form.
+    /// Form of the function; `None` for sound and where the units are not those of a form.
     pub form: Option<ResponseForm>,
     /// The form in words: "accelerance", "sound pressure per force", "response per force".
     pub form_words: &'static str,
-    /// Its unit: "(m/s2)/N"; says where a channel has none but the file's.
+    /// Unit of the function: "(m/s2)/N"; words where a channel has none but the file's.
     pub unit: String,
     /// The axis.
     pub lines: Lines,
@@ -54,23 +56,26 @@ pub struct Frf {
 }
 
 /// A resonance on a frequency response function.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct FrfResonance {
-    /// Number of the mode; `None` for a peak that belongs to no mode.
+    /// Number of the mode; null for a peak that belongs to none.
     pub mode: Option<usize>,
-    /// What a peak that is no mode is.
+    /// Name of a peak that is no mode: "mains 50 Hz".
     pub label: Option<String>,
     /// Best reading of its frequency (Hz).
     pub frequency: f64,
     /// The nearest line (Hz), on which the following stand.
     pub line_frequency: f64,
-    /// The function (its unit), by the estimator that is meant.
-    pub value: Option<Complex64>,
-    /// Coherence and random error.
+    /// Magnitude (unit of the function), by the estimator that is meant.
+    pub magnitude: Option<f64>,
+    /// Phase (degrees).
+    pub phase: Option<f64>,
+    /// Coherence and random error of the function.
+    #[serde(flatten)]
     pub quality: LineQuality,
 }
 
-/// What keeps frequency response functions from being given.
+/// Reasons for which there are no frequency response functions.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FrfError {
     /// No force was recorded.
@@ -93,9 +98,9 @@ pub enum FrfError {
         recording: String,
         /// The sensor.
         response: String,
-        /// What is measured.
+        /// Unit of the measured function.
         unit: String,
-        /// What was asked for.
+        /// The form that was asked for.
         wanted: &'static str,
     },
 }
@@ -103,9 +108,22 @@ pub enum FrfError {
 /// The form of what is measured, by its units: `None` unless the response is in m/s2, m/s or m and
 /// the force in N.
 pub fn form_of(response: &Response, force_unit: Option<&str>) -> Option<ResponseForm> {
-    let unit = response.unit.as_deref()?;
-    let form = |form: &ResponseForm| form.response_unit() == unit && force_unit == Some("N");
-    ResponseForm::ALL.into_iter().find(form)
+    let unit = response
+        .unit
+        .as_deref()
+        .filter(|_| force_unit == Some("N"))?;
+    let mut forms = ResponseForm::ALL.into_iter();
+    forms.find(|form| form.response_unit() == unit)
+}
+
+/// The form of what a sensor senses over a force; `None` for sound.
+pub(super) fn form_of_kind(kind: SensorKind) -> Option<ResponseForm> {
+    match kind {
+        SensorKind::Acceleration => Some(ResponseForm::Accelerance),
+        SensorKind::Velocity => Some(ResponseForm::Mobility),
+        SensorKind::Displacement => Some(ResponseForm::Receptance),
+        SensorKind::Sound => None,
+    }
 }
 
 /// The frequency response functions of a recording, one for each response; none without an accepted
@@ -122,70 +140,16 @@ pub fn frfs_of(recording: &RecordingResult, settings: &FrfSettings) -> Result<Ve
     let Some(spectra) = &recording.measurement.spectra else {
         return Ok(Vec::new());
     };
-    recording
-        .responses
-        .iter()
-        .enumerate()
-        .map(|(index, response)| {
-            let conversion = conversion(recording, response, settings.form)?;
-            let mut frf = frf(recording, spectra, (index, settings.estimator), &conversion);
-            frf.resonances = resonances(&frf, recording, spectra);
-            Ok(frf)
-        })
-        .collect()
-}
-
-/// From what is measured to what is given.
-struct Conversion {
-    measured: Option<ResponseForm>,
-    given: Option<ResponseForm>,
-    words: &'static str,
-    unit: String,
-}
-
-fn conversion(
-    recording: &RecordingResult,
-    response: &Response,
-    wanted: Option<ResponseForm>,
-) -> Result<Conversion, FrfError> {
-    let force_unit = recording.tap_unit.as_deref();
-    let measured = form_of(response, force_unit);
-    let unit = unit_per_force(response.unit.as_deref(), force_unit);
-    match (measured, wanted) {
-        (None, Some(wanted)) => Err(FrfError::NoForm {
-            recording: recording.file.clone(),
-            response: response.name.clone(),
-            unit,
-            wanted: wanted.name(),
-        }),
-        (Some(form), wanted) => {
-            let given = wanted.unwrap_or(form);
-            Ok(Conversion {
-                measured,
-                given: Some(given),
-                words: given.name(),
-                unit: given.unit().to_string(),
-            })
-        }
-        (None, None) => Ok(Conversion {
-            measured,
-            given: None,
-            words: words_without_form(response),
-            unit,
-        }),
+    let mut frfs = Vec::with_capacity(recording.responses.len());
+    for (index, response) in recording.responses.iter().enumerate() {
+        let mut frf = frf(recording, spectra, index, response, settings)?;
+        frf.resonances = resonances(&frf, recording);
+        frfs.push(frf);
     }
+    Ok(frfs)
 }
 
-fn words_without_form(response: &Response) -> &'static str {
-    let sound = response.kind == Some(SensorKind::Sound) || response.unit.as_deref() == Some("Pa");
-    if sound {
-        "sound pressure per force"
-    } else {
-        "response per force"
-    }
-}
-
-/// The unit of a quotient; a unit that nobody stated is not invented.
+/// The unit of a quotient; a unit that is not stated is not invented.
 fn unit_per_force(response: Option<&str>, force: Option<&str>) -> String {
     match (response, force) {
         (Some(unit), Some(force)) if unit.contains('/') => format!("({unit})/{force}"),
@@ -196,71 +160,93 @@ fn unit_per_force(response: Option<&str>, force: Option<&str>) -> String {
     }
 }
 
+/// The function of one response, without its resonances.
 fn frf(
     recording: &RecordingResult,
     spectra: &MeasuredSpectra,
-    (index, estimator): (usize, FrfEstimator),
-    conversion: &Conversion,
-) -> Frf {
+    index: usize,
+    response: &Response,
+    settings: &FrfSettings,
+) -> Result<Frf, FrfError> {
+    let force_unit = recording.tap_unit.as_deref();
+    let measured_unit = unit_per_force(response.unit.as_deref(), force_unit);
+    let measured = form_of(response, force_unit);
+    let form = match (measured, settings.form) {
+        (None, Some(wanted)) => {
+            return Err(FrfError::NoForm {
+                recording: recording.file.clone(),
+                response: response.name.clone(),
+                unit: measured_unit,
+                wanted: wanted.name(),
+            });
+        }
+        (measured, wanted) => wanted.or(measured),
+    };
+    let sound = response.kind == Some(SensorKind::Sound) || response.unit.as_deref() == Some("Pa");
     let averages = &spectra.averages;
     let lines = averages.lines;
-    let estimated = |estimator| {
-        let values = averages.frf(index, estimator).unwrap_or_default();
-        let converted = values.into_iter().enumerate().map(|(line, value)| {
-            match (conversion.measured, conversion.given) {
-                (Some(from), Some(to)) => from.convert(to, value?, lines.frequency(line)),
-                _ => value,
+    let [h1, h2, hv] = [FrfEstimator::H1, FrfEstimator::H2, FrfEstimator::Hv].map(|estimator| {
+        let mut values = averages.frf(index, estimator).unwrap_or_default();
+        if let (Some(from), Some(to)) = (measured, form) {
+            for (line, value) in values.iter_mut().enumerate() {
+                *value = value.and_then(|value| from.convert(to, value, lines.frequency(line)));
             }
-        });
-        converted.collect::<Vec<_>>()
-    };
+        }
+        values
+    });
     let coherence = averages.coherence(index);
-    let error = |g2: &Option<f64>| g2.and_then(|g2| random_error(g2, averages.taps));
-    Frf {
+    let errors = coherence.as_ref().map(|lines| {
+        let errors = lines.iter();
+        errors
+            .map(|coherence| random_error((*coherence)?, averages.taps))
+            .collect()
+    });
+    Ok(Frf {
         recording: recording.file.clone(),
-        response: recording.responses[index].name.clone(),
-        form: conversion.given,
-        form_words: conversion.words,
-        unit: conversion.unit.clone(),
+        response: response.name.clone(),
+        form,
+        form_words: match form {
+            Some(form) => form.name(),
+            None if sound => "sound pressure per force",
+            None => "response per force",
+        },
+        unit: form.map_or(measured_unit, |form| form.unit().to_string()),
         lines,
         averages: averages.taps,
         window: spectra.window,
-        estimator,
-        h1: estimated(FrfEstimator::H1),
-        h2: estimated(FrfEstimator::H2),
-        hv: estimated(FrfEstimator::Hv),
-        random_error: coherence.as_ref().map(|g2| g2.iter().map(error).collect()),
+        estimator: settings.estimator,
+        h1,
+        h2,
+        hv,
+        random_error: errors,
         coherence,
         resonances: Vec::new(),
-    }
+    })
 }
 
-fn resonances(
-    frf: &Frf,
-    recording: &RecordingResult,
-    spectra: &MeasuredSpectra,
-) -> Vec<FrfResonance> {
-    let numbers = recording.mode_numbers.iter();
-    let readings = spectra.readings.iter().zip(numbers);
-    readings
-        .map(|(reading, &mode)| {
-            let line = frf.lines.nearest(reading.frequency);
-            let on_line = |values: &Option<Vec<Option<f64>>>| {
-                values.as_ref().and_then(|values| *values.get(line)?)
-            };
-            FrfResonance {
-                mode,
-                label: reading.label.map(|label| label.to_string()),
-                frequency: reading.frequency,
-                line_frequency: frf.lines.frequency(line),
-                value: frf.values().get(line).copied().flatten(),
-                quality: LineQuality {
-                    coherence: on_line(&frf.coherence),
-                    random_error: on_line(&frf.random_error),
-                },
-            }
-        })
-        .collect()
+/// The recording's readings with the values of a function on their lines.
+fn resonances(frf: &Frf, recording: &RecordingResult) -> Vec<FrfResonance> {
+    let numbered = recording.readings().iter().zip(&recording.mode_numbers);
+    let found = numbered.map(|(reading, &mode)| {
+        let line = frf.lines.nearest(reading.frequency);
+        let value = frf.values().get(line).copied().flatten();
+        FrfResonance {
+            mode,
+            label: reading.label.map(|label| label.to_string()),
+            frequency: reading.frequency,
+            line_frequency: frf.lines.frequency(line),
+            magnitude: value.map(|value| value.norm()),
+            phase: value.map(|value| value.arg().to_degrees()),
+            quality: LineQuality {
+                coherence: frf.coherence.as_ref().and_then(|lines| *lines.get(line)?),
+                random_error: frf
+                    .random_error
+                    .as_ref()
+                    .and_then(|lines| *lines.get(line)?),
+            },
+        }
+    });
+    found.collect()
 }
 
 impl Frf {

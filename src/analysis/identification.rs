@@ -1,32 +1,35 @@
 //! From modes to joint: estimate, prediction, perturbation, and doubts about them.
 
 use super::analysis::{
-    Analysis, BoundPerturbation, Estimate, EstimateMethod, Identification, ModeResult, Perturbation,
+    Analysis, AverageSection, BetweenRecordings, Estimate, EstimateMethod, Identification,
+    ModeResult, MonteCarloSection, PerturbationSection, Perturbations, ResolutionSpanSection,
+    SensitivitySection,
 };
-use super::between_recordings::scatter;
+use super::between_recordings::common_share;
 use super::doubts;
-use super::structure::{StructureDetails, TestedStructure, estimator, predicted_specimen};
+use super::structure::{
+    StructureDetails, TestedStructure, frequencies_of, jointed, predicted_specimen,
+};
 use super::warning::Warning;
 use schemars::JsonSchema;
 use serde::Serialize;
-use tapjoint_beam::Beam;
 use tapjoint_beam::specimen::{Body, Mesh, Specimen};
-use tapjoint_identify::consistent::{ConsistentEstimate, ConsistentEstimator};
+use tapjoint_identify::consistent::ConsistentEstimator;
 use tapjoint_identify::perturbation::{
     average_errors, mode_sensitivities, perturb_uniformly, sign_pattern_estimates, spans_of,
 };
 use tapjoint_identify::{
-    Doubt, FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PairsModel, PredictedMode,
-    Stiffnesses, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
+    FREQUENCY_FLOOR, IdentifyError, MeasuredMode, MonteCarlo, PredictedMode, Spread, Stiffnesses,
+    Uncertain, compare, estimate_joint, estimate_modulus, monte_carlo, pairs_estimator, predict,
 };
 
-/// How the joint is identified.
+/// Settings of the identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifySettings {
     /// Which estimate is the main one: the consistent one, because it satisfies its own frequency
     /// equation.
     pub method: EstimateMethod,
-    /// What the consistent estimate knows beyond beam and joint; nothing.
+    /// Details of the structure beyond beam and joint; none.
     pub details: StructureDetails,
     /// The first so many modes enter; `None` = all.
     pub fit_modes: Option<usize>,
@@ -65,10 +68,6 @@ impl IdentifySettings {
     }
 }
 
-/// A misfit is worth a warning beyond this error (%): what a beam's stated dimensions usually leave
-/// open in its frequencies.
-const NOTABLE_MISFIT: f64 = 100.0 * tapjoint_identify::consistent::NOTABLE_MISFIT;
-
 /// Estimates the joint from numbered modes, predicts with it and perturbs it.
 pub fn identify(
     structure: &TestedStructure,
@@ -81,26 +80,26 @@ pub fn identify(
         .copied()
         .take(settings.fit_modes.unwrap_or(usize::MAX))
         .collect();
-    let mut warnings = Vec::new();
-    let (consistent, refused) = match settings.method {
-        EstimateMethod::Pairs => (None, None),
-        EstimateMethod::Consistent => split(consistently(structure, &settings.details, &used)),
+    let (mut estimator, mut consistent, mut refused) = (None, None, None);
+    if settings.method == EstimateMethod::Consistent {
+        let found = super::structure::estimator(structure, &settings.details, &used);
+        match found.and_then(|found| found.estimate().map(|estimate| (found, estimate))) {
+            Ok((found, estimate)) => {
+                estimator = Some(found);
+                consistent = Some(Box::new(estimate));
+            }
+            Err(error) => refused = Some(error.to_string()),
+        }
+    }
+    let closed = match structure.regression {
+        Some(model) => estimate_joint(model, &structure.beam, &used)
+            .map(|joint| Estimate::Joint(Box::new(joint))),
+        None => estimate_modulus(structure.theory, &structure.beam, &used).map(Estimate::FreeBeam),
     };
-    let (estimator, consistent) = consistent.unzip();
-    let consistent = consistent.map(Box::new);
-    let (estimate, missing) = split(estimate(structure, &used));
-    if let Some(reason) = refused.as_ref().filter(|_| estimate.is_some()) {
-        warnings.push(doubts::of_fallback(structure, reason));
-    }
-    if let Some(found) = &consistent {
-        warnings.extend(doubts::of_consistent(found, modes));
-    }
-    if let Some(Estimate::Joint(joint)) = &estimate {
-        let told = |doubt: &&Doubt| {
-            consistent.is_none() || !matches!(doubt, Doubt::CouplingNotEstablished)
-        };
-        warnings.extend(joint.doubts.iter().filter(told).map(of_doubt));
-    }
+    let (estimate, missing) = match closed {
+        Ok(found) => (Some(found), None),
+        Err(error) => (None, Some(error.to_string())),
+    };
     let reason = match (&consistent, &estimate) {
         (Some(_), _) => None,
         (None, Some(_)) => refused,
@@ -112,22 +111,24 @@ pub fn identify(
         reason,
         prediction: Vec::new(),
         predicted: None,
-        perturbations: perturbations(structure, estimator.as_ref(), (modes, &used), settings),
+        perturbations: perturbations(structure, estimator.as_ref(), modes, &used, settings),
     };
+    let mut warnings = doubts::of_estimate(structure, &found, modes);
     // An estimate that no joint can have has its warning already; it predicts nothing.
-    match prediction(structure, &found, (&measured, &used), settings) {
-        Ok((prediction, predicted)) => {
+    match prediction(structure, &found, &measured, &used, settings) {
+        Ok(Some((prediction, predicted))) => {
             found.prediction = prediction;
-            found.predicted = predicted;
+            found.predicted = Some(predicted);
         }
+        Ok(None) => {}
         Err(error) => {
-            warnings.extend(found.consistent.as_ref().map(|_| Warning::Estimate {
-                code: "no-prediction",
-                text: format!("the estimated joint cannot be predicted with: {error}"),
-            }));
+            let text = format!("the estimated joint cannot be predicted with: {error}");
+            if found.consistent.is_some() {
+                warnings.push(Warning::new("no-prediction", text));
+            }
         }
     }
-    warnings.extend(misfit(&found.prediction, &measured));
+    warnings.extend(doubts::of_prediction(&found.prediction, &measured));
     (found, warnings)
 }
 
@@ -137,106 +138,52 @@ pub fn identify(
 /// feels the joint most would count least. What no repetition shows, `floor` (1), is added to
 /// every one that was read here.
 pub(super) fn measured_modes(modes: &[ModeResult], floor: f64) -> Vec<MeasuredMode> {
-    let scatter = scatter(modes);
-    let share = |mode: &ModeResult| match mode.reading {
-        Some(_) => scatter.hypot(floor),
-        None => scatter,
-    };
-    modes
-        .iter()
-        .filter_map(|mode| {
-            Some(MeasuredMode {
-                mode: mode.mode?,
-                frequency: mode.frequency,
-                std: mode.std.map(|std| std.hypot(share(mode) * mode.frequency)),
-            })
-        })
-        .collect()
-}
-
-fn consistently(
-    structure: &TestedStructure,
-    details: &StructureDetails,
-    used: &[MeasuredMode],
-) -> Result<(ConsistentEstimator, ConsistentEstimate), IdentifyError> {
-    let estimator = estimator(structure, details, used)?;
-    let estimate = estimator.estimate()?;
-    Ok((estimator, estimate))
-}
-
-fn estimate(structure: &TestedStructure, used: &[MeasuredMode]) -> Result<Estimate, IdentifyError> {
-    match structure.regression {
-        Some(model) => estimate_joint(model, &structure.beam, used)
-            .map(|joint| Estimate::Joint(Box::new(joint))),
-        None => estimate_modulus(structure.theory, &structure.beam, used).map(Estimate::FreeBeam),
+    let between: Vec<BetweenRecordings> = modes.iter().filter_map(|mode| mode.between).collect();
+    let scatter = common_share(&between);
+    let mut measured = Vec::with_capacity(modes.len());
+    for mode in modes {
+        let Some(number) = mode.mode else { continue };
+        let share = match mode.reading {
+            Some(_) => scatter.hypot(floor),
+            None => scatter,
+        };
+        measured.push(MeasuredMode {
+            mode: number,
+            frequency: mode.frequency,
+            std: mode.std.map(|std| std.hypot(share * mode.frequency)),
+        });
     }
-}
-
-/// A result, or the reason why there is none.
-fn split<T>(result: Result<T, IdentifyError>) -> (Option<T>, Option<String>) {
-    match result {
-        Ok(found) => (Some(found), None),
-        Err(error) => (None, Some(error.to_string())),
-    }
+    measured
 }
 
 /// Frequencies of the estimated beam and joint beside the measured ones, and the structure that has them;
-/// nothing where no joint is known.
+/// `None` where no joint is known.
 fn prediction(
     structure: &TestedStructure,
     found: &Identification,
-    (measured, used): (&[MeasuredMode], &[MeasuredMode]),
+    measured: &[MeasuredMode],
+    used: &[MeasuredMode],
     settings: &IdentifySettings,
-) -> Result<(Vec<PredictedMode>, Option<Specimen>), IdentifyError> {
+) -> Result<Option<(Vec<PredictedMode>, Specimen)>, IdentifyError> {
     let Some((beam, joint)) = found.beam_and_joint(structure) else {
-        return Ok((Vec::new(), None));
+        return Ok(None);
     };
     let used = if found.is_answered() { used } else { &[] };
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
     let beside = (measured, &numbers[..]);
-    let detailed =
-        settings.method == EstimateMethod::Consistent && found.predicts_with_details(structure);
+    let detailed = found.method(structure, settings.method) == EstimateMethod::Consistent;
     let plain = StructureDetails::default();
     let details = if detailed { &settings.details } else { &plain };
-    let held = (&beam, &joint);
     let rows = if detailed {
-        super::structure::predict(structure, details, held, beside, count)?
+        let there = jointed(structure, details).with_beam(&beam);
+        compare(&beam, &frequencies_of(&there, &joint, count)?, beside)
     } else {
         let held = (structure.assembly, &joint);
         predict(structure.theory, &beam, held, beside, count)?
     };
-    Ok((rows, Some(predicted_specimen(structure, details, held))))
-}
-
-/// The largest notable misfit of those beyond three standard deviations of their reading. A coarse
-/// reading may miss by more than a sharp one and mean less.
-fn misfit(prediction: &[PredictedMode], measured: &[MeasuredMode]) -> Option<Warning> {
-    let notable = prediction.iter().filter_map(|mode| {
-        let error_percent = mode.error_percent.filter(|e| e.abs() > NOTABLE_MISFIT)?;
-        let reading = measured.iter().find(|reading| reading.mode == mode.mode)?;
-        let deviations = reading
-            .std
-            .map(|std| (mode.predicted - reading.frequency) / std);
-        let beyond = deviations.is_none_or(|deviations| deviations.abs() > 3.0);
-        beyond.then_some((mode.mode, error_percent, deviations))
-    });
-    let worst = notable.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-    worst.map(|(mode, error_percent, deviations)| Warning::Misfit {
-        mode,
-        error_percent,
-        deviations,
-    })
-}
-
-fn of_doubt(doubt: &Doubt) -> Warning {
-    match doubt {
-        Doubt::Closure { closure } => Warning::Closure { closure: *closure },
-        Doubt::CouplingNotEstablished => Warning::CouplingNotEstablished,
-        other => Warning::UnphysicalEstimate {
-            what: other.to_string(),
-        },
-    }
+    let specimen = predicted_specimen(structure, details, &beam, &joint);
+    Ok(Some((rows, specimen)))
 }
 
 /// Points along the beam: enough for five half waves between two of them to look smooth.
@@ -270,20 +217,21 @@ pub fn sampled_shapes(analysis: &Analysis) -> Vec<SampledShape> {
         return Vec::new();
     };
     let positions = positions(&specimen.body);
-    let shape = |mode: usize| {
+    let mut shapes = Vec::with_capacity(modes.len());
+    for (mode, &frequency) in modes.frequencies().iter().enumerate() {
         let raw = positions.iter().map(|(_, x)| modes.displacement(mode, *x));
         let raw: Vec<f64> = raw.collect();
         // A free end is no node, so that its sign fixes that of the shape.
         let sign = raw.last().map_or(1.0, |tip| 1f64.copysign(*tip));
         let largest = raw.iter().fold(0.0f64, |most, value| most.max(value.abs())) * sign;
-        SampledShape {
+        shapes.push(SampledShape {
             mode: mode + 1,
-            frequency: modes.frequencies()[mode],
+            frequency,
             positions: positions.iter().map(|(x, _)| *x).collect(),
             displacements: raw.iter().map(|value| value / largest).collect(),
-        }
-    };
-    (0..modes.len()).map(shape).collect()
+        });
+    }
+    shapes
 }
 
 /// Places along all beams (m), and where the model is asked for each: a hair inside the beam that is
@@ -296,32 +244,113 @@ fn positions(body: &Body) -> Vec<(f64, f64)> {
     let mut all = Vec::new();
     for beam in beams {
         let end = start + beam.length;
-        let share = |point: usize| point as f64 / (points - 1) as f64;
-        let places = (0..points).map(|point| start + share(point) * beam.length);
-        all.extend(places.map(|x| (x, x.clamp(start + hair, end - hair))));
+        for point in 0..points {
+            let x = start + point as f64 / (points - 1) as f64 * beam.length;
+            all.push((x, x.clamp(start + hair, end - hair)));
+        }
         start = end;
     }
     all
 }
 
-/// Perturbs what is asked for and can be: first the pair regression, then the consistent estimate.
-/// Neither a free beam nor a joint of which no spring is estimated has anything to perturb.
+/// Perturbs what is asked for and can be. Neither a free beam nor a joint of which no spring is estimated has
+/// anything to perturb.
 pub(super) fn perturbations(
     structure: &TestedStructure,
     consistent: Option<&ConsistentEstimator>,
-    (modes, used): (&[ModeResult], &[MeasuredMode]),
+    modes: &[ModeResult],
+    used: &[MeasuredMode],
     settings: &IdentifySettings,
-) -> Vec<Perturbation> {
+) -> Perturbations {
     let frequencies = Frequencies::new(modes, used);
-    let asked = |method: EstimateMethod| settings.perturbed.contains(&method);
-    let pairs = structure
-        .regression
-        .filter(|_| asked(EstimateMethod::Pairs))
-        .and_then(|model| of_pairs(model, &structure.beam, &frequencies, settings));
-    let consistent = consistent
-        .filter(|_| asked(EstimateMethod::Consistent))
-        .and_then(|estimator| of_consistent(estimator, &frequencies, settings));
-    pairs.into_iter().chain(consistent).collect()
+    let percents = &settings.percents;
+    let mut found = Perturbations::default();
+    if let Some(model) = structure.regression
+        && settings.perturbed.contains(&EstimateMethod::Pairs)
+        && let Ok(estimator) = pairs_estimator(model, &structure.beam, &frequencies.numbers)
+    {
+        let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
+        let random = random.and_then(|((samples, seed), stds)| {
+            monte_carlo(&frequencies.values, stds, samples, seed, &estimator).ok()
+        });
+        add(
+            &mut found,
+            EstimateMethod::Pairs,
+            random,
+            &frequencies,
+            percents,
+            estimator,
+        );
+    }
+    if let Some(estimator) = consistent
+        && settings.perturbed.contains(&EstimateMethod::Consistent)
+        && estimator.estimates_a_spring()
+    {
+        let near = estimator.neighbourhood();
+        // Without the uncertainties of all modes there is nothing to draw from.
+        let random = settings.monte_carlo.and_then(|(samples, seed)| {
+            let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
+            Some(found.joint)
+        });
+        let estimator = estimator.stiffnesses_near(&near);
+        add(
+            &mut found,
+            EstimateMethod::Consistent,
+            random,
+            &frequencies,
+            percents,
+            estimator,
+        );
+    }
+    found
+}
+
+/// Adds the perturbations of one method, if it has an estimate.
+fn add(
+    found: &mut Perturbations,
+    method: EstimateMethod,
+    random: Option<MonteCarlo>,
+    frequencies: &Frequencies,
+    percents: &[f64],
+    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
+) {
+    let Some(nominal) = estimator(&frequencies.values) else {
+        return;
+    };
+    let uniform = perturb_uniformly(&frequencies.values, percents, &estimator);
+    let averages = average_errors(&nominal, &uniform).into_iter();
+    found.averages.extend(averages.map(|row| AverageSection {
+        method,
+        percent: row.percent,
+        kx_percent: finite(row.mean_magnitude.kx),
+        ky_percent: finite(row.mean_magnitude.ky),
+        kz_percent: row.mean_magnitude.kz.and_then(finite),
+        kx_of_mean_percent: finite(row.of_mean.kx),
+        ky_of_mean_percent: finite(row.of_mean.ky),
+        kz_of_mean_percent: row.of_mean.kz.and_then(finite),
+    }));
+    found
+        .uniform
+        .extend(uniform.into_iter().map(|row| PerturbationSection {
+            percent: row.percent,
+            method,
+            kx: row.estimate.map(|estimate| estimate.kx),
+            ky: row.estimate.map(|estimate| estimate.ky),
+            kz: row.estimate.and_then(|estimate| estimate.kz),
+        }));
+    found.random.extend(random.map(|random| MonteCarloSection {
+        method,
+        samples: random.samples,
+        failed: random.failed,
+        kx: random.kx.map(interval),
+        ky: random.ky.map(interval),
+        kz: random.kz.map(interval),
+        cloud: cloud(&random.cloud),
+    }));
+    if let Some(bounds) = &frequencies.bounds {
+        let section = under_bounds(method, nominal, frequencies, bounds, estimator);
+        found.spans.push(section);
+    }
 }
 
 /// The frequencies that enter the estimate, with what is known of their errors.
@@ -336,100 +365,81 @@ struct Frequencies {
 
 impl Frequencies {
     fn new(modes: &[ModeResult], used: &[MeasuredMode]) -> Self {
-        let half_line = |measured: &MeasuredMode| {
-            let listed = modes.iter().find(|mode| mode.mode == Some(measured.mode));
-            listed?.half_line
-        };
+        let listed = used.iter().map(|measured| {
+            let mut modes = modes.iter();
+            modes.find(|mode| mode.mode == Some(measured.mode))
+        });
         Self {
             numbers: used.iter().map(|mode| mode.mode).collect(),
             values: used.iter().map(|mode| mode.frequency).collect(),
-            bounds: used.iter().map(half_line).collect(),
+            bounds: listed.map(|mode| mode?.half_line).collect(),
             stds: used.iter().map(|mode| mode.std).collect(),
         }
     }
 }
 
-fn of_pairs(
-    model: PairsModel,
-    beam: &Beam,
+/// The estimate under each mode's own bound (Hz).
+fn under_bounds(
+    method: EstimateMethod,
+    nominal: Stiffnesses,
     frequencies: &Frequencies,
-    settings: &IdentifySettings,
-) -> Option<Perturbation> {
-    let estimator = pairs_estimator(model, beam, &frequencies.numbers).ok()?;
-    let random = settings.monte_carlo.zip(frequencies.stds.as_deref());
-    let random = random.and_then(|(repetitions, stds)| {
-        monte_carlo(
-            &frequencies.values,
-            stds,
-            repetitions.0,
-            repetitions.1,
-            &estimator,
-        )
-        .ok()
-    });
-    perturbation(
-        (EstimateMethod::Pairs, random),
-        frequencies,
-        settings,
-        estimator,
-    )
-}
-
-fn of_consistent(
-    estimator: &ConsistentEstimator,
-    frequencies: &Frequencies,
-    settings: &IdentifySettings,
-) -> Option<Perturbation> {
-    if !estimator.estimates_a_spring() {
-        return None;
-    }
-    let near = estimator.neighbourhood();
-    // Without the uncertainties of all modes there is nothing to draw from.
-    let random = settings.monte_carlo.and_then(|(samples, seed)| {
-        let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
-        Some(found.joint)
-    });
-    perturbation(
-        (EstimateMethod::Consistent, random),
-        frequencies,
-        settings,
-        estimator.stiffnesses_near(&near),
-    )
-}
-
-fn perturbation(
-    (method, random): (EstimateMethod, Option<MonteCarlo>),
-    frequencies: &Frequencies,
-    settings: &IdentifySettings,
+    bounds: &[f64],
     estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
-) -> Option<Perturbation> {
-    let nominal = estimator(&frequencies.values)?;
-    let uniform = perturb_uniformly(&frequencies.values, &settings.percents, &estimator);
-    let bounds = frequencies.bounds.as_deref();
-    Some(Perturbation {
-        method,
-        averages: average_errors(&nominal, &uniform),
-        uniform,
-        bounds: bounds.map(|bounds| of_bounds((nominal, bounds), frequencies, &estimator)),
-        random,
-    })
-}
-
-/// The estimate under each mode's own bound.
-fn of_bounds(
-    (nominal, bounds): (Stiffnesses, &[f64]),
-    frequencies: &Frequencies,
-    estimator: impl Fn(&[f64]) -> Option<Stiffnesses> + Sync,
-) -> BoundPerturbation {
-    let patterns = sign_pattern_estimates(&frequencies.values, bounds, &estimator).ok();
+) -> ResolutionSpanSection {
     let sensitivities = mode_sensitivities(&frequencies.values, bounds, &estimator);
-    BoundPerturbation {
-        modes: frequencies.numbers.clone(),
-        bounds: bounds.to_vec(),
-        spans: patterns
-            .as_ref()
-            .map(|found| spans_of(Some(nominal), found)),
-        cloud: patterns.into_iter().flatten().flatten().collect(),
-        sensitivities: sensitivities.unwrap_or_default(),
+    let sensitivities = sensitivities.unwrap_or_default().into_iter();
+    let sensitivities = sensitivities.map(|row| {
+        let (change, slope) = (row.percent_per_bound, row.percent_per_percent);
+        SensitivitySection {
+            mode: frequencies.numbers[row.index],
+            half_line: bounds[row.index],
+            kx_percent: change.map(|change| change.kx),
+            ky_percent: change.map(|change| change.ky),
+            kz_percent: change.and_then(|change| change.kz),
+            kx_percent_per_percent: slope.map(|slope| slope.kx),
+            ky_percent_per_percent: slope.map(|slope| slope.ky),
+            kz_percent_per_percent: slope.and_then(|slope| slope.kz),
+        }
+    });
+    let section = ResolutionSpanSection {
+        method,
+        sensitivity: sensitivities.collect(),
+        ..ResolutionSpanSection::default()
+    };
+    // There are no spans of more modes than can be tried.
+    let Ok(patterns) = sign_pattern_estimates(&frequencies.values, bounds, &estimator) else {
+        return section;
+    };
+    let spans = spans_of(Some(nominal), &patterns);
+    let found: Vec<Stiffnesses> = patterns.into_iter().flatten().collect();
+    ResolutionSpanSection {
+        patterns: spans.patterns,
+        failed: spans.failed,
+        kx: spans.kx.map(|span| [span.low, span.high]),
+        ky: spans.ky.map(|span| [span.low, span.high]),
+        kz: spans.kz.map(|span| [span.low, span.high]),
+        cloud: cloud(&found),
+        ..section
     }
+}
+
+/// A stiffness that is rigid or held has no relative change.
+fn finite(percent: f64) -> Option<f64> {
+    Some(percent).filter(|percent| percent.is_finite())
+}
+
+fn interval(spread: Spread) -> Uncertain {
+    Uncertain {
+        value: spread.median,
+        low: finite(spread.low),
+        high: finite(spread.high),
+        ..Uncertain::default()
+    }
+}
+
+fn cloud(estimates: &[Stiffnesses]) -> Vec<[f64; 2]> {
+    let estimates = estimates.iter();
+    estimates
+        .map(|estimate| [estimate.kx, estimate.ky])
+        .collect()
 }

@@ -28,28 +28,26 @@ mod warning;
 
 use std::path::Path;
 
-use rayon::prelude::*;
-
 pub use amplitude::AmplitudeChange;
-pub use analysis::PipelineError;
 pub use analysis::{
-    Analysis, BetweenRecordings, BoundPerturbation, CloseUp, Conditions, Estimate, EstimateMethod,
-    Identification, ModeResult, Overview, Perturbation, RecordingResult, Response,
+    Analysis, AverageSection, BetweenRecordings, CloseUp, Conditions, Estimate, EstimateMethod,
+    Identification, ModeResult, MonteCarloSection, Overview, PerturbationSection, Perturbations,
+    PipelineError, RecordingResult, ResolutionSpanSection, Response, SensitivitySection,
 };
 pub use checks::together;
 pub use frf::{Frf, FrfError, FrfResonance, FrfSettings, form_of, frfs_of};
 pub use identification::{IdentifySettings, SampledShape, identify, sampled_shapes};
 pub use measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 pub use modes::{modes_of_measured, modes_of_recordings};
-pub use observations::observations;
-pub use observations::{diagnose_test, nominal, nominal_with};
-pub use recordings::{FunctionSettings, run_functions};
-pub use recordings::{Wiring, run_wired};
-pub use recordings::{inspect_bare, measure_bare, si_unit};
-pub use structure::{KnownJoint, TestedStructure, tested_structure};
+use modes::{modes_of_test, set_aside};
+pub use observations::{diagnose_test, nominal, nominal_with, observations, read_elsewhere};
+use recordings::measure_test;
+pub use recordings::{
+    FunctionSettings, Wiring, inspect_bare, measure_bare, run_functions, run_wired, si_unit,
+};
 pub use structure::{
-    StructureDetails, frequencies_of, jointed as jointed_structure, predict_described,
-    structure_details,
+    KnownJoint, StructureDetails, TestedStructure, frequencies_of, jointed as jointed_structure,
+    predict_described, structure_details, tested_structure,
 };
 pub use warning::Warning;
 
@@ -72,38 +70,19 @@ pub fn run_test(
 ) -> Result<Analysis, PipelineError> {
     let structure = tested_structure(test);
     let details = structure_details(test, &structure.beam);
-    // In parallel, but collected in the description's order, so that of several errors the first is told.
-    let mut recordings = test
-        .recordings
-        .par_iter()
-        .map(|recording| recordings::measure_described(test, recording, place))
-        .collect::<Vec<Result<_, _>>>()
-        .into_iter()
-        .collect::<Result<Vec<_>, _>>()?;
-    let mut warnings: Vec<Warning> = test
-        .warnings
-        .iter()
-        .map(|warning| Warning::Description {
-            text: warning.to_string(),
-        })
-        .collect();
-    warnings.extend(
-        recordings
-            .iter()
-            .flat_map(|r| r.measurement.warnings.iter().cloned()),
-    );
+    let mut recordings = measure_test(test, place.0, place.1)?;
+    let mut warnings = doubts::of_description(test);
+    for recording in &recordings {
+        warnings.extend_from_slice(&recording.measurement.warnings);
+    }
     let mut aside = vec![None; recordings.len()];
-    let modes = match &test.measured {
-        Some(measured) => modes_of_measured(measured, &structure),
-        None => {
-            aside = modes::set_aside(test, &recordings);
-            let reference = modes::reference_configuration(&aside);
-            let known = (&structure, &details);
-            let (found, doubts) = modes_of_recordings(&mut recordings, &reference, known);
-            warnings.extend(doubts);
-            warnings.extend(modes::number_loaded(&mut recordings, &found, test, known));
-            found
-        }
+    let modes = if let Some(measured) = &test.measured {
+        modes_of_measured(measured, &structure)
+    } else {
+        aside = set_aside(test, &recordings);
+        let (modes, doubts) = modes_of_test(test, &mut recordings, &aside, &structure, &details);
+        warnings.extend(doubts);
+        modes
     };
     warnings.extend(checks::of_amplitude(&recordings));
     let settings = IdentifySettings {
@@ -112,14 +91,8 @@ pub fn run_test(
         ..settings.clone()
     };
     let (identification, doubts) = identify(&structure, &modes, &settings);
-    let known = structure.known.over(None).is_some();
-    let method = match settings.method {
-        EstimateMethod::Consistent if known || identification.consistent.is_some() => {
-            EstimateMethod::Consistent
-        }
-        _ => EstimateMethod::Pairs,
-    };
-    warnings.extend(doubts::of_neglect(test, &structure, method));
+    let method = identification.method(&structure, settings.method);
+    warnings.extend(doubts::neglected_effects(test, &structure, method));
     warnings.extend(doubts);
     let (verdicts, doubts) = checks::judge(&recordings);
     warnings.extend(doubts);

@@ -1,7 +1,7 @@
 //! Measuring one recording: taps, averaged spectra, free decays, readings.
 
 use super::fits::{Candidates, Stabilisation, stabilisation};
-use super::noise::{PulseWindow, Quiet, pulse_window, remove_offset};
+use super::noise::{PreTriggerNoise, PulseWindow, pulse_window, remove_offset};
 use super::warning::Warning;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -23,10 +23,10 @@ use tapjoint_signal::spectral::{
 };
 use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
 
-/// How one recording is analysed.
+/// Settings of the measurement of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasureSettings {
-    /// Where taps are looked for; its response channels are the ones analysed.
+    /// Channels in which taps are searched; the responses among them are analysed.
     pub source: TapSource,
     /// Zoom band (Hz); `None` = 0 to rate/2.56.
     pub band: Option<(f64, f64)>,
@@ -34,16 +34,16 @@ pub struct MeasureSettings {
     pub block: Option<usize>,
     /// Window; `None` = by the decay in the record.
     pub window: Option<WindowKind>,
-    /// How natural frequencies are read.
+    /// Way in which natural frequencies are read.
     pub reading: ReadBy,
-    /// What each response measures, for modal constants; `None` where nobody said, or it is no motion in
+    /// Form of each response, for modal constants; `None` where it is not known, or no motion in
     /// SI units over a force in N.
     pub kinds: Vec<Option<ResponseForm>>,
-    /// How taps are judged.
+    /// Limits for taps.
     pub taps: TapSettings,
-    /// What counts as a resonance.
+    /// Limits for resonances.
     pub peaks: PeakSettings,
-    /// What counts as a mains line.
+    /// Limits for mains lines.
     pub mains: MainsSettings,
 }
 
@@ -64,14 +64,14 @@ impl MeasureSettings {
     }
 }
 
-/// What one recording tells.
+/// Taps and spectra of one recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     /// The taps, accepted and rejected.
     pub taps: Taps,
     /// Averages over the accepted taps and what was read from them; `None` without an accepted tap.
     pub spectra: Option<MeasuredSpectra>,
-    /// What a reader has to know.
+    /// Everything that a reader of the results has to know.
     pub warnings: Vec<Warning>,
 }
 
@@ -86,14 +86,14 @@ pub struct MeasuredSpectra {
     pub decay: Option<DecayCheck>,
     /// Resonances and mains lines, ascending.
     pub readings: Vec<ModeReading>,
-    /// What the noise of the force channel leaves in its windowed transforms, line by line (N s); `None`
+    /// Noise of the force channel in its windowed transforms, line by line (N s); `None`
     /// without a hammer or a quiet stretch before the first tap.
     pub force_noise: Option<Vec<f64>>,
-    /// What the polyreference fit found.
+    /// Result of the polyreference fit.
     pub stabilisation: Stabilisation,
 }
 
-/// What stops a measurement.
+/// Reasons for which a measurement stops.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// The recording could not be read.
@@ -104,7 +104,7 @@ pub enum MeasureError {
     Spectral {
         /// The recording.
         file: String,
-        /// What does not fit.
+        /// The problem.
         problem: SpectralError,
     },
 }
@@ -119,44 +119,33 @@ pub fn measure(
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
     // The band is judged before anything is read: it is the user's typing, not the data.
-    let fits = |problem| MeasureError::Spectral {
+    let trial = lines_for(settings, recording.sample_rate(), recording.duration());
+    let trial = trial.map_err(|problem| MeasureError::Spectral {
         file: recording.name().to_string(),
         problem,
-    };
-    let trial = lines_for(settings, recording.sample_rate(), recording.duration()).map_err(fits)?;
+    })?;
     let mut tap_settings = settings.taps;
     tap_settings.wanted = settings
         .block
         .map(|_| trial.block as f64 / (DISPLAY_RATIO * (trial.high - trial.low)));
     let taps = find_taps(recording, &settings.source, &tap_settings)?;
     let mut warnings = of_recording(recording, &settings.source, &taps);
-    let Some(shortest) = taps.shortest() else {
-        return Ok(Measurement {
-            taps,
-            spectra: None,
-            warnings,
-        });
-    };
-    let available = shortest as f64 / recording.sample_rate();
-    let lines = match lines_for(settings, recording.sample_rate(), available) {
-        Ok(lines) => lines,
-        // The file would do, but its taps come too soon: data, not typing.
-        Err(problem) => {
-            let file = recording.name().to_string();
-            warnings.push(Warning::TapsTooShort { file, problem });
-            return Ok(Measurement {
-                taps,
-                spectra: None,
-                warnings,
-            });
+    let mut spectra = None;
+    if let Some(shortest) = taps.shortest() {
+        let available = shortest as f64 / recording.sample_rate();
+        match lines_for(settings, recording.sample_rate(), available) {
+            Ok(lines) => {
+                let found = Stage::new(recording, settings, &taps, lines).spectra()?;
+                warnings.extend(of_spectra(recording.name(), &found));
+                spectra = Some(found);
+            }
+            // The file would do, but its taps come too soon: data, not typing.
+            Err(problem) => warnings.push(Warning::taps_too_short(recording.name(), &problem)),
         }
-    };
-    let stage = Stage::new(recording, settings, &taps, lines);
-    let spectra = stage.spectra()?;
-    warnings.extend(of_spectra(recording.name(), &spectra));
+    }
     Ok(Measurement {
         taps,
-        spectra: Some(spectra),
+        spectra,
         warnings,
     })
 }
@@ -181,41 +170,32 @@ fn lines_for(
 
 /// Doubts about a recording and its taps.
 pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Taps) -> Vec<Warning> {
-    let file = recording.name().to_string();
-    let mut warnings: Vec<Warning> = recording
-        .warnings()
-        .iter()
-        .map(|warning| Warning::Recording {
-            code: warning.code(),
-            file: file.clone(),
-            text: warning.to_string(),
-        })
-        .collect();
-    warnings.extend(taps.remarks.iter().map(|remark| Warning::Recording {
-        code: "taps",
-        file: file.clone(),
-        text: remark.to_string(),
-    }));
+    let file = recording.name();
+    let mut warnings = Vec::new();
+    for warning in recording.warnings() {
+        warnings.push(Warning::about(file, warning.code(), warning));
+    }
+    for remark in &taps.remarks {
+        warnings.push(Warning::about(file, "taps", remark));
+    }
     let accepted = taps.accepted().count();
     let rejected = taps.taps.len() - accepted;
     if rejected > 0 {
-        warnings.push(Warning::RejectedTaps {
-            file: file.clone(),
-            rejected,
-            total: taps.taps.len(),
-        });
+        warnings.push(Warning::rejected_taps(file, rejected, taps.taps.len()));
     }
     if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
-        warnings.push(Warning::SingleTap { file });
+        warnings.push(Warning::single_tap(file));
     }
     warnings
 }
 
 /// Doubts about a recording's spectra.
-pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
+fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let rings = |decay: &DecayCheck| decay.remaining > RUNG_DOWN && decay.remaining > decay.noise;
-    if let Some(decay) = spectra.decay.filter(rings) {
+    if let Some(decay) = spectra.decay
+        && decay.remaining > RUNG_DOWN
+        && decay.remaining > decay.noise
+    {
         warnings.push(Warning::NotRungDown {
             file: file.to_string(),
             remaining: decay.remaining,
@@ -224,9 +204,7 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
         });
     }
     if spectra.window == Window::Hann {
-        warnings.push(Warning::HannOnTaps {
-            file: file.to_string(),
-        });
+        warnings.push(Warning::hann_on_taps(file));
     }
     for reading in &spectra.readings {
         if let Some(label @ PeakLabel::Mains(_)) = reading.label {
@@ -241,21 +219,21 @@ pub(super) fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> 
     warnings
 }
 
-/// What every step of one recording's measurement needs.
-pub(super) struct Stage<'a> {
-    pub(super) recording: &'a Recording,
-    pub(super) settings: &'a MeasureSettings,
-    pub(super) taps: &'a Taps,
-    pub(super) lines: Lines,
+/// Data that every step of one recording's measurement needs.
+struct Stage<'a> {
+    recording: &'a Recording,
+    settings: &'a MeasureSettings,
+    taps: &'a Taps,
+    lines: Lines,
     /// Force first, where there is one, then the responses.
-    pub(super) channels: Vec<usize>,
-    pub(super) has_force: bool,
+    channels: Vec<usize>,
+    has_force: bool,
     /// Frames of a block.
-    pub(super) gate: u64,
+    gate: u64,
 }
 
 impl<'a> Stage<'a> {
-    pub(super) fn new(
+    fn new(
         recording: &'a Recording,
         settings: &'a MeasureSettings,
         taps: &'a Taps,
@@ -273,10 +251,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Samples of all channels in a range of frames, each channel's mean taken out.
-    pub(super) fn read(
-        &self,
-        range: std::ops::Range<u64>,
-    ) -> Result<Vec<Vec<f64>>, RecordingError> {
+    fn read(&self, range: std::ops::Range<u64>) -> Result<Vec<Vec<f64>>, RecordingError> {
         let mut channels = self.recording.read_channels(&self.channels, range)?;
         for (samples, &channel) in channels.iter_mut().zip(&self.channels) {
             let mean = self.recording.mean(channel);
@@ -290,7 +265,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The quiet stretch before the first tap, at most a block.
-    fn quiet(&self) -> Result<Quiet, RecordingError> {
+    fn quiet(&self) -> Result<PreTriggerNoise, RecordingError> {
         let quiet = self.taps.quiet();
         let start = quiet.start.max(quiet.end.saturating_sub(self.gate));
         let mut force = self.read(start..quiet.end)?;
@@ -302,7 +277,7 @@ impl<'a> Stage<'a> {
             .filter_map(|tap| pulse_window(tap, rate));
         let energy: f64 = windows.map(PulseWindow::energy).sum();
         let count = self.taps.accepted().count().max(1) as f64;
-        Ok(Quiet {
+        Ok(PreTriggerNoise {
             force: force.pop(),
             responses,
             sample_rate: self.recording.sample_rate(),
@@ -311,10 +286,15 @@ impl<'a> Stage<'a> {
         })
     }
 
-    pub(super) fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
+    fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
         let quiet = self.quiet()?;
         let checks = self.decay_checks(&quiet)?;
-        let decay = slowest_decay(&checks);
+        // The slowest of the decays that stand above their noise; of none, the slowest of all.
+        let slowest = checks.iter().copied().max_by(|a, b| {
+            let above = (a.remaining > a.noise).cmp(&(b.remaining > b.noise));
+            above.then(a.remaining.total_cmp(&b.remaining))
+        });
+        let decay = slowest.unwrap_or(DecayCheck::NOTHING);
         let window = match self.settings.window {
             None => choose_window(&checks, self.lines.duration),
             Some(WindowKind::Rectangular) => Window::Rectangular,
@@ -358,7 +338,7 @@ impl<'a> Stage<'a> {
     }
 
     /// The decay of each response inside the band, the largest over the accepted taps.
-    fn decay_checks(&self, quiet: &Quiet) -> Result<Vec<DecayCheck>, RecordingError> {
+    fn decay_checks(&self, quiet: &PreTriggerNoise) -> Result<Vec<DecayCheck>, RecordingError> {
         let rate = self.recording.sample_rate();
         let band = (self.lines.low, self.lines.high);
         let noise: Vec<f64> = quiet
@@ -406,12 +386,16 @@ impl<'a> Stage<'a> {
             let responses = transforms.split_off(usize::from(self.has_force));
             averager.add(transforms.first().map(Vec::as_slice), &responses);
             if !self.has_force && kept.len() * self.lines.points() < MOST_KEPT {
+                // Time zero is moved to the trigger: the slope that the quiet before it puts on the phase is no
+                // background that a fit of few lines could follow.
                 let delay = tap.time - tap.record.start as f64 / rate;
-                kept.extend(
-                    responses
-                        .into_iter()
-                        .map(|x| self.timed_from_trigger(x, delay)),
-                );
+                for mut transform in responses {
+                    for (line, value) in transform.iter_mut().enumerate() {
+                        let turn = TAU * self.lines.frequency(line) * delay;
+                        *value *= Complex64::from_polar(1.0, turn);
+                    }
+                    kept.push(transform);
+                }
             }
         }
         // At least one tap was accepted, or there would be no axis.
@@ -421,22 +405,12 @@ impl<'a> Stage<'a> {
         Ok((averages, kept))
     }
 
-    /// A transform with its time zero at the trigger, `delay` (s) into the record: the slope that the
-    /// quiet before it puts on the phase is no background that a fit of few lines could follow.
-    fn timed_from_trigger(&self, mut transform: Vec<Complex64>, delay: f64) -> Vec<Complex64> {
-        for (line, value) in transform.iter_mut().enumerate() {
-            let turn = TAU * self.lines.frequency(line) * delay;
-            *value *= Complex64::from_polar(1.0, turn);
-        }
-        transform
-    }
-
     /// Peaks of the composite level over all sensors, read and labelled.
     fn readings(
         &self,
         averages: &AveragedSpectra,
         transforms: &[Vec<Complex64>],
-        quiet: &Quiet,
+        quiet: &PreTriggerNoise,
         window: Window,
     ) -> Vec<ModeReading> {
         let powers: Vec<Vec<f64>> = match &averages.h1 {
@@ -462,80 +436,54 @@ impl<'a> Stage<'a> {
             .collect();
         let mut readings = read_peaks(&level, &spectra, &peaks, window);
         for (reading, peak) in readings.iter_mut().zip(&peaks) {
-            let gap = |force: &Vec<f64>| is_force_gap(force, &level, peak.index);
-            if averages.force.as_ref().is_some_and(gap) {
+            let force = averages.force.as_deref();
+            if force.is_some_and(|force| is_force_gap(force, &level.level_db, peak.index)) {
                 reading.label = Some(PeakLabel::ForceGap);
             }
-            if let Some(label) =
-                quiet.mains_label(peak.index, averages, window, &self.settings.mains)
-            {
-                *reading = as_mains(reading, self.lines.frequency(peak.index), label);
+            let mains = &self.settings.mains;
+            if let Some(label) = quiet.mains_label(peak.index, averages, window, mains) {
+                // A mains line keeps its line reading and loses what only a resonance has.
+                reading.line_frequency = self.lines.frequency(peak.index);
+                reading.interpolated = None;
+                reading.bound = None;
+                reading.damping_ratio = None;
+                reading.damping_std = None;
+                reading.label = Some(label);
+                reading.prefer(ReadBy::Line);
             }
         }
         readings
     }
 }
 
-/// The slowest of the decays that stand above their noise; of none, the slowest of all.
-fn slowest_decay(checks: &[DecayCheck]) -> DecayCheck {
-    let above = |check: &DecayCheck| check.remaining > check.noise;
-    checks
-        .iter()
-        .copied()
-        .max_by(|a, b| {
-            above(a)
-                .cmp(&above(b))
-                .then(a.remaining.total_cmp(&b.remaining))
-        })
-        .unwrap_or(DecayCheck::NOTHING)
-}
-
 /// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
 /// each). Taps beyond it are left out of them.
-pub(super) const MOST_KEPT: usize = 1 << 24;
+const MOST_KEPT: usize = 1 << 24;
 
-/// Whether a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
+/// Returns true if a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
 /// resonates, so the quotient's peak is the force's doing. The force on the peak is compared with that
-/// on its flanks, where the level has fallen by 6 dB.
-fn is_force_gap(force: &[f64], level: &CompositeLevel, peak: usize) -> bool {
-    let foot = level.level_db[peak] - 6.0;
-    let fallen = |line: &usize| level.level_db.get(*line).is_some_and(|&l| l < foot);
-    let left = (0..peak)
-        .rev()
-        .find(fallen)
-        .and_then(|line| force.get(line));
-    let right = (peak..level.level_db.len())
-        .find(fallen)
-        .and_then(|line| force.get(line));
+/// on its flanks, where the level (dB) has fallen by 6 dB.
+fn is_force_gap(force: &[f64], level: &[f64], peak: usize) -> bool {
+    let foot = level[peak] - 6.0;
+    let left = level[..peak].iter().rposition(|&level| level < foot);
+    let right = level[peak..].iter().position(|&level| level < foot);
+    let (Some(left), Some(right)) = (left, right) else {
+        return false;
+    };
     // A gap is lower than either flank; a force that merely falls off is lower than one.
-    match (left, right) {
+    match (force.get(left), force.get(peak + right)) {
         (Some(&left), Some(&right)) => force[peak] < 0.6 * left.min(right),
         _ => false,
     }
 }
 
-/// A mains line keeps its line reading and loses what only a resonance has.
-fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> ModeReading {
-    let mut reading = ModeReading {
-        line_frequency,
-        interpolated: None,
-        bound: None,
-        damping_ratio: None,
-        damping_std: None,
-        label: Some(label),
-        ..reading.clone()
-    };
-    reading.prefer(ReadBy::Line);
-    reading
-}
-
 /// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
 const AFTER_TRIGGER: f64 = 5e-3;
-/// Fewest samples of a decay that is worth a fit: some 16 lines for a mode and what surrounds it.
+/// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
 const LEAST_SAMPLES: u64 = 64;
 
 /// Decays of all taps, and what of them is fitted.
-pub(super) struct FreeDecays {
+struct FreeDecays {
     /// Transforms of every tap and sensor on the lines of the band.
     pub data: ModalData,
     /// Force of each tap; empty without a hammer.
@@ -550,8 +498,10 @@ impl FreeDecays {
     /// Reads the decays; `None` where they are too short for a fit.
     pub fn read(stage: &Stage<'_>) -> Result<Option<Self>, RecordingError> {
         let taps: Vec<&Tap> = stage.taps.accepted().collect();
-        let left = |tap: &&Tap| (tap.record.start + stage.gate).saturating_sub(stage.begin(tap));
-        let shortest = taps.iter().map(left).min().unwrap_or(0);
+        let lengths = taps
+            .iter()
+            .map(|tap| (tap.record.start + stage.gate).saturating_sub(stage.begin(tap)));
+        let shortest = lengths.min().unwrap_or(0);
         let samples = match largest_smooth_block(shortest as usize) {
             Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
             _ => return Ok(None),
@@ -561,13 +511,18 @@ impl FreeDecays {
         let mut forces = Vec::new();
         for (number, tap) in taps.into_iter().take(most.max(1)).enumerate() {
             let (decay, force) = stage.decay(tap, samples)?;
+            forces.extend(force.map(|samples| TapForce {
+                tap: number,
+                start: -(samples.len() as f64) / decay.sample_rate,
+                samples,
+                sample_rate: decay.sample_rate,
+            }));
             decays.push(decay);
-            forces.extend(force.map(|samples| stage.tap_force(number, samples)));
         }
         Ok(transformed(stage, samples, decays, forces).ok())
     }
 
-    /// What the polyreference fit reads, each column on the same lines: with a hammer the response of
+    /// Columns of the polyreference fit, all on the same lines: with a hammer the response of
     /// every sensor to the force, H = sum conj(F) X/sum |F|^2 over the taps; without one every tap's
     /// transforms.
     pub fn functions(&self) -> Vec<Vec<Complex64>> {
@@ -616,7 +571,12 @@ fn transformed(
     }
     let mut pulses = FreeDecayCollector::new(rate, samples, &band)?;
     for force in &forces {
-        pulses.add_tap(&[wrapped(&force.samples, samples)])?;
+        // The force before time zero stands at the end of the block: on multiples of rate/block a transform
+        // cannot tell a time from one a block later.
+        let kept = force.samples.len().min(samples);
+        let mut block = vec![0.0; samples - kept];
+        block.extend_from_slice(&force.samples[force.samples.len() - kept..]);
+        pulses.add_tap(&[block])?;
     }
     let force_columns = if forces.is_empty() {
         Vec::new()
@@ -629,15 +589,6 @@ fn transformed(
         decays,
         force_columns,
     })
-}
-
-/// What came before time zero, at the end of the block: on multiples of rate/block a transform cannot
-/// tell a time from one a block later.
-fn wrapped(before: &[f64], block: usize) -> Vec<f64> {
-    let kept = before.len().min(block);
-    let mut samples = vec![0.0; block];
-    samples[block - kept..].copy_from_slice(&before[before.len() - kept..]);
-    samples
 }
 
 impl Stage<'_> {
@@ -681,25 +632,11 @@ impl Stage<'_> {
         };
         Ok((decay, force))
     }
-
-    fn tap_force(&self, tap: usize, samples: Vec<f64>) -> TapForce {
-        let sample_rate = self.recording.sample_rate();
-        TapForce {
-            tap,
-            start: -(samples.len() as f64) / sample_rate,
-            samples,
-            sample_rate,
-        }
-    }
 }
 
 /// Adds to the fits what needs the decays themselves: modal constants, and frequency and damping against
 /// amplitude.
-pub(super) fn complete(
-    readings: &mut [ModeReading],
-    decays: &FreeDecays,
-    kinds: &[Option<ResponseForm>],
-) {
+fn complete(readings: &mut [ModeReading], decays: &FreeDecays, kinds: &[Option<ResponseForm>]) {
     let fitted: Vec<&mut FittedReading> = readings
         .iter_mut()
         .filter_map(|reading| reading.fit.as_deref_mut())

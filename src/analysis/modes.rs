@@ -1,6 +1,6 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
-use super::analysis::{BetweenRecordings, ModeResult, RecordingResult};
+use super::analysis::{ModeResult, RecordingResult};
 use super::between_recordings::between;
 use super::identification::measured_modes;
 use super::observed_mode::shape_of;
@@ -12,11 +12,8 @@ use super::warning::Warning;
 use std::f64::consts::TAU;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
-use tapjoint_description::{
-    FitParameter, MeasuredFrequencies, RecordingDescription, TestDescription,
-};
+use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
-use tapjoint_identify::observation::UNPAIRED;
 use tapjoint_identify::pairing::{
     MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, PeakStrength,
     ShapeAt, is_plain,
@@ -37,24 +34,17 @@ const FREE_BEAM_RANGE: f64 = 0.2;
 /// of a usual bar.
 const FREE_BEAM_TOLERANCE: f64 = 0.04;
 
-/// What another sensor position or tap level moves a frequency at most, relative: 24 g at the end of a
+/// Largest relative change of a frequency by another sensor position or tap level: 24 g at the end of a
 /// usual bar are 3 %, a joint that softens by 15 % at the hardest tap 4 %. Bending modes are farther
 /// apart.
 const OTHER_CONFIGURATION: f64 = 0.05;
 
-/// So many modes of a free beam are looked for.
+/// Number of modes of a free beam among which peaks are numbered.
 const FREE_BEAM_MODES: usize = 30;
 
-/// Indices of the recordings of the reference configuration: the first, and all others with its
-/// sensor positions, fastened masses and tap level.
-pub(super) fn reference_configuration(aside: &[Option<String>]) -> Vec<usize> {
-    (0..aside.len())
-        .filter(|&index| aside[index].is_none())
-        .collect()
-}
-
-/// Of each recording how it differs from the first, so that it is left out of the list of modes; `None` where it does
-/// not.
+/// Returns how each recording differs from the first, so that it is left out of the list of modes; `None` where it
+/// belongs to the reference configuration: the first recording, and all others with its sensor positions, fastened
+/// masses and tap level.
 pub(super) fn set_aside(
     test: &TestDescription,
     recordings: &[RecordingResult],
@@ -62,24 +52,26 @@ pub(super) fn set_aside(
     let Some(first) = recordings.first() else {
         return Vec::new();
     };
-    let described = test.recordings.first();
-    let differs = |(index, own): (usize, &RecordingResult)| {
-        let both = described.zip(test.recordings.get(index));
-        let level = median_force(own)
-            .zip(median_force(first))
-            .map(|(own, first)| own / first)
-            .filter(|ratio| ratio.max(1.0 / ratio) >= SAME_LEVEL);
-        let words = [
-            level.map(|ratio| format!("{} times its tap level", times(ratio))),
-            both.filter(|(a, b)| a.at != b.at)
-                .map(|_| "sensors elsewhere".to_owned()),
-            both.filter(|(a, b)| a.masses != b.masses)
-                .map(|_| "other masses fastened".to_owned()),
-        ];
-        let words: Vec<String> = words.into_iter().flatten().collect();
-        (!words.is_empty()).then(|| words.join(", "))
-    };
-    recordings.iter().enumerate().map(differs).collect()
+    let mut aside = Vec::with_capacity(recordings.len());
+    for (index, own) in recordings.iter().enumerate() {
+        let mut words = Vec::new();
+        if let Some((own, first)) = median_force(own).zip(median_force(first)) {
+            let ratio: f64 = own / first;
+            if ratio.max(1.0 / ratio) >= SAME_LEVEL {
+                words.push(format!("{} times its tap level", times(ratio)));
+            }
+        }
+        if let (Some(first), Some(own)) = (test.recordings.first(), test.recordings.get(index)) {
+            if first.at != own.at {
+                words.push("sensors elsewhere".to_owned());
+            }
+            if first.masses != own.masses {
+                words.push("other masses fastened".to_owned());
+            }
+        }
+        aside.push((!words.is_empty()).then(|| words.join(", ")));
+    }
+    aside
 }
 
 /// Median peak force of the accepted taps; `None` without a hammer or tap.
@@ -97,68 +89,72 @@ fn median_force(recording: &RecordingResult) -> Option<f64> {
     peaks.get(peaks.len() / 2).copied()
 }
 
+/// Merges and numbers the readings of the recordings that are not set `aside`, and numbers the readings of all others.
+pub(super) fn modes_of_test(
+    test: &TestDescription,
+    recordings: &mut [RecordingResult],
+    aside: &[Option<String>],
+    structure: &TestedStructure,
+    details: &StructureDetails,
+) -> (Vec<ModeResult>, Vec<Warning>) {
+    let mut reference: Vec<usize> = (0..recordings.len()).collect();
+    reference.retain(|&index| aside[index].is_none());
+    let (modes, mut warnings) = modes_of_recordings(recordings, &reference, structure, details);
+    let doubts = pair_mass_loaded(recordings, &modes, test, structure, details);
+    warnings.extend(doubts);
+    (modes, warnings)
+}
+
 /// Merges the readings of the `reference` recordings and numbers them; every recording's own
 /// readings get the number of the mode they belong to.
 pub fn modes_of_recordings(
     recordings: &mut [RecordingResult],
     reference: &[usize],
-    (structure, details): (&TestedStructure, &StructureDetails),
+    structure: &TestedStructure,
+    details: &StructureDetails,
 ) -> (Vec<ModeResult>, Vec<Warning>) {
-    let merged = merge_modes(&readings_of(recordings, reference));
+    let seen: Vec<&RecordingResult> = reference.iter().map(|&index| &recordings[index]).collect();
+    let shown = seen.iter().map(|recording| BandReadings {
+        band: recording.looked_at().unwrap_or((0.0, f64::INFINITY)),
+        readings: recording.readings().to_vec(),
+    });
+    let merged = merge_modes(&shown.collect::<Vec<_>>()).into_iter();
     let mut modes: Vec<ModeResult> = merged
-        .into_iter()
-        .map(|mode| {
-            let file = reference
-                .get(mode.recording)
-                .map(|&index| recordings[index].file.clone());
-            let lambda = Some(structure.beam.lambda_of(mode.reading.frequency));
-            ModeResult {
-                lambda,
-                ..from_reading(mode.reading, file)
-            }
+        .map(|mode| ModeResult {
+            lambda: Some(structure.beam.lambda_of(mode.reading.frequency)),
+            ..ModeResult::of(mode.reading, &seen[mode.recording].file)
         })
         .collect();
     let warnings = match structure.assembly {
         Assembly::Free => number_free(&mut modes, structure),
         Assembly::Cantilever | Assembly::Lap => {
-            let seen: Vec<&RecordingResult> =
-                reference.iter().map(|&index| &recordings[index]).collect();
-            number_jointed(&mut modes, (structure, details), &seen)
+            number_jointed(&mut modes, structure, details, &seen)
         }
     };
     for recording in recordings.iter_mut() {
-        recording.mode_numbers = own_numbers(&modes, &own_readings(recording));
+        recording.mode_numbers = own_numbers(&modes, recording.readings());
     }
-    for mode in &mut modes {
-        mode.between = between_recordings(mode, recordings, reference);
+    for mode in modes.iter_mut().filter(|mode| mode.mode.is_some()) {
+        let mut frequencies = Vec::new();
+        for recording in reference.iter().map(|&index| &recordings[index]) {
+            let numbered = recording.readings().iter().zip(&recording.mode_numbers);
+            let mut own = numbered.filter(|(_, number)| **number == mode.mode);
+            if let Some((reading, _)) = own.next()
+                && let Some(std) = reading.std.filter(|std| *std > 0.0 && std.is_finite())
+            {
+                frequencies.push((reading.frequency, std));
+            }
+        }
+        mode.between = between(&frequencies);
     }
     (modes, warnings)
 }
 
-/// How far a mode's frequency scatters between the `reference` recordings.
-fn between_recordings(
-    mode: &ModeResult,
-    recordings: &[RecordingResult],
-    reference: &[usize],
-) -> Option<BetweenRecordings> {
-    let number = mode.mode?;
-    let readings: Vec<ModeReading> = reference
-        .iter()
-        .filter_map(|&index| {
-            let of_mode = |own: &Option<usize>| *own == Some(number);
-            let place = recordings[index].mode_numbers.iter().position(of_mode)?;
-            own_readings(&recordings[index]).into_iter().nth(place)
-        })
-        .collect();
-    between(&readings)
-}
-
 /// The readings of a bare recording, numbered as they come.
 pub(super) fn modes_of_bare(recording: &mut RecordingResult) -> Vec<ModeResult> {
-    let file = Some(recording.file.clone());
-    let mut modes: Vec<ModeResult> = own_readings(recording)
-        .into_iter()
-        .map(|reading| from_reading(reading, file.clone()))
+    let readings = recording.readings().iter().cloned();
+    let mut modes: Vec<ModeResult> = readings
+        .map(|reading| ModeResult::of(reading, &recording.file))
         .collect();
     number_in_order(&mut modes);
     recording.mode_numbers = modes.iter().map(|mode| mode.mode).collect();
@@ -170,98 +166,56 @@ pub fn modes_of_measured(
     measured: &MeasuredFrequencies,
     structure: &TestedStructure,
 ) -> Vec<ModeResult> {
-    measured
-        .frequencies
-        .iter()
-        .enumerate()
-        .map(|(index, &frequency)| {
-            let of =
-                |values: &Option<Vec<f64>>| values.as_ref().and_then(|v| v.get(index)).copied();
-            let half_line = of(&measured.half_line);
-            ModeResult {
-                mode: measured.modes.get(index).copied(),
-                frequency,
-                half_line,
-                std: standard_uncertainty(
-                    frequency,
-                    half_line,
-                    of(&measured.std),
-                    measured.scatter,
-                ),
-                between: None,
-                reading: None,
-                recording: None,
-                label: None,
-                lambda: Some(structure.beam.lambda_of(frequency)),
-            }
-        })
-        .collect()
-}
-
-/// std^2 = half_line^2/3 + (scatter f)^2, or the stated std with the scatter added; `None` when
-/// nothing is stated. A uniform distribution of half width h has the variance h^2/3.
-fn standard_uncertainty(
-    frequency: f64,
-    half_line: Option<f64>,
-    std: Option<f64>,
-    scatter: Option<f64>,
-) -> Option<f64> {
-    let reading = std
-        .map(|std| std * std)
-        .or(half_line.map(|half| half * half / 3.0));
-    let repeat = scatter.map(|scatter| (scatter * frequency).powi(2));
-    if reading.is_none() && repeat.is_none() {
-        return None;
+    let half_lines = measured.half_line.as_deref().unwrap_or_default();
+    let stds = measured.std.as_deref().unwrap_or_default();
+    let mut modes = Vec::with_capacity(measured.frequencies.len());
+    for (index, &frequency) in measured.frequencies.iter().enumerate() {
+        let half_line = half_lines.get(index).copied();
+        // std^2 = half_line^2/3 + (scatter f)^2, or the stated std with the scatter added. A uniform distribution of
+        // half width h has the variance h^2/3.
+        let stated = stds.get(index).map(|std| std * std);
+        let reading = stated.or(half_line.map(|half| half * half / 3.0));
+        let repeat = measured
+            .scatter
+            .map(|scatter| (scatter * frequency).powi(2));
+        let known = reading.is_some() || repeat.is_some();
+        let variance = reading.unwrap_or(0.0) + repeat.unwrap_or(0.0);
+        modes.push(ModeResult {
+            mode: measured.modes.get(index).copied(),
+            frequency,
+            half_line,
+            std: known.then(|| variance.sqrt()),
+            between: None,
+            reading: None,
+            recording: None,
+            lambda: Some(structure.beam.lambda_of(frequency)),
+        });
     }
-    Some((reading.unwrap_or(0.0) + repeat.unwrap_or(0.0)).sqrt())
+    modes
 }
 
-pub(super) fn own_readings(recording: &RecordingResult) -> Vec<ModeReading> {
-    recording
-        .measurement
-        .spectra
-        .as_ref()
-        .map_or(Vec::new(), |spectra| spectra.readings.clone())
-}
-
-fn readings_of(recordings: &[RecordingResult], which: &[usize]) -> Vec<BandReadings> {
-    let shown = |recording: &RecordingResult| BandReadings {
-        band: looked_at(recording).unwrap_or((0.0, f64::INFINITY)),
-        readings: own_readings(recording),
-    };
-    which
-        .iter()
-        .map(|&index| shown(&recordings[index]))
-        .collect()
-}
-
-/// Frequencies at which a recording was looked for resonances (Hz); `None` without spectra.
-pub(super) fn looked_at(recording: &RecordingResult) -> Option<(f64, f64)> {
-    let lines = recording.measurement.spectra.as_ref()?.averages.lines;
-    Some((lines.low, lines.high))
-}
-
-fn from_reading(reading: ModeReading, recording: Option<String>) -> ModeResult {
-    ModeResult {
-        mode: None,
-        frequency: reading.frequency,
-        half_line: Some(reading.half_line),
-        std: reading.std,
-        between: None,
-        label: reading.label.map(|label| label.to_string()),
-        recording,
-        lambda: None,
-        reading: Some(reading),
-    }
+/// Indices of the peaks that may be modes.
+fn unlabelled(modes: &[ModeResult]) -> Vec<usize> {
+    let all = 0..modes.len();
+    all.filter(|&index| modes[index].may_be_mode()).collect()
 }
 
 /// Numbers a free beam's modes by their nominal frequencies, where any is near one; else in ascending
 /// order.
 fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<Warning> {
-    let free: Vec<usize> = (0..modes.len())
-        .filter(|&i| modes[i].label.is_none())
-        .collect();
-    let peaks: Vec<WeightedPeak> = free.iter().map(|&i| weighted(&modes[i])).collect();
+    let free = unlabelled(modes);
+    let mut peaks = Vec::with_capacity(free.len());
+    for mode in free.iter().map(|&index| &modes[index]) {
+        // Height over the noise, or prominence.
+        let weight = mode.reading.as_ref().map_or(1.0, |reading| {
+            let height = reading.above_noise_db.or(reading.prominence_db);
+            height.unwrap_or(0.0)
+        });
+        peaks.push(WeightedPeak {
+            frequency: mode.frequency,
+            weight,
+        });
+    }
     let nominal = natural_frequencies(
         structure.theory,
         &structure.beam,
@@ -274,82 +228,61 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
     if numbers.iter().any(Option::is_some) {
         let text = "none of the free beam's natural frequencies lies near them; another direction \
                     of bending, torsion, the supports or the room are the usual causes";
-        return apply_numbers(modes, (&free, &numbers), text.to_string());
+        return apply_numbers(modes, &free, &numbers, text);
     }
     number_in_order(modes);
-    if free.is_empty() {
-        Vec::new()
-    } else {
-        vec![Warning::NumberedInOrder]
+    match free.is_empty() {
+        true => Vec::new(),
+        false => vec![Warning::numbered_in_order()],
     }
 }
 
-/// A mode with its height over the noise, or its prominence, as weight.
-fn weighted(mode: &ModeResult) -> WeightedPeak {
-    let weight = mode.reading.as_ref().map_or(1.0, |reading| {
-        reading
-            .above_noise_db
-            .or(reading.prominence_db)
-            .unwrap_or(0.0)
-    });
-    WeightedPeak {
-        frequency: mode.frequency,
-        weight,
-    }
-}
-
-/// Gives the peaks their numbers; those without one are labelled, and `text` says why.
-pub(super) fn apply_numbers(
+/// Gives the peaks with these indices their numbers; `text` says why some have none.
+fn apply_numbers(
     modes: &mut [ModeResult],
-    (which, numbers): (&[usize], &[Option<usize>]),
-    text: String,
+    which: &[usize],
+    numbers: &[Option<usize>],
+    text: &str,
 ) -> Vec<Warning> {
-    let mut unpaired = 0;
     for (&index, &number) in which.iter().zip(numbers) {
         modes[index].mode = number;
-        if number.is_none() {
-            modes[index].label = Some(UNPAIRED.to_string());
-            unpaired += 1;
-        }
     }
-    if unpaired > 0 {
-        vec![Warning::Unpaired {
-            count: unpaired,
-            text,
-        }]
-    } else {
-        Vec::new()
+    let count = numbers.iter().filter(|number| number.is_none()).count();
+    match count {
+        0 => Vec::new(),
+        _ => vec![Warning::unpaired(count, text)],
     }
 }
 
-pub(super) fn number_in_order(modes: &mut [ModeResult]) {
-    for (index, mode) in modes
-        .iter_mut()
-        .filter(|mode| mode.label.is_none())
-        .enumerate()
-    {
-        mode.mode = Some(index + 1);
+fn number_in_order(modes: &mut [ModeResult]) {
+    let unlabelled = modes.iter_mut().filter(|mode| mode.may_be_mode());
+    for (number, mode) in (1..).zip(unlabelled) {
+        mode.mode = Some(number);
     }
 }
 
-/// The numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
+/// Returns the numbers of the modes that a recording's readings belong to. Each mode takes the reading nearest
 /// to it, within their half lines together and [`OTHER_CONFIGURATION`], and no reading serves two
 /// modes. A reading that lies nearer to a peak without a number is that peak's, if none is nearer to the peak: a torsion
 /// mode stays one where the sensor sits on a node of the bending mode beside it, and a bending mode that moved towards
 /// it stays that one.
-pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
+fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
-        let distance = |index: &usize| (mode.frequency - readings[*index].frequency).abs();
-        let nearest = (0..readings.len())
-            .filter(|&index| readings[index].label.is_none() && numbers[index].is_none())
-            .filter(|&index| !is_of_another(modes, mode, (readings, index)))
-            .filter(|index| {
-                let half_lines = mode.half_line.unwrap_or(0.0) + readings[*index].half_line;
-                distance(index) <= half_lines + OTHER_CONFIGURATION * mode.frequency
-            })
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        if let Some(nearest) = nearest {
+        let mut nearest: Option<(usize, f64)> = None;
+        for (index, reading) in readings.iter().enumerate() {
+            let distance = (mode.frequency - reading.frequency).abs();
+            let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
+            if reading.label.is_none()
+                && numbers[index].is_none()
+                && distance <= half_lines + OTHER_CONFIGURATION * mode.frequency
+                && nearest.is_none_or(|(_, least)| distance < least)
+                && !is_of_another(reading, mode, modes, readings)
+            {
+                nearest = Some((index, distance));
+            }
+        }
+        if let Some((nearest, _)) = nearest {
             numbers[nearest] = mode.mode;
         }
     }
@@ -359,27 +292,23 @@ pub(super) fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec
 /// Peaks without a number that lie nearer than this to a mode may be a part of its line (1, relative).
 const OF_ITS_LINE: f64 = 0.01;
 
-/// Whether a reading lies nearer to a peak without a number, one apart from this mode, than to the mode, and is the one
-/// that shows the peak: the nearest to it of all readings.
+/// Returns true if a reading lies nearer to a peak without a number, one apart from this mode, than to the mode, and
+/// is the reading that shows the peak: the nearest to it of all readings.
 fn is_of_another(
-    modes: &[ModeResult],
+    reading: &ModeReading,
     mode: &ModeResult,
-    (readings, index): (&[ModeReading], usize),
+    modes: &[ModeResult],
+    readings: &[ModeReading],
 ) -> bool {
-    let frequency = readings[index].frequency;
-    let apart =
-        |peak: &&ModeResult| (peak.frequency - mode.frequency).abs() > OF_ITS_LINE * mode.frequency;
-    let unpaired =
-        |peak: &&ModeResult| peak.mode.is_none() && peak.label.as_deref() == Some(UNPAIRED);
-    let own = (frequency - mode.frequency).abs();
-    let shows = |peak: &ModeResult| {
-        let distance = (frequency - peak.frequency).abs();
+    let own = (reading.frequency - mode.frequency).abs();
+    modes.iter().filter(|peak| peak.is_unpaired()).any(|peak| {
+        let apart = (peak.frequency - mode.frequency).abs() > OF_ITS_LINE * mode.frequency;
+        let distance = (reading.frequency - peak.frequency).abs();
         let mut others = readings.iter().filter(|other| other.label.is_none());
-        let nearer = others.any(|other| (other.frequency - peak.frequency).abs() < distance);
-        distance < own && !nearer
-    };
-    let mut peaks = modes.iter().filter(unpaired).filter(apart);
-    peaks.any(shows)
+        apart
+            && distance < own
+            && !others.any(|other| (other.frequency - peak.frequency).abs() < distance)
+    })
 }
 
 /// A reading of another recording is of the same peak within its half lines and this: what merges
@@ -387,101 +316,84 @@ fn is_of_another(
 const SAME_PEAK: f64 = 0.005;
 
 /// Numbers the peaks of a jointed structure; in ascending order where nothing better can be had.
-pub(super) fn number_jointed(
+fn number_jointed(
     modes: &mut [ModeResult],
-    known: (&TestedStructure, &StructureDetails),
+    structure: &TestedStructure,
+    details: &StructureDetails,
     recordings: &[&RecordingResult],
 ) -> Vec<Warning> {
-    let free: Vec<usize> = (0..modes.len())
-        .filter(|&index| modes[index].label.is_none())
-        .collect();
-    let peaks: Vec<MeasuredPeak> = free
-        .iter()
-        .map(|&index| peak(index, modes, recordings))
-        .collect();
-    if fits_the_beam(known.1) {
+    let free = unlabelled(modes);
+    let fit = details.fit.as_deref().unwrap_or_default();
+    if fit.contains(&FitParameter::Modulus) || fit.contains(&FitParameter::Density) {
         // Beside an unknown beam the joint's bounds say nothing of a mode's number.
         number_in_order(modes);
         return Vec::new();
     }
-    let jointed = jointed(known.0, known.1);
-    let found = pair_modes(&jointed, &peaks, &settings(known, recordings));
+    let mut peaks = Vec::with_capacity(free.len());
+    for &index in &free {
+        peaks.push(measured_peak(index, modes, recordings));
+    }
+    // The joint is estimated and held as the estimate has it.
+    let units = StiffnessUnits::of(&structure.beam);
+    let known = &structure.known;
+    let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
+    let mut fit = fitted(structure, details);
+    fit.retain(|parameter| joint.contains(parameter));
+    let settings = PairingSettings {
+        fit,
+        held: [
+            known.kx.map(|kx| kx.max(NO_SPRING) * units.kt),
+            known.ky.map(|ky| ky.max(NO_SPRING) * units.kr),
+            known.cross_compliance.map(|c| units.ktr / c),
+        ],
+        bands: recordings
+            .iter()
+            .filter_map(|one| one.looked_at())
+            .collect(),
+        ..PairingSettings::default()
+    };
+    let found = pair_modes(&jointed(structure, details), &peaks, &settings);
     let Some(pairing) = found.ok().filter(|_| !peaks.is_empty()) else {
         number_in_order(modes);
         return Vec::new();
     };
-    let numbers = &pairing.chosen.numbers;
     let text = "with them no joint explains the peaks as well; torsion, another direction of \
-                bending, the fixture or the suspension are the usual causes"
-        .to_string();
-    let mut warnings = apply_numbers(modes, (&free, numbers), text);
+                bending, the fixture or the suspension are the usual causes";
+    let mut warnings = apply_numbers(modes, &free, &pairing.chosen.numbers, text);
     warnings.extend(missing(&pairing.chosen.missing));
     warnings.extend(ambiguous(&pairing, &peaks));
     warnings
 }
 
-fn fits_the_beam(details: &StructureDetails) -> bool {
-    let beam = [FitParameter::Modulus, FitParameter::Density];
-    let fit = details.fit.as_deref().unwrap_or(&[]);
-    fit.iter().any(|parameter| beam.contains(parameter))
-}
-
-/// What is estimated and what is held, as the estimate has it.
-fn settings(
-    (structure, details): (&TestedStructure, &StructureDetails),
+/// A peak with its shape and its strength in each recording.
+fn measured_peak(
+    index: usize,
+    modes: &[ModeResult],
     recordings: &[&RecordingResult],
-) -> PairingSettings {
-    let units = StiffnessUnits::of(&structure.beam);
-    let held = |known: Option<f64>, unit: f64| known.map(|value| value.max(NO_SPRING) * unit);
-    let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
-    let mut fit = fitted(structure, details);
-    fit.retain(|parameter| joint.contains(parameter));
-    let band = |recording: &&RecordingResult| looked_at(recording);
-    PairingSettings {
-        fit,
-        held: [
-            held(structure.known.kx, units.kt),
-            held(structure.known.ky, units.kr),
-            structure.known.cross_compliance.map(|c| units.ktr / c),
-        ],
-        bands: recordings.iter().filter_map(band).collect(),
-        ..PairingSettings::default()
-    }
-}
-
-fn peak(index: usize, modes: &[ModeResult], recordings: &[&RecordingResult]) -> MeasuredPeak {
+) -> MeasuredPeak {
     let mode = &modes[index];
+    let (mut shape, mut strengths) = (Vec::new(), Vec::new());
+    for (group, recording) in (1..).zip(recordings) {
+        let Some(reading) = reading_of(mode, recording) else {
+            strengths.push(None);
+            continue;
+        };
+        shape.extend(shape_in(recording, reading, group));
+        // Where the reading is nearer to another peak, it is the other peak's.
+        let own = (mode.frequency - reading.frequency).abs();
+        let mut others = modes.iter();
+        let of_another = others.any(|other| (other.frequency - reading.frequency).abs() < own);
+        strengths.push((!of_another).then(|| PeakStrength {
+            energy: energy(reading),
+            level_db: reading.prominence_db.and(reading.above_noise_db),
+        }));
+    }
     MeasuredPeak {
         frequency: mode.frequency,
         std: mode.std,
-        shape: recordings
-            .iter()
-            .enumerate()
-            .flat_map(|(index, recording)| shape(mode, recording, index))
-            .collect(),
-        strengths: recordings
-            .iter()
-            .map(|recording| strength(index, modes, recording))
-            .collect(),
+        shape,
+        strengths,
     }
-}
-
-/// How strongly one recording saw a peak; `None` where its reading nearest to the peak is another peak's.
-fn strength(
-    index: usize,
-    modes: &[ModeResult],
-    recording: &RecordingResult,
-) -> Option<PeakStrength> {
-    let reading = reading_of(&modes[index], recording)?;
-    let distance = |mode: &ModeResult| (mode.frequency - reading.frequency).abs();
-    let own = distance(&modes[index]);
-    if modes.iter().any(|other| distance(other) < own) {
-        return None;
-    }
-    Some(PeakStrength {
-        energy: energy(reading),
-        level_db: reading.prominence_db.and(reading.above_noise_db),
-    })
 }
 
 /// Energy of a fitted oscillation in all taps and sensors of its recording: the integral of
@@ -493,73 +405,72 @@ fn energy(reading: &ModeReading) -> Option<f64> {
     (decay > 0.0 && squares > 0.0).then(|| squares / (4.0 * decay))
 }
 
-/// The peak's shape in one recording. Modal constants of all recordings share the hammer's unit; a
-/// shape without them has one of its own.
-fn shape(mode: &ModeResult, recording: &RecordingResult, index: usize) -> Vec<ShapeAt> {
-    let Some(reading) = reading_of(mode, recording) else {
-        return Vec::new();
-    };
+/// Shape of a reading's peak in its recording. Modal constants of all recordings share the hammer's unit; a
+/// shape without them has one of its own, that of its `group`.
+fn shape_in(recording: &RecordingResult, reading: &ModeReading, group: usize) -> Vec<ShapeAt> {
     let (shape, constant) = shape_of(reading, recording);
     let tap = recording.conditions.tap.filter(|_| constant.is_some());
     let unit = constant.filter(|_| tap.is_some()).map_or(1.0, |c| c.value);
-    let at = |value: &tapjoint_identify::observation::ShapeValue| {
-        let name = &recording.responses.get(value.sensor)?.name;
-        Some(ShapeAt {
-            sensor: *recording.conditions.sensor_positions.get(name)?,
+    // The reference's own noise is in the constant.
+    let least_std = constant.map_or(0.0, |c| c.std / c.value.abs());
+    let mut values = Vec::with_capacity(shape.len());
+    for value in shape {
+        let response = recording.responses.get(value.sensor);
+        let positions = &recording.conditions.sensor_positions;
+        let Some(&sensor) = response.and_then(|response| positions.get(&response.name)) else {
+            continue;
+        };
+        values.push(ShapeAt {
+            sensor,
             tap,
             value: value.value * unit,
-            // The reference's own noise is in the constant.
-            std: value
-                .std
-                .max(constant.map_or(0.0, |c| c.std / c.value.abs()))
-                * unit.abs(),
-            group: if tap.is_some() { 0 } else { index + 1 },
-        })
-    };
-    shape.iter().filter_map(at).collect()
-}
-
-/// The recording's own reading of a peak.
-fn reading_of<'a>(mode: &ModeResult, recording: &'a RecordingResult) -> Option<&'a ModeReading> {
-    let readings = &recording.measurement.spectra.as_ref()?.readings;
-    let distance = |reading: &&ModeReading| (reading.frequency - mode.frequency).abs();
-    let near = |reading: &&ModeReading| {
-        let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
-        reading.label.is_none() && distance(reading) <= half_lines + SAME_PEAK * mode.frequency
-    };
-    readings
-        .iter()
-        .filter(near)
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-}
-
-fn missing(modes: &[MissingMode]) -> Option<Warning> {
-    if modes.is_empty() {
-        return None;
+            std: value.std.max(least_std) * unit.abs(),
+            group: if tap.is_some() { 0 } else { group },
+        });
     }
-    let one = |missing: &MissingMode| {
+    values
+}
+
+/// Returns the recording's own reading of a peak.
+fn reading_of<'a>(mode: &ModeResult, recording: &'a RecordingResult) -> Option<&'a ModeReading> {
+    let mut nearest: Option<(&ModeReading, f64)> = None;
+    for reading in recording.readings() {
+        let distance = (reading.frequency - mode.frequency).abs();
+        let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
+        if reading.label.is_none()
+            && distance <= half_lines + SAME_PEAK * mode.frequency
+            && nearest.is_none_or(|(_, least)| distance < least)
+        {
+            nearest = Some((reading, distance));
+        }
+    }
+    nearest.map(|(reading, _)| reading)
+}
+
+/// The warning about modes that no peak was taken for.
+fn missing(modes: &[MissingMode]) -> Option<Warning> {
+    let mut list = Vec::with_capacity(modes.len());
+    for missing in modes {
         let why = match missing.cause {
             MissingCause::OutsideBand => "outside the measured band",
             MissingCause::AtNode => "near a node of its shape at every sensor or tap",
             MissingCause::Unknown => "within the band",
         };
-        format!(
-            "mode {} (about {:.1} Hz, {why})",
-            missing.mode, missing.frequency
-        )
-    };
-    let list: Vec<String> = modes.iter().map(one).collect();
-    Some(Warning::Estimate {
-        code: "missing-mode",
-        text: format!(
-            "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
-             and measure elsewhere, or from a lower frequency on, to see it",
-            list.join(", ")
-        ),
-    })
+        let frequency = missing.frequency;
+        list.push(format!(
+            "mode {} (about {frequency:.1} Hz, {why})",
+            missing.mode
+        ));
+    }
+    let text = format!(
+        "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
+         and measure elsewhere, or from a lower frequency on, to see it",
+        list.join(", ")
+    );
+    (!list.is_empty()).then(|| Warning::new("missing-mode", text))
 }
 
-/// Other numberings that explain the peaks comparably.
+/// The warning about another numbering that explains the peaks comparably.
 fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     let other = pairing.others.first()?;
     let chosen = &pairing.chosen;
@@ -568,47 +479,42 @@ fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     } else {
         "taken as the most probable"
     };
-    Some(Warning::Estimate {
-        code: "ambiguous-pairing",
-        text: format!(
-            "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
-             ({}); another sensor or tap position, or more modes, would decide",
-            words(chosen, peaks),
-            words(other, peaks),
-            compared(chosen.odds / other.odds),
-        ),
-    })
-}
-
-/// How probable the other is beside the chosen, from the ratio of the two.
-fn compared(times: f64) -> String {
-    if (0.95..1.05).contains(&times) {
+    let times = chosen.odds / other.odds;
+    let odds = if (0.95..1.05).contains(&times) {
         "as probable".to_owned()
     } else if times >= 1.0 {
         format!("{times:.1} times as probable")
     } else {
         format!("{:.1} times less probable", 1.0 / times)
-    }
+    };
+    let text = format!(
+        "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
+         ({odds}); another sensor or tap position, or more modes, would decide",
+        words(chosen, peaks),
+        words(other, peaks),
+    );
+    Some(Warning::new("ambiguous-pairing", text))
 }
 
-/// "1: 17.00 Hz, 3: 335.6 Hz, none: 50.00 Hz".
+/// "(1: 17.00 Hz, 3: 335.60 Hz, none: 50.00 Hz)".
 fn words(numbering: &Numbering, peaks: &[MeasuredPeak]) -> String {
-    let one = |(number, peak): (&Option<usize>, &MeasuredPeak)| {
+    let mut list = Vec::with_capacity(peaks.len());
+    for (number, peak) in numbering.numbers.iter().zip(peaks) {
         let number = number.map_or("none".to_string(), |number| number.to_string());
-        format!("{number}: {:.2} Hz", peak.frequency)
-    };
-    let list: Vec<String> = numbering.numbers.iter().zip(peaks).map(one).collect();
+        list.push(format!("{number}: {:.2} Hz", peak.frequency));
+    }
     format!("({})", list.join(", "))
 }
 
 /// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
 /// which these masses take the reference configuration's modes. Where that is not known they lose the numbers
 /// that their neighbours of the reference gave them: a heavy mass takes a mode to another's place.
-pub(super) fn number_loaded(
+fn pair_mass_loaded(
     recordings: &mut [RecordingResult],
     modes: &[ModeResult],
     test: &TestDescription,
-    known: (&TestedStructure, &StructureDetails),
+    structure: &TestedStructure,
+    details: &StructureDetails,
 ) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let first = test.recordings.first().map(|recording| &recording.masses);
@@ -616,53 +522,32 @@ pub(super) fn number_loaded(
         if Some(&described.masses) == first {
             continue;
         }
-        match moved(modes, (test, described), known) {
-            Some(moved) => recording.mode_numbers = own_numbers(&moved, &own_readings(recording)),
-            None => {
-                recording.mode_numbers.fill(None);
-                warnings.push(unnumbered(&recording.file));
+        let loaded = StructureDetails {
+            masses: masses_in(test, Some(described)),
+            ..details.clone()
+        };
+        if let Some([before, after]) = frequencies(modes, structure, [details, &loaded]) {
+            let mut moved = modes.to_vec();
+            for mode in &mut moved {
+                let place = mode.mode.and_then(|number| number.checked_sub(1));
+                if let Some(place) = place.filter(|place| *place < before.len()) {
+                    mode.frequency *= after[place] / before[place];
+                }
             }
+            recording.mode_numbers = own_numbers(&moved, recording.readings());
+        } else {
+            recording.mode_numbers.fill(None);
+            let text = "its peaks have no mode numbers: the first recording gives no estimate of the joint, so that \
+                        it is not known where the masses fastened here take the modes; read more modes in the first \
+                        recording, or state kt and kr in [joint]";
+            warnings.push(Warning::about(&recording.file, "unnumbered", text));
         }
     }
     warnings
 }
 
-fn unnumbered(file: &str) -> Warning {
-    Warning::Recording {
-        code: "unnumbered",
-        file: file.to_owned(),
-        text: "its peaks have no mode numbers: the first recording gives no estimate of the joint, so that it is \
-               not known where the masses fastened here take the modes; read more modes in the first recording, \
-               or state kt and kr in [joint]"
-            .to_owned(),
-    }
-}
-
-/// The modes at the frequencies of another recording: the ratio that the masses on the beam make. `None` where
-/// nothing tells of the joint.
-fn moved(
-    modes: &[ModeResult],
-    (test, recording): (&TestDescription, &RecordingDescription),
-    (structure, details): (&TestedStructure, &StructureDetails),
-) -> Option<Vec<ModeResult>> {
-    let other = StructureDetails {
-        masses: masses_in(test, Some(recording)),
-        ..details.clone()
-    };
-    let [before, after] = frequencies(modes, structure, [details, &other])?;
-    let moved = |one: &ModeResult| {
-        let place = one.mode.and_then(|mode| mode.checked_sub(1));
-        let both = place.and_then(|place| before.get(place).zip(after.get(place)));
-        ModeResult {
-            frequency: both.map_or(1.0, |(before, after)| after / before) * one.frequency,
-            ..one.clone()
-        }
-    };
-    Some(modes.iter().map(moved).collect())
-}
-
 /// Frequencies (Hz) of the structure without and with the other masses, on the joint that the reference's
-/// frequencies have, else on the described one.
+/// frequencies have, else on the described one; `None` where the joint is not known.
 fn frequencies(
     modes: &[ModeResult],
     structure: &TestedStructure,
@@ -671,20 +556,23 @@ fn frequencies(
     // Only the weights depend on the floor, and of these the numbering does not.
     let measured = measured_modes(modes, FREQUENCY_FLOOR);
     let count = measured.last()?.mode;
-    let found = estimator(structure, both[0], &measured).map(|estimator| estimator.fit());
-    let of = |details: &StructureDetails| {
-        let there = jointed(structure, details);
-        let Ok(found) = &found else {
-            // Of a joint that is known nothing is left to estimate.
+    let there = both.map(|details| jointed(structure, details));
+    let [before, after] = match estimator(structure, both[0], &measured) {
+        Ok(estimator) => {
+            let found = estimator.fit();
+            there.map(|there| {
+                let model = FrequencyModel::new(&there, count)?;
+                let modes = (1..=count).map(|mode| model.response(&found.point, mode, mode as f64));
+                Ok(modes.map(|mode| mode.frequency).collect())
+            })
+        }
+        // Of a joint that is known nothing is left to estimate.
+        Err(_) => {
             let joint = structure.known.over(None)?;
-            return frequencies_of(&there, &joint, count).ok();
-        };
-        let model = FrequencyModel::new(&there, count).ok()?;
-        let frequency = |mode| model.response(&found.point, mode, mode as f64).frequency;
-        Some((1..=count).map(frequency).collect())
+            there.map(|there| frequencies_of(&there, &joint, count))
+        }
     };
-    let [before, after] = both.map(of);
-    Some([before?, after?])
+    Some([before.ok()?, after.ok()?])
 }
 
 #[cfg(test)]
@@ -698,8 +586,7 @@ mod tests {
     fn mode(number: Option<usize>, frequency: f64) -> ModeResult {
         ModeResult {
             mode: number,
-            label: number.is_none().then(|| UNPAIRED.to_owned()),
-            ..from_reading(reading(frequency), None)
+            ..ModeResult::of(reading(frequency), "a.wav")
         }
     }
 

@@ -11,7 +11,7 @@ use tapjoint_signal::spectral::{
 use tapjoint_signal::taps::Tap;
 
 /// Samples of a quiet stretch, means taken out, and the block they are compared with.
-pub(super) struct Quiet {
+pub(super) struct PreTriggerNoise {
     /// Force, where there is a hammer.
     pub force: Option<Vec<f64>>,
     /// Responses.
@@ -24,7 +24,7 @@ pub(super) struct Quiet {
     pub force_window: f64,
 }
 
-impl Quiet {
+impl PreTriggerNoise {
     /// Power that noise alone would leave in the averages, per response: of H1 where there is a
     /// hammer, else of the response's transform. `None` where the stretch is too short to tell.
     ///
@@ -61,12 +61,14 @@ impl Quiet {
             .collect()
     }
 
-    /// What the noise of the force channel leaves in the transforms of its windowed pulses (N s), on
+    /// Noise of the force channel in the transforms of its windowed pulses (N s), on
     /// each line; `None` without a hammer, or where the stretch is too short to tell.
     pub fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
-        let power = noise_power(self.force.clone()?, self.sample_rate, lines)?;
-        let amplitude = |power: f64| (power * self.force_window).sqrt();
-        Some(power.into_iter().map(amplitude).collect())
+        let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
+        for value in &mut noise {
+            *value = (*value * self.force_window).sqrt();
+        }
+        Some(noise)
     }
 
     /// The label of a peak on line `index` that is hum, judged on the response in which it is
@@ -81,10 +83,9 @@ impl Quiet {
         let lines = &averages.lines;
         let frequency = lines.frequency(index);
         near_mains(frequency, lines.half_line(), settings)?;
-        let strength =
-            |s: &usize| averages.responses[*s][index] / averages.responses[*s].iter().sum::<f64>();
-        let strongest =
-            (0..averages.responses.len()).max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
+        let shares = averages.responses.iter();
+        let shares = shares.map(|x| x[index] / x.iter().sum::<f64>()).enumerate();
+        let (strongest, _) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let (sum, _) = self.window_sums(window);
         let within = 2.0 * averages.responses[strongest][index] * self.sample_rate / sum;
         let samples = self.responses.get(strongest)?;
@@ -104,7 +105,7 @@ impl Quiet {
     }
 }
 
-/// Where the pulse of a tap lies in its record (samples): zero before `start`, unity for `length`
+/// Window about the pulse of a tap in its record (samples): zero before `start`, unity for `length`
 /// from there, a taper of the pulse's own length after it.
 #[derive(Clone, Copy)]
 pub(super) struct PulseWindow {

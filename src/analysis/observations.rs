@@ -1,18 +1,13 @@
-//! What a finished analysis observed, and the diagnosis of it. There is one configuration for each recording and tap
-//! level.
-//! level.
+//! The observations of a finished analysis, and the diagnosis of them. There is one configuration for each recording and
+//! tap level.
 //!
 //! ```text
-//! readings, numbered -> taps of one level -> frequency, damping   (repeats)
-//!                                         -> covariance of frequencies  (covariance)
-//!                                         -> shape, amplitude, change along the decay  (mode)
+//! readings, numbered -> taps of one level -> frequency, damping, shape, amplitude, change along the decay
+//!                                         -> covariance of the frequencies
 //! ```
-//!
-//! diagnosis.
 
-use super::analysis::{Analysis, ModeResult, RecordingResult};
-use super::modes::looked_at;
-use super::observed_mode::{ModeSeen, shape_of};
+use super::analysis::{Analysis, RecordingResult};
+use super::observed_mode::{ModeSeen, SeenTaps, independent, judge_scatter, of_taps, shape_of};
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::SpecimenJoint;
@@ -35,16 +30,24 @@ const LEVEL_GAP: f64 = 2.0;
 /// 5e-5) are the same in all recordings, and no part of it.
 const COMMON: f64 = 1.5e-5;
 
-/// What the test observed; empty for a bare recording, whose peaks have no numbers of a model.
+/// Returns the observations of a test; none for a bare recording, whose peaks have no numbers of a model.
 pub fn observations(analysis: &Analysis) -> Observations {
-    let mut configurations: Vec<Configuration> = if analysis.structure.is_none() {
-        Vec::new()
-    } else if analysis.recordings.is_empty() {
-        vec![of_measured(&analysis.modes)]
-    } else {
-        let recordings = analysis.recordings.iter().enumerate();
-        recordings.flat_map(|(i, r)| of_recording(i, r)).collect()
-    };
+    let mut configurations = Vec::new();
+    if analysis.structure.is_some() && analysis.recordings.is_empty() {
+        let modes = analysis.modes.iter();
+        let modes = modes.filter_map(|mode| {
+            Some(ObservedMode::read_elsewhere(
+                mode.mode?,
+                mode.frequency,
+                mode.std,
+            ))
+        });
+        configurations.push(read_elsewhere(modes.collect()));
+    } else if analysis.structure.is_some() {
+        for (index, recording) in analysis.recordings.iter().enumerate() {
+            configurations.extend(of_recording(index, recording));
+        }
+    }
     let forces = configurations.iter().filter_map(|c| c.peak_force);
     let hardest = forces.fold(0.0, f64::max);
     for configuration in &mut configurations {
@@ -56,16 +59,8 @@ pub fn observations(analysis: &Analysis) -> Observations {
     Observations { configurations }
 }
 
-/// Frequencies read elsewhere: independent of each other, with the uncertainty that was stated.
-fn of_measured(modes: &[ModeResult]) -> Configuration {
-    let mode = |mode: &ModeResult| {
-        Some(ObservedMode::read_elsewhere(
-            mode.mode?,
-            mode.frequency,
-            mode.std,
-        ))
-    };
-    let mut modes: Vec<ObservedMode> = modes.iter().filter_map(mode).collect();
+/// The configuration of frequencies read elsewhere: independent of each other, with the uncertainty that was stated.
+pub fn read_elsewhere(mut modes: Vec<ObservedMode>) -> Configuration {
     modes.sort_by_key(|mode| mode.mode);
     Configuration {
         file: None,
@@ -78,7 +73,7 @@ fn of_measured(modes: &[ModeResult]) -> Configuration {
         taps: 0,
         decay_seconds: None,
         band: None,
-        covariance: super::observed_mode::independent(&modes),
+        covariance: independent(&modes),
         modes,
         // What was stated is meant to be all.
         common: 0.0,
@@ -103,38 +98,42 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
         .filter_map(|(reading, number)| Some(((*number)?, reading)))
         .collect();
     numbered.sort_by_key(|(number, _)| *number);
-    let only = levels.len() == 1;
-    let configuration = |(place, taps): (usize, &Vec<usize>)| {
+    let of_file = recording.format == Format::FrequencyResponses;
+    let mut configurations = Vec::with_capacity(levels.len());
+    for (place, taps) in levels.iter().enumerate() {
+        let seen_taps = SeenTaps {
+            recording,
+            taps,
+            all: levels.len() == 1,
+        };
         let mut seen: Vec<ModeSeen> = numbered
             .iter()
-            .map(|&(number, reading)| ModeSeen::new(number, reading, (recording, taps, only)))
+            .map(|&(number, reading)| ModeSeen::new(number, reading, seen_taps))
             .collect();
         // What was not fitted tap by tap says the same at every level.
         seen.retain(|seen| place == 0 || seen.is_of_taps());
-        super::observed_mode::judge_scatter(&mut seen);
-        Configuration {
+        judge_scatter(&mut seen);
+        let forces = taps.iter().filter_map(|&tap| peaks.get(tap).copied());
+        let mut forces: Vec<f64> = forces.filter(|_| recording.has_hammer).collect();
+        configurations.push(Configuration {
             file: Some(recording.file.clone()),
             recording: Some(index),
             sensors: sensors(recording),
             masses: recording.conditions.masses.clone(),
             tap: recording.conditions.tap,
-            peak_force: peak_force(recording, &peaks, taps),
+            peak_force: (!forces.is_empty()).then(|| median(&mut forces)),
             level: None,
-            taps: match recording.format {
-                Format::FrequencyResponses => 0,
-                _ => taps.len(),
-            },
-            decay_seconds: Some(spectra.averages.lines.duration)
-                .filter(|_| recording.format != Format::FrequencyResponses),
-            band: looked_at(recording),
-            covariance: super::observed_mode::of_taps(&seen),
+            taps: if of_file { 0 } else { taps.len() },
+            decay_seconds: (!of_file).then_some(spectra.averages.lines.duration),
+            band: recording.looked_at(),
+            covariance: of_taps(&seen),
             // Changes along the decays belong to all taps; they stand with the hardest.
             modes: seen.iter().map(|seen| seen.observed(place == 0)).collect(),
             common: COMMON,
-            extra_peaks: extra_peaks(recording, &spectra.readings),
-        }
-    };
-    levels.iter().enumerate().map(configuration).collect()
+            extra_peaks: extra_peaks(recording),
+        });
+    }
+    configurations
 }
 
 /// Places of the taps of each level, the hardest level first; without a hammer all are one.
@@ -146,73 +145,62 @@ fn levels(peaks: &[f64], has_hammer: bool) -> Vec<Vec<usize>> {
     order.sort_by(|&a, &b| peaks[b].total_cmp(&peaks[a]));
     let mut levels: Vec<Vec<usize>> = Vec::new();
     for tap in order {
-        match levels.last_mut() {
-            Some(level)
-                if level
-                    .last()
-                    .is_some_and(|&last| peaks[last] < LEVEL_GAP * peaks[tap]) =>
-            {
-                level.push(tap);
-            }
-            _ => levels.push(vec![tap]),
+        let level = levels.last_mut().filter(|level| {
+            let last = level.last();
+            last.is_some_and(|&last| peaks[last] < LEVEL_GAP * peaks[tap])
+        });
+        match level {
+            Some(level) => level.push(tap),
+            None => levels.push(vec![tap]),
         }
     }
     levels
 }
 
-fn peak_force(recording: &RecordingResult, peaks: &[f64], taps: &[usize]) -> Option<f64> {
-    let mut forces: Vec<f64> = taps
-        .iter()
-        .filter_map(|&tap| peaks.get(tap).copied())
-        .collect();
-    (recording.has_hammer && !forces.is_empty()).then(|| median(&mut forces))
-}
-
 fn sensors(recording: &RecordingResult) -> Vec<ObservedSensor> {
     let positions = &recording.conditions.sensor_positions;
-    let sensor = |response: &super::analysis::Response| ObservedSensor {
-        name: response.name.clone(),
-        position: positions
-            .get(&response.name)
-            .copied()
-            .filter(|_| response.kind != Some(SensorKind::Sound)),
-    };
-    recording.responses.iter().map(sensor).collect()
+    let mut sensors = Vec::with_capacity(recording.responses.len());
+    for response in &recording.responses {
+        let position = positions.get(&response.name).copied();
+        sensors.push(ObservedSensor {
+            name: response.name.clone(),
+            position: position.filter(|_| response.kind != Some(SensorKind::Sound)),
+        });
+    }
+    sensors
 }
 
 /// Resonances without a number, and mains lines. What is no resonance at all is left out.
-fn extra_peaks(recording: &RecordingResult, readings: &[ModeReading]) -> Vec<ExtraPeak> {
-    let peak = |(reading, number): (&ModeReading, &Option<usize>)| {
-        let label = match (number, reading.label) {
-            (Some(_), _) | (_, Some(PeakLabel::NoResonance | PeakLabel::ForceGap)) => return None,
-            (None, Some(label)) => label.to_string(),
-            (None, None) => UNPAIRED.to_owned(),
+fn extra_peaks(recording: &RecordingResult) -> Vec<ExtraPeak> {
+    let mut peaks = Vec::new();
+    let numbered = recording.readings().iter().zip(&recording.mode_numbers);
+    for (reading, _) in numbered.filter(|(_, number)| number.is_none()) {
+        let label = match reading.label {
+            Some(PeakLabel::NoResonance | PeakLabel::ForceGap) => continue,
+            Some(label) => label.to_string(),
+            None => UNPAIRED.to_owned(),
         };
-        Some(ExtraPeak {
+        peaks.push(ExtraPeak {
             frequency: reading.frequency,
             std: reading.std,
             level_db: reading.above_noise_db.or(reading.prominence_db),
             constant: shape_of(reading, recording).1.map(|one| one.value),
             label,
-        })
-    };
-    readings
-        .iter()
-        .zip(&recording.mode_numbers)
-        .filter_map(peak)
-        .collect()
+        });
+    }
+    peaks
 }
 
-/// What each of length, thickness, modulus and density adds to the uncertainty of all frequencies where
+/// Share of each of length, thickness, modulus and density in the uncertainty of all frequencies, where
 /// its own is not stated (1): all four together 0.2 %, as [`GapSettings::scale_std`].
 const USUAL_SHARE: f64 = 0.001;
 
-/// Where the search for the joint begins if the frequencies gave no estimate: Kx and Ky (1) of the
+/// Start of the search for the joint if the frequencies gave no estimate: Kx and Ky (1) of the
 /// bolted cantilever of Ingole & Chatterjee.
 const USUAL_JOINT: [f64; 2] = [1400.0, 4.8];
 /// Stiffnesses beyond this (1) hold a beam like a wall; a search that begins further out does not move.
 const STIFFEST_START: f64 = 1e5;
-/// Where a usual stiffness would make the coupling with the described Ktr stronger than a joint can have, the
+/// Start of the coupling (1) where a usual stiffness would make it, with the described Ktr, stronger than a joint can have: the
 /// search begins here (1): the end of what the diagnosis searches.
 const STRONGEST_START: f64 = 0.95;
 
@@ -267,21 +255,25 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
     }
 }
 
-/// Where the search for the joint begins: known stiffnesses, else those found, else usual ones; and the
+/// Start of the search for the joint: known stiffnesses, else those found, else usual ones; and the
 /// coupling, where the joint's model has one.
 fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
     if test.joint.kind == Assembly::Free {
         return SpecimenJoint::Free;
     }
     let units = StiffnessUnits::of(&described_beam(test));
-    let start = |known: Option<f64>, found: Option<f64>, (usual, unit): (f64, f64)| {
-        let begin = found.filter(|k| *k > 0.0).unwrap_or(usual);
-        known.unwrap_or(unit * begin.min(STIFFEST_START))
-    };
     let [kx, ky] = USUAL_JOINT;
+    let kx = found
+        .map(|joint| joint.kx)
+        .filter(|kx| *kx > 0.0)
+        .unwrap_or(kx);
+    let ky = found
+        .map(|joint| joint.ky)
+        .filter(|ky| *ky > 0.0)
+        .unwrap_or(ky);
     let model = test.joint.model;
-    let kt = start(test.joint.kt, found.map(|joint| joint.kx), (kx, units.kt));
-    let kr = start(test.joint.kr, found.map(|joint| joint.ky), (ky, units.kr));
+    let kt = test.joint.kt.unwrap_or(units.kt * kx.min(STIFFEST_START));
+    let kr = test.joint.kr.unwrap_or(units.kr * ky.min(STIFFEST_START));
     let coupling = match (model, found, test.joint.ktr) {
         (JointModel::ThreeParameter, Some(joint), _) => joint.coupling(),
         (JointModel::ThreeParameter, None, Some(ktr)) => {
@@ -306,16 +298,16 @@ fn scale_std(test: &TestDescription) -> Option<f64> {
         (tolerance.modulus, beam.modulus, 0.5),
         (tolerance.density, beam.density, 0.5),
     ];
-    let square = |(std, value, power): &(Option<f64>, f64, f64)| {
-        std.map_or(USUAL_SHARE, |std| power * std / value).powi(2)
-    };
     let stated = shares.iter().any(|(std, ..)| std.is_some());
-    stated.then(|| shares.iter().map(square).sum::<f64>().sqrt())
+    let squares = shares.iter().map(|(std, value, power)| {
+        let share = std.map_or(USUAL_SHARE, |std| power * std / value);
+        share.powi(2)
+    });
+    stated.then(|| squares.sum::<f64>().sqrt())
 }
 
 /// Frequencies read elsewhere may be off by half a line, all in one direction.
 fn reading_bias(test: &TestDescription) -> Option<f64> {
-    let largest = |values: &Vec<f64>| values.iter().copied().fold(0.0, f64::max);
-    let measured = test.measured.as_ref()?;
-    measured.half_line.as_ref().map(largest)
+    let half_lines = test.measured.as_ref()?.half_line.as_ref()?;
+    Some(half_lines.iter().copied().fold(0.0, f64::max))
 }

@@ -1,20 +1,20 @@
 //! One mode as the taps of one level saw it: frequency, damping, covariance, shape, amplitude.
 
 use super::RecordingResult;
-use super::analysis::Response;
-use super::frf::form_of;
+use super::frf::{form_of, form_of_kind};
 use super::measure::MeasuredSpectra;
 use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use tapjoint_description::SensorKind;
 use tapjoint_identify::observation::{
     AlongDecay, DecayEnd, DecayVerdict, Observed, ObservedMode, ShapeValue,
 };
 use tapjoint_numerics::stats::{median, root_mean_square};
-use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict, Trend};
+use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict};
 use tapjoint_signal::modal::fit::{
-    ColumnAmplitude, FittedValue, UncertaintySource, scatter_about_mean, weighted_mean,
+    FittedValue, UncertaintySource, scatter_about_mean, weighted_mean,
 };
 use tapjoint_signal::modal::{FittedReading, ModeReading, ReadBy};
 use tapjoint_signal::recording::ResponseForm;
@@ -27,42 +27,39 @@ const BOUND: f64 = 1.96;
 /// noise and neighbours bend the curve.
 const LATE_SHARE: f64 = 0.1;
 
-/// A mode, and the taps that count.
+/// Taps of one level in a recording.
+#[derive(Clone, Copy)]
+pub(super) struct SeenTaps<'a> {
+    pub recording: &'a RecordingResult,
+    pub taps: &'a [usize],
+    /// True if these are all taps of the recording.
+    pub all: bool,
+}
+
+/// A mode as the taps of one level show it.
 pub(super) struct ModeSeen<'a> {
     number: usize,
     reading: &'a ModeReading,
     recording: &'a RecordingResult,
-    /// The taps of this level.
     taps: &'a [usize],
     pub(super) frequency: Repeats,
     damping: Option<Repeats>,
 }
 
 impl<'a> ModeSeen<'a> {
-    /// From a reading; `only`: whether these are all taps of the recording.
-    pub fn new(
-        number: usize,
-        reading: &'a ModeReading,
-        (recording, taps, only): (&'a RecordingResult, &'a [usize], bool),
-    ) -> Self {
+    pub fn new(number: usize, reading: &'a ModeReading, seen: SeenTaps<'a>) -> Self {
         let fit = reading.fit.as_deref().map(|fit| &fit.mode);
         let fit = fit.filter(|_| reading.source == ReadBy::Fit);
-        let of_taps = |of: fn(&tapjoint_signal::modal::fit::TapFit) -> (f64, f64)| {
-            let fits = fit.map_or(&[][..], |fit| fit.taps.as_slice());
-            let counted = fits.iter().filter(|tap| taps.contains(&tap.tap));
-            counted.map(|tap| (tap.tap, of(tap).0, of(tap).1)).collect()
-        };
+        let (mut frequencies, mut dampings) = (Vec::new(), Vec::new());
+        let fits = fit.map_or(&[][..], |fit| fit.taps.as_slice());
+        for tap in fits.iter().filter(|tap| seen.taps.contains(&tap.tap)) {
+            frequencies.push((tap.tap, tap.frequency, tap.frequency_std));
+            dampings.push((tap.tap, tap.damping_ratio, tap.damping_std));
+        }
         let inflation = fit.map_or(1.0, |fit| fit.inflation);
-        let frequency = Repeats::new(
-            of_taps(|tap| (tap.frequency, tap.frequency_std)),
-            fit.map(|fit| &fit.frequency).filter(|_| only),
-            inflation,
-        );
-        let damping = Repeats::new(
-            of_taps(|tap| (tap.damping_ratio, tap.damping_std)),
-            fit.map(|fit| &fit.damping_ratio).filter(|_| only),
-            inflation,
-        );
+        let whole = fit.filter(|_| seen.all);
+        let frequency = Repeats::new(frequencies, whole.map(|fit| &fit.frequency), inflation);
+        let damping = Repeats::new(dampings, whole.map(|fit| &fit.damping_ratio), inflation);
         // Without a fit the reading is what there is.
         let read = Repeats {
             taps: Vec::new(),
@@ -76,14 +73,14 @@ impl<'a> ModeSeen<'a> {
         ModeSeen {
             number,
             reading,
-            recording,
-            taps,
+            recording: seen.recording,
+            taps: seen.taps,
             frequency: frequency.unwrap_or(read),
             damping,
         }
     }
 
-    /// Whether its frequency is that of these taps, and not of the whole recording.
+    /// Returns true if its frequency is that of these taps, and not of the whole recording.
     pub fn is_of_taps(&self) -> bool {
         !self.frequency.taps.is_empty()
     }
@@ -118,13 +115,6 @@ impl<'a> ModeSeen<'a> {
         }
     }
 
-    /// The shape, and the modal constant (1/kg) where it is 1.
-    pub fn shape_and_constant(&self) -> (Vec<ShapeValue>, Option<Observed>) {
-        let shape = self.shape();
-        let constant = reference(&shape).and_then(|sensor| self.constant(sensor));
-        (shape, constant)
-    }
-
     fn fit(&self) -> Option<&'a FittedReading> {
         self.reading.fit.as_deref()
     }
@@ -140,71 +130,72 @@ impl<'a> ModeSeen<'a> {
         })
     }
 
-    /// Time derivatives of the displacement that a sensor senses; `None` where nobody said.
+    /// Number of time derivatives of the displacement that a sensor senses; `None` where it is not known.
     fn derivatives(&self, sensor: usize) -> Option<i32> {
         let response = self.recording.responses.get(sensor)?;
-        derivatives(response, self.recording.tap_unit.as_deref())
+        // By what the description says the sensor senses, else by its unit.
+        let form = match response.kind {
+            Some(kind) => form_of_kind(kind),
+            None => form_of(response, self.recording.tap_unit.as_deref()),
+        };
+        form.map(|form| match form {
+            ResponseForm::Receptance => 0,
+            ResponseForm::Mobility => 1,
+            ResponseForm::Accelerance => 2,
+        })
     }
 
     /// The sensor's amplitudes of the taps that count, as displacements where its quantity is known.
     fn displacements(&self, sensor: usize) -> Vec<(usize, Complex64, f64)> {
-        let Some(fit) = self.fit().filter(|_| !self.hears_sound(sensor)) else {
+        let response = self.recording.responses.get(sensor);
+        let kind = response.and_then(|response| response.kind);
+        let Some(fit) = self.fit().filter(|_| kind != Some(SensorKind::Sound)) else {
             return Vec::new();
         };
         // x_k = p^k x of a free decay with k time derivatives; without a known quantity all are alike.
         let factor = fit.mode.pole.powi(-self.derivatives(sensor).unwrap_or(0));
-        let counts = |amplitude: &&ColumnAmplitude| {
-            amplitude.sensor == sensor
-                && (self.taps.is_empty() || self.taps.contains(&amplitude.tap))
-        };
-        let amplitudes = fit.mode.amplitudes.iter().filter(counts);
-        amplitudes
+        let own = fit.mode.amplitudes.iter().filter(|a| a.sensor == sensor);
+        own.filter(|a| self.taps.is_empty() || self.taps.contains(&a.tap))
             .map(|a| (a.tap, a.value * factor, a.std * factor.norm()))
             .collect()
     }
 
-    fn hears_sound(&self, sensor: usize) -> bool {
-        let response = self.recording.responses.get(sensor);
-        response.is_some_and(|response| response.kind == Some(SensorKind::Sound))
-    }
-
     /// Displacements over those at the strongest sensor, tap by tap and then as the taps repeat.
     fn shape(&self) -> Vec<ShapeValue> {
-        let sensors = self.recording.responses.len();
-        let all: Vec<Vec<(usize, Complex64, f64)>> = (0..sensors)
-            .map(|sensor| self.displacements(sensor))
-            .collect();
-        let size = |sensor: usize| {
-            let sizes: Vec<f64> = all[sensor].iter().map(|one| one.1.norm()).collect();
-            root_mean_square(&sizes)
-        };
-        let seen = (0..sensors).filter(|&sensor| !all[sensor].is_empty());
-        let Some(reference) = seen.max_by(|&a, &b| size(a).total_cmp(&size(b))) else {
+        let mut all = Vec::with_capacity(self.recording.responses.len());
+        let mut strongest: Option<(usize, f64)> = None;
+        for sensor in 0..self.recording.responses.len() {
+            let amplitudes = self.displacements(sensor);
+            let sizes: Vec<f64> = amplitudes.iter().map(|one| one.1.norm()).collect();
+            let size = root_mean_square(&sizes);
+            if !sizes.is_empty() && strongest.is_none_or(|(_, most)| size >= most) {
+                strongest = Some((sensor, size));
+            }
+            all.push(amplitudes);
+        }
+        let Some((reference, _)) = strongest else {
             return Vec::new();
         };
-        let value = |sensor: usize| {
-            let ratios = ratios(&all[sensor], &all[reference]);
-            let observed = Repeats::new(ratios, None, 1.0)?.observed();
-            Some(ShapeValue {
-                sensor,
-                value: observed.value,
-                std: observed.std,
-            })
-        };
-        let one = ShapeValue {
-            sensor: reference,
-            value: 1.0,
-            std: 0.0,
-        };
-        (0..sensors)
-            .filter_map(|sensor| {
-                if sensor == reference {
-                    Some(one)
-                } else {
-                    value(sensor)
-                }
-            })
-            .collect()
+        let mut shape = Vec::with_capacity(all.len());
+        for (sensor, amplitudes) in all.iter().enumerate() {
+            if sensor == reference {
+                shape.push(ShapeValue {
+                    sensor,
+                    value: 1.0,
+                    std: 0.0,
+                });
+                continue;
+            }
+            let repeats = Repeats::new(ratios(amplitudes, &all[reference]), None, 1.0);
+            if let Some(observed) = repeats.map(|repeats| repeats.observed()) {
+                shape.push(ShapeValue {
+                    sensor,
+                    value: observed.value,
+                    std: observed.std,
+                });
+            }
+        }
+        shape
     }
 
     /// Modal constant of the recording at a sensor (1/kg): over all its taps, the shape is linear.
@@ -228,38 +219,36 @@ impl<'a> ModeSeen<'a> {
         self.derivatives(sensor)?;
         let amplitudes = self.displacements(sensor);
         let mut sizes: Vec<f64> = amplitudes.iter().map(|one| one.1.norm()).collect();
-        (!sizes.is_empty() && self.is_of_decays()).then(|| median(&mut sizes))
+        // Functions from a file have residues, which are no amplitudes.
+        let of_decays = self.recording.sample_rate.is_some();
+        (!sizes.is_empty() && of_decays).then(|| median(&mut sizes))
     }
 
-    /// Functions from a file have residues, which are no amplitudes.
-    fn is_of_decays(&self) -> bool {
-        self.recording.sample_rate.is_some()
-    }
-
+    /// Change of the mode along its decays, from its amplitude curve.
     fn along_decay(&self, curve: &AmplitudeCurve, shape: &[ShapeValue]) -> Option<AlongDecay> {
         let (frequency, damping) = (curve.frequency.as_ref()?, curve.damping.as_ref()?);
-        let freedom = Some(curve.points.len() as f64 - 2.0);
-        let slope = |trend: &Trend| Observed {
+        let [frequency_slope, damping_slope] = [frequency, damping].map(|trend| Observed {
             value: trend.slope,
             std: trend.slope_std,
-            freedom,
-        };
-        let amplitudes = || curve.points.iter().map(|point| point.amplitude);
-        let end = |amplitude: f64| self.decay_end(curve, amplitude, shape);
-        let most = amplitudes().fold(0.0, f64::max);
-        let least = amplitudes().fold(f64::INFINITY, f64::min);
+            freedom: Some(curve.points.len() as f64 - 2.0),
+        });
+        let (mut least, mut most) = (f64::INFINITY, 0.0);
+        for point in &curve.points {
+            most = f64::max(most, point.amplitude);
+            least = f64::min(least, point.amplitude);
+        }
         let late = least.max(most * LATE_SHARE);
         let change = frequency.between(late, most);
         Some(AlongDecay {
-            frequency_slope: slope(frequency),
+            frequency_slope,
             frequency_change: change.map(|(value, std)| Observed {
                 value,
                 std,
                 freedom: Some(frequency.freedom()),
             }),
-            damping_slope: slope(damping),
-            early: end(most)?,
-            late: end(late)?,
+            damping_slope,
+            early: self.decay_end(curve, most, shape)?,
+            late: self.decay_end(curve, late, shape)?,
             verdict: match curve.verdict {
                 AmplitudeVerdict::Changes => DecayVerdict::Changes,
                 AmplitudeVerdict::Steady => DecayVerdict::Steady,
@@ -289,15 +278,18 @@ impl<'a> ModeSeen<'a> {
                 .abs();
             (share > 0.0).then(|| own / share)
         });
-        let observed = |value: f64, bound: f64| Observed {
-            value,
-            std: bound / BOUND,
-            freedom: None,
-        };
         Some(DecayEnd {
             amplitude: displacement,
-            frequency: observed(reading.frequency, reading.frequency_bound),
-            damping: observed(reading.damping_ratio, reading.damping_bound),
+            frequency: Observed {
+                value: reading.frequency,
+                std: reading.frequency_bound / BOUND,
+                freedom: None,
+            },
+            damping: Observed {
+                value: reading.damping_ratio,
+                std: reading.damping_bound / BOUND,
+                freedom: None,
+            },
         })
     }
 }
@@ -313,29 +305,18 @@ fn ratios(
     sensor: &[(usize, Complex64, f64)],
     reference: &[(usize, Complex64, f64)],
 ) -> Vec<(usize, f64, f64)> {
-    let ratio = |&(tap, value, std): &(usize, Complex64, f64)| {
-        let &(_, other, other_std) = reference.iter().find(|one| one.0 == tap)?;
+    let mut ratios = Vec::with_capacity(sensor.len());
+    for &(tap, value, std) in sensor {
+        let Some(&(_, other, other_std)) = reference.iter().find(|one| one.0 == tap) else {
+            continue;
+        };
         let ratio = value / other;
         let std = std.hypot(ratio.norm() * other_std) / other.norm();
-        (ratio.is_finite() && std > 0.0).then_some((tap, ratio.re, std))
-    };
-    sensor.iter().filter_map(ratio).collect()
-}
-
-/// By what the description says the sensor senses, else by its unit.
-fn derivatives(response: &Response, force_unit: Option<&str>) -> Option<i32> {
-    let form = match response.kind {
-        Some(SensorKind::Acceleration) => Some(ResponseForm::Accelerance),
-        Some(SensorKind::Velocity) => Some(ResponseForm::Mobility),
-        Some(SensorKind::Displacement) => Some(ResponseForm::Receptance),
-        Some(SensorKind::Sound) => None,
-        None => form_of(response, force_unit),
-    };
-    form.map(|form| match form {
-        ResponseForm::Receptance => 0,
-        ResponseForm::Mobility => 1,
-        ResponseForm::Accelerance => 2,
-    })
+        if ratio.is_finite() && std > 0.0 {
+            ratios.push((tap, ratio.re, std));
+        }
+    }
+    ratios
 }
 
 /// A scatter less probable than this is not noise alone. 5 %, more lenient than for one mode of a report:
@@ -343,18 +324,18 @@ fn derivatives(response: &Response, force_unit: Option<&str>) -> Option<i32> {
 /// little.
 const SCATTER_LEVEL: f64 = 0.05;
 /// Fewer taps say nothing of their scatter.
-pub(super) const LEAST_TAPS: usize = 3;
+const LEAST_TAPS: usize = 3;
 /// With more degrees of freedom than this Student's t is as good as normal: 2 % wider at 100.
 const KNOWN: f64 = 100.0;
 
-/// What repeated taps say of one quantity.
+/// One quantity by repeated taps.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
     /// Number of the tap, its value and that value's standard uncertainty from noise.
     pub taps: Vec<(usize, f64, f64)>,
-    /// What the noise alone says of all of them.
+    /// Value with the uncertainty by noise alone.
     pub by_noise: Observed,
-    /// Whether they scatter more than that.
+    /// True if the taps scatter more than noise explains.
     pub scattered: bool,
 }
 
@@ -370,7 +351,7 @@ impl Repeats {
             Some(joint) if joint.source == UncertaintySource::Residual => Observed {
                 value: joint.value,
                 std: joint.std,
-                freedom: freedom(joint.freedom),
+                freedom: Some(joint.freedom).filter(|freedom| *freedom < KNOWN),
             },
             _ => mean_by_noise(&taps, inflation)?,
         };
@@ -426,10 +407,6 @@ impl Repeats {
     }
 }
 
-fn freedom(value: f64) -> Option<f64> {
-    (value < KNOWN).then_some(value)
-}
-
 /// Weighted mean with the weights 1/std^2, and its standard uncertainty.
 fn mean_by_noise(taps: &[(usize, f64, f64)], inflation: f64) -> Option<Observed> {
     let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();
@@ -461,19 +438,18 @@ pub(super) fn judge_scatter(modes: &mut [ModeSeen<'_>]) {
 /// are fewer than modes.
 const LEAST_SHRINKAGE: f64 = 0.1;
 
-/// Modes that have nothing in common; `None` where one has no uncertainty.
+/// Covariance of the frequencies of modes that have nothing in common; `None` where one has no uncertainty.
 pub(super) fn independent(modes: &[ObservedMode]) -> Option<Vec<Vec<f64>>> {
     let stds: Vec<f64> = modes.iter().map(|mode| mode.std).collect::<Option<_>>()?;
-    Some(with_correlation(&stds, |_, _| 0.0))
+    Some(diagonal(&stds))
 }
 
-fn with_correlation(stds: &[f64], correlation: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
-    let entry = |i: usize, j: usize| {
-        let r = if i == j { 1.0 } else { correlation(i, j) };
-        r * stds[i] * stds[j]
-    };
-    let row = |i: usize| (0..stds.len()).map(|j| entry(i, j)).collect();
-    (0..stds.len()).map(row).collect()
+fn diagonal(stds: &[f64]) -> Vec<Vec<f64>> {
+    let mut covariance = vec![vec![0.0; stds.len()]; stds.len()];
+    for (index, std) in stds.iter().enumerate() {
+        covariance[index][index] = std * std;
+    }
+    covariance
 }
 
 /// Variances of the modes' frequencies, and where several scatter from tap to tap more than noise does,
@@ -483,49 +459,55 @@ pub(super) fn of_taps(modes: &[ModeSeen<'_>]) -> Option<Vec<Vec<f64>>> {
     if stds.iter().any(|std| !std.is_finite()) {
         return None;
     }
+    let mut covariance = diagonal(&stds);
     let scattered: Vec<usize> = (0..modes.len())
         .filter(|&index| modes[index].frequency.scattered)
         .collect();
-    let correlation = shrunk_correlation(modes, &scattered);
-    Some(with_correlation(&stds, |i, j| {
-        let place = |index: usize| scattered.iter().position(|&s| s == index);
-        match (&correlation, place(i), place(j)) {
-            (Some(correlation), Some(i), Some(j)) => correlation[i][j],
-            _ => 0.0,
+    if let Some(correlation) = shrunk_correlation(modes, &scattered) {
+        for (row, &i) in correlation.iter().zip(&scattered) {
+            for (r, &j) in row.iter().zip(&scattered).filter(|(_, j)| **j != i) {
+                covariance[i][j] = r * stds[i] * stds[j];
+            }
         }
-    }))
+    }
+    Some(covariance)
 }
 
 /// Correlations between the taps' deviations, shrunk towards none as Schaefer & Strimmer 2005 do:
 /// lambda = sum var(r)/sum r^2 with var(r) about (1 - r^2)^2/(n - 1); `None` with too few taps that
 /// have all these modes.
 fn shrunk_correlation(modes: &[ModeSeen<'_>], which: &[usize]) -> Option<Vec<Vec<f64>>> {
-    let taps = |&index: &usize| &modes[index].frequency.taps;
-    let of = |index: &usize, tap: usize| taps(index).iter().find(|t| t.0 == tap).map(|t| t.1);
-    let common: Vec<usize> = taps(which.first()?)
+    let values: Vec<BTreeMap<usize, f64>> = which
         .iter()
-        .map(|tap| tap.0)
-        .filter(|&tap| which.iter().all(|index| of(index, tap).is_some()))
+        .map(|&index| modes[index].frequency.taps.iter())
+        .map(|taps| taps.map(|(tap, value, _)| (*tap, *value)).collect())
         .collect();
+    let mut common: Vec<usize> = values.first()?.keys().copied().collect();
+    common.retain(|tap| values.iter().all(|mode| mode.contains_key(tap)));
     if which.len() < 2 || common.len() < LEAST_TAPS {
         return None;
     }
-    let columns: Vec<Vec<f64>> = which
+    let columns: Vec<Vec<f64>> = values
         .iter()
-        .map(|index| unit_deviations(common.iter().filter_map(|&tap| of(index, tap)).collect()))
+        .map(|mode| unit_deviations(common.iter().map(|tap| mode[tap]).collect()))
         .collect();
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let sample: Vec<Vec<f64>> = columns
-        .iter()
-        .map(|a| columns.iter().map(|b| product(a, b)).collect())
-        .collect();
-    let pairs = || (0..which.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-    let squares: f64 = pairs().map(|(i, j)| sample[i][j].powi(2)).sum();
-    let spread = |r: f64| (1.0 - r * r).powi(2) / (common.len() as f64 - 1.0);
-    let variances: f64 = pairs().map(|(i, j)| spread(sample[i][j])).sum();
-    let shrinkage = (variances / squares.max(f64::MIN_POSITIVE)).clamp(LEAST_SHRINKAGE, 1.0);
-    let shrunk = |row: Vec<f64>| row.into_iter().map(|r| (1.0 - shrinkage) * r).collect();
-    Some(sample.into_iter().map(shrunk).collect())
+    let mut sample = vec![vec![0.0; which.len()]; which.len()];
+    let (mut squares, mut variances) = (0.0, 0.0);
+    for (i, a) in columns.iter().enumerate() {
+        for (j, b) in columns.iter().enumerate() {
+            let r: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+            if j < i {
+                squares += r.powi(2);
+                variances += (1.0 - r * r).powi(2) / (common.len() as f64 - 1.0);
+            }
+            sample[i][j] = r;
+        }
+    }
+    let shrinkage = (variances / f64::max(squares, f64::MIN_POSITIVE)).clamp(LEAST_SHRINKAGE, 1.0);
+    for r in sample.iter_mut().flatten() {
+        *r *= 1.0 - shrinkage;
+    }
+    Some(sample)
 }
 
 /// Deviations from the mean, scaled to a unit sum of squares.
@@ -538,9 +520,9 @@ fn unit_deviations(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// What the hammer's noise leaves in a ratio to its force (1, relative).
+/// Error of a ratio to the force by the hammer's noise (1, relative).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ForceNoise {
+struct ForceNoise {
     /// At random: it shows in the scatter of the taps as well.
     random: f64,
     /// In common.
@@ -548,12 +530,12 @@ pub(super) struct ForceNoise {
 }
 
 impl ForceNoise {
-    pub(super) const NONE: ForceNoise = ForceNoise {
+    const NONE: ForceNoise = ForceNoise {
         random: 0.0,
         common: 0.0,
     };
 
-    /// Of n taps: r/sqrt(2 n), the half of the noise's power that is in phase, and r^2, by which the mean square of a
+    /// The error for n taps: r/sqrt(2 n), the half of the noise's power that is in phase, and r^2, by which the mean square of a
     /// noisy force is too large. r is the noise over the force without it, whose root mean squares are given (N s).
     ///
     /// `None` where there is no more than noise.
@@ -567,23 +549,24 @@ impl ForceNoise {
     }
 
     /// The standard uncertainty of a value with that of its taps.
-    pub(super) fn added_to(self, std: f64, value: f64) -> f64 {
+    fn added_to(self, std: f64, value: f64) -> f64 {
         std.max(self.random * value.abs())
             .hypot(self.common * value)
     }
 }
 
-/// The same at a mode's line; none without a hammer or a quiet stretch.
-pub(super) fn noise_of_force(
-    spectra: &MeasuredSpectra,
-    reading: &ModeReading,
-) -> Option<ForceNoise> {
+/// Noise of the hammer at a mode's line; none without a hammer or a quiet stretch.
+fn noise_of_force(spectra: &MeasuredSpectra, reading: &ModeReading) -> Option<ForceNoise> {
     let averages = &spectra.averages;
     let line = averages.lines.nearest(reading.frequency);
-    let at_line = |values: &Option<Vec<f64>>| values.as_ref()?.get(line).copied();
-    match at_line(&spectra.force_noise).zip(at_line(&averages.force)) {
-        Some((noise, force)) => ForceNoise::of(noise, force, averages.taps),
-        None => Some(ForceNoise::NONE),
+    let noise = spectra
+        .force_noise
+        .as_ref()
+        .and_then(|noise| noise.get(line));
+    let force = averages.force.as_ref().and_then(|force| force.get(line));
+    match (noise, force) {
+        (Some(&noise), Some(&force)) => ForceNoise::of(noise, force, averages.taps),
+        _ => Some(ForceNoise::NONE),
     }
 }
 
@@ -594,7 +577,15 @@ pub(super) fn shape_of(
     recording: &RecordingResult,
 ) -> (Vec<ShapeValue>, Option<Observed>) {
     let taps: Vec<usize> = (0..recording.measurement.taps.accepted().count()).collect();
-    ModeSeen::new(0, reading, (recording, &taps, true)).shape_and_constant()
+    let all = SeenTaps {
+        recording,
+        taps: &taps,
+        all: true,
+    };
+    let seen = ModeSeen::new(0, reading, all);
+    let shape = seen.shape();
+    let constant = reference(&shape).and_then(|sensor| seen.constant(sensor));
+    (shape, constant)
 }
 
 #[cfg(test)]

@@ -6,10 +6,13 @@ use super::analysis::{
 };
 use super::checks::{judge, of_amplitude, together};
 use super::fits::{Candidates, stabilisation};
+use super::frf::form_of_kind;
 use super::measure::{MeasureError, MeasureSettings, MeasuredSpectra, Measurement, measure};
 use super::modes::modes_of_bare;
 use super::warning::Warning;
 use num_complex::Complex64;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 use tapjoint_description::{
@@ -17,7 +20,7 @@ use tapjoint_description::{
     TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
-use tapjoint_signal::modal::{CompositeLevel, ModeReading, PeakSettings, find_peaks, read_peaks};
+use tapjoint_signal::modal::{CompositeLevel, PeakSettings, find_peaks, read_peaks};
 use tapjoint_signal::recording::{
     Format, FrequencyResponses, ReadSettings, Recording, RecordingError, ResponseForm,
     open_frequency_responses,
@@ -25,45 +28,72 @@ use tapjoint_signal::recording::{
 use tapjoint_signal::spectral::{
     AveragedSpectra, DISPLAY_RATIO, LEAST_BLOCK, Lines, SpectralError, Window,
 };
-use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
+use tapjoint_signal::taps::{TapSettings, TapSource, Taps, find_taps};
 
 /// Pieces of the overview of a recording over time: two for each pixel of a usual picture.
 const OVERVIEW_PIECES: u64 = 2400;
 
-/// Opens and measures one recording of a described test.
-pub(super) fn measure_described(
+/// Opens and measures the recordings of a described test, `test_file`, which lie in `folder`.
+pub(super) fn measure_test(
+    test: &TestDescription,
+    folder: &Path,
+    test_file: &str,
+) -> Result<Vec<RecordingResult>, PipelineError> {
+    // In parallel, but collected in the description's order, so that of several errors the first is reported.
+    let recordings = test.recordings.par_iter();
+    let results: Vec<Result<_, _>> = recordings
+        .map(|recording| measure_described(test, recording, folder, test_file))
+        .collect();
+    results.into_iter().collect()
+}
+
+fn measure_described(
     test: &TestDescription,
     description: &RecordingDescription,
-    (folder, test_file): (&Path, &str),
+    folder: &Path,
+    test_file: &str,
 ) -> Result<RecordingResult, PipelineError> {
+    let path = folder.join(&description.file);
     let file = description.file.display().to_string();
     if let Some(form) = description.form {
-        return described_functions(test, description, (folder, form));
+        let mut functions = open_frequency_responses(&path)?;
+        functions.file = file;
+        let mut sensor = description.sensor.clone();
+        if let ([one], None) = (test.sensors.as_slice(), &sensor) {
+            sensor = Some(one.name.clone());
+        }
+        let settings = FunctionSettings {
+            form: Some(form),
+            sensor,
+            band: description.band,
+            reading: test.analysis.reading,
+        };
+        let mut result = measure_functions(&functions, &settings)?;
+        result.conditions = conditions(test, description);
+        return Ok(result);
     }
+    let read = ReadSettings {
+        sample_rate: description.sample_rate,
+    };
     if test.sensors.is_empty() {
         return Err(PipelineError::NoSensors {
             file: test_file.to_string(),
         });
     }
-    let (recording, source) = open_described(test, description, (folder, test_file))?;
-    let mut settings = MeasureSettings::new(source);
+    let mut recording = Recording::open(&path, &read)?;
+    let wiring = described_wiring(test, &mut recording, test_file)?;
+    let mut settings = MeasureSettings::new(wiring.source());
     settings.band = description.band;
     settings.block = description.block;
     settings.window = test.analysis.window;
     settings.reading = test.analysis.reading;
-    settings.kinds = response_kinds(test);
-    let responses = test
-        .sensors
-        .iter()
-        .map(|sensor| Response {
-            name: sensor.name.clone(),
-            kind: Some(sensor.kind),
-            unit: Some(si_unit(sensor.kind).to_string()),
-        })
-        .collect();
-    let hammer_unit = test.hammer.as_ref().map(|_| "N".to_string());
-    let units = described_units(test, &settings.source);
-    let placed = |error| match error {
+    if wiring.hammer.is_some() {
+        // The hammer's force makes modal constants of the responses.
+        let kinds = test.sensors.iter().map(|sensor| form_of_kind(sensor.kind));
+        settings.kinds = kinds.collect();
+    }
+    let finished = finish(recording.renamed(file), settings, &wiring);
+    let mut result = finished.map_err(|error| match error {
         PipelineError::Measure(MeasureError::Spectral { file, problem }) => {
             PipelineError::Setting {
                 file: test_file.to_string(),
@@ -73,102 +103,66 @@ pub(super) fn measure_described(
             }
         }
         other => other,
-    };
-    let mut result =
-        finish(recording.renamed(file), settings, (hammer_unit, responses)).map_err(placed)?;
+    })?;
     result.conditions = conditions(test, description);
-    for (channel, unit) in units {
-        if let Some(info) = result.channels.get_mut(channel) {
-            info.unit.get_or_insert_with(|| unit.to_string());
+    for (channel, unit) in wiring.units() {
+        if let Some(info) = result
+            .channels
+            .get_mut(channel)
+            .filter(|info| info.unit.is_none())
+        {
+            info.unit.clone_from(unit);
         }
     }
     Ok(result)
 }
 
-/// Opens and reads a described file of frequency response functions.
-fn described_functions(
+/// Finds and scales the described channels of a recording.
+fn described_wiring(
     test: &TestDescription,
-    description: &RecordingDescription,
-    (folder, form): (&Path, ResponseForm),
-) -> Result<RecordingResult, PipelineError> {
-    let mut functions = open_frequency_responses(&folder.join(&description.file))?;
-    functions.file = description.file.display().to_string();
-    let only = |sensors: &[SensorDescription]| match sensors {
-        [one] => Some(one.name.clone()),
-        _ => None,
-    };
-    let settings = FunctionSettings {
-        form: Some(form),
-        sensor: description.sensor.clone().or_else(|| only(&test.sensors)),
-        band: description.band,
-        reading: test.analysis.reading,
-    };
-    let mut result = measure_functions(&functions, &settings)?;
-    result.conditions = conditions(test, description);
-    Ok(result)
-}
-
-/// What the sensors measure, where the hammer's force makes modal constants of it.
-fn response_kinds(test: &TestDescription) -> Vec<Option<ResponseForm>> {
-    let kind = |sensor: &SensorDescription| match sensor.kind {
-        SensorKind::Acceleration => Some(ResponseForm::Accelerance),
-        SensorKind::Velocity => Some(ResponseForm::Mobility),
-        SensorKind::Displacement => Some(ResponseForm::Receptance),
-        SensorKind::Sound => None,
-    };
-    match &test.hammer {
-        Some(_) => test.sensors.iter().map(kind).collect(),
-        None => Vec::new(),
+    recording: &mut Recording,
+    test_file: &str,
+) -> Result<Wiring, PipelineError> {
+    let mut wiring = Wiring::default();
+    if let Some(hammer) = &test.hammer {
+        let found = channel(recording, &hammer.channel, hammer.scale);
+        wiring.hammer = Some(found.map_err(|problem| at(problem, test_file, &hammer.place))?);
+        wiring.hammer_unit = Some("N".to_string());
     }
-}
-
-/// The unit that the description gives to each channel's values.
-fn described_units(test: &TestDescription, source: &TapSource) -> Vec<(usize, &'static str)> {
-    let (hammer, responses) = match source {
-        TapSource::Hammer { channel, responses } => (Some((*channel, "N")), responses),
-        TapSource::Responses(responses) => (None, responses),
-    };
-    let sensors = test.sensors.iter().map(|sensor| si_unit(sensor.kind));
-    hammer
-        .into_iter()
-        .chain(responses.iter().copied().zip(sensors))
-        .collect()
-}
-
-/// Opens a described recording, scales its channels, and says which of them are what.
-fn open_described(
-    test: &TestDescription,
-    description: &RecordingDescription,
-    (folder, test_file): (&Path, &str),
-) -> Result<(Recording, TapSource), PipelineError> {
-    let settings = ReadSettings {
-        sample_rate: description.sample_rate,
-    };
-    let mut recording = Recording::open(&folder.join(&description.file), &settings)?;
-    let mut find = |reference: &ChannelRef, scale: Option<Scale>, place: &ChannelPlace| {
-        channel(&mut recording, reference, scale).map_err(|problem| PipelineError::Channel {
-            file: test_file.to_string(),
-            line: place.line,
-            key: place.key.clone(),
-            problem: Box::new(problem),
-        })
-    };
-    let hammer = match &test.hammer {
-        Some(hammer) => Some(find(&hammer.channel, hammer.scale, &hammer.place)?),
-        None => None,
-    };
-    let mut channels = Vec::with_capacity(test.sensors.len());
     for sensor in &test.sensors {
-        channels.push(find(&sensor.channel, sensor.scale, &sensor.place)?);
+        let found = channel(recording, &sensor.channel, sensor.scale);
+        let channel = found.map_err(|problem| at(problem, test_file, &sensor.place))?;
+        let response = Response {
+            name: sensor.name.clone(),
+            kind: Some(sensor.kind),
+            unit: Some(si_unit(sensor.kind).to_string()),
+        };
+        wiring.responses.push((channel, response));
     }
-    Ok((recording, source(hammer, channels)))
+    Ok(wiring)
 }
 
-/// What the description says of the circumstances of a recording.
+/// The error about a channel, with its place in the description.
+fn at(problem: RecordingError, test_file: &str, place: &ChannelPlace) -> PipelineError {
+    PipelineError::Channel {
+        file: test_file.to_string(),
+        line: place.line,
+        key: place.key.clone(),
+        problem: Box::new(problem),
+    }
+}
+
+/// Circumstances of a recording, as described.
 fn conditions(test: &TestDescription, description: &RecordingDescription) -> Conditions {
-    let place =
-        |sensor: &SensorDescription| Some((sensor.name.clone(), description.place_of(sensor)?));
-    let mass = |sensor: &SensorDescription| Some((sensor.name.clone(), sensor.mass?));
+    let (mut positions, mut masses) = (BTreeMap::new(), BTreeMap::new());
+    for sensor in &test.sensors {
+        if let Some(place) = description.place_of(sensor) {
+            positions.insert(sensor.name.clone(), place);
+        }
+        if let Some(mass) = sensor.mass {
+            masses.insert(sensor.name.clone(), mass);
+        }
+    }
     Conditions {
         tap: description.tap,
         sensor_positions: test.sensors.iter().filter_map(place).collect(),
@@ -190,10 +184,10 @@ pub fn measure_bare(
     hammer: Option<&ChannelRef>,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<RecordingResult, PipelineError> {
-    let (source, named) = bare_source(&recording, hammer)?;
-    let mut settings = MeasureSettings::new(source);
+    let wiring = bare_wiring(&recording, hammer)?;
+    let mut settings = MeasureSettings::new(wiring.source());
     adjust(&mut settings);
-    let mut result = finish(recording, settings, named)?;
+    let mut result = finish(recording, settings, &wiring)?;
     if hammer.is_none() {
         let forgotten = of_hammer_by_name(&result);
         result.measurement.warnings.extend(forgotten);
@@ -201,36 +195,29 @@ pub fn measure_bare(
     Ok(result)
 }
 
-/// Unit of the hammer channel, where there is one, and the responses.
-type Named = (Option<String>, Vec<Response>);
-
-/// Where taps are looked for in a bare recording, and what the file says of its channels.
-fn bare_source(
+/// The channels of a bare recording, with the names and units that the file gives.
+fn bare_wiring(
     recording: &Recording,
     hammer: Option<&ChannelRef>,
-) -> Result<(TapSource, Named), RecordingError> {
-    let hammer = hammer
-        .map(|reference| channel_index(recording, reference))
-        .transpose()?;
-    let channels: Vec<usize> = (0..recording.channels().len())
-        .filter(|&c| Some(c) != hammer)
-        .collect();
-    let named = bare_channels(recording, hammer, &channels);
-    Ok((source(hammer, channels), named))
-}
-
-/// Unit of the hammer channel, and the responses with what the file says of them.
-fn bare_channels(recording: &Recording, hammer: Option<usize>, channels: &[usize]) -> Named {
-    let info = |channel: usize| recording.channels().get(channel);
-    let responses = channels.iter().map(|&channel| Response {
-        name: info(channel)
-            .and_then(|info| info.name.clone())
-            .unwrap_or_else(|| format!("channel {}", channel + 1)),
-        kind: None,
-        unit: info(channel).and_then(|info| info.unit.clone()),
-    });
-    let hammer = hammer.and_then(info).and_then(|info| info.unit.clone());
-    (hammer, responses.collect())
+) -> Result<Wiring, RecordingError> {
+    let mut wiring = Wiring::default();
+    if let Some(reference) = hammer {
+        wiring.hammer = Some(channel_index(recording, reference)?);
+    }
+    for (channel, info) in recording.channels().iter().enumerate() {
+        if Some(channel) == wiring.hammer {
+            wiring.hammer_unit.clone_from(&info.unit);
+            continue;
+        }
+        let name = info.name.clone();
+        let response = Response {
+            name: name.unwrap_or_else(|| format!("channel {}", channel + 1)),
+            kind: None,
+            unit: info.unit.clone(),
+        };
+        wiring.responses.push((channel, response));
+    }
+    Ok(wiring)
 }
 
 /// Finds the taps of a recording and goes no further: what is in it and what is wrong with it.
@@ -241,7 +228,8 @@ pub fn inspect_bare(
     recording: Recording,
     hammer: Option<&ChannelRef>,
 ) -> Result<RecordingResult, PipelineError> {
-    let (source, named) = bare_source(&recording, hammer)?;
+    let wiring = bare_wiring(&recording, hammer)?;
+    let source = wiring.source();
     let taps = find_taps(&recording, &source, &TapSettings::default())?;
     let warnings = super::measure::of_recording(&recording, &source, &taps);
     let measurement = Measurement {
@@ -249,19 +237,8 @@ pub fn inspect_bare(
         spectra: None,
         warnings,
     };
-    result(
-        &recording,
-        &MeasureSettings::new(source),
-        named,
-        measurement,
-    )
-}
-
-fn source(hammer: Option<usize>, responses: Vec<usize>) -> TapSource {
-    match hammer {
-        Some(channel) => TapSource::Hammer { channel, responses },
-        None => TapSource::Responses(responses),
-    }
+    let settings = MeasureSettings::new(source);
+    result(&recording, &settings, &wiring, measurement)
 }
 
 fn channel_index(recording: &Recording, reference: &ChannelRef) -> Result<usize, RecordingError> {
@@ -290,39 +267,43 @@ fn channel(
     Ok(index)
 }
 
-pub(super) fn finish(
+/// Measures a recording whose channels are known.
+fn finish(
     recording: Recording,
     settings: MeasureSettings,
-    named: Named,
+    wiring: &Wiring,
 ) -> Result<RecordingResult, PipelineError> {
     let measurement = measure(&recording, &settings)?;
-    result(&recording, &settings, named, measurement)
+    result(&recording, &settings, wiring, measurement)
 }
 
 fn result(
     recording: &Recording,
     settings: &MeasureSettings,
-    (hammer_unit, responses): Named,
+    wiring: &Wiring,
     measurement: Measurement,
 ) -> Result<RecordingResult, PipelineError> {
     let shown = settings.source.channels().first().copied().unwrap_or(0);
-    let readings = measurement
-        .spectra
-        .as_ref()
-        .map_or(0, |spectra| spectra.readings.len());
-    let has_hammer = matches!(settings.source, TapSource::Hammer { .. });
+    let spectra = measurement.spectra.as_ref();
+    let readings = spectra.map_or(0, |spectra| spectra.readings.len());
+    let responses = wiring.responses.iter();
+    let responses: Vec<Response> = responses.map(|(_, response)| response.clone()).collect();
+    // Without a hammer the unit that all responses have.
+    let common_unit = responses.first().and_then(|first| {
+        let same = responses.iter().all(|other| other.unit == first.unit);
+        first.unit.clone().filter(|_| same)
+    });
     Ok(RecordingResult {
         file: recording.name().to_string(),
         format: recording.format(),
         sample_rate: Some(recording.sample_rate()),
         seconds: Some(recording.duration()),
         channels: recording.channels().to_vec(),
-        has_hammer,
+        has_hammer: wiring.hammer.is_some(),
         conditions: Conditions::default(),
-        tap_unit: if has_hammer {
-            hammer_unit
-        } else {
-            common_unit(&responses)
+        tap_unit: match wiring.hammer {
+            Some(_) => wiring.hammer_unit.clone(),
+            None => common_unit,
         },
         responses,
         band: settings.band,
@@ -333,13 +314,6 @@ fn result(
         measurement,
         mode_numbers: vec![None; readings],
     })
-}
-
-/// The unit that all responses have.
-fn common_unit(responses: &[Response]) -> Option<String> {
-    let first = responses.first()?;
-    let same = responses.iter().all(|other| other.unit == first.unit);
-    first.unit.clone().filter(|_| same)
 }
 
 /// The SI unit of what a sensor senses.
@@ -375,30 +349,26 @@ fn overview(recording: &Recording, channel: usize) -> Result<Overview, Recording
     })
 }
 
-/// A channel that is taken for a response, though its name says that it is the hammer's.
-pub(super) fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
-    let is_hammers = |name: &str| {
+/// The warning about a channel that is taken for a response, though its name says that it is the hammer's.
+fn of_hammer_by_name(recording: &RecordingResult) -> Option<Warning> {
+    let mut names = recording.responses.iter().map(|response| &response.name);
+    let name = names.find(|name| {
         let name = name.to_lowercase();
         name.contains("hammer") || name.contains("force")
-    };
-    let mut names = recording.responses.iter().map(|response| &response.name);
-    let name = names.find(|name| is_hammers(name))?;
+    })?;
     let argument = match name.contains(char::is_whitespace) {
         true => format!("\"{name}\""),
         false => name.clone(),
     };
-    Some(Warning::Recording {
-        code: "hammer-channel",
-        file: recording.file.clone(),
-        text: format!(
-            "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
-             say --hammer {argument}: taps are then judged by their force, and there are frequency \
-             response functions"
-        ),
-    })
+    let text = format!(
+        "channel \"{name}\" is taken for a response, but by its name it may be the hammer's; if so, \
+         say --hammer {argument}: taps are then judged by their force, and there are frequency \
+         response functions"
+    );
+    Some(Warning::about(&recording.file, "hammer-channel", text))
 }
 
-/// What is known of a file of frequency response functions beside its numbers.
+/// Settings for a file of frequency response functions.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FunctionSettings {
     /// Form of all functions; `None` = what the file says.
@@ -407,7 +377,7 @@ pub struct FunctionSettings {
     pub sensor: Option<String>,
     /// Band to be analysed (Hz); `None` = all lines.
     pub band: Option<(f64, f64)>,
-    /// How natural frequencies are read.
+    /// Way in which natural frequencies are read.
     pub reading: ReadBy,
 }
 
@@ -423,27 +393,34 @@ pub fn run_functions(
 }
 
 /// Reads the resonances of frequency response functions.
-pub(super) fn measure_functions(
+fn measure_functions(
     functions: &FrequencyResponses,
     settings: &FunctionSettings,
 ) -> Result<RecordingResult, PipelineError> {
-    let fits = |problem| PipelineError::Functions {
+    let axis = axis(functions, settings.band);
+    let (first, lines) = axis.map_err(|problem| MeasureError::Spectral {
         file: functions.file.clone(),
         problem,
-    };
-    let (first, lines) = axis(functions, settings.band).map_err(fits)?;
-    let values: Vec<Vec<Complex64>> = functions
-        .responses
-        .iter()
-        .map(|response| response.values[first..first + lines.points()].to_vec())
-        .collect();
-    let responses = responses(functions, settings);
-    let spectra = spectra(lines, values, (functions, settings));
-    let warnings = functions.warnings.iter().map(|warning| Warning::Recording {
-        code: warning.code(),
-        file: functions.file.clone(),
-        text: warning.to_string(),
-    });
+    })?;
+    let (mut responses, mut forms, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    for response in &functions.responses {
+        let form = settings.form.or(response.form);
+        let sensor = settings.sensor.as_ref();
+        responses.push(Response {
+            name: sensor.unwrap_or(&response.name).clone(),
+            kind: form.map(|form| match form {
+                ResponseForm::Accelerance => SensorKind::Acceleration,
+                ResponseForm::Mobility => SensorKind::Velocity,
+                ResponseForm::Receptance => SensorKind::Displacement,
+            }),
+            unit: form.map(|form| form.response_unit().to_string()),
+        });
+        forms.push(form);
+        values.push(response.values[first..first + lines.points()].to_vec());
+    }
+    let spectra = spectra_of_functions(lines, values, &forms, settings.reading);
+    let warnings = functions.warnings.iter();
+    let warnings = warnings.map(|warning| Warning::about(&functions.file, warning.code(), warning));
     Ok(RecordingResult {
         file: functions.file.clone(),
         format: Format::FrequencyResponses,
@@ -504,29 +481,12 @@ fn axis(
     Ok((first, lines))
 }
 
-fn responses(functions: &FrequencyResponses, settings: &FunctionSettings) -> Vec<Response> {
-    let one = |response: &tapjoint_signal::recording::FrequencyResponse| {
-        let form = settings.form.or(response.form);
-        Response {
-            name: settings
-                .sensor
-                .clone()
-                .unwrap_or_else(|| response.name.clone()),
-            kind: form.map(|form| match form {
-                ResponseForm::Accelerance => SensorKind::Acceleration,
-                ResponseForm::Mobility => SensorKind::Velocity,
-                ResponseForm::Receptance => SensorKind::Displacement,
-            }),
-            unit: form.map(|form| form.response_unit().to_string()),
-        }
-    };
-    functions.responses.iter().map(one).collect()
-}
-
-fn spectra(
+/// Reads the resonances of functions, each with its form where it is known.
+fn spectra_of_functions(
     lines: Lines,
     values: Vec<Vec<Complex64>>,
-    (functions, settings): (&FrequencyResponses, &FunctionSettings),
+    forms: &[Option<ResponseForm>],
+    wanted: ReadBy,
 ) -> MeasuredSpectra {
     let powers: Vec<Vec<f64>> = values
         .iter()
@@ -537,17 +497,33 @@ fn spectra(
     let peaks = find_peaks(&level, &PeakSettings::default());
     let mut readings = read_peaks(&level, &columns, &peaks, Window::Rectangular);
     let stabilisation = stabilisation(lines.low, lines.spacing, &columns);
-    if let Some(data) = modal_data(&lines, &values) {
+    // The fit takes the functions without the line at 0 Hz.
+    let first_fitted = usize::from(lines.low <= 0.0);
+    let basis = Basis::FrequencyResponse {
+        resolution: lines.resolution(),
+    };
+    let fitted = values.iter().enumerate().map(|(sensor, values)| Column {
+        tap: 0,
+        sensor,
+        values: values[first_fitted..].to_vec(),
+    });
+    let frequencies = lines.frequencies().split_off(first_fitted);
+    if let Ok(data) = ModalData::new(basis, frequencies, fitted.collect()) {
         let candidates = Candidates {
             lines: &lines,
             data: &data,
             stabilisation: &stabilisation,
         };
         candidates.fit(&mut readings);
-        add_constants(&mut readings, (functions, settings));
+        // There are modal constants where the form of every function is known.
+        if let Some(forms) = forms.iter().copied().collect::<Option<Vec<ResponseForm>>>() {
+            for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {
+                fit.constants = modal_constants_of_frf(&fit.mode, &forms);
+            }
+        }
     }
     for reading in &mut readings {
-        reading.prefer(settings.reading);
+        reading.prefer(wanted);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     MeasuredSpectra {
@@ -563,33 +539,6 @@ fn spectra(
     }
 }
 
-/// The functions without the line at 0 Hz; `None` where they cannot be fitted.
-fn modal_data(lines: &Lines, values: &[Vec<Complex64>]) -> Option<ModalData> {
-    let first = usize::from(lines.low <= 0.0);
-    let basis = Basis::FrequencyResponse {
-        resolution: lines.resolution(),
-    };
-    let columns = values.iter().enumerate().map(|(sensor, values)| Column {
-        tap: 0,
-        sensor,
-        values: values[first..].to_vec(),
-    });
-    let frequencies = lines.frequencies().split_off(first);
-    ModalData::new(basis, frequencies, columns.collect()).ok()
-}
-
-/// Modal constants, where the form of every function is known.
-fn add_constants(
-    readings: &mut [ModeReading],
-    (functions, settings): (&FrequencyResponses, &FunctionSettings),
-) {
-    let forms = functions.responses.iter();
-    let forms: Option<Vec<ResponseForm>> = forms
-        .map(|response| settings.form.or(response.form))
-        .collect();
-    let Some(forms) = forms else { return };
-    for fit in readings.iter_mut().filter_map(|r| r.fit.as_deref_mut()) {
-        fit.constants = modal_constants_of_frf(&fit.mode, &forms);
     }
 }
 
@@ -600,8 +549,8 @@ const AFTER: f64 = 30e-3;
 /// Shown after a second hit (s): its pulse.
 const AFTER_SECOND: f64 = 10e-3;
 
-/// One for each tap.
-pub(super) fn close_ups(
+/// The samples about each tap.
+fn close_ups(
     recording: &Recording,
     source: &TapSource,
     taps: &Taps,
@@ -610,33 +559,31 @@ pub(super) fn close_ups(
         TapSource::Hammer { channel, responses } => (Some(*channel), responses),
         TapSource::Responses(responses) => (None, responses),
     };
-    let channels = (force, responses.first().copied());
-    let shown = |tap: &Tap| {
-        let second = tap.second_hit.map(|second| second.delay + AFTER_SECOND);
-        (tap.time, second.map_or(AFTER, |second| second.max(AFTER)))
-    };
-    let all = taps.taps.iter().map(shown);
-    all.map(|about| close_up(recording, channels, about))
-        .collect()
-}
-
-fn close_up(
-    recording: &Recording,
-    (force, response): (Option<usize>, Option<usize>),
-    (time, after): (f64, f64),
-) -> Result<CloseUp, RecordingError> {
     let rate = recording.sample_rate();
-    let first = ((time - BEFORE) * rate).round().max(0.0) as u64;
-    let last = ((time + after) * rate).round().max(0.0) as u64;
-    let read = |channel| samples(recording, channel, first..last);
-    Ok(CloseUp {
-        start: first as f64 / rate - time,
-        step: 1.0 / rate,
-        force: force.map(read).transpose()?,
-        response: response.map(read).transpose()?,
-    })
+    let mut all = Vec::with_capacity(taps.taps.len());
+    for tap in &taps.taps {
+        let second = tap.second_hit.map(|second| second.delay + AFTER_SECOND);
+        let after = second.map_or(AFTER, |second| second.max(AFTER));
+        let first = ((tap.time - BEFORE) * rate).round().max(0.0) as u64;
+        let last = ((tap.time + after) * rate).round().max(0.0) as u64;
+        let (mut of_force, mut of_response) = (None, None);
+        if let Some(channel) = force {
+            of_force = Some(samples(recording, channel, first..last)?);
+        }
+        if let Some(&channel) = responses.first() {
+            of_response = Some(samples(recording, channel, first..last)?);
+        }
+        all.push(CloseUp {
+            start: first as f64 / rate - tap.time,
+            step: 1.0 / rate,
+            force: of_force,
+            response: of_response,
+        });
+    }
+    Ok(all)
 }
 
+/// Samples of a channel, its mean taken out.
 fn samples(
     recording: &Recording,
     channel: usize,
@@ -647,18 +594,36 @@ fn samples(
     Ok(samples.into_iter().map(|value| value - mean).collect())
 }
 
-/// What the channels of a bare recording are; the recording carries their scales already.
-#[derive(Debug, Clone, PartialEq)]
+/// The channels of hammer and responses; the recording carries their scales already.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Wiring {
-    /// Channel of the hammer (0-based).
-    pub hammer: usize,
-    /// Unit of the force; `None` = the file's, whatever that is.
+    /// Channel of the hammer (0-based); `None` without one.
+    pub hammer: Option<usize>,
+    /// Unit of the force; `None` where it is not known.
     pub hammer_unit: Option<String>,
     /// Channels of the responses (0-based), each with what is known of it.
     pub responses: Vec<(usize, Response)>,
 }
 
-/// Takes a bare recording with a hammer as far as it goes: taps, spectra, readings. `adjust` may
+impl Wiring {
+    /// The channels in which taps are searched.
+    fn source(&self) -> TapSource {
+        let responses = self.responses.iter().map(|(channel, _)| *channel).collect();
+        match self.hammer {
+            Some(channel) => TapSource::Hammer { channel, responses },
+            None => TapSource::Responses(responses),
+        }
+    }
+
+    /// Every channel with its unit.
+    fn units(&self) -> impl Iterator<Item = (usize, &Option<String>)> {
+        let responses = self.responses.iter();
+        let responses = responses.map(|(channel, response)| (*channel, &response.unit));
+        responses.chain(self.hammer.map(|hammer| (hammer, &self.hammer_unit)))
+    }
+}
+
+/// Takes a bare recording with known channels as far as it goes: taps, spectra, readings. `adjust` may
 /// change the defaults of the measurement.
 ///
 /// # Errors
@@ -668,21 +633,12 @@ pub fn run_wired(
     wiring: &Wiring,
     adjust: impl FnOnce(&mut MeasureSettings),
 ) -> Result<Analysis, PipelineError> {
-    let (channels, responses): (Vec<usize>, Vec<Response>) =
-        wiring.responses.iter().cloned().unzip();
-    let mut settings = MeasureSettings::new(TapSource::Hammer {
-        channel: wiring.hammer,
-        responses: channels.clone(),
-    });
+    let mut settings = MeasureSettings::new(wiring.source());
     adjust(&mut settings);
-    let units = responses.iter().map(|response| response.unit.clone());
-    let units: Vec<Option<String>> = units.collect();
-    let named = (wiring.hammer_unit.clone(), responses);
-    let mut result = finish(recording, settings, named)?;
-    let stated = channels.into_iter().zip(units);
-    for (channel, unit) in stated.chain([(wiring.hammer, wiring.hammer_unit.clone())]) {
+    let mut result = finish(recording, settings, wiring)?;
+    for (channel, unit) in wiring.units() {
         if let Some(info) = result.channels.get_mut(channel) {
-            info.unit = unit;
+            info.unit.clone_from(unit);
         }
     }
     Ok(analysis_of(result))
@@ -711,7 +667,7 @@ pub(super) fn analysis_of(mut recording: RecordingResult) -> Analysis {
 mod tests {
     use super::*;
     use tapjoint_signal::recording::Channel;
-    use tapjoint_signal::taps::SecondHit;
+    use tapjoint_signal::taps::{SecondHit, Tap};
 
     #[test]
     fn limit_a_close_up_ends_where_the_recording_does() {
@@ -722,18 +678,8 @@ mod tests {
         };
         let channels = vec![channel(0.0), channel(500.0)];
         let recording = Recording::from_samples("taps", 1000.0, channels).expect("samples");
-        let found =
-            |time: f64| close_up(&recording, (Some(0), Some(1)), (time, AFTER)).expect("samples");
-        let lengths = [0.001, 0.050, 0.090].map(|time| found(time).force.map(|force| force.len()));
-        assert_eq!(lengths, [Some(31), Some(32), Some(12)]);
-        let middle = found(0.050);
-        assert!((middle.start + 0.002).abs() < 1e-12, "{}", middle.start);
-        // Of both channels the same frames, each less its mean.
-        assert_eq!(middle.force, middle.response);
-        assert_eq!(middle.force.map(|force| force[0]), Some(48.0 - 49.5));
-        // As far as a second hit, which is why a tap is rejected.
-        let hit = |second_hit| Tap {
-            time: 0.010,
+        let hit = |time, second_hit| Tap {
+            time,
             peak: 1.0,
             pulse_end: None,
             record: 0..100,
@@ -745,15 +691,30 @@ mod tests {
             ratio: 0.6,
         };
         let taps = Taps {
-            taps: vec![hit(None), hit(Some(far))],
+            taps: vec![
+                hit(0.001, None),
+                hit(0.050, None),
+                hit(0.090, None),
+                // As far as a second hit, which is why a tap is rejected.
+                hit(0.010, Some(far)),
+            ],
             noise: 0.0,
             remarks: Vec::new(),
         };
-        let all = close_ups(&recording, &TapSource::Responses(vec![0]), &taps).expect("samples");
-        let lengths: Vec<_> = all
-            .iter()
-            .map(|one| one.response.as_ref().map(Vec::len))
-            .collect();
-        assert_eq!(lengths, [Some(32), Some(47)]);
+        let source = TapSource::Hammer {
+            channel: 0,
+            responses: vec![1],
+        };
+        let all = close_ups(&recording, &source, &taps).expect("samples");
+        let forces: Vec<&Vec<f64>> = all.iter().flat_map(|one| &one.force).collect();
+        let lengths: Vec<usize> = forces.iter().map(|force| force.len()).collect();
+        assert_eq!(lengths, [31, 32, 12, 47]);
+        assert!((all[1].start + 0.002).abs() < 1e-12, "{}", all[1].start);
+        // Of both channels the same frames, each less its mean.
+        assert_eq!(all[1].force, all[1].response);
+        assert_eq!(forces[1][0], 48.0 - 49.5);
+        let alone = close_ups(&recording, &TapSource::Responses(vec![0]), &taps).expect("samples");
+        assert!(alone.iter().all(|one| one.force.is_none()));
+        assert_eq!(alone[3].response.as_ref(), Some(forces[3]));
     }
 }

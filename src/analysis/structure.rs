@@ -19,7 +19,7 @@ use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
 pub struct TestedStructure {
     /// The beam.
     pub beam: Beam,
-    /// How it is held.
+    /// Kind of structure.
     pub assembly: Assembly,
     /// Beam theory of the prediction.
     pub theory: BeamTheory,
@@ -41,7 +41,7 @@ pub struct KnownJoint {
 }
 
 impl KnownJoint {
-    /// Whether anything is known.
+    /// Returns true if any stiffness is known.
     pub fn any(&self) -> bool {
         self.kx.is_some() || self.ky.is_some() || self.cross_compliance.is_some()
     }
@@ -62,6 +62,7 @@ impl KnownJoint {
 /// The structure that a test description describes.
 pub fn tested_structure(test: &TestDescription) -> TestedStructure {
     let beam = described_beam(test);
+    let units = StiffnessUnits::of(&beam);
     TestedStructure {
         beam,
         assembly: test.joint.kind,
@@ -72,33 +73,30 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
             (Assembly::Cantilever, JointModel::TwoParameter) => Some(PairsModel::TwoParameter),
             (Assembly::Cantilever, JointModel::ThreeParameter) => Some(PairsModel::ThreeParameter),
         },
-        known: known_joint(test, &beam),
-    }
-}
-
-fn known_joint(test: &TestDescription, beam: &Beam) -> KnownJoint {
-    let units = StiffnessUnits::of(beam);
-    let in_units = |known: Option<f64>, unit: f64| known.map(|known| known / unit);
-    KnownJoint {
-        kx: in_units(test.joint.kt, units.kt),
-        ky: in_units(test.joint.kr, units.kr),
-        cross_compliance: in_units(test.joint.ktr, units.ktr).map(f64::recip),
+        known: KnownJoint {
+            kx: test.joint.kt.map(|kt| kt / units.kt),
+            ky: test.joint.kr.map(|kr| kr / units.kr),
+            cross_compliance: test
+                .joint
+                .ktr
+                .map(|ktr| units.ktr / ktr),
+        },
     }
 }
 
 /// A spring stated as absent (1): below every stiffness that a frequency feels, and with a logarithm.
 pub(super) const NO_SPRING: f64 = 1e-9;
 
-/// What the consistent estimate knows beyond the plain beam with its joint.
+/// Details of the structure beyond the plain beam with its joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct StructureDetails {
-    /// Where a lap joint's halves differ from two equal pieces.
+    /// Differences of a lap joint's halves from two equal pieces.
     pub lap: LapLayout,
     /// Masses (kg) of the sensors, where they sit in the reference configuration, and what is fastened there.
     pub masses: Vec<PointMass>,
     /// Relative standard uncertainties of the beam's properties.
     pub tolerances: BeamTolerances,
-    /// What is estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
+    /// Parameters that are estimated; `None` = the joint's stiffnesses that are not known, free beam: modulus.
     pub fit: Option<Vec<FitParameter>>,
     /// Weights; `None` = measured where every uncertainty is known.
     pub weights: Option<Weights>,
@@ -107,23 +105,22 @@ pub struct StructureDetails {
 /// The details of a described test.
 pub fn structure_details(test: &TestDescription, beam: &Beam) -> StructureDetails {
     let tolerance = &test.beam.tolerance;
-    let relative = |std: Option<f64>, value: f64| std.map(|std| std / value);
     StructureDetails {
         lap: lap_layout(test),
         masses: masses_in(test, test.recordings.first()),
         tolerances: BeamTolerances {
-            length: relative(tolerance.length, beam.length),
-            width: relative(tolerance.width, beam.width),
-            thickness: relative(tolerance.thickness, beam.thickness),
-            modulus: relative(tolerance.modulus, beam.modulus),
-            density: relative(tolerance.density, beam.density),
+            length: tolerance.length.map(|std| std / beam.length),
+            width: tolerance.width.map(|std| std / beam.width),
+            thickness: tolerance.thickness.map(|std| std / beam.thickness),
+            modulus: tolerance.modulus.map(|std| std / beam.modulus),
+            density: tolerance.density.map(|std| std / beam.density),
         },
         fit: test.analysis.fit.clone(),
         weights: test.analysis.weights,
     }
 }
 
-/// What is known to sit on the beam in a recording: sensors whose mass and place are known, and what is
+/// Masses on the beam in a recording: sensors whose mass and place are known, and what is
 /// fastened. A microphone loads nothing.
 pub(super) fn masses_in(
     test: &TestDescription,
@@ -153,39 +150,29 @@ pub fn jointed(structure: &TestedStructure, details: &StructureDetails) -> Joint
     jointed
 }
 
-/// What of the joint is estimated where the description names nothing: all that is not known.
-fn usual_fit(structure: &TestedStructure) -> Vec<Parameter> {
-    let known = &structure.known;
-    let joint = match structure.regression {
-        None => return vec![Parameter::Modulus],
-        Some(PairsModel::ThreeParameter) => 3,
-        Some(PairsModel::TwoParameter | PairsModel::Lap) => 2,
-    };
-    [
-        (Parameter::Kt, known.kx),
-        (Parameter::Kr, known.ky),
-        (Parameter::Coupling, known.cross_compliance),
-    ]
-    .into_iter()
-    .take(joint)
-    .filter(|(_, known)| known.is_none())
-    .map(|(parameter, _)| parameter)
-    .collect()
-}
-
-/// What is estimated: what the description names, else all of the joint that is not known.
+/// Parameters that are estimated: those the description names, else all of the joint that are not known.
 pub(super) fn fitted(structure: &TestedStructure, details: &StructureDetails) -> Vec<Parameter> {
-    let parameter = |fit: &FitParameter| match fit {
-        FitParameter::Kt => Parameter::Kt,
-        FitParameter::Kr => Parameter::Kr,
-        FitParameter::Ktr => Parameter::Coupling,
-        FitParameter::Modulus => Parameter::Modulus,
-        FitParameter::Density => Parameter::Density,
-    };
-    match &details.fit {
-        Some(fit) => fit.iter().map(parameter).collect(),
-        None => usual_fit(structure),
+    if let Some(fit) = &details.fit {
+        let named = fit.iter().map(|parameter| match parameter {
+            FitParameter::Kt => Parameter::Kt,
+            FitParameter::Kr => Parameter::Kr,
+            FitParameter::Ktr => Parameter::Coupling,
+            FitParameter::Modulus => Parameter::Modulus,
+            FitParameter::Density => Parameter::Density,
+        });
+        return named.collect();
     }
+    let Some(model) = structure.regression else {
+        return vec![Parameter::Modulus];
+    };
+    let known = &structure.known;
+    let mut fit = Vec::new();
+    fit.extend(known.kx.is_none().then_some(Parameter::Kt));
+    fit.extend(known.ky.is_none().then_some(Parameter::Kr));
+    if model == PairsModel::ThreeParameter && known.cross_compliance.is_none() {
+        fit.push(Parameter::Coupling);
+    }
+    fit
 }
 
 fn settings(
@@ -254,9 +241,9 @@ fn hold_cross_stiffness(
         settings.held.coupling = Some(held);
         let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
         // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
-        let spring = |parameter: Parameter, unit: f64| fit.point[parameter as usize].exp() / unit;
-        let product = spring(Parameter::Kt, units.kt) * spring(Parameter::Kr, units.kr);
-        let next = (cross * product.sqrt()).clamp(-LARGEST, LARGEST);
+        let kx = fit.point[Parameter::Kt as usize].exp() / units.kt;
+        let ky = fit.point[Parameter::Kr as usize].exp() / units.kr;
+        let next = (cross * (kx * ky).sqrt()).clamp(-LARGEST, LARGEST);
         let moved = (next - held).abs();
         held = next;
         if moved.is_nan() || moved <= STILL {
@@ -265,20 +252,6 @@ fn hold_cross_stiffness(
     }
     settings.held.coupling = Some(held);
     Ok(())
-}
-
-/// Frequencies of this beam on this joint with everything that is fastened to it, beside the
-/// measured ones.
-pub(super) fn predict(
-    structure: &TestedStructure,
-    details: &StructureDetails,
-    (beam, joint): (&Beam, &JointStiffness),
-    measured: (&[MeasuredMode], &[usize]),
-    count: usize,
-) -> Result<Vec<PredictedMode>, IdentifyError> {
-    let there = jointed(structure, details).with_beam(beam);
-    let frequencies = frequencies_of(&there, joint, count)?;
-    Ok(compare(beam, &frequencies, measured))
 }
 
 /// Frequencies of the described structure on this joint (non-dimensional), with everything that is
@@ -293,8 +266,9 @@ pub fn predict_described(
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
     joint.check()?;
-    let held = (&structure.beam, joint);
-    predict(structure, details, held, (&[], &[]), count)
+    let there = jointed(structure, details).with_beam(&structure.beam);
+    let frequencies = frequencies_of(&there, joint, count)?;
+    Ok(compare(&structure.beam, &frequencies, (&[], &[])))
 }
 
 /// The first natural frequencies (Hz) of a structure on this joint, non-dimensional by its beam.
@@ -325,7 +299,8 @@ pub fn frequencies_of(
 pub(super) fn predicted_specimen(
     structure: &TestedStructure,
     details: &StructureDetails,
-    (beam, joint): (&Beam, &JointStiffness),
+    beam: &Beam,
+    joint: &JointStiffness,
 ) -> Specimen {
     let there = jointed(structure, details).with_beam(beam);
     let units = StiffnessUnits::of(beam);

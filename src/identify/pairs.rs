@@ -13,6 +13,8 @@
 use super::IdentifyError;
 use super::perturbation::Stiffnesses;
 use nalgebra::{DMatrix, DVector, SVD};
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::fmt;
 use tapjoint_beam::interface::{Coefficients, JointedBody};
 use tapjoint_beam::joint::StiffnessUnits;
@@ -333,30 +335,35 @@ fn interpret(model: PairsModel, solution: &Solution) -> PairsEstimate {
     }
 }
 
-/// What one mode of a lap joint says on its own.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SingleModeStiffness {
-    /// The mode's number.
+/// Estimate from one mode alone; a value that the mode cannot give is null.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
+pub struct SingleMode {
+    /// Mode number.
     pub mode: usize,
-    /// Kx = -1/A (1), if the mode is antisymmetric; `None` where it is negative or infinite, so
+    /// Kx = -1/A (1) of a lap joint, if the mode is antisymmetric; null where it is negative or infinite, so
     /// that the mode cannot be antisymmetric.
     pub kx: Option<f64>,
-    /// Ky = -1/B (1), if the mode is symmetric; `None` where the mode cannot be.
+    /// Ky = -1/B (1) of a lap joint, if the mode is symmetric; null where the mode cannot be.
     pub ky: Option<f64>,
+    /// Young's modulus (Pa) of a free beam.
+    pub modulus: Option<f64>,
 }
 
 /// The stiffness that each mode of a lap joint gives alone, for either symmetry.
 ///
 /// # Errors
 /// [`IdentifyError::Frequency`].
-pub fn single_mode_stiffness(
-    modes: &[ModeLambda],
-) -> Result<Vec<SingleModeStiffness>, IdentifyError> {
+pub fn single_mode_stiffness(modes: &[ModeLambda]) -> Result<Vec<SingleMode>, IdentifyError> {
     let modes = modes.iter().map(|&ModeLambda { mode, lambda }| {
         check_frequency(mode, lambda)?;
         let Coefficients { p, x, y, .. } = PairsModel::Lap.body().coefficients(lambda);
         let [kx, ky] = [-p / x, -p / y].map(|k| (k > 0.0 && k.is_finite()).then_some(k));
-        Ok(SingleModeStiffness { mode, kx, ky })
+        Ok(SingleMode {
+            mode,
+            kx,
+            ky,
+            modulus: None,
+        })
     });
     modes.collect()
 }
@@ -456,17 +463,29 @@ pub struct MeasuredMode {
     pub std: Option<f64>,
 }
 
-/// A value with its uncertainty, as far as it is known.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A value with its uncertainty.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Uncertain {
-    /// Best value.
+    /// The value; null where it is infinite: rigid.
+    #[schemars(with = "Option<f64>")]
     pub value: f64,
-    /// Standard uncertainty.
+    /// Standard deviation.
     pub std: Option<f64>,
-    /// Lower end of the 95 % interval; `None` = unknown or unbounded.
+    /// Lower 95 % limit; null where it is unknown or unbounded.
     pub low: Option<f64>,
-    /// Upper end of the 95 % interval; `None` = unknown or unbounded.
+    /// Upper 95 % limit; null where it is unknown or unbounded.
     pub high: Option<f64>,
+    /// Standard deviation scaled by the misfit: where the model misses the frequencies by more than
+    /// their uncertainties, and where none are stated.
+    pub std_scaled: Option<f64>,
+    /// Lower 95 % limit by the scaled standard deviation and Student's distribution.
+    pub low_scaled: Option<f64>,
+    /// Upper 95 % limit likewise.
+    pub high_scaled: Option<f64>,
+    /// Where there is no upper limit: at least this much, with 95 % confidence.
+    pub at_least: Option<f64>,
+    /// Where there is no lower limit: at most this much, likewise.
+    pub at_most: Option<f64>,
 }
 
 impl Uncertain {
@@ -477,17 +496,25 @@ impl Uncertain {
             std,
             low: std.map(|std| value - NORMAL_95 * std),
             high: std.map(|std| value + NORMAL_95 * std),
+            ..Self::default()
         }
     }
 
     /// In another unit, `factor` (positive) times the number.
     pub fn scaled(&self, factor: f64) -> Self {
-        Self {
-            value: factor * self.value,
-            std: self.std.map(|std| factor * std),
-            low: self.low.map(|low| factor * low),
-            high: self.high.map(|high| factor * high),
+        let mut scaled = *self;
+        scaled.value *= factor;
+        let known = [&mut scaled.std, &mut scaled.low, &mut scaled.high];
+        let of_misfit = [
+            &mut scaled.std_scaled,
+            &mut scaled.low_scaled,
+            &mut scaled.high_scaled,
+        ];
+        let limits = [&mut scaled.at_least, &mut scaled.at_most];
+        for number in known.into_iter().chain(of_misfit).chain(limits).flatten() {
+            *number *= factor;
         }
+        scaled
     }
 }
 
@@ -514,7 +541,7 @@ pub struct JointEstimate {
     /// The regression behind it.
     pub pairs: PairsEstimate,
     /// For a lap joint: what each mode says alone; else empty.
-    pub single_modes: Vec<SingleModeStiffness>,
+    pub single_modes: Vec<SingleMode>,
     /// What speaks against it.
     pub doubts: Vec<Doubt>,
 }

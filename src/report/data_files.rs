@@ -4,7 +4,7 @@
 use super::ReportError;
 use super::document::{
     Document, EstimateSection, FreeBeamSection, Method, ModeSection, MonteCarloSection,
-    PairsSection, ResolutionSpanSection, ValueSection,
+    PairsSection, ResolutionSpanSection, ValueSection, method_name,
 };
 use num_complex::Complex64;
 use tapjoint_analysis::Frf;
@@ -150,7 +150,7 @@ fn mode_row(mode: &ModeSection) -> Vec<String> {
         mode.mode.map(|n| n.to_string()).unwrap_or_default(),
         mode.label.clone().unwrap_or_default(),
         mode.recording.clone().unwrap_or_default(),
-        mode.method.name().to_owned(),
+        method_name(mode.method).to_owned(),
         number(Some(mode.frequency)),
         number(mode.std),
         number(mode.line_frequency),

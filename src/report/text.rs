@@ -1,7 +1,7 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
 use super::document::{
-    Document, EstimateSection, ModeSection, ReadBy, RecordingSection, TapSection,
+    Document, EstimateSection, ModeSection, ReadBy, RecordingSection, TapSection, method_name,
 };
 use super::format::{signed_percent, significant, trimmed};
 use super::tables::{self, Table};
@@ -66,7 +66,7 @@ pub fn modes(document: &Document) -> String {
         return String::new();
     };
     let modes = document.modes.as_deref().unwrap_or_default();
-    let fitted = modes.iter().any(|mode| mode.method == ReadBy::Fit);
+    let fitted = modes.iter().any(|mode| mode.method == Some(ReadBy::Fit));
     let note = if fitted {
         let note = format!(
             "Frequency: fit of {}, \u{b1} half the 95 % interval{}; line: the highest spectral line \
@@ -86,8 +86,8 @@ pub fn modes(document: &Document) -> String {
 fn not_fitted(modes: &[ModeSection]) -> String {
     let others: Vec<String> = modes
         .iter()
-        .filter(|mode| mode.method != ReadBy::Fit)
-        .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, mode.method.name())))
+        .filter(|mode| mode.method != Some(ReadBy::Fit))
+        .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, method_name(mode.method))))
         .collect();
     match others.is_empty() {
         true => String::new(),
@@ -306,5 +306,8 @@ fn peak_stage(mode: &ModeSection) -> String {
         (None, None) => "no number".to_owned(),
     };
     let frequency = significant(mode.frequency, 7);
-    format!("peak at {frequency} Hz ({}), {what}", mode.method.name())
+    format!(
+        "peak at {frequency} Hz ({}), {what}",
+        method_name(mode.method)
+    )
 }

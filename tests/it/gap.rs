@@ -9,6 +9,7 @@ use tapjoint::gap::{
 use tapjoint::identify::observation::{
     Configuration, ExtraPeak, Observations, ObservedMode, UNPAIRED,
 };
+use tapjoint::pipeline::read_elsewhere;
 use tapjoint::structure::specimen::{PointMass, SpecimenJoint};
 
 const LENGTH: f64 = 0.423;
@@ -518,26 +519,10 @@ fn prop_two_changes_of_the_beam_are_no_more_than_something_spread_over_it() {
 
 /// Frequencies read elsewhere.
 fn read(frequencies: &[f64], std: impl Fn(f64) -> Option<f64>) -> Observations {
-    let mode = |(index, frequency): (usize, &f64)| {
-        ObservedMode::read_elsewhere(index + 1, *frequency, std(*frequency))
-    };
+    let modes = (1..).zip(frequencies);
+    let modes = modes.map(|(number, &f)| ObservedMode::read_elsewhere(number, f, std(f)));
     Observations {
-        configurations: vec![Configuration {
-            file: None,
-            recording: None,
-            sensors: Vec::new(),
-            masses: Vec::new(),
-            tap: None,
-            peak_force: None,
-            level: None,
-            taps: 0,
-            decay_seconds: None,
-            band: None,
-            modes: frequencies.iter().enumerate().map(mode).collect(),
-            covariance: None,
-            common: 0.0,
-            extra_peaks: Vec::new(),
-        }],
+        configurations: vec![read_elsewhere(modes.collect())],
     }
 }
 

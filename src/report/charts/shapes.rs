@@ -18,13 +18,13 @@ pub fn shapes(document: &Document) -> Option<Chart> {
     let shapes = document.mode_shapes.as_deref().unwrap_or_default();
     let (mut sensors, mut taps) = (BTreeMap::<&str, Vec<f64>>::new(), Vec::new());
     for recording in document.recordings.iter().flatten() {
-        for (name, place) in &recording.sensor_positions {
+        for (name, place) in &recording.conditions.sensor_positions {
             let places = sensors.entry(name).or_default();
             if !places.contains(place) {
                 places.push(*place);
             }
         }
-        taps.extend(recording.tap.filter(|tap| !taps.contains(tap)));
+        taps.extend(recording.conditions.tap.filter(|tap| !taps.contains(tap)));
     }
     let kind = document.kind();
     let mut panels = Vec::new();

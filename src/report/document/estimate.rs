@@ -6,39 +6,37 @@ use serde::Serialize;
 use super::super::format::significant;
 use tapjoint_analysis::{Estimate, EstimateMethod, Identification};
 use tapjoint_beam::Beam;
-use tapjoint_identify::consistent::{
-    ConsistentEstimate, Correlation, EstimatedQuantity, Limit, Quantity,
-};
-use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Uncertain};
+use tapjoint_identify::consistent::{ConsistentEstimate, Correlation, Limit, Quantity};
+use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, SingleMode, Uncertain};
 use tapjoint_numerics::stats::times;
 
 /// The joint, or the free beam's material.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct EstimateSection {
     /// "consistent", "pairs", or "free-beam".
-    pub method: Method,
+    pub method: EstimateMethod,
     /// Modes that entered.
     pub modes_used: Vec<usize>,
     /// Why the estimate is doubtful, if it is.
     pub reason: Option<String>,
     /// Kx, non-dimensional.
-    pub kx: Option<ValueSection>,
+    pub kx: Option<Uncertain>,
     /// Ky, non-dimensional.
-    pub ky: Option<ValueSection>,
+    pub ky: Option<Uncertain>,
     /// Kz, non-dimensional.
-    pub kz: Option<ValueSection>,
+    pub kz: Option<Uncertain>,
     /// sqrt(Kx Ky)/Kz.
-    pub coupling: Option<ValueSection>,
+    pub coupling: Option<Uncertain>,
     /// Kt (N/m).
-    pub kt: Option<ValueSection>,
+    pub kt: Option<Uncertain>,
     /// Kr (N m/rad).
-    pub kr: Option<ValueSection>,
+    pub kr: Option<Uncertain>,
     /// Ktr (N/rad).
-    pub ktr: Option<ValueSection>,
+    pub ktr: Option<Uncertain>,
     /// Young's modulus (Pa).
-    pub modulus: Option<ValueSection>,
+    pub modulus: Option<Uncertain>,
     /// Density (kg/m3).
-    pub density: Option<ValueSection>,
+    pub density: Option<Uncertain>,
     /// The beam that belongs to the joint: as described but for what was estimated of it; null of a closed
     /// form.
     pub beam: Option<Beam>,
@@ -51,89 +49,18 @@ pub struct EstimateSection {
     pub goodness_of_fit: Option<f64>,
     /// The misfit behind it; null of a closed form.
     pub misfit: Option<MisfitSection>,
-    /// What the frequencies can tell; null of a closed form.
+    /// Combinations of parameters that the frequencies determine; null of a closed form.
     pub identifiability: Option<IdentifiabilitySection>,
     /// The pair regression.
     pub pairs: Option<PairsSection>,
     /// A free beam in closed form.
     pub free_beam: Option<FreeBeamSection>,
-    /// What each mode says alone: of a lap joint its Kx if antisymmetric or Ky if symmetric, of a free
+    /// Estimates from each mode alone: of a lap joint its Kx if antisymmetric or Ky if symmetric, of a free
     /// beam its modulus; else empty.
-    pub single_modes: Vec<SingleModeSection>,
+    pub single_modes: Vec<SingleMode>,
 }
 
-/// How a joint or a beam was estimated.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// Least squares on the frequencies themselves.
-    #[default]
-    Consistent,
-    /// The regression over pairs of modes.
-    Pairs,
-    /// A free beam's closed form.
-    FreeBeam,
-}
-
-impl Method {
-    /// Its name in outputs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::Consistent => "consistent",
-            Method::Pairs => "pairs",
-            Method::FreeBeam => "free-beam",
-        }
-    }
-}
-
-impl From<EstimateMethod> for Method {
-    fn from(method: EstimateMethod) -> Self {
-        match method {
-            EstimateMethod::Consistent => Method::Consistent,
-            EstimateMethod::Pairs => Method::Pairs,
-        }
-    }
-}
-
-/// A value with its uncertainty.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
-pub struct ValueSection {
-    /// The value; null where it is infinite: rigid.
-    #[schemars(with = "Option<f64>")]
-    pub value: f64,
-    /// Standard deviation.
-    pub std: Option<f64>,
-    /// Lower 95 % limit.
-    pub low: Option<f64>,
-    /// Upper 95 % limit.
-    pub high: Option<f64>,
-    /// Standard deviation scaled by the misfit: where the model misses the frequencies by more than
-    /// their uncertainties, and where none are stated.
-    pub std_scaled: Option<f64>,
-    /// Lower 95 % limit by the scaled standard deviation and Student's distribution.
-    pub low_scaled: Option<f64>,
-    /// Upper 95 % limit likewise.
-    pub high_scaled: Option<f64>,
-    /// Where there is no upper limit: at least this much, with 95 % confidence.
-    pub at_least: Option<f64>,
-    /// Where there is no lower limit: at most this much, likewise.
-    pub at_most: Option<f64>,
-}
-
-/// What one mode says alone; a value that it cannot give is null.
-#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
-pub struct SingleModeSection {
-    /// Mode number.
-    pub mode: usize,
-    /// Kx, if the mode is antisymmetric.
-    pub kx: Option<f64>,
-    /// Ky, if the mode is symmetric.
-    pub ky: Option<f64>,
-    /// Young's modulus (Pa).
-    pub modulus: Option<f64>,
-}
-
-/// The pair regression's values.
+/// Values of the pair regression: non-dimensional those of its equations, with units those of the joint that they make.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PairsSection {
     /// Kx.
@@ -154,7 +81,7 @@ pub struct PairsSection {
     pub condition: Option<f64>,
 }
 
-/// How well the model explains the frequencies.
+/// Fit of the model to the frequencies: the goodness of the estimate in percent and in words.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct MisfitSection {
     /// Sum of squared residuals over their standard deviations; null without uncertainties.
@@ -167,7 +94,7 @@ pub struct MisfitSection {
     pub verdict: String,
 }
 
-/// What the frequencies can and cannot tell.
+/// Combinations of parameters that the frequencies determine, and those that they do not.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct IdentifiabilitySection {
     /// Singular values of the Jacobian, descending: the inverse of each is the relative uncertainty of
@@ -188,7 +115,7 @@ pub struct FreeBeamSection {
     pub density: f64,
 }
 
-/// One measured mode beside its prediction. error_percent = 100 (predicted - measured)/measured.
+/// One measured mode beside its prediction, of which there is lambda alone without a beam. error_percent = 100 (predicted - measured)/measured.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct PredictionSection {
     /// Mode number.
@@ -201,7 +128,7 @@ pub struct PredictionSection {
     pub lambda: Option<f64>,
     /// Error (%).
     pub error_percent: Option<f64>,
-    /// Whether the mode entered the estimate.
+    /// True if the mode entered the estimate.
     pub used: bool,
 }
 
@@ -225,16 +152,16 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
 fn joint_section(joint: &JointEstimate) -> EstimateSection {
     let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
     EstimateSection {
-        method: Method::Pairs,
+        method: EstimateMethod::Pairs,
         modes_used: joint.modes_used.clone(),
         reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
-        kx: joint.kx.map(ValueSection::from),
-        ky: joint.ky.map(ValueSection::from),
-        kz: joint.kz.map(ValueSection::from),
-        coupling: joint.coupling.map(ValueSection::from),
-        kt: joint.kt.map(ValueSection::from),
-        kr: joint.kr.map(ValueSection::from),
-        ktr: joint.ktr.map(ValueSection::from),
+        kx: joint.kx,
+        ky: joint.ky,
+        kz: joint.kz,
+        coupling: joint.coupling,
+        kt: joint.kt,
+        kr: joint.kr,
+        ktr: joint.ktr,
         pairs: Some(PairsSection {
             kx: joint.pairs.kx,
             ky: joint.pairs.ky,
@@ -245,26 +172,17 @@ fn joint_section(joint: &JointEstimate) -> EstimateSection {
             closure: joint.pairs.closure,
             condition: Some(joint.pairs.condition),
         }),
-        single_modes: joint
-            .single_modes
-            .iter()
-            .map(|single| SingleModeSection {
-                mode: single.mode,
-                kx: single.kx,
-                ky: single.ky,
-                modulus: None,
-            })
-            .collect(),
+        single_modes: joint.single_modes.clone(),
         ..Default::default()
     }
 }
 
 fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
     EstimateSection {
-        method: Method::FreeBeam,
+        method: EstimateMethod::FreeBeam,
         modes_used: free.modes_used.clone(),
-        modulus: Some(free.modulus.into()),
-        density: Some(free.density.into()),
+        modulus: Some(free.modulus),
+        density: Some(free.density),
         free_beam: Some(FreeBeamSection {
             modulus: free.modulus.value,
             density: free.density.value,
@@ -272,25 +190,13 @@ fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
         single_modes: free
             .per_mode
             .iter()
-            .map(|&(mode, modulus)| SingleModeSection {
+            .map(|&(mode, modulus)| SingleMode {
                 mode,
                 modulus: Some(modulus),
                 ..Default::default()
             })
             .collect(),
         ..Default::default()
-    }
-}
-
-impl From<Uncertain> for ValueSection {
-    fn from(found: Uncertain) -> Self {
-        ValueSection {
-            value: found.value,
-            std: found.std,
-            low: found.low,
-            high: found.high,
-            ..ValueSection::default()
-        }
     }
 }
 
@@ -307,12 +213,9 @@ pub(super) fn prediction_section(mode: &PredictedMode) -> PredictionSection {
 
 /// The main estimate; what stands beside it is added by the caller.
 fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
-    let value = |quantity: Quantity| found.quantity(quantity).and_then(value_section);
-    // A property with a tolerance is fitted along, but nobody asked for it.
-    let asked = |quantity: Quantity| value(quantity).filter(|_| is_asked(found, quantity));
     let goodness = &found.goodness;
     EstimateSection {
-        method: Method::Consistent,
+        method: EstimateMethod::Consistent,
         modes_used: found.modes_used.clone(),
         reason: goodness.uncertainty_factor().map(|factor| {
             format!(
@@ -322,15 +225,15 @@ fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
                 times(factor)
             )
         }),
-        kx: value(Quantity::Kx),
-        ky: value(Quantity::Ky),
-        kz: value(Quantity::Kz),
-        coupling: value(Quantity::Coupling),
-        kt: value(Quantity::Kt),
-        kr: value(Quantity::Kr),
-        ktr: value(Quantity::Ktr),
-        modulus: asked(Quantity::Modulus),
-        density: asked(Quantity::Density),
+        kx: value(found, Quantity::Kx),
+        ky: value(found, Quantity::Ky),
+        kz: value(found, Quantity::Kz),
+        coupling: value(found, Quantity::Coupling),
+        kt: value(found, Quantity::Kt),
+        kr: value(found, Quantity::Kr),
+        ktr: value(found, Quantity::Ktr),
+        modulus: asked(found, Quantity::Modulus),
+        density: asked(found, Quantity::Density),
         correlations: found.correlations.clone(),
         beam: Some(found.beam),
         log_covariance: found.stiffness_covariance,
@@ -346,9 +249,10 @@ fn consistent_section(found: &ConsistentEstimate) -> EstimateSection {
     }
 }
 
-/// A rigid joint is infinite in the tables and null in JSON; a value at the edge of its range has no
-/// standard deviation.
-fn value_section(quantity: &EstimatedQuantity) -> Option<ValueSection> {
+/// Returns the value of an estimated quantity. A rigid joint is infinite in the tables and null in JSON; a value at the
+/// edge of its range has no standard deviation.
+fn value(found: &ConsistentEstimate, quantity: Quantity) -> Option<Uncertain> {
+    let quantity = found.quantity(quantity)?;
     let rigid = quantity.limit == Some(Limit::Rigid) || quantity.value.is_none();
     let spring = !matches!(
         quantity.quantity,
@@ -359,7 +263,7 @@ fn value_section(quantity: &EstimatedQuantity) -> Option<ValueSection> {
     }
     let rigid = rigid && spring;
     let scaled = quantity.scaled.filter(|_| !rigid);
-    Some(ValueSection {
+    Some(Uncertain {
         value: quantity.value.filter(|_| !rigid).unwrap_or(f64::INFINITY),
         std: quantity.std.filter(|_| !rigid),
         low: quantity.low,
@@ -372,14 +276,17 @@ fn value_section(quantity: &EstimatedQuantity) -> Option<ValueSection> {
     })
 }
 
-fn is_asked(found: &ConsistentEstimate, quantity: Quantity) -> bool {
-    found
-        .fit
-        .iter()
-        .any(|parameter| parameter.name() == quantity.name())
+/// Returns the value of a quantity that was asked for: a property with a tolerance is fitted along without that.
+fn asked(found: &ConsistentEstimate, quantity: Quantity) -> Option<Uncertain> {
+    value(found, quantity).filter(|_| is_asked(found, quantity))
 }
 
-/// Where the beam's uncertain properties went.
+fn is_asked(found: &ConsistentEstimate, quantity: Quantity) -> bool {
+    let mut parameters = found.fit.iter();
+    parameters.any(|parameter| parameter.name() == quantity.name())
+}
+
+/// Sentences on the uncertain properties of the beam that were fitted along.
 fn fitted_along(found: &ConsistentEstimate) -> Vec<String> {
     let beam = [
         (Quantity::Modulus, "Pa"),

@@ -14,7 +14,7 @@ use tapjoint_diagnosis::{
 pub struct GapSection {
     /// The answer.
     pub verdict: Verdict,
-    /// Where the gap lies, given that there is one; null without a diagnosis.
+    /// Location of the gap, given that there is one; null without a diagnosis.
     #[serde(rename = "where")]
     pub place: Option<GapPlaceSection>,
     /// All hypotheses, the most probable first.
@@ -23,7 +23,7 @@ pub struct GapSection {
     pub noise_floor: Option<f64>,
     /// Probability of a misfit as large or larger, under the best hypothesis.
     pub goodness_of_fit: Option<f64>,
-    /// How much the joint moves when the best hypothesis is added.
+    /// Change of the joint when the best hypothesis is added.
     pub joint_shift: Option<JointShift>,
     /// Modes above this number took no part in the fit; null without a diagnosis.
     pub fitted_modes: Option<usize>,
@@ -32,10 +32,10 @@ pub struct GapSection {
     pub unplaced: Option<UnlocatedSensors>,
     /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
     pub decided_by: Option<DecidedBy>,
-    /// What the decays by themselves say of a joint whose stiffness depends on the amplitude, whatever the
+    /// Evidence of the decays alone for a joint whose stiffness depends on the amplitude, whatever the
     /// verdict; null where no frequency changes along them.
     pub along_decays: Option<AmplitudeDependence>,
-    /// What the residual of the nominal model calls for along the beam.
+    /// Changes along the beam that would explain the residual of the nominal model.
     pub map: Option<LocationMap>,
     /// Two plain answers beside the diagnosis: nothing added, and one common factor.
     pub baselines: Vec<BaselineSection>,
@@ -46,7 +46,7 @@ pub struct GapSection {
     pub updated_model: Option<UpdatedModelSection>,
 }
 
-/// Where the gap lies.
+/// Location of the gap.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct GapPlaceSection {
     /// Probability (1) of joint, fixture, sensor, body, acquisition, unknown.
@@ -69,7 +69,7 @@ pub struct BaselineSection {
     pub holdout_after: Option<f64>,
 }
 
-/// What a plain answer adds to the model.
+/// Addition of a plain answer to the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Baseline {

@@ -7,23 +7,25 @@ mod estimate;
 mod frf;
 mod gap;
 mod modes;
-mod perturbation;
 mod recordings;
 
 pub use estimate::{
-    EstimateSection, FreeBeamSection, IdentifiabilitySection, Method, MisfitSection, PairsSection,
-    PredictionSection, SingleModeSection, ValueSection,
+    EstimateSection, FreeBeamSection, IdentifiabilitySection, MisfitSection, PairsSection,
+    PredictionSection,
 };
-pub use frf::{FrfResonanceSection, FrfSection, frf_document};
+pub use frf::{FrfSection, frf_document};
 pub use gap::{
     Baseline, BaselineSection, GapPlaceSection, GapSection, UpdatedModelSection, gap_section,
 };
-pub use modes::{AmplitudeSection, FitSection, ModeSection, ReadBy};
-pub use perturbation::{
-    AverageSection, MonteCarloSection, PerturbationSection, ResolutionSpanSection,
-    SensitivitySection,
-};
+pub use modes::{AmplitudeSection, FitSection, ModeSection, method_name};
 pub use recordings::{ChannelSection, DatasetSection, RecordingSection, TapSection, datasets_of};
+// Sections that are results as they are.
+pub use tapjoint_analysis::{
+    AverageSection, Conditions, EstimateMethod as Method, FrfResonance as FrfResonanceSection,
+    MonteCarloSection, PerturbationSection, ResolutionSpanSection, SensitivitySection,
+};
+pub use tapjoint_identify::Uncertain as ValueSection;
+pub use tapjoint_signal::modal::ReadBy;
 
 use super::format::with_minus_signs;
 use estimate::{estimate_section, prediction_section};
@@ -45,7 +47,7 @@ pub const VERSION: u32 = 1;
 pub struct Document {
     /// Version of the layout.
     pub version: u32,
-    /// What was tested.
+    /// The tested structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub test: Option<TestSection>,
     /// Each recording: taps, spectra, its own readings.
@@ -88,14 +90,14 @@ pub struct Document {
     /// The gap between model and measurement: where, which effect, how far it closes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gap: Option<GapSection>,
-    /// How well the test was made: every check of good practice.
+    /// Quality of the test: every check of good practice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Vec<Verdict>>,
-    /// What a reader has to know.
+    /// Everything that a reader of the results has to know.
     pub warnings: Vec<WarningSection>,
 }
 
-/// What was tested.
+/// The tested structure.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TestSection {
     /// Name of the test.
@@ -119,13 +121,13 @@ pub struct TestSection {
 pub struct WarningSection {
     /// Short code that scripts may look for.
     pub code: String,
-    /// What happened, why it might be, what helps.
+    /// Event, likely cause and remedy.
     pub text: String,
-    /// Whether it concerns only the pair regression that stands beside the estimate, and not the estimate.
+    /// True if it concerns only the pair regression that stands beside the estimate, and not the estimate.
     pub beside: bool,
 }
 
-/// Those of some warnings that concern the result itself.
+/// Returns the warnings that concern the result itself.
 pub fn of_the_result(warnings: &[WarningSection]) -> Vec<&WarningSection> {
     warnings.iter().filter(|warning| !warning.beside).collect()
 }
@@ -141,12 +143,12 @@ impl WarningSection {
 }
 
 impl Document {
-    /// What the joint joins; `None` for a bare recording.
+    /// Kind of structure; `None` for a bare recording.
     pub fn kind(&self) -> Option<Assembly> {
         self.test.as_ref()?.kind
     }
 
-    /// Whether a joint is sought: a free beam has none.
+    /// Returns true if a joint is sought: a free beam has none.
     pub fn has_joint(&self) -> bool {
         self.kind() != Some(Assembly::Free)
     }
@@ -162,7 +164,7 @@ impl Document {
         of_the_result(&self.warnings).into_iter()
     }
 
-    /// Those that concern only the pair regression beside it.
+    /// The warnings that concern only the pair regression beside the result.
     pub fn warnings_beside(&self) -> impl Iterator<Item = &WarningSection> {
         self.warnings.iter().filter(|warning| warning.beside)
     }
@@ -198,8 +200,12 @@ pub fn document_of(analysis: &Analysis) -> Document {
         warnings: warnings.collect(),
         ..Document::default()
     };
-    if let Some(found) = identification {
-        document.add_perturbations(&found.perturbations);
+    let perturbations = identification.map(|found| &found.perturbations);
+    if let Some(found) = perturbations.filter(|found| !found.is_empty()) {
+        document.perturbation = Some(found.uniform.clone());
+        document.perturbation_averages = Some(found.averages.clone());
+        document.monte_carlo = Some(found.random.clone()).filter(|list| !list.is_empty());
+        document.resolution_span = Some(found.spans.clone()).filter(|list| !list.is_empty());
     }
     document
 }

@@ -1,12 +1,12 @@
 //! Resonances in the document: readings, fits, change with amplitude.
 
-use schemars::JsonSchema;
-use serde::Serialize;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Serialize, Serializer};
 
 use tapjoint_analysis::{AmplitudeChange, ModeResult, RecordingResult};
 use tapjoint_signal::modal::amplitude::{AmplitudePoint, AmplitudeVerdict, Trend};
 use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
-use tapjoint_signal::modal::{self, FittedReading, ModeReading};
+use tapjoint_signal::modal::{FittedReading, ModeReading, ReadBy};
 
 /// One resonance.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
@@ -16,14 +16,16 @@ pub struct ModeSection {
     /// Best frequency (Hz).
     pub frequency: f64,
     /// "fit", "interpolated" or "line" ("given" when read elsewhere).
-    pub method: ReadBy,
+    #[serde(serialize_with = "write_method")]
+    #[schemars(schema_with = "method_schema")]
+    pub method: Option<ReadBy>,
     /// Frequency on the line (Hz).
     pub line_frequency: Option<f64>,
     /// Bound of the line reading (Hz).
     pub half_line: Option<f64>,
     /// Frequency between the lines (Hz).
     pub interpolated_frequency: Option<f64>,
-    /// Its bound (Hz), about 95 %.
+    /// Bound of the frequency between the lines (Hz), about 95 %.
     pub interpolated_bound: Option<f64>,
     /// Standard deviation of the best frequency (Hz).
     pub std: Option<f64>,
@@ -33,7 +35,7 @@ pub struct ModeSection {
     pub high: Option<f64>,
     /// Damping ratio.
     pub damping: Option<f64>,
-    /// Its standard deviation.
+    /// Standard deviation of the damping ratio.
     pub damping_std: Option<f64>,
     /// The fit; null where the mode was not fitted.
     pub fit: Option<FitSection>,
@@ -49,35 +51,21 @@ pub struct ModeSection {
     pub above_noise_db: Option<f64>,
     /// The recording it was read from.
     pub recording: Option<String>,
-    /// What a peak that is no mode is: "mains 50 Hz".
+    /// Name of a peak that is no mode: "mains 50 Hz".
     pub label: Option<String>,
 }
 
-/// How a frequency was read.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ReadBy {
-    /// By a fit of the decays.
-    Fit,
-    /// Between the spectral lines.
-    Interpolated,
-    /// On a spectral line.
-    Line,
-    /// Elsewhere: the frequency was given.
-    #[default]
-    Given,
+/// Name of the way in which a frequency was read; "given" for one that was read elsewhere.
+pub fn method_name(method: Option<ReadBy>) -> &'static str {
+    method.map_or("given", ReadBy::name)
 }
 
-impl ReadBy {
-    /// Its name in outputs.
-    pub fn name(self) -> &'static str {
-        match self {
-            ReadBy::Fit => "fit",
-            ReadBy::Interpolated => "interpolated",
-            ReadBy::Line => "line",
-            ReadBy::Given => "given",
-        }
-    }
+fn write_method<S: Serializer>(method: &Option<ReadBy>, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(method_name(*method))
+}
+
+fn method_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "string", "enum": ["fit", "interpolated", "line", "given"] })
 }
 
 /// The fit of one mode.
@@ -87,7 +75,7 @@ pub struct FitSection {
     pub damping_low: f64,
     /// Upper end of the damping ratio's 95 % interval.
     pub damping_high: f64,
-    /// What the frequency's standard deviation rests on: "residual" (the noise that the fit leaves) or
+    /// Source of the frequency's standard deviation: "residual" (the noise that the fit leaves) or
     /// "taps" (their scatter, where it is more than that noise explains).
     pub uncertainty_from: UncertaintySource,
     /// Degrees of freedom of the frequency's standard deviation.
@@ -146,7 +134,7 @@ impl ModeSection {
             std: mode.std,
             lambda: mode.lambda,
             recording: mode.recording.clone(),
-            label: mode.label.clone(),
+            label: mode.label(),
             ..reading
         }
     }
@@ -160,11 +148,7 @@ impl ModeSection {
         ModeSection {
             mode: None,
             frequency: reading.frequency,
-            method: match reading.source {
-                modal::ReadBy::Fit => ReadBy::Fit,
-                modal::ReadBy::Interpolated => ReadBy::Interpolated,
-                modal::ReadBy::Line => ReadBy::Line,
-            },
+            method: Some(reading.source),
             line_frequency: Some(reading.line_frequency),
             half_line: Some(reading.half_line),
             interpolated_frequency: reading.interpolated,

@@ -1,15 +1,13 @@
 //! Recordings in the document: channels, taps, spectra, readings; and the datasets of universal files.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::ModeSection;
-use tapjoint_analysis::RecordingResult;
-use tapjoint_beam::specimen::PointMass;
+use tapjoint_analysis::{Conditions, RecordingResult};
 use tapjoint_signal::recording::{
-    Abscissa, Dataset, Format, Function, Ordinate, Precision, Separator, UffCoding, UniversalFile,
+    Abscissa, ChannelInfo, Format, Function, Ordinate, Precision, Separator, UffCoding,
+    UniversalFile,
 };
 use tapjoint_signal::spectral::Window;
 
@@ -18,7 +16,7 @@ use tapjoint_signal::spectral::Window;
 pub struct RecordingSection {
     /// File as the description names it.
     pub file: String,
-    /// How it differs from the first recording, so that modes and estimate leave it out: "8.8 times its tap level";
+    /// Difference from the first recording, for which modes and estimate leave it out: "8.8 times its tap level";
     /// null where they do not.
     pub aside: Option<String>,
     /// Format in words: "WAV, 24-bit integer".
@@ -31,11 +29,11 @@ pub struct RecordingSection {
     pub channel_details: Vec<ChannelSection>,
     /// Length (s); null of frequency response functions from a file.
     pub seconds: Option<f64>,
-    /// Whether there is a hammer channel.
+    /// True if there is a hammer channel.
     pub has_hammer: bool,
     /// Names of the responses: sensors, or channels.
     pub responses: Vec<String>,
-    /// Unit of the taps' peaks; null where nobody said.
+    /// Unit of the taps' peaks; null where it is not known.
     pub tap_unit: Option<String>,
     /// Taps in order of time.
     pub taps: Vec<TapSection>,
@@ -51,20 +49,9 @@ pub struct RecordingSection {
     pub lines: Option<usize>,
     /// Taps averaged.
     pub averages: usize,
-    /// Where the hammer strikes (m), where the description says.
-    pub tap: Option<f64>,
-    /// Where each sensor sits (m), moved ones at their place in this recording.
-    pub sensor_positions: BTreeMap<String, f64>,
-    /// What each sensor weighs (kg), of those whose mass is stated.
-    pub sensor_masses: BTreeMap<String, f64>,
-    /// Known masses fastened to the beam for this recording, as described.
-    pub masses: Vec<PointMass>,
-    /// Tightening torque (N m), as described.
-    pub torque: Option<f64>,
-    /// Temperature (degrees Celsius), as described.
-    pub temperature: Option<f64>,
-    /// Date, as described.
-    pub date: Option<String>,
+    /// Circumstances, as described.
+    #[serde(flatten)]
+    pub conditions: Conditions,
     /// Band (Hz).
     pub band: Option<[f64; 2]>,
     /// "rectangular", "hann" or "exponential".
@@ -77,7 +64,7 @@ pub struct RecordingSection {
     pub modes: Vec<ModeSection>,
 }
 
-/// One tap.
+/// One tap: its peak is a force with a hammer, and a response without one.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct TapSection {
     /// When it begins (s from the start of the recording).
@@ -86,38 +73,24 @@ pub struct TapSection {
     pub peak_force: Option<f64>,
     /// Peak of the response on which it stands out most (`tap_unit`); null with a hammer.
     pub peak_response: Option<f64>,
-    /// Whether it enters the averages.
+    /// True if it enters the averages.
     pub accepted: bool,
     /// Why not.
     pub reason: Option<String>,
 }
 
 /// One channel of a recording, in the unit that its values have.
-#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChannelSection {
     /// Number, from 1.
     pub channel: usize,
-    /// Name, where the file gives one.
-    pub name: Option<String>,
-    /// Unit, where known.
-    pub unit: Option<String>,
-    /// Units per unit of the file.
-    pub scale: f64,
-    /// Mean (DC offset).
-    pub mean: f64,
-    /// Root mean square about the mean.
-    pub rms: f64,
-    /// Largest magnitude.
-    pub peak: f64,
-    /// Samples at the format's full scale.
-    pub full_scale_samples: u64,
-    /// Flat tops.
-    pub flat_tops: u64,
-    /// Samples in runs that repeat one value.
-    pub dropped_samples: u64,
+    /// Name, unit, scale and quality of the samples.
+    #[serde(flatten)]
+    pub info: ChannelInfo,
 }
 
-/// One dataset of a universal file, as its header describes it.
+/// One dataset of a universal file, as its header describes it: words for the codes of the format, and the numbers of a
+/// function beside those of the dataset.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct DatasetSection {
     /// The file.
@@ -126,7 +99,7 @@ pub struct DatasetSection {
     pub dataset: usize,
     /// Type of the dataset: 58 for functions, 164 for units, ...
     pub dataset_type: u32,
-    /// What it holds, in words: "frequency response function".
+    /// Contents in words: "frequency response function".
     pub kind: String,
     /// Number of the function's type; null for other datasets, like all below.
     pub function_type: Option<u32>,
@@ -142,7 +115,7 @@ pub struct DatasetSection {
     pub response: Option<String>,
     /// Reference point.
     pub reference: Option<String>,
-    /// What the ordinate, or its numerator, measures.
+    /// Quantity of the ordinate, or of its numerator.
     pub quantity: Option<String>,
     /// Unit of the ordinate, or of its numerator, as written.
     pub unit: Option<String>,
@@ -165,8 +138,16 @@ impl RecordingSection {
     pub(super) fn of(recording: &RecordingResult, aside: Option<String>) -> Self {
         let spectra = recording.measurement.spectra.as_ref();
         let lines = spectra.map(|spectra| spectra.averages.lines);
-        let readings = spectra.iter().flat_map(|spectra| &spectra.readings);
-        let readings = readings.zip(&recording.mode_numbers);
+        let channels = (1..).zip(recording.channels.iter().cloned());
+        let taps = recording.measurement.taps.taps.iter();
+        let taps = taps.map(|tap| TapSection {
+            time: tap.time,
+            peak_force: recording.has_hammer.then_some(tap.peak),
+            peak_response: (!recording.has_hammer).then_some(tap.peak),
+            accepted: tap.accepted(),
+            reason: tap.rejection.as_ref().map(ToString::to_string),
+        });
+        let readings = recording.readings().iter().zip(&recording.mode_numbers);
         let modes = readings.map(|(reading, &mode)| ModeSection {
             mode,
             recording: Some(recording.file.clone()),
@@ -178,25 +159,21 @@ impl RecordingSection {
             format: format_words(recording.format),
             sample_rate: recording.sample_rate,
             channels: recording.channels.len(),
-            channel_details: channel_sections(recording),
+            channel_details: channels
+                .map(|(channel, info)| ChannelSection { channel, info })
+                .collect(),
             seconds: recording.seconds,
             has_hammer: recording.has_hammer,
             responses: recording.responses.iter().map(|r| r.name.clone()).collect(),
             tap_unit: recording.tap_unit.clone(),
-            taps: tap_sections(recording),
+            taps: taps.collect(),
             line_spacing: lines.map(|lines| lines.spacing),
             resolution: lines.map(|lines| lines.resolution()),
             half_line: lines.map(|lines| lines.half_line()),
             block: lines.map(|lines| lines.block),
             lines: lines.map(|lines| lines.displayed()),
             averages: spectra.map_or(0, |spectra| spectra.averages.taps),
-            tap: recording.conditions.tap,
-            sensor_positions: recording.conditions.sensor_positions.clone(),
-            sensor_masses: recording.conditions.sensor_masses.clone(),
-            masses: recording.conditions.masses.clone(),
-            torque: recording.conditions.torque,
-            temperature: recording.conditions.temperature,
-            date: recording.conditions.date.clone(),
+            conditions: recording.conditions.clone(),
             band: lines.map(|lines| [lines.low, lines.high]),
             window: spectra.map(|spectra| spectra.window.name().to_string()),
             window_decay: spectra.and_then(|spectra| added_decay(spectra.window)),
@@ -240,61 +217,27 @@ fn format_words(format: Format) -> String {
     }
 }
 
-fn channel_sections(recording: &RecordingResult) -> Vec<ChannelSection> {
-    recording
-        .channels
-        .iter()
-        .enumerate()
-        .map(|(index, channel)| ChannelSection {
-            channel: index + 1,
-            name: channel.name.clone(),
-            unit: channel.unit.clone(),
-            scale: channel.scale,
-            mean: channel.health.mean,
-            rms: channel.health.rms,
-            peak: channel.health.peak,
-            full_scale_samples: channel.health.full_scale_samples,
-            flat_tops: channel.health.flat_top_count,
-            dropped_samples: channel.health.dropped_samples,
-        })
-        .collect()
-}
-
-fn tap_sections(recording: &RecordingResult) -> Vec<TapSection> {
-    let taps = recording.measurement.taps.taps.iter();
-    taps.map(|tap| TapSection {
-        time: tap.time,
-        peak_force: recording.has_hammer.then_some(tap.peak),
-        peak_response: (!recording.has_hammer).then_some(tap.peak),
-        accepted: tap.accepted(),
-        reason: tap.rejection.as_ref().map(ToString::to_string),
-    })
-    .collect()
-}
-
 /// Returns the datasets of universal files, in their order. `name` is the file as tables show it.
 pub fn datasets_of(name: &str, file: &UniversalFile) -> Vec<DatasetSection> {
-    let datasets = file.datasets.iter();
-    datasets
-        .map(|dataset| dataset_section(name, dataset))
-        .collect()
-}
-
-fn dataset_section(name: &str, dataset: &Dataset) -> DatasetSection {
-    let listed = DatasetSection {
-        file: name.to_owned(),
-        dataset: dataset.number,
-        dataset_type: dataset.kind,
-        kind: dataset.kind_name(),
-        bytes: dataset.bytes,
-        ..Default::default()
-    };
-    match &dataset.function {
-        Some(function) => with_function(listed, function),
-        None => listed,
+    let mut sections = Vec::with_capacity(file.datasets.len());
+    for dataset in &file.datasets {
+        let listed = DatasetSection {
+            file: name.to_owned(),
+            dataset: dataset.number,
+            dataset_type: dataset.kind,
+            kind: dataset.kind_name(),
+            bytes: dataset.bytes,
+            ..Default::default()
+        };
+        sections.push(match &dataset.function {
+            Some(function) => with_function(listed, function),
+            None => listed,
+        });
     }
+    sections
 }
 
+/// The section of a dataset that holds a function.
 fn with_function(listed: DatasetSection, function: &Function) -> DatasetSection {
     let (start, spacing) = match function.abscissa {
         Abscissa::Even { start, step, .. } => (Some(start), Some(step)),
@@ -311,15 +254,16 @@ fn with_function(listed: DatasetSection, function: &Function) -> DatasetSection 
         (Ordinate::Complex, Precision::Single) => "complex, single",
         (Ordinate::Complex, Precision::Double) => "complex, double",
     };
-    let point = |text: String| (text != "-").then_some(text);
+    let [response, reference] = [&function.response, &function.reference]
+        .map(|point| Some(point.to_string()).filter(|text| text != "-"));
     DatasetSection {
         function_type: Some(function.function_type.0),
         points: Some(function.points),
         start,
         spacing,
         spacing_unit: function.abscissa_axis.unit.clone(),
-        response: point(function.response.to_string()),
-        reference: point(function.reference.to_string()),
+        response,
+        reference,
         quantity: function.numerator.quantity_name().map(str::to_owned),
         unit: function.numerator.unit.clone(),
         denominator_unit: function.denominator.unit.clone(),

@@ -182,12 +182,12 @@ fn mode_of(document: &Document, mode: usize) -> Option<&ModeSection> {
 /// Bound of a resonance's best frequency (Hz).
 pub fn bound_of(mode: &ModeSection) -> Option<f64> {
     let own = match mode.method {
-        ReadBy::Interpolated => mode.interpolated_bound,
-        ReadBy::Fit => mode
+        Some(ReadBy::Interpolated) => mode.interpolated_bound,
+        Some(ReadBy::Fit) => mode
             .low
             .zip(mode.high)
             .map(|(low, high)| 0.5 * (high - low)),
-        ReadBy::Line | ReadBy::Given => None,
+        Some(ReadBy::Line) | None => None,
     };
     own.or(mode.half_line)
         .or(mode.std.map(|std| 2.0 * std))

@@ -2,7 +2,7 @@
 
 use super::super::document::{
     Document, FrfResonanceSection, FrfSection, ModeSection, PredictionSection, ReadBy,
-    RecordingSection,
+    RecordingSection, method_name,
 };
 use super::super::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
@@ -20,7 +20,7 @@ const DAMPING_DIGITS: i32 = 4;
 /// One row for each resonance of the merged list; `None` without any.
 pub fn modes(document: &Document) -> Option<Table> {
     let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
-    let given = modes.iter().all(|mode| mode.method == ReadBy::Given);
+    let given = modes.iter().all(|mode| mode.method.is_none());
     let described = document.test.iter().any(|test| test.kind.is_some());
     let caption = match (given, described) {
         (true, _) => "Modes, frequencies given",
@@ -110,7 +110,7 @@ fn details(table: Table) -> Option<Table> {
 
 fn details_note(modes: &[ModeSection]) -> String {
     let mut parts = Vec::new();
-    if modes.iter().any(|mode| mode.method == ReadBy::Fit) {
+    if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit)) {
         parts.push(INTERVAL_NOTE);
     }
     if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
@@ -139,7 +139,7 @@ pub fn fitted_to(document: &Document) -> &'static str {
 
 /// What the columns mean, of the methods that occur.
 fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
-    let by = |method: ReadBy| modes.iter().any(|mode| mode.method == method);
+    let by = |method: ReadBy| modes.iter().any(|mode| mode.method == Some(method));
     let fit = format!(
         "Fit: maximum likelihood of {}; its bound is half the 95 % interval.",
         fitted_to(document)
@@ -238,7 +238,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
     vec![
         mode_name(mode.mode, mode.label.as_deref()),
         reading(mode).joined(),
-        mode.method.name().to_owned(),
+        method_name(mode.method).to_owned(),
         fit.map_or(MISSING, |fit| match fit.uncertainty_from {
             UncertaintySource::Residual => "residual",
             UncertaintySource::TapScatter => "taps",
@@ -262,7 +262,7 @@ fn row(mode: &ModeSection) -> Vec<String> {
 fn is_of(mode: &ModeSection, line: f64) -> bool {
     let bounds = mode.half_line.zip(bound_of(mode));
     let far = |(half, bound): (f64, f64)| (line - mode.frequency).abs() > half + 3.0 * bound;
-    mode.method != ReadBy::Fit || !bounds.is_some_and(far)
+    mode.method != Some(ReadBy::Fit) || !bounds.is_some_and(far)
 }
 
 /// Distance (Hz) of the tap farthest from the mean of all taps; `None` with fewer than two.
@@ -288,9 +288,7 @@ fn damping(mode: &ModeSection) -> String {
 /// The best frequency with its bound.
 pub fn reading(mode: &ModeSection) -> Rounded {
     match (mode.method, mode.half_line, bound_of(mode)) {
-        (ReadBy::Line | ReadBy::Given, Some(half_line), _) => {
-            line_reading(mode.frequency, half_line)
-        }
+        (Some(ReadBy::Line) | None, Some(half_line), _) => line_reading(mode.frequency, half_line),
         (_, half_line, Some(bound)) => frequency_reading(mode.frequency, bound, half_line),
         (_, _, None) => Rounded {
             value: significant(mode.frequency, 6),
@@ -421,8 +419,8 @@ fn function_row(
         optional(found.magnitude, 4),
         unit,
         or_missing(found.phase.map(phase)),
-        coherence(found.coherence),
-        optional(found.random_error.map(|error| 100.0 * error), 2),
+        coherence(found.quality.coherence),
+        optional(found.quality.random_error.map(|error| 100.0 * error), 2),
     ]
 }
 

@@ -77,21 +77,21 @@ pub fn recordings(document: &Document) -> Option<Table> {
 pub fn conditions(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
     let row = |recording: &RecordingSection| {
-        let sensors = recording.sensor_positions.iter();
+        let sensors = recording.conditions.sensor_positions.iter();
         let sensors = sensors.map(|(name, position)| format!("{name} {}", trimmed(*position, 4)));
-        let masses = recording.masses.iter();
+        let masses = recording.conditions.masses.iter();
         let masses = masses.map(|one| {
             let grams = significant(1e3 * one.mass, 4);
             format!("{grams} g at {} m", trimmed(one.position, 4))
         });
         vec![
             recording.file.clone(),
-            exact(recording.tap),
+            exact(recording.conditions.tap),
             listed(sensors.collect()),
             listed(masses.collect()),
-            exact(recording.torque),
-            exact(recording.temperature),
-            or_missing(recording.date.clone()),
+            exact(recording.conditions.torque),
+            exact(recording.conditions.temperature),
+            or_missing(recording.conditions.date.clone()),
         ]
     };
     let table = Table {
@@ -160,18 +160,19 @@ pub fn channels(document: &Document) -> Option<Table> {
 }
 
 fn channel_row(file: &str, channel: &ChannelSection) -> Vec<String> {
-    let unit = channel.unit.as_deref().unwrap_or("not given");
+    let health = &channel.info.health;
+    let unit = channel.info.unit.as_deref().unwrap_or("not given");
     vec![
         file.to_owned(),
         channel.channel.to_string(),
-        channel.name.clone().unwrap_or_default(),
+        channel.info.name.clone().unwrap_or_default(),
         unit_words(unit),
-        significant(channel.mean, 3),
-        significant(channel.rms, 3),
-        significant(channel.peak, 3),
-        channel.full_scale_samples.to_string(),
-        channel.flat_tops.to_string(),
-        channel.dropped_samples.to_string(),
+        significant(health.mean, 3),
+        significant(health.rms, 3),
+        significant(health.peak, 3),
+        health.full_scale_samples.to_string(),
+        health.flat_top_count.to_string(),
+        health.dropped_samples.to_string(),
     ]
 }
 

@@ -269,7 +269,7 @@ fn channels(document: &Document) -> Option<String> {
 fn modes(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref()?;
     let (count, range) = numbered(modes);
-    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method == ReadBy::Given);
+    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method.is_none());
     let found = if given { "given" } else { "found" };
     let described = document.test.iter().any(|test| test.kind.is_some());
     let word = if described { "mode" } else { "resonance" };
@@ -460,7 +460,7 @@ fn bound_name(document: &Document) -> &'static str {
     let modes = document.modes.as_deref().unwrap_or_default();
     let between = modes
         .iter()
-        .any(|mode| matches!(mode.method, ReadBy::Fit | ReadBy::Interpolated));
+        .any(|mode| matches!(mode.method, Some(ReadBy::Fit | ReadBy::Interpolated)));
     if between {
         "half line (as if it had been read on a line only)"
     } else {

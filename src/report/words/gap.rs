@@ -74,8 +74,12 @@ fn sensors_at(document: &Document, gap: &GapSection) -> String {
         });
     let mut sensors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for one in recordings {
-        for (name, position) in &one.sensor_positions {
-            let weighed = one.sensor_masses.get(name).is_some_and(|mass| *mass > 0.0);
+        for (name, position) in &one.conditions.sensor_positions {
+            let weighed = one
+                .conditions
+                .sensor_masses
+                .get(name)
+                .is_some_and(|mass| *mass > 0.0);
             if !(by_mass == Some(true) && weighed) {
                 sensors.entry(name).or_default().push(*position);
             }

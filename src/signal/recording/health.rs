@@ -3,6 +3,8 @@
 use super::error::RecordingError;
 use super::text::LARGEST;
 use super::warning::{ChannelLabel, RecordingWarning};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 /// Longest list of places kept for one channel and one fault; beyond it only the count grows.
 const PLACES_KEPT: usize = 32;
@@ -142,7 +144,7 @@ pub struct Dropout {
 }
 
 /// The quality of one channel over the whole recording, in the channel's unit.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ChannelHealth {
     /// Mean value, the DC offset (the channel's unit).
     pub mean: f64,
@@ -151,25 +153,33 @@ pub struct ChannelHealth {
     /// Largest magnitude (the channel's unit).
     pub peak: f64,
     /// Lowest value (the channel's unit).
+    #[serde(skip)]
     pub minimum: f64,
     /// Highest value (the channel's unit).
+    #[serde(skip)]
     pub maximum: f64,
     /// Samples at the largest or smallest number of an integer format; 0 for other formats.
     pub full_scale_samples: u64,
     /// The first of them (0-based).
+    #[serde(skip)]
     pub first_full_scale: Option<u64>,
     /// Runs of at least 3 equal samples at the channel's highest or lowest level, the first 32 of
     /// each side.
+    #[serde(skip)]
     pub flat_tops: Vec<FlatTop>,
-    /// How many there are.
+    /// Number of flat tops.
+    #[serde(rename = "flat_tops")]
     pub flat_top_count: u64,
     /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
+    #[serde(skip)]
     pub dropped: Vec<Dropout>,
     /// How many there are.
+    #[serde(skip)]
     pub dropout_count: u64,
     /// Samples in all of them together.
     pub dropped_samples: u64,
     /// All samples are equal: nothing was connected, or nothing was recorded.
+    #[serde(skip)]
     pub constant: bool,
 }
 

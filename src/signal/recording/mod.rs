@@ -12,6 +12,8 @@
 //!
 //! This stage knows nothing of taps, spectra or beams, and repairs no samples.
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -120,18 +122,20 @@ pub enum Timing {
 }
 
 /// What is known about one channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ChannelInfo {
     /// Name without the unit, where the file gives one.
     pub name: Option<String>,
     /// The unit that values have: SI where the header's unit is known, the header's text where it
-    /// is not; `None` without a unit and after a scale was set.
+    /// is not; null without a unit and after a scale was set.
     pub unit: Option<String>,
     /// The unit as the header has it.
+    #[serde(skip)]
     pub header_unit: Option<String>,
     /// What file units are multiplied by: the scale set, else the header unit's factor to SI, else 1.
     pub scale: f64,
     /// Quality of the samples, in the unit that values have.
+    #[serde(flatten)]
     pub health: ChannelHealth,
 }
 

@@ -7,6 +7,8 @@
 
 use num_complex::Complex64;
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::lines::Lines;
 use super::transform::{Transformer, Workspace};
@@ -303,12 +305,12 @@ pub fn random_error(coherence: f64, averages: usize) -> Option<f64> {
     (averages >= 2 && error.is_finite()).then_some(error)
 }
 
-/// How well a line is known.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// Quality of a frequency response function on a line.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
 pub struct LineQuality {
-    /// Coherence; `None` below two averages and without a hammer.
+    /// Coherence; null below two averages and without a hammer.
     pub coherence: Option<f64>,
-    /// Relative random error of the FRF's magnitude; `None` where there is no coherence.
+    /// Relative random error (standard deviation) of the magnitude; null without coherence.
     pub random_error: Option<f64>,
 }
 

@@ -133,7 +133,9 @@ impl Estimators {
                 self.consistent(modes, truth),
                 Some(self.true_values(&truth.joint)),
             ),
-            EstimateMethod::Pairs => (self.pairs(modes), self.pairs(&self.exact(truth))),
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
+                (self.pairs(modes), self.pairs(&self.exact(truth)))
+            }
         };
         let nothing = || vec![None; self.parameters.len()];
         let Some((found, exact)) = found.zip(exact) else {
@@ -239,7 +241,7 @@ impl Estimators {
                 .collect();
             let found = match method {
                 EstimateMethod::Consistent => self.consistent(&modes, &self.nominal)?,
-                EstimateMethod::Pairs => self.pairs(&modes)?,
+                EstimateMethod::Pairs | EstimateMethod::FreeBeam => self.pairs(&modes)?,
             };
             found.get(parameter).copied()
         };

@@ -235,7 +235,7 @@ fn sentence(study: &ResolutionStudy) -> String {
     let parts = EstimateMethod::ALL.map(|method| {
         let name = match method {
             EstimateMethod::Consistent => "the consistent estimate",
-            EstimateMethod::Pairs => "the pair regression",
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => "the pair regression",
         };
         format!("{name} needs {}", needs(study, method))
     });

@@ -2,7 +2,6 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
 use tapjoint::description::JointModel;
 use tapjoint::modal::polyreference::PoleStability;
 use tapjoint::quality::{Check, Outcome, Subject, Verdict};
@@ -106,13 +105,12 @@ fn recording(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Recor
     let lines = lines(band);
     RecordingSection {
         aside: None,
-        tap: Some(0.04),
-        sensor_positions: [("A".to_owned(), 0.338)].into(),
-        sensor_masses: BTreeMap::new(),
-        torque: Some(12.0),
-        masses: Vec::new(),
-        temperature: None,
-        date: None,
+        conditions: Conditions {
+            tap: Some(0.04),
+            sensor_positions: [("A".to_owned(), 0.338)].into(),
+            torque: Some(12.0),
+            ..Conditions::default()
+        },
         channel_details: Vec::new(),
         file: file.into(),
         format: "WAV, 24-bit integer".into(),
@@ -166,7 +164,7 @@ fn mode(index: usize, file: &str, lines: &Lines) -> ModeSection {
         random_error: Some(0.016),
         mode: Some(index + 1),
         frequency,
-        method: ReadBy::Interpolated,
+        method: Some(ReadBy::Interpolated),
         line_frequency: Some((frequency / lines.spacing).round() * lines.spacing),
         half_line: Some(lines.half_line()),
         interpolated_frequency: Some(frequency),
@@ -199,7 +197,7 @@ fn modes() -> Vec<ModeSection> {
     modes.push(ModeSection {
         mode: None,
         frequency: 50.0,
-        method: ReadBy::Line,
+        method: Some(ReadBy::Line),
         line_frequency: Some(50.0),
         half_line: Some(0.125),
         recording: Some("low.wav".into()),

@@ -6,7 +6,8 @@ use tapjoint::gap::{
     LocationProbabilities, NextTest, ParameterValue, Proposal, Residual, Verdict,
 };
 use tapjoint::report::document::{
-    Baseline, BaselineSection, Document, GapPlaceSection, GapSection, RecordingSection, TestSection,
+    Baseline, BaselineSection, Conditions, Document, GapPlaceSection, GapSection, RecordingSection,
+    TestSection,
 };
 use tapjoint::report::render_text;
 use tapjoint::report::tables::{gap_in_short, gap_story, hypotheses, next_tests};
@@ -190,7 +191,10 @@ fn regress_digits_of_a_size_follow_its_uncertainty() {
 fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
     let mut document = gap_with(named());
     let sensor = RecordingSection {
-        sensor_positions: [("A".to_owned(), 0.338)].into(),
+        conditions: Conditions {
+            sensor_positions: [("A".to_owned(), 0.338)].into(),
+            ..Conditions::default()
+        },
         ..RecordingSection::default()
     };
     document.recordings = Some(vec![sensor.clone(), sensor]);
@@ -211,7 +215,7 @@ fn regress_the_price_of_an_effect_is_a_stiffness_and_a_sensor_has_a_name() {
     );
     assert!(story.contains("sensor (A at 338 mm) 99.7 %"), "{story}");
     if let Some(recordings) = &mut document.recordings {
-        recordings[1].sensor_positions = [("A".to_owned(), 0.2)].into();
+        recordings[1].conditions.sensor_positions = [("A".to_owned(), 0.2)].into();
     }
     let story = gap_story(&document).join("\n");
     assert!(story.contains("sensor (A, which was moved)"), "{story}");

@@ -1,6 +1,7 @@
 //! Page, JSON, CSV and terminal.
 
 use serde_json::Value;
+use tapjoint::recording::{ChannelHealth, ChannelInfo};
 use tapjoint::report::document::{
     AverageSection, ChannelSection, Document, Method, ModeSection, MonteCarloSection,
     PredictionSection, ReadBy, TapSection, ValueSection, WarningSection,
@@ -427,15 +428,21 @@ fn bare() -> Document {
 fn inspected() -> Document {
     let channel = ChannelSection {
         channel: 2,
-        name: Some("ch2_response_of_the_left_beam".into()),
-        unit: Some("m/s2".into()),
-        mean: -0.0154,
-        peak: 7.47,
-        rms: 1.4,
-        full_scale_samples: 12,
-        flat_tops: 3,
-        dropped_samples: 40,
-        scale: 1.0,
+        info: ChannelInfo {
+            name: Some("ch2_response_of_the_left_beam".into()),
+            unit: Some("m/s2".into()),
+            header_unit: None,
+            scale: 1.0,
+            health: ChannelHealth {
+                mean: -0.0154,
+                peak: 7.47,
+                rms: 1.4,
+                full_scale_samples: 12,
+                flat_top_count: 3,
+                dropped_samples: 40,
+                ..ChannelHealth::default()
+            },
+        },
     };
     let mut document = bare();
     for recording in document.recordings.iter_mut().flatten() {
@@ -829,8 +836,8 @@ fn regress_a_mode_without_a_fit_is_named_in_the_note() {
     let numbered = modes.iter_mut().filter(|mode| mode.mode.is_some());
     for (index, mode) in numbered.enumerate() {
         mode.method = match index {
-            1 => ReadBy::Interpolated,
-            _ => ReadBy::Fit,
+            1 => Some(ReadBy::Interpolated),
+            _ => Some(ReadBy::Fit),
         };
     }
     let text = render_text(&document).replace('\n', " ");

@@ -208,7 +208,7 @@ fn demodulate(
     let factor = ((sample_rate / (OVERSAMPLING * width)) as usize).max(1);
     let mut times = Vec::new();
     let mut shifted = Vec::with_capacity(columns.len());
-    let decimator = Decimator::new(sample_rate, (centre, width), factor, samples);
+    let decimator = Decimator::new(sample_rate, centre, width, factor, samples);
     let delay = decimator.delay();
     for column in columns {
         let zoomed = decimator.run(&column[..samples]);

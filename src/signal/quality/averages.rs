@@ -1,12 +1,9 @@
-//! What the averages over taps are good for.
-//!
-//! Whether the records ring down, and what a window does to their damping.
+//! Checks of the averages over taps: coherence, scatter, decay, and the window's share in the damping.
 
 use std::f64::consts::TAU;
 
 use super::{
-    Check, DampingSource, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Subject,
-    Verdict,
+    Check, DampingSource, Outcome, QualitySettings, RecordingEvidence, ResonanceEvidence, Verdict,
 };
 use crate::spectral::{Window, random_error};
 use tapjoint_numerics::stats::times;
@@ -16,9 +13,7 @@ const ONE_IN_A_HUNDRED: f64 = 2.326;
 
 /// Enough taps.
 pub fn check_averages(recording: &RecordingEvidence, settings: &QualitySettings) -> Verdict {
-    let file = recording.file.clone();
-    let limit = settings.averages as f64;
-    let verdict = Verdict::new(Check::Averages, Subject::Recording { file }, limit);
+    let verdict = recording.verdict(Check::Averages, settings.averages as f64);
     let count = recording.averages();
     let (outcome, meaning) = match count {
         0 => (Outcome::Bad, "there is no spectrum"),
@@ -43,8 +38,9 @@ pub fn check_averages(recording: &RecordingEvidence, settings: &QualitySettings)
 
 /// Coherence at each resonance, of the sensor that sees it best.
 pub fn check_coherence(recording: &RecordingEvidence, settings: &QualitySettings) -> Vec<Verdict> {
-    let of_mode = |mode: &ResonanceEvidence| {
-        let verdict = of_mode(recording, Check::Coherence, (mode, settings.coherence));
+    let modes = recording.resonances.iter();
+    modes.map(|mode| {
+        let verdict = recording.mode_verdict(Check::Coherence, mode, settings.coherence);
         let (sensor, value) = match coherence_at(recording, mode, settings) {
             Ok(found) => found,
             Err(why) => return verdict.missing(why),
@@ -61,8 +57,8 @@ pub fn check_coherence(recording: &RecordingEvidence, settings: &QualitySettings
             settings.trusted_averages
         );
         verdict.found(value, outcome, happened)
-    };
-    recording.resonances.iter().map(of_mode).collect()
+    })
+    .collect()
 }
 
 /// Random error of the FRF's magnitude at each resonance.
@@ -70,8 +66,9 @@ pub fn check_random_error(
     recording: &RecordingEvidence,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
-    let of_mode = |mode: &ResonanceEvidence| {
-        let verdict = of_mode(recording, Check::RandomError, (mode, settings.random_error));
+    let modes = recording.resonances.iter();
+    modes.map(|mode| {
+        let verdict = recording.mode_verdict(Check::RandomError, mode, settings.random_error);
         let (sensor, coherence) = match coherence_at(recording, mode, settings) {
             Ok(found) => found,
             Err(why) => return verdict.missing(why),
@@ -91,8 +88,8 @@ pub fn check_random_error(
             100.0 * settings.random_error
         );
         verdict.found(error, outcome, happened)
-    };
-    recording.resonances.iter().map(of_mode).collect()
+    })
+    .collect()
 }
 
 /// Name and coherence of the sensor that sees a resonance best, or why there is none.
@@ -115,8 +112,7 @@ fn coherence_at<'a>(
     }
     let line = recording.lines.nearest(mode.frequency);
     recording
-        .best_sensor(line)
-        .and_then(|sensor| Some((sensor.name.as_str(), *sensor.coherence.as_ref()?.get(line)?)))
+        .best_coherence(line)
         .ok_or("Not applicable: no coherence was computed.")
 }
 
@@ -125,51 +121,54 @@ pub fn check_frequency_scatter(
     recording: &RecordingEvidence,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
-    let of_mode = |mode: &ResonanceEvidence| {
-        let limit = settings.frequency_scatter;
-        let verdict = of_mode(recording, Check::FrequencyScatter, (mode, limit));
-        let Some(scatter) = deviation(&mode.tap_frequencies) else {
-            return verdict.missing("Not applicable: fewer than two taps were read one by one.");
-        };
-        let relative = scatter / mode.frequency;
-        let explained = mode.tap_std.filter(|std| *std > 0.0);
-        let excess = explained.map(|std| scatter / std);
-        let largest = largest_ratio(mode.tap_frequencies.len());
-        let beyond_noise = excess.is_some_and(|excess| excess > largest);
-        let (outcome, small) = match relative {
-            _ if relative > limit => (Outcome::Bad, String::new()),
-            _ if !beyond_noise => (Outcome::Good, String::new()),
-            _ if relative > settings.least_scatter => (Outcome::Doubtful, String::new()),
-            _ => (
-                Outcome::Good,
-                format!(
-                    "; up to {:.3} % is none to doubt",
-                    100.0 * settings.least_scatter
+    let modes = recording.resonances.iter();
+    modes
+        .map(|mode| {
+            let limit = settings.frequency_scatter;
+            let verdict = recording.mode_verdict(Check::FrequencyScatter, mode, limit);
+            let Some(scatter) = deviation(&mode.tap_frequencies) else {
+                return verdict
+                    .missing("Not applicable: fewer than two taps were read one by one.");
+            };
+            let relative = scatter / mode.frequency;
+            let explained = mode.tap_std.filter(|std| *std > 0.0);
+            let excess = explained.map(|std| scatter / std);
+            let largest = largest_ratio(mode.tap_frequencies.len());
+            let beyond_noise = excess.is_some_and(|excess| excess > largest);
+            let (outcome, small) = match relative {
+                _ if relative > limit => (Outcome::Bad, String::new()),
+                _ if !beyond_noise => (Outcome::Good, String::new()),
+                _ if relative > settings.least_scatter => (Outcome::Doubtful, String::new()),
+                _ => (
+                    Outcome::Good,
+                    format!(
+                        "; up to {:.3} % is none to doubt",
+                        100.0 * settings.least_scatter
+                    ),
                 ),
-            ),
-        };
-        let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {
-            let excess = times(excess);
-            format!("{excess} times what noise explains, where chance reaches {largest:.1}")
-        });
-        let limit = match outcome {
-            Outcome::Doubtful => format!("bad from {:.0} %", 100.0 * limit),
-            _ => format!("limit {:.0} %", 100.0 * limit),
-        };
-        let happened = format!(
-            "The frequency scatters by {:.4} % over {} taps, {noise}{small} ({limit}).",
-            100.0 * relative,
-            mode.tap_frequencies.len()
-        );
-        // What decides is shown: a doubt comes of the noise's share, not of the limit.
-        match excess.filter(|_| outcome == Outcome::Doubtful) {
-            Some(excess) => verdict
-                .against(largest, TIMES_NOISE)
-                .found(excess, outcome, happened),
-            None => verdict.found(relative, outcome, happened),
-        }
-    };
-    recording.resonances.iter().map(of_mode).collect()
+            };
+            let noise = excess.map_or("what noise explains is not known".to_owned(), |excess| {
+                let excess = times(excess);
+                format!("{excess} times what noise explains, where chance reaches {largest:.1}")
+            });
+            let limit = match outcome {
+                Outcome::Doubtful => format!("bad from {:.0} %", 100.0 * limit),
+                _ => format!("limit {:.0} %", 100.0 * limit),
+            };
+            let happened = format!(
+                "The frequency scatters by {:.4} % over {} taps, {noise}{small} ({limit}).",
+                100.0 * relative,
+                mode.tap_frequencies.len()
+            );
+            // What decides is shown: a doubt comes of the noise's share, not of the limit.
+            match excess.filter(|_| outcome == Outcome::Doubtful) {
+                Some(excess) => verdict
+                    .against(largest, TIMES_NOISE)
+                    .found(excess, outcome, happened),
+                None => verdict.found(relative, outcome, happened),
+            }
+        })
+        .collect()
 }
 
 /// Unit of a scatter held against what noise explains.
@@ -193,30 +192,11 @@ fn largest_ratio(count: usize) -> f64 {
     (1.0 - share + ONE_IN_A_HUNDRED * share.sqrt()).powf(1.5)
 }
 
-/// An empty verdict on a mode.
-pub(super) fn of_mode(
-    recording: &RecordingEvidence,
-    check: Check,
-    (mode, limit): (&ResonanceEvidence, f64),
-) -> Verdict {
-    let subject = Subject::Mode {
-        file: recording.file.clone(),
-        frequency: mode.frequency,
-        is_mode: mode.is_mode,
-    };
-    Verdict::new(check, subject, limit)
-}
-
 const NO_WINDOW: &str = "Not applicable: no exponential window was used.";
-
-fn of_recording(recording: &RecordingEvidence, check: Check, limit: f64) -> Verdict {
-    let file = recording.file.clone();
-    Verdict::new(check, Subject::Recording { file }, limit)
-}
 
 /// Level left at the record's end, under the window.
 pub fn check_decay(recording: &RecordingEvidence, settings: &QualitySettings) -> Verdict {
-    let verdict = of_recording(recording, Check::Decay, settings.remaining);
+    let verdict = recording.verdict(Check::Decay, settings.remaining);
     let Some(decay) = recording.decay else {
         return verdict.missing("Not applicable: no tap was accepted.");
     };
@@ -251,7 +231,7 @@ pub fn check_exponential_window(
     settings: &QualitySettings,
 ) -> Verdict {
     let limit = settings.remaining_for_window;
-    let verdict = of_recording(recording, Check::ExponentialWindow, limit);
+    let verdict = recording.verdict(Check::ExponentialWindow, limit);
     let (Window::Exponential { decay: added }, Some(decay)) = (recording.window, recording.decay)
     else {
         return verdict.missing(NO_WINDOW);
@@ -273,12 +253,9 @@ pub fn check_window_damping(
     recording: &RecordingEvidence,
     settings: &QualitySettings,
 ) -> Vec<Verdict> {
-    let of_mode = |mode: &ResonanceEvidence| {
-        let verdict = of_mode(
-            recording,
-            Check::WindowDamping,
-            (mode, settings.window_share),
-        );
+    let modes = recording.resonances.iter();
+    modes.map(|mode| {
+        let verdict = recording.mode_verdict(Check::WindowDamping, mode, settings.window_share);
         let added = recording.window.added_decay();
         if added <= 0.0 {
             return verdict.missing(NO_WINDOW);
@@ -292,20 +269,15 @@ pub fn check_window_damping(
             return verdict.missing("Not applicable: no damping was read.");
         };
         let share = added / (TAU * mode.frequency) / apparent;
-        let (outcome, rest) = match corrected_damping(apparent, added, mode.frequency) {
-            None => (
-                Outcome::Bad,
-                "so that none is left: it is refused".to_owned(),
-            ),
-            Some(own) => {
-                let good = share <= settings.window_share;
-                let outcome = if good {
-                    Outcome::Good
-                } else {
-                    Outcome::Doubtful
-                };
-                (outcome, format!("{own:.5} is the structure's"))
-            }
+        // The pole moves by exactly a, so that zeta = zeta_hat - a/omega; from share 1 on no damping is left that
+        // could be told from an error.
+        let own = apparent - added / (TAU * mode.frequency);
+        let (outcome, rest) = if own > 0.0 {
+            let outcome = Outcome::doubtful_unless(share <= settings.window_share);
+            (outcome, format!("{own:.5} is the structure's"))
+        } else {
+            let none = "so that none is left: it is refused";
+            (Outcome::Bad, none.to_owned())
         };
         let happened = format!(
             "Of the damping ratio {apparent:.5} the window makes {:.0} %, {rest} (limit {:.0} %).",
@@ -313,15 +285,6 @@ pub fn check_window_damping(
             100.0 * settings.window_share
         );
         verdict.found(share, outcome, happened)
-    };
-    recording.resonances.iter().map(of_mode).collect()
-}
-
-/// Damping ratio without the window's share: the pole moves by exactly a, zeta = zeta_hat - a/omega.
-/// `None` where a/omega >= zeta_hat: no damping is left that could be told from an error.
-///
-/// `added_decay` is a (1/s), `frequency` in Hz.
-fn corrected_damping(apparent: f64, added_decay: f64, frequency: f64) -> Option<f64> {
-    let own = apparent - added_decay / (TAU * frequency);
-    (own > 0.0).then_some(own)
+    })
+    .collect()
 }

@@ -5,18 +5,20 @@
 //! need several. Limits are in [`QualitySettings`], each with its source.
 
 mod averages;
-mod evidence;
 mod recordings;
 mod taps;
 mod verdict;
 
+use num_complex::Complex64;
+
+use crate::recording::ResponseForm;
+use crate::spectral::{DecayCheck, Lines, Window};
+use crate::taps::{Rejection, SecondHit, Tap};
+use tapjoint_numerics::stats::median;
+
 pub use averages::{
     check_averages, check_coherence, check_decay, check_exponential_window,
     check_frequency_scatter, check_random_error, check_window_damping,
-};
-pub use evidence::{
-    DampingSource, ForceEvidence, QualitySettings, RecordingEvidence, ResonanceEvidence,
-    SensorEvidence, TapEvidence,
 };
 pub use recordings::{
     check_antiresonances, check_driving_point, check_linearity, check_mass_loading,
@@ -60,4 +62,243 @@ pub fn judge_test(recordings: &[RecordingEvidence], settings: &QualitySettings) 
     verdicts.extend(check_linearity(recordings, settings));
     verdicts.extend(check_mass_loading(recordings, settings));
     verdicts
+}
+
+/// One tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TapEvidence {
+    /// Peak of the force (N), or of the response (its unit).
+    pub peak: f64,
+    /// A second hit in its force, if any.
+    pub second_hit: Option<SecondHit>,
+    /// Why it was rejected; `None` = accepted.
+    pub rejection: Option<Rejection>,
+}
+
+impl From<&Tap> for TapEvidence {
+    fn from(tap: &Tap) -> Self {
+        TapEvidence {
+            peak: tap.peak,
+            second_hit: tap.second_hit,
+            rejection: tap.rejection.clone(),
+        }
+    }
+}
+
+/// The force's spectrum over the accepted taps, line by line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ForceEvidence {
+    /// Root mean square of the taps' transforms (N s).
+    pub spectrum: Vec<f64>,
+    /// Part of the channel's noise alone (N s); `None` where it is not known.
+    pub noise: Option<Vec<f64>>,
+}
+
+/// One sensor as placed in a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SensorEvidence {
+    /// Its name.
+    pub name: String,
+    /// Position (m); `None` where it is not given.
+    pub position: Option<f64>,
+    /// Form of its FRF; `None` for a quantity whose phase to the force means nothing, such as sound.
+    pub form: Option<ResponseForm>,
+    /// H1, line by line (unit of the response per N); `None` without a hammer.
+    pub frf: Option<Vec<Complex64>>,
+    /// Coherence, line by line; `None` where it does not exist.
+    pub coherence: Option<Vec<f64>>,
+}
+
+/// Source of a damping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DampingSource {
+    /// Spectra, under their window.
+    Spectra,
+    /// Decays without any window.
+    Decays,
+}
+
+/// One resonance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResonanceEvidence {
+    /// Its frequency (Hz).
+    pub frequency: f64,
+    /// `false` for a peak without a mode number among others that have theirs.
+    pub is_mode: bool,
+    /// Standard deviation of that (Hz); `None` where it is not known.
+    pub std: Option<f64>,
+    /// Damping ratio as the spectra show it, the window's share in it.
+    pub apparent_damping_ratio: Option<f64>,
+    /// Source of the damping.
+    pub damping_from: DampingSource,
+    /// Frequency of each tap alone (Hz); empty where they were not read.
+    pub tap_frequencies: Vec<f64>,
+    /// Standard deviation of one tap's frequency that the noise explains (Hz).
+    pub tap_std: Option<f64>,
+}
+
+/// One recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingEvidence {
+    /// Its name.
+    pub file: String,
+    /// Position of the hammer (m); `None` where it is not given.
+    pub tap_position: Option<f64>,
+    /// Places (m) and masses (kg) of what is fastened to the beam for this recording.
+    pub fastened: Vec<(f64, f64)>,
+    /// All taps, accepted and rejected, in order of time.
+    pub taps: Vec<TapEvidence>,
+    /// The axis of all that is given line by line.
+    pub lines: Lines,
+    /// The force; `None` without a hammer.
+    pub force: Option<ForceEvidence>,
+    /// The sensors.
+    pub sensors: Vec<SensorEvidence>,
+    /// The resonances, ascending.
+    pub resonances: Vec<ResonanceEvidence>,
+    /// Decay of the slowest response without a window; `None` without an accepted tap.
+    pub decay: Option<DecayCheck>,
+    /// The window applied.
+    pub window: Window,
+}
+
+impl RecordingEvidence {
+    /// Number of taps averaged.
+    pub fn averages(&self) -> usize {
+        self.accepted().count()
+    }
+
+    /// The taps averaged.
+    fn accepted(&self) -> impl Iterator<Item = &TapEvidence> {
+        self.taps.iter().filter(|tap| tap.rejection.is_none())
+    }
+
+    /// Median peak of the accepted taps; `None` without any.
+    fn tap_level(&self) -> Option<f64> {
+        let mut peaks: Vec<f64> = self.accepted().map(|tap| tap.peak).collect();
+        (!peaks.is_empty()).then(|| median(&mut peaks))
+    }
+
+    /// Name and coherence of the sensor with the highest coherence at a line. Levels of different quantities
+    /// cannot be compared.
+    fn best_coherence(&self, line: usize) -> Option<(&str, f64)> {
+        let known = self.sensors.iter().filter_map(|sensor| {
+            let coherence = sensor.coherence.as_ref()?.get(line)?;
+            Some((sensor.name.as_str(), *coherence))
+        });
+        known.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Begins a verdict on this recording.
+    fn verdict(&self, check: Check, limit: f64) -> Verdict {
+        let file = self.file.clone();
+        Verdict::new(check, Subject::Recording { file }, limit)
+    }
+
+    /// Begins a verdict on a mode of this recording.
+    fn mode_verdict(&self, check: Check, mode: &ResonanceEvidence, limit: f64) -> Verdict {
+        let subject = Subject::Mode {
+            file: self.file.clone(),
+            frequency: mode.frequency,
+            is_mode: mode.is_mode,
+        };
+        Verdict::new(check, subject, limit)
+    }
+
+    /// Begins a verdict on a sensor of this recording.
+    fn sensor_verdict(&self, check: Check, sensor: &SensorEvidence, limit: f64) -> Verdict {
+        let subject = Subject::Sensor {
+            file: self.file.clone(),
+            sensor: sensor.name.clone(),
+        };
+        Verdict::new(check, subject, limit)
+    }
+}
+
+/// Limits, each with its source. "ISO 7626-5" is ISO 7626-5:2019, impact excitation, in the reading of
+/// field practice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QualitySettings {
+    /// Second hit over the first that rejects a tap. 0.1: a ripple of 1.7 dB in the force spectrum
+    /// (field practice after ISO 7626-5: one impact per record).
+    pub double_hit: f64,
+    /// Fall of the force spectrum over the band (dB). 20: 10 to 20 dB are common, beyond that the far end
+    /// is hardly excited (ISO 7626-5).
+    pub force_fall: f64,
+    /// Force over its noise below which the noise shows in H1 (dB). 10: noise in the force makes H1 too
+    /// small by the share of its power, here a tenth.
+    pub force_over_noise: f64,
+    /// Largest over smallest accepted tap. 3: 10 dB, one range of an amplifier; wider, a joint that is not
+    /// linear shows in the averages.
+    pub tap_levels: f64,
+    /// Fewest taps that are enough. 3 (ISO 7626-5: 3 to 5).
+    pub averages: usize,
+    /// Fewest taps from which a coherence is trusted. 5: chance alone gives 1 - 0.05^(1/(n-1)), 0.53 for 5
+    /// taps and 0.78 for 3.
+    pub trusted_averages: usize,
+    /// High coherence. 0.9 (ISO 7626-5).
+    pub coherence: f64,
+    /// Random error of an FRF's magnitude at a resonance. 5 % (ISO 7626-5).
+    pub random_error: f64,
+    /// Level left at the record's end. 1 % (ISO 7626-5: 10 % at half time).
+    pub remaining: f64,
+    /// Natural decay from which an exponential window may be used. 25 % (ISO 7626-5): beyond, the window
+    /// and not the structure decides what is measured.
+    pub remaining_for_window: f64,
+    /// Share of a window in the damping read under it, from which that damping is doubtful. 0.5: the
+    /// structure's own share is then the smaller one, and carries the error of both.
+    pub window_share: f64,
+    /// Relative scatter of a frequency from tap to tap. 1 % (ASTM E1876: readings agree within 1 %).
+    pub frequency_scatter: f64,
+    /// Relative scatter below which there is no doubt, whatever noise explains. 0.005 %: a third of a kelvin does as
+    /// much to steel.
+    pub least_scatter: f64,
+    /// Standard deviations by which two frequencies must differ. 3: one in 370 by chance.
+    pub deviations: f64,
+    /// Relative change of a frequency that time, and taking a sensor off, may leave between recordings.
+    /// 0.5 %: bolted joints drift by some 1 % of their stiffness, and no frequency changes by more than half
+    /// of that, f^2 being at most proportional to the stiffness.
+    pub drift: f64,
+    /// Agreement of two FRFs that should be equal, |sum H1 conj(H2)|^2/(sum |H1|^2 sum |H2|^2). 0.9: they
+    /// share nine tenths of their power.
+    pub reciprocity: f64,
+    /// Relative difference of their levels. 0.2: twice the 10 % to which hammer and accelerometer are
+    /// usually calibrated together.
+    pub reciprocity_gain: f64,
+    /// Distance within which two positions are the same (m). 5 mm: about the size of a hammer tip or an
+    /// accelerometer's base.
+    pub same_position: f64,
+    /// Ratio of two tap levels from which they can show a non-linearity. 1.5: below, one series scatters as
+    /// much.
+    pub two_levels: f64,
+    /// Relative difference within which two resonances of two recordings are the same mode. 3 %: what an
+    /// accelerometer's mass or a joint's level usually move, and less than modes lie apart.
+    pub same_mode: f64,
+}
+
+impl Default for QualitySettings {
+    fn default() -> Self {
+        QualitySettings {
+            double_hit: 0.1,
+            force_fall: 20.0,
+            force_over_noise: 10.0,
+            tap_levels: 3.0,
+            averages: 3,
+            trusted_averages: 5,
+            coherence: 0.9,
+            random_error: 0.05,
+            remaining: 0.01,
+            remaining_for_window: 0.25,
+            window_share: 0.5,
+            frequency_scatter: 0.01,
+            least_scatter: 5e-5,
+            deviations: 3.0,
+            drift: 5e-3,
+            reciprocity: 0.9,
+            reciprocity_gain: 0.2,
+            same_position: 0.005,
+            two_levels: 1.5,
+            same_mode: 0.03,
+        }
+    }
 }

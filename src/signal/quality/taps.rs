@@ -1,8 +1,4 @@
-//! Checks of each tap.
-//!
-//! Whether the taps of a recording are of one level.
-//!
-//! Whether the force reaches over the band.
+//! Checks of the taps: second hits, overload, levels, and the band that the force reaches over.
 
 use super::{
     Check, ForceEvidence, Outcome, QualitySettings, RecordingEvidence, Subject, TapEvidence,
@@ -14,25 +10,20 @@ const NO_HAMMER: &str = "Not applicable without a hammer: a second hit cannot be
 
 /// Exactly one impact in each tap, by the force in time.
 pub fn check_double_hit(recording: &RecordingEvidence, settings: &QualitySettings) -> Vec<Verdict> {
-    of_force(
-        recording,
-        (Check::DoubleHit, settings.double_hit),
-        |tap, verdict| {
-            let Some(hit) = tap.second_hit else {
-                return verdict.clear("One impact.".to_owned());
-            };
-            let happened = format!(
-                "A second hit of {:.1} % of the first after {:.2} ms (limit {:.0} %).",
-                100.0 * hit.ratio,
-                1e3 * hit.delay,
-                100.0 * settings.double_hit
-            );
-            verdict.found(hit.ratio, outcome(hit, settings), happened)
-        },
-    )
+    let (check, limit) = (Check::DoubleHit, settings.double_hit);
+    of_second_hits(recording, settings, check, limit, "One impact.", |hit| {
+        let happened = format!(
+            "A second hit of {:.1} % of the first after {:.2} ms (limit {:.0} %).",
+            100.0 * hit.ratio,
+            1e3 * hit.delay,
+            100.0 * limit
+        );
+        (hit.ratio, happened)
+    })
 }
 
-/// The same as a ripple in the force spectrum, |1 + r e^{-j omega d}|: from 1 - r to 1 + r, every 1/d.
+/// Exactly one impact in each tap, by the ripple in the force spectrum, |1 + r e^{-j omega d}|: from 1 - r to 1 + r,
+/// every 1/d.
 pub fn check_force_ripple(
     recording: &RecordingEvidence,
     settings: &QualitySettings,
@@ -41,20 +32,25 @@ pub fn check_force_ripple(
         delay: 0.0,
         ratio: settings.double_hit,
     });
-    of_force(recording, (Check::ForceRipple, limit), |tap, verdict| {
-        let Some(hit) = tap.second_hit else {
-            return verdict.clear("No second hit that would ripple the force spectrum.".to_owned());
-        };
-        let depth = decibels(hit);
-        let happened = format!(
-            "The force spectrum ripples by {}{depth:.1} dB every {:.1} Hz, from a second hit of {:.1} % after {:.2} ms (limit {limit:.1} dB).",
-            if hit.is_deepest() { "more than " } else { "" },
-            hit.ripple_period(),
-            100.0 * hit.ratio,
-            1e3 * hit.delay,
-        );
-        verdict.found(depth, outcome(hit, settings), happened)
-    })
+    let none = "No second hit that would ripple the force spectrum.";
+    of_second_hits(
+        recording,
+        settings,
+        Check::ForceRipple,
+        limit,
+        none,
+        |hit| {
+            let depth = decibels(hit);
+            let happened = format!(
+                "The force spectrum ripples by {}{depth:.1} dB every {:.1} Hz, from a second hit of {:.1} % after {:.2} ms (limit {limit:.1} dB).",
+                if hit.is_deepest() { "more than " } else { "" },
+                hit.ripple_period(),
+                100.0 * hit.ratio,
+                1e3 * hit.delay,
+            );
+            (depth, happened)
+        },
+    )
 }
 
 /// Depth of the ripple that a second hit leaves (dB).
@@ -62,52 +58,58 @@ fn decibels(hit: SecondHit) -> f64 {
     20.0 * hit.ripple_depth().log10()
 }
 
-fn outcome(hit: SecondHit, settings: &QualitySettings) -> Outcome {
-    match hit.ratio >= settings.double_hit {
-        true => Outcome::Bad,
-        false => Outcome::Doubtful,
-    }
-}
-
-/// One verdict for each tap, or one for the recording that has no force.
-fn of_force(
+/// One verdict for each tap on its second hit, or one for a recording without a force. `found` returns the value and
+/// the sentence for a second hit, `none` is the sentence without one.
+fn of_second_hits(
     recording: &RecordingEvidence,
-    (check, limit): (Check, f64),
-    judge: impl Fn(&TapEvidence, Verdict) -> Verdict,
+    settings: &QualitySettings,
+    check: Check,
+    limit: f64,
+    none: &str,
+    found: impl Fn(SecondHit) -> (f64, String),
 ) -> Vec<Verdict> {
     if recording.force.is_none() {
-        let file = recording.file.clone();
-        return vec![Verdict::new(check, Subject::Recording { file }, limit).missing(NO_HAMMER)];
+        return vec![recording.verdict(check, limit).missing(NO_HAMMER)];
     }
-    of_taps(recording, (check, limit), judge)
+    of_taps(recording, check, limit, |tap, verdict| {
+        let Some(hit) = tap.second_hit else {
+            return verdict.clear(none.to_owned());
+        };
+        let outcome = match hit.ratio >= settings.double_hit {
+            true => Outcome::Bad,
+            false => Outcome::Doubtful,
+        };
+        let (value, happened) = found(hit);
+        verdict.found(value, outcome, happened)
+    })
 }
 
+/// One verdict for each tap, or one for a recording without any.
 fn of_taps(
     recording: &RecordingEvidence,
-    (check, limit): (Check, f64),
+    check: Check,
+    limit: f64,
     judge: impl Fn(&TapEvidence, Verdict) -> Verdict,
 ) -> Vec<Verdict> {
-    let one = |(index, tap): (usize, &TapEvidence)| {
-        let subject = Subject::Tap {
-            file: recording.file.clone(),
-            tap: index + 1,
-        };
-        judge(tap, Verdict::new(check, subject, limit))
-    };
     if recording.taps.is_empty() {
-        let file = recording.file.clone();
-        let verdict = Verdict::new(check, Subject::Recording { file }, limit);
+        let verdict = recording.verdict(check, limit);
         return vec![verdict.missing("Not applicable: no tap was found.")];
     }
-    recording.taps.iter().enumerate().map(one).collect()
+    let mut verdicts = Vec::with_capacity(recording.taps.len());
+    for (number, tap) in (1..).zip(&recording.taps) {
+        let subject = Subject::Tap {
+            file: recording.file.clone(),
+            tap: number,
+        };
+        verdicts.push(judge(tap, Verdict::new(check, subject, limit)));
+    }
+    verdicts
 }
 
 /// No sample at a channel's limit.
 pub fn check_overload(recording: &RecordingEvidence) -> Vec<Verdict> {
-    of_taps(
-        recording,
-        (Check::Overload, 0.0),
-        |tap, verdict| match &tap.rejection {
+    of_taps(recording, Check::Overload, 0.0, |tap, verdict| {
+        match &tap.rejection {
             Some(Rejection::Overload { channel, samples }) => verdict.found(
                 *samples as f64,
                 Outcome::Bad,
@@ -116,17 +118,14 @@ pub fn check_overload(recording: &RecordingEvidence) -> Vec<Verdict> {
             // Other reasons are looked for first: what they reject was not searched for an overload.
             Some(_) => verdict.missing("Not applicable: rejected for another reason."),
             None => verdict.found(0.0, Outcome::Good, "No channel at its limit.".to_owned()),
-        },
-    )
+        }
+    })
 }
 
-/// No tap far weaker than the others.
+/// No tap far weaker than the others; value and limit are in units of the least accepted peak.
 pub fn check_weak(recording: &RecordingEvidence) -> Vec<Verdict> {
-    // In units of the least accepted peak.
-    of_taps(
-        recording,
-        (Check::WeakTap, 1.0),
-        |tap, verdict| match &tap.rejection {
+    of_taps(recording, Check::WeakTap, 1.0, |tap, verdict| {
+        match &tap.rejection {
             Some(Rejection::TooWeak { peak, limit }) => verdict.found(
                 peak / limit,
                 Outcome::Doubtful,
@@ -137,18 +136,13 @@ pub fn check_weak(recording: &RecordingEvidence) -> Vec<Verdict> {
             ),
             Some(_) => verdict.missing("Not applicable: rejected for another reason."),
             None => verdict.clear("As strong as the others.".to_owned()),
-        },
-    )
+        }
+    })
 }
 
 /// Largest over smallest accepted peak.
 pub fn check_tap_levels(recording: &RecordingEvidence, settings: &QualitySettings) -> Verdict {
-    let file = recording.file.clone();
-    let verdict = Verdict::new(
-        Check::TapLevels,
-        Subject::Recording { file },
-        settings.tap_levels,
-    );
+    let verdict = recording.verdict(Check::TapLevels, settings.tap_levels);
     let peaks: Vec<f64> = recording.accepted().map(|tap| tap.peak).collect();
     let smallest = peaks.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = peaks.iter().copied().fold(0.0, f64::max);
@@ -156,10 +150,7 @@ pub fn check_tap_levels(recording: &RecordingEvidence, settings: &QualitySetting
         return verdict.missing("Not applicable: fewer than two accepted taps.");
     }
     let ratio = largest / smallest;
-    let outcome = match ratio <= settings.tap_levels {
-        true => Outcome::Good,
-        false => Outcome::Doubtful,
-    };
+    let outcome = Outcome::doubtful_unless(ratio <= settings.tap_levels);
     let happened = format!(
         "The strongest of {} taps is {ratio:.1} times the weakest (limit {:.1}).",
         peaks.len(),
@@ -174,7 +165,7 @@ const NO_FORCE: &str = "Not applicable without a hammer: the force is not known.
 
 /// Fall of the force spectrum over the band, largest over smallest.
 pub fn check_force_fall(recording: &RecordingEvidence, settings: &QualitySettings) -> Verdict {
-    let verdict = of_band(recording, Check::ForceFall, settings.force_fall);
+    let verdict = recording.verdict(Check::ForceFall, settings.force_fall);
     let Some((frequencies, power)) = band_power(recording) else {
         return verdict.missing(NO_FORCE);
     };
@@ -188,10 +179,7 @@ pub fn check_force_fall(recording: &RecordingEvidence, settings: &QualitySetting
     };
     // Level difference of two powers, 10 log10 (dB).
     let fall = 10.0 * (largest / smallest).log10();
-    let outcome = match fall <= settings.force_fall {
-        true => Outcome::Good,
-        false => Outcome::Doubtful,
-    };
+    let outcome = Outcome::doubtful_unless(fall <= settings.force_fall);
     let happened = format!(
         "The force spectrum falls by {fall:.1} dB over the band, lowest at {at:.1} Hz (limit {:.0} dB).",
         settings.force_fall
@@ -199,17 +187,14 @@ pub fn check_force_fall(recording: &RecordingEvidence, settings: &QualitySetting
     verdict.found(fall, outcome, happened)
 }
 
-/// The frequency from which on the force is no longer clear of its noise.
+/// Frequency above which the force is no longer clear of its noise.
 pub fn check_force_noise(recording: &RecordingEvidence, settings: &QualitySettings) -> Verdict {
-    let verdict = of_band(recording, Check::ForceNoise, recording.lines.high);
+    let verdict = recording.verdict(Check::ForceNoise, recording.lines.high);
     let Some((frequencies, power)) = band_power(recording) else {
         return verdict.missing(NO_FORCE);
     };
-    let noise = recording
-        .force
-        .as_ref()
-        .and_then(|force| force.noise.as_ref());
-    let Some(noise) = noise else {
+    let force = recording.force.as_ref();
+    let Some(noise) = force.and_then(|force| force.noise.as_ref()) else {
         return verdict.missing("Not applicable: no quiet stretch tells the force's noise.");
     };
     let clear = 10f64.powf(settings.force_over_noise / 10.0);
@@ -233,11 +218,6 @@ pub fn check_force_noise(recording: &RecordingEvidence, settings: &QualitySettin
             ),
         ),
     }
-}
-
-fn of_band(recording: &RecordingEvidence, check: Check, limit: f64) -> Verdict {
-    let file = recording.file.clone();
-    Verdict::new(check, Subject::Recording { file }, limit)
 }
 
 /// Frequencies (Hz) and smoothed power of the force; `None` without any.

@@ -1,11 +1,11 @@
-//! A verdict: what was checked, what came out, why it might be, what helps.
-//!
-//! What a verdict is about: a recording, a tap, a mode, a sensor, or the test.
+//! A verdict: the check, its outcome, the likely cause, the remedy, and its subject (a recording, a tap, a mode, a
+//! sensor, or the test).
 
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+
 /// What is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(into = "&'static str")]
@@ -53,177 +53,143 @@ pub enum Check {
 /// Unit of a difference held against its uncertainty.
 const DEVIATIONS: &str = "standard deviations";
 
-/// Code, unit of value and limit, likely cause, remedy.
-type Words = (&'static str, &'static str, &'static str, &'static str);
+/// Code, unit of value and limit, likely cause and remedy of each check, in the order of [`Check`].
+const WORDS: [[&str; 4]; 19] = [
+    [
+        "double-hit",
+        "1",
+        "The structure came back and met the hammer again.",
+        "Hit shorter from a loose wrist, with a lighter hammer, or nearer to a support; never hide it under the force window.",
+    ],
+    [
+        "force-ripple",
+        "dB",
+        "Two blows interfere: where they cancel the structure is excited less.",
+        "Repeat the tap; lines in the valleys of the ripple are the least reliable.",
+    ],
+    [
+        "overload",
+        "samples",
+        "The blow was harder than the range of an amplifier or converter allows.",
+        "Set a larger range or hit softer, and repeat the tap.",
+    ],
+    [
+        "weak-tap",
+        "1",
+        "The hammer was laid down or touched the structure by accident, or the blow was a poor one.",
+        "Nothing needs to be done where it was no tap; else repeat it at the level of the others.",
+    ],
+    [
+        "tap-levels",
+        "1",
+        "The blows were of different strength.",
+        "Repeat with even blows; keep a second level in a recording of its own, where it shows whether the joint is linear.",
+    ],
+    [
+        "force-fall",
+        "dB",
+        "The pulse is too long for the band: a soft tip, a heavy hammer or a soft surface.",
+        "Take a harder tip or a lighter hammer, or end the band lower.",
+    ],
+    [
+        "force-noise",
+        "Hz",
+        "There the pulse has no power left, and noise in the force makes H1 too small.",
+        "Take a harder tip, hit harder, use the force window, or end the band below.",
+    ],
+    [
+        "averages",
+        "taps",
+        "Too few taps were made, or too many of them were rejected.",
+        "Make 3 to 5 good taps; 5 where the coherence shall be trusted.",
+    ],
+    [
+        "coherence",
+        "1",
+        "Noise, leakage, uneven hits, or a joint that is not linear.",
+        "Record until the response has decayed, hit the same spot, take more taps, or move the sensor off the mode's node.",
+    ],
+    [
+        "random-error",
+        "1",
+        "The coherence is too low for so few taps.",
+        "Take more taps: the error falls with the square root of their number.",
+    ],
+    [
+        "decay",
+        "1",
+        "The record ends before the structure has come to rest.",
+        "Leave more time between taps, or give a larger block.",
+    ],
+    [
+        "exponential-window",
+        "1",
+        "The window and not the structure ends the record.",
+        "Leave more time between taps until the response decays to a quarter by itself, and let the window do the rest.",
+    ],
+    [
+        "window-damping",
+        "1",
+        "The exponential window adds its own decay to every mode, most to the lowest.",
+        "Leave more time between taps and use a weaker window; do not quote this damping.",
+    ],
+    [
+        "frequency-scatter",
+        "1",
+        "The taps are of different strength on a joint that is not linear, the support moves, or temperature or preload drifts.",
+        "Compare the taps' frequencies with their peaks and their order in time; even the blows, fasten what is loose.",
+    ],
+    [
+        "driving-point",
+        "resonances",
+        "Sensor and hammer do not point the same way, channels are swapped, or they are not at the same place.",
+        "Check wiring, the sign of the scales, and the positions in the description.",
+    ],
+    [
+        "antiresonance",
+        "gaps",
+        "The tap is not where the sensor is, or a channel holds something else.",
+        "Hit right behind the sensor, and check the positions in the description.",
+    ],
+    [
+        "reciprocity",
+        "1",
+        "A scale, a sign or a position is wrong, a sensor's mass loads the beam, or the joint is not linear.",
+        "Check scales and positions first, then compare two tap levels.",
+    ],
+    [
+        "linearity",
+        DEVIATIONS,
+        "The joint changed between the recordings: it slips or opens with the level, it drifted, or it was touched.",
+        "Tap softly and hard within one recording, where a joint has no time to drift; if it is the level, state it with every frequency, and identify the joint at the lowest one that rises clear of the noise.",
+    ],
+    [
+        "mass-loading",
+        DEVIATIONS,
+        "The sensor's mass lowers the modes that move where it sits, or the joint changed between the recordings.",
+        "State the sensors' masses in the description: the model carries those that it states, and then this is no fault. Else take a lighter sensor, or place it near the joint.",
+    ],
+];
 
 impl Check {
     /// Short code for scripts.
     pub fn code(self) -> &'static str {
-        self.words().0
+        WORDS[self as usize][0]
     }
 
     /// Unit of value and limit, where a verdict has no other; "1" for a ratio.
     pub fn unit(self) -> &'static str {
-        self.words().1
+        WORDS[self as usize][1]
     }
 
-    /// Why it might fail.
+    /// Likely cause of a failure.
     pub fn cause(self) -> &'static str {
-        self.words().2
+        WORDS[self as usize][2]
     }
 
-    /// What helps.
+    /// Remedy against the cause.
     pub fn remedy(self) -> &'static str {
-        self.words().3
-    }
-
-    fn words(self) -> Words {
-        match self {
-            Check::DoubleHit
-            | Check::ForceRipple
-            | Check::Overload
-            | Check::WeakTap
-            | Check::TapLevels
-            | Check::ForceFall
-            | Check::ForceNoise => self.words_of_taps(),
-            Check::Averages
-            | Check::Coherence
-            | Check::RandomError
-            | Check::Decay
-            | Check::ExponentialWindow
-            | Check::WindowDamping
-            | Check::FrequencyScatter => self.words_of_averages(),
-            _ => self.words_of_setup(),
-        }
-    }
-
-    fn words_of_taps(self) -> Words {
-        match self {
-            Check::DoubleHit => (
-                "double-hit",
-                "1",
-                "The structure came back and met the hammer again.",
-                "Hit shorter from a loose wrist, with a lighter hammer, or nearer to a support; never hide it under the force window.",
-            ),
-            Check::ForceRipple => (
-                "force-ripple",
-                "dB",
-                "Two blows interfere: where they cancel the structure is excited less.",
-                "Repeat the tap; lines in the valleys of the ripple are the least reliable.",
-            ),
-            Check::Overload => (
-                "overload",
-                "samples",
-                "The blow was harder than the range of an amplifier or converter allows.",
-                "Set a larger range or hit softer, and repeat the tap.",
-            ),
-            Check::WeakTap => (
-                "weak-tap",
-                "1",
-                "The hammer was laid down or touched the structure by accident, or the blow was a poor one.",
-                "Nothing needs to be done where it was no tap; else repeat it at the level of the others.",
-            ),
-            Check::TapLevels => (
-                "tap-levels",
-                "1",
-                "The blows were of different strength.",
-                "Repeat with even blows; keep a second level in a recording of its own, where it shows whether the joint is linear.",
-            ),
-            Check::ForceFall => (
-                "force-fall",
-                "dB",
-                "The pulse is too long for the band: a soft tip, a heavy hammer or a soft surface.",
-                "Take a harder tip or a lighter hammer, or end the band lower.",
-            ),
-            _ => (
-                "force-noise",
-                "Hz",
-                "There the pulse has no power left, and noise in the force makes H1 too small.",
-                "Take a harder tip, hit harder, use the force window, or end the band below.",
-            ),
-        }
-    }
-
-    fn words_of_averages(self) -> Words {
-        match self {
-            Check::Averages => (
-                "averages",
-                "taps",
-                "Too few taps were made, or too many of them were rejected.",
-                "Make 3 to 5 good taps; 5 where the coherence shall be trusted.",
-            ),
-            Check::Coherence => (
-                "coherence",
-                "1",
-                "Noise, leakage, uneven hits, or a joint that is not linear.",
-                "Record until the response has decayed, hit the same spot, take more taps, or move the sensor off the mode's node.",
-            ),
-            Check::RandomError => (
-                "random-error",
-                "1",
-                "The coherence is too low for so few taps.",
-                "Take more taps: the error falls with the square root of their number.",
-            ),
-            Check::Decay => (
-                "decay",
-                "1",
-                "The record ends before the structure has come to rest.",
-                "Leave more time between taps, or give a larger block.",
-            ),
-            Check::ExponentialWindow => (
-                "exponential-window",
-                "1",
-                "The window and not the structure ends the record.",
-                "Leave more time between taps until the response decays to a quarter by itself, and let the window do the rest.",
-            ),
-            Check::WindowDamping => (
-                "window-damping",
-                "1",
-                "The exponential window adds its own decay to every mode, most to the lowest.",
-                "Leave more time between taps and use a weaker window; do not quote this damping.",
-            ),
-            _ => (
-                "frequency-scatter",
-                "1",
-                "The taps are of different strength on a joint that is not linear, the support moves, or temperature or preload drifts.",
-                "Compare the taps' frequencies with their peaks and their order in time; even the blows, fasten what is loose.",
-            ),
-        }
-    }
-
-    fn words_of_setup(self) -> Words {
-        match self {
-            Check::DrivingPoint => (
-                "driving-point",
-                "resonances",
-                "Sensor and hammer do not point the same way, channels are swapped, or they are not at the same place.",
-                "Check wiring, the sign of the scales, and the positions in the description.",
-            ),
-            Check::Antiresonances => (
-                "antiresonance",
-                "gaps",
-                "The tap is not where the sensor is, or a channel holds something else.",
-                "Hit right behind the sensor, and check the positions in the description.",
-            ),
-            Check::Reciprocity => (
-                "reciprocity",
-                "1",
-                "A scale, a sign or a position is wrong, a sensor's mass loads the beam, or the joint is not linear.",
-                "Check scales and positions first, then compare two tap levels.",
-            ),
-            Check::Linearity => (
-                "linearity",
-                DEVIATIONS,
-                "The joint changed between the recordings: it slips or opens with the level, it drifted, or it was touched.",
-                "Tap softly and hard within one recording, where a joint has no time to drift; if it is the level, state it with every frequency, and identify the joint at the lowest one that rises clear of the noise.",
-            ),
-            _ => (
-                "mass-loading",
-                DEVIATIONS,
-                "The sensor's mass lowers the modes that move where it sits, or the joint changed between the recordings.",
-                "State the sensors' masses in the description: the model carries those that it states, and then this is no fault. Else take a lighter sensor, or place it near the joint.",
-            ),
-        }
+        WORDS[self as usize][3]
     }
 }
 
@@ -249,7 +215,16 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Its name.
+    /// Returns `Good`, or `Doubtful` where something is not as good practice asks.
+    pub(super) fn doubtful_unless(is_good: bool) -> Self {
+        if is_good {
+            Outcome::Good
+        } else {
+            Outcome::Doubtful
+        }
+    }
+
+    /// Name as `report.json` has it.
     pub fn name(self) -> &'static str {
         match self {
             Outcome::NotApplicable => "not applicable",
@@ -301,14 +276,14 @@ impl Verdict {
         }
     }
 
-    /// Held against another limit of the check, in its own unit.
+    /// Replaces the limit and its unit.
     pub(super) fn against(mut self, limit: f64, unit: &'static str) -> Self {
         self.limit = limit;
         self.unit = unit;
         self
     }
 
-    /// With its value, what came out, and what happened.
+    /// Adds the value that was found, the outcome and the sentence.
     pub(super) fn found(mut self, value: f64, outcome: Outcome, happened: String) -> Self {
         self.value = Some(value);
         self.outcome = outcome;
@@ -318,23 +293,23 @@ impl Verdict {
         self
     }
 
-    /// Nothing wrong, and nothing to measure.
+    /// Makes it good, without a value.
     pub(super) fn clear(mut self, happened: String) -> Self {
         self.outcome = Outcome::Good;
         self.happened = happened;
         self
     }
 
-    /// Not applicable, and why.
+    /// Says why the check is not applicable.
     pub(super) fn missing(mut self, why: &str) -> Self {
         self.happened = why.to_owned();
         self
     }
 
-    /// How far off it is, to tell the worst of one check; of no use between checks.
+    /// Distance from the limit, to sort the verdicts of one check; not comparable between checks.
     pub fn severity(&self) -> f64 {
         let value = self.value.unwrap_or(0.0);
-        // In its own limit, which may differ between recordings.
+        // Relative to its limit, which may differ between recordings.
         let relative = if self.limit > 0.0 {
             value / self.limit
         } else {
@@ -346,14 +321,14 @@ impl Verdict {
         }
     }
 
-    /// Whether a reader must be told.
+    /// Returns `true` for an outcome that the reader must know about.
     pub fn is_doubt(&self) -> bool {
         matches!(self.outcome, Outcome::Doubtful | Outcome::Bad)
     }
 }
 
 impl fmt::Display for Verdict {
-    /// What happened; of a doubt also why it might be and what helps.
+    /// Writes the sentence; for a doubt also its cause and remedy.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.subject, self.happened)?;
         match self.cause.zip(self.remedy) {
@@ -400,7 +375,7 @@ pub enum Subject {
 }
 
 impl Subject {
-    /// The recording it belongs to; `None` of the test as a whole.
+    /// File of the recording; `None` for the test as a whole.
     pub fn file(&self) -> Option<&str> {
         match self {
             Subject::Recording { file }
@@ -466,5 +441,25 @@ impl fmt::Display for Subject {
             Subject::Sensor { file, sensor } => write!(f, "{file}, sensor {sensor}"),
             Subject::Test => f.write_str("test"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_words_stand_in_the_order_of_the_checks() {
+        for (check, code) in [
+            (Check::DoubleHit, "double-hit"),
+            (Check::ForceNoise, "force-noise"),
+            (Check::Averages, "averages"),
+            (Check::FrequencyScatter, "frequency-scatter"),
+            (Check::DrivingPoint, "driving-point"),
+            (Check::MassLoading, "mass-loading"),
+        ] {
+            assert_eq!(check.code(), code);
+        }
+        assert_eq!(Check::MassLoading as usize + 1, WORDS.len());
     }
 }

@@ -106,11 +106,9 @@ pub enum RecordingError {
         /// What stands there.
         value: String,
     },
-    /// Text where a number is needed.
-    #[error(
-        "{file}:{line}: column {column}{name} holds \"{value}\", which is not a number; allowed: numbers such as -1.25e-3; correct or remove this line"
-    )]
-    TextInCell {
+    /// A cell that is no usable number.
+    #[error("{file}:{line}: column {column}{name} {problem}")]
+    BadCell {
         /// The file.
         file: String,
         /// Line, 1-based.
@@ -119,40 +117,8 @@ pub enum RecordingError {
         column: usize,
         /// ` ("name")` where the header names the column, empty otherwise.
         name: String,
-        /// The text.
-        value: String,
-    },
-    /// NaN or infinity in a cell.
-    #[error(
-        "{file}:{line}: column {column}{name} holds \"{value}\"; allowed: finite numbers of magnitude up to 1e100; remove the damaged rows and take what stays connected"
-    )]
-    CellNotFinite {
-        /// The file.
-        file: String,
-        /// Line, 1-based.
-        line: u64,
-        /// Column in the file, 1-based.
-        column: usize,
-        /// ` ("name")` where the header names the column, empty otherwise.
-        name: String,
-        /// The text.
-        value: String,
-    },
-    /// An empty cell, or a row that ends early.
-    #[error(
-        "{file}:{line}: column {column}{name} is missing; every row needs {columns} numbers; fill the cell or remove the column"
-    )]
-    MissingCell {
-        /// The file.
-        file: String,
-        /// Line, 1-based.
-        line: u64,
-        /// Column in the file, 1-based.
-        column: usize,
-        /// ` ("name")` where the header names the column, empty otherwise.
-        name: String,
-        /// Columns of the file.
-        columns: usize,
+        /// Found value, allowed values, and remedy.
+        problem: String,
     },
     /// More cells than columns.
     #[error(
@@ -179,24 +145,6 @@ pub enum RecordingError {
         file: String,
         /// Line, 1-based.
         line: u64,
-    },
-    /// Decimal point and decimal comma in one file.
-    #[error(
-        "{file}:{line}: column {column}{name} holds \"{value}\", but the numbers before use \"{decimal}\" as decimal mark; allowed: one decimal mark, no thousands separators"
-    )]
-    MixedDecimal {
-        /// The file.
-        file: String,
-        /// Line, 1-based.
-        line: u64,
-        /// Column in the file, 1-based.
-        column: usize,
-        /// ` ("name")` where the header names the column, empty otherwise.
-        name: String,
-        /// The text.
-        value: String,
-        /// The mark used so far.
-        decimal: char,
     },
     /// Commas both as separators and within numbers.
     #[error(

@@ -14,13 +14,14 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::fs::File;
+use std::io::{self, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 mod csv;
 mod error;
-mod file_type;
 mod health;
 mod responses;
 mod spacing;
@@ -32,7 +33,6 @@ mod wav;
 mod write;
 
 pub use error::{RecordingError, ResponseError, UffError, WavError};
-pub use file_type::is_universal_file;
 pub use health::{ChannelHealth, Dropout, FlatTop};
 pub use responses::{FrequencyResponse, FrequencyResponses, open_frequency_responses};
 pub use text::Separator;
@@ -48,7 +48,6 @@ pub use write::{
 };
 
 use csv::{CsvCursor, CsvSource};
-use file_type::FileType;
 use health::{HealthMeter, check_rate, check_samples};
 use uff::{UffCursor, UffSource};
 use wav::{WavCursor, WavSource};
@@ -183,7 +182,7 @@ impl Recording {
         if let Some(value) = settings.sample_rate {
             check_rate(&file, value)?;
         }
-        match file_type::recognise(path, &file)? {
+        match recognise(path, &file)? {
             FileType::Wav => wav::open_wav(path, file, settings),
             FileType::Text => csv::open_csv(path, file, settings),
             FileType::Universal => uff::open_uff(path, file, settings),
@@ -363,27 +362,26 @@ impl Recording {
         let Some(info) = self.channels.get_mut(channel) else {
             return Ok(());
         };
-        let overruled = |warning: &RecordingWarning| match warning {
+        self.warnings.retain(|warning| match warning {
             RecordingWarning::ScaleOverUnit { channel: label, .. }
             | RecordingWarning::UnknownUnit { channel: label, .. }
-            | RecordingWarning::UnitsDisagree { channel: label, .. } => label.number == channel + 1,
-            _ => false,
-        };
-        self.warnings.retain(|warning| !overruled(warning));
-        // A scale says what a volt means; whether per millivolt or per volt, nobody knows.
-        let agrees = |unit: &String| {
-            channel_unit(unit).is_some_and(|(factor, si)| match si {
-                "V" => factor == 1.0,
-                _ => (scale.abs() / factor - 1.0).abs() <= SAME_SCALE,
-            })
-        };
-        let overrules = |unit: &&String| !agrees(unit);
-        if let Some(unit) = info.header_unit.as_ref().filter(overrules) {
-            self.warnings.push(RecordingWarning::ScaleOverUnit {
-                channel: channel_label(channel, info),
-                scale,
-                unit: unit.clone(),
-            });
+            | RecordingWarning::UnitsDisagree { channel: label, .. } => label.number != channel + 1,
+            _ => true,
+        });
+        if let Some(unit) = &info.header_unit {
+            let agrees = match channel_unit(unit) {
+                // A scale says what a volt means, but not whether it is per volt or per millivolt.
+                Some((factor, "V")) => factor == 1.0,
+                Some((factor, _)) => (scale.abs() / factor - 1.0).abs() <= SAME_SCALE,
+                None => false,
+            };
+            if !agrees {
+                self.warnings.push(RecordingWarning::ScaleOverUnit {
+                    channel: channel_label(channel, info),
+                    scale,
+                    unit: unit.clone(),
+                });
+            }
         }
         info.health = info.health.scaled(scale / info.scale);
         info.scale = scale;
@@ -446,9 +444,9 @@ impl Recording {
             &|name| units::split_unit(name).0.eq_ignore_ascii_case(without_unit),
         ];
         for rule in rules {
-            let named = |channel: &ChannelInfo| channel.name.as_deref().is_some_and(rule);
-            let mut found = (0..).zip(&self.channels).filter(|(_, c)| named(c));
-            if let Some((index, _)) = found.next() {
+            let mut found = (0..self.channels.len())
+                .filter(|index| self.channels[*index].name.as_deref().is_some_and(rule));
+            if let Some(index) = found.next() {
                 return match found.count() {
                     0 => Ok(index),
                     others => Err(RecordingError::AmbiguousChannelName {
@@ -637,5 +635,145 @@ impl MemoryCursor<'_> {
             samples.extend_from_slice(part.unwrap_or_default());
         }
         self.at = end;
+    }
+}
+
+// ---- Formats are told apart by the first bytes of a file, never by its name.
+
+/// Formats that are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileType {
+    Wav,
+    Text,
+    Universal,
+}
+
+/// First bytes, where they stand, and what they mean. Known so that the message can name them.
+const UNREAD: &[(usize, &[u8], &str)] = &[
+    (0, b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+    (512, b"\x89HDF\r\n\x1a\n", "a MATLAB 7.3 (HDF5) file"),
+    (0, b"MATLAB 5.0", "a MATLAB file"),
+    (0, b"MATLAB 7.3", "a MATLAB 7.3 (HDF5) file"),
+    (0, b"fLaC", "FLAC audio"),
+    (0, b"OggS", "Ogg audio"),
+    (0, b"ID3", "MP3 audio"),
+    (0, b"\xff\xfb", "MP3 audio"),
+    (0, b"\xff\xf3", "MP3 audio"),
+    (0, b"\xff\xf2", "MP3 audio"),
+    (4, b"ftyp", "MPEG-4 audio"),
+    (0, b"riff\x2e\x91\xcf\x11", "Wave64 (W64) audio"),
+    (0, b"RIFX", "big-endian WAV (RIFX)"),
+    (0, b"FORM", "AIFF audio"),
+    (0, b"caff", "Core Audio (CAF)"),
+    (0, b".snd", "Sun/NeXT audio (AU)"),
+    (0, b"wvpk", "WavPack audio"),
+    (0, b"TDSm", "a LabVIEW TDMS file"),
+    (0, b"PK\x03\x04", "a zip archive or Excel workbook"),
+    (0, b"\xd0\xcf\x11\xe0", "an old Excel workbook"),
+    (0, b"\x1f\x8b", "a gzip archive"),
+    (0, b"%PDF", "a PDF document"),
+    (0, b"PAR1", "a Parquet file"),
+    (0, b"RIFF", "a RIFF file without WAVE data"),
+    (0, b"RF64", "a RIFF file without WAVE data"),
+    (0, b"BW64", "a RIFF file without WAVE data"),
+];
+
+/// How many bytes decide.
+const DECIDING_BYTES: usize = 4096;
+
+/// Recognises the format of the file at `path`.
+fn recognise(path: &Path, file: &str) -> Result<FileType, RecordingError> {
+    let head = read_head(path, file, DECIDING_BYTES)?;
+    if head.is_empty() {
+        return Err(RecordingError::EmptyFile {
+            file: file.to_owned(),
+        });
+    }
+    // The mark that begins such text in either order of bytes.
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return Err(RecordingError::Utf16 {
+            file: file.to_owned(),
+        });
+    }
+    let riff = [b"RIFF", b"RF64", b"BW64"]
+        .iter()
+        .any(|mark| head.starts_with(*mark));
+    if riff && stands_at(&head, 8, b"WAVE") {
+        return Ok(FileType::Wav);
+    }
+    let mut unread = UNREAD.iter();
+    if let Some((.., format)) = unread.find(|(at, bytes, _)| stands_at(&head, *at, bytes)) {
+        return Err(RecordingError::UnsupportedFormat {
+            file: file.to_owned(),
+            format,
+        });
+    }
+    if begins_with_mark(&head) {
+        return Ok(FileType::Universal);
+    }
+    // Text has no control characters but tabs, line ends and form feeds; latin-1 letters may occur.
+    if head
+        .iter()
+        .all(|byte| matches!(byte, b'\t' | b'\n' | b'\r' | 0x0c | 0x1a | 0x20..))
+    {
+        return Ok(FileType::Text);
+    }
+    let first_bytes: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
+    Err(RecordingError::UnknownFormat {
+        file: file.to_owned(),
+        first_bytes: first_bytes.join(" "),
+    })
+}
+
+fn stands_at(head: &[u8], at: usize, bytes: &[u8]) -> bool {
+    head.get(at..).is_some_and(|rest| rest.starts_with(bytes))
+}
+
+/// Returns `true` for a universal file, by its first bytes.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn is_universal_file(path: &Path) -> Result<bool, RecordingError> {
+    let head = read_head(path, &path.display().to_string(), DECIDING_BYTES)?;
+    Ok(begins_with_mark(&head))
+}
+
+/// Returns `true` where the first line that is not empty has -1 in columns 5 and 6, the mark of universal files.
+fn begins_with_mark(head: &[u8]) -> bool {
+    let mut lines = head
+        .split(|byte| *byte == b'\n')
+        .map(<[u8]>::trim_ascii_end);
+    lines.find(|line| !line.is_empty()) == Some(b"    -1")
+}
+
+/// Reads the first `limit` bytes of a file, or as many as there are.
+fn read_head(path: &Path, file: &str, limit: usize) -> Result<Vec<u8>, RecordingError> {
+    let mut head = vec![0_u8; limit];
+    let got = File::open(path)
+        .and_then(|mut opened| read_fully(&mut opened, &mut head))
+        .map_err(|source| unreadable(file, source))?;
+    head.truncate(got);
+    Ok(head)
+}
+
+/// Fills `into` as far as the reader goes, and returns how many bytes it read.
+fn read_fully(reader: &mut impl Read, into: &mut [u8]) -> io::Result<usize> {
+    let mut got = 0;
+    while let Some(rest) = into.get_mut(got..).filter(|rest| !rest.is_empty()) {
+        match reader.read(rest) {
+            Ok(0) => break,
+            Ok(more) => got += more,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(got)
+}
+
+/// Returns the error of a file that the operating system does not give.
+fn unreadable(file: &str, source: io::Error) -> RecordingError {
+    RecordingError::Unreadable {
+        file: file.to_owned(),
+        source,
     }
 }

@@ -11,17 +11,17 @@ use num_complex::Complex64;
 
 use super::csv::{CsvSource, split_texts};
 use super::error::{RecordingError, ResponseError, UffError};
-use super::file_type::{FileType, read_head, recognise};
 use super::health::first_unusable;
 use super::spacing::TimeCheck;
 use super::text::shown;
 use super::uff::{
-    ACCELERATION, AbscissaUnit, DISPLACEMENT, EXCITATION_FORCE, Entry, EvenPoints, Function,
-    FunctionGroup, FunctionType, Ordinate, Point, UniversalFile, VELOCITY, describe, even_points,
-    list_datasets, read_values,
+    ACCELERATION, AbscissaUnit, DISPLACEMENT, Dataset, EXCITATION_FORCE, Entry, EvenPoints,
+    Function, FunctionGroup, FunctionType, Ordinate, Point, UniversalFile, VELOCITY, describe,
+    even_points, list_datasets, read_values,
 };
 use super::units::{ResponseForm, quotient, response_unit};
 use super::warning::ResponseWarning;
+use super::{FileType, read_head, recognise};
 
 /// Bytes of header that are looked at.
 const HEADER_BYTES: usize = 1 << 16;
@@ -290,20 +290,22 @@ fn open_uff(path: &Path) -> Result<FrequencyResponses, RecordingError> {
     let Some(points) = group.points else {
         return Err(nothing_usable(&file, group.left_out.first()));
     };
-    for (entry, reason) in group.left_out {
-        warnings.push(left_out(entry, reason));
+    for ((dataset, function), reason) in group.left_out {
+        warnings.push(left_out(dataset, function, reason));
     }
     let mut responses = Vec::with_capacity(group.functions.len());
-    for entry in group.functions {
-        responses.push((entry, read_response(&file, entry, &mut warnings)?));
+    for (dataset, function) in group.functions {
+        let response = read_response(&file, dataset, function, &mut warnings)?;
+        responses.push(((dataset, function), response));
     }
     let lines = complete_lines(points.points, &mut responses, &mut warnings);
     if lines == 0 {
         return Err(RecordingError::NoSamples { file: file.name });
     }
-    for entry in functions(&file, FunctionType::COHERENCE) {
-        if let Err(reason) = attach_coherence(&file, entry, &points, lines, &mut responses)? {
-            warnings.push(left_out(entry, reason.to_owned()));
+    for (dataset, function) in functions(&file, FunctionType::COHERENCE) {
+        let attached = attach_coherence(&file, dataset, function, &points, lines, &mut responses)?;
+        if let Err(reason) = attached {
+            warnings.push(left_out(dataset, function, reason.to_owned()));
         }
     }
     let responses = responses.into_iter().map(|(_, response)| response);
@@ -322,7 +324,7 @@ fn functions(file: &UniversalFile, wanted: FunctionType) -> impl Iterator<Item =
         .filter(move |(_, function)| function.function_type == wanted)
 }
 
-fn left_out((dataset, function): Entry<'_>, reason: String) -> ResponseWarning {
+fn left_out(dataset: &Dataset, function: &Function, reason: String) -> ResponseWarning {
     ResponseWarning::LeftOut {
         dataset: dataset.number,
         name: describe(function),
@@ -361,7 +363,8 @@ fn nothing_usable(file: &UniversalFile, unusable: Option<&(Entry<'_>, String)>) 
 /// Reads one response in SI units, and adds the doubts about it.
 fn read_response(
     file: &UniversalFile,
-    (dataset, function): Entry<'_>,
+    dataset: &Dataset,
+    function: &Function,
     warnings: &mut Vec<ResponseWarning>,
 ) -> Result<FrequencyResponse, RecordingError> {
     let read = read_values(file, dataset, function)?;
@@ -463,12 +466,12 @@ fn complete_lines(
 ) -> usize {
     let lengths = responses.iter().map(|(_, response)| response.values.len());
     if lengths.clone().any(|present| present as u64 == promised) {
-        responses.retain(|(entry, response)| {
+        responses.retain(|((dataset, function), response)| {
             let present = response.values.len();
             let complete = present as u64 == promised;
             if !complete {
                 let reason = format!("{present} of its {promised} lines are there");
-                warnings.push(left_out(*entry, reason));
+                warnings.push(left_out(dataset, function, reason));
             }
             complete
         });
@@ -488,7 +491,8 @@ fn complete_lines(
 /// Gives a coherence to the first response of the same points that has none yet; `Err` inside says why it is unused.
 fn attach_coherence(
     file: &UniversalFile,
-    (dataset, function): Entry<'_>,
+    dataset: &Dataset,
+    function: &Function,
     points: &EvenPoints,
     lines: usize,
     responses: &mut [(Entry<'_>, FrequencyResponse)],

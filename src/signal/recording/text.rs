@@ -23,12 +23,12 @@ impl Separator {
     /// In order of preference where several fit equally well.
     pub(super) const ALL: [Self; 4] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Blanks];
 
-    fn byte(self) -> Option<u8> {
+    fn bytes(self) -> &'static [u8] {
         match self {
-            Self::Tab => Some(b'\t'),
-            Self::Semicolon => Some(b';'),
-            Self::Comma => Some(b','),
-            Self::Blanks => None,
+            Self::Tab => b"\t",
+            Self::Semicolon => b";",
+            Self::Comma => b",",
+            Self::Blanks => b" \t",
         }
     }
 }
@@ -46,40 +46,19 @@ pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cel
     let line = line
         .get(..last.map_or(0, |last| last + 1))
         .unwrap_or_default();
-    match separator.byte() {
-        Some(byte) => split_at_byte(line, byte, cells),
-        None => split_at_blanks(line, cells),
-    }
-}
-
-fn split_at_byte(line: &[u8], separator: u8, cells: &mut Vec<Cell>) {
+    let bytes = separator.bytes();
     let (mut start, mut quoted) = (0, false);
     for (at, byte) in line.iter().enumerate() {
-        if *byte == b'"' {
-            quoted = !quoted;
-        } else if *byte == separator && !quoted {
-            cells.push(trimmed(line, start..at));
+        quoted ^= *byte == b'"';
+        if !quoted && bytes.contains(byte) {
+            // One or more blanks separate, so that there is no cell between two of them.
+            if at > start || separator != Separator::Blanks {
+                cells.push(trimmed(line, start..at));
+            }
             start = at + 1;
         }
     }
-    cells.push(trimmed(line, start..line.len()));
-}
-
-fn split_at_blanks(line: &[u8], cells: &mut Vec<Cell>) {
-    let (mut start, mut quoted) = (None, false);
-    for (at, byte) in line.iter().enumerate() {
-        if *byte == b'"' {
-            quoted = !quoted;
-        }
-        if matches!(byte, b' ' | b'\t') && !quoted {
-            if let Some(start) = start.take() {
-                cells.push(trimmed(line, start..at));
-            }
-        } else {
-            start.get_or_insert(at);
-        }
-    }
-    if let Some(start) = start {
+    if line.len() > start || separator != Separator::Blanks {
         cells.push(trimmed(line, start..line.len()));
     }
 }
@@ -99,7 +78,7 @@ fn without_blanks(line: &[u8], cell: Cell) -> Cell {
     start..start + bytes.trim_ascii().len()
 }
 
-/// Why a cell is no usable number.
+/// Reason why a cell is no usable number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CellProblem {
     Missing,
@@ -126,9 +105,10 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
             _ => {}
         }
     }
+    let text = str::from_utf8(cell).map_err(|_| CellProblem::Text)?;
     let value = match mark {
-        Some(b',') => parse_with_comma(cell),
-        _ => parse_plain(cell),
+        Some(b',') => parse_with_comma(text),
+        _ => parse_plain(text),
     };
     let value = value.ok_or(CellProblem::Text)?;
     match (mark, *decimal) {
@@ -144,31 +124,20 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
     }
 }
 
-fn parse_plain(cell: &[u8]) -> Option<f64> {
-    let text = str::from_utf8(cell).ok()?;
-    text.parse().ok().or_else(|| parse_fortran(text))
-}
-
-/// Fortran writes double precision exponents with D.
-fn parse_fortran(text: &str) -> Option<f64> {
-    let (mantissa, exponent) = text.split_once(['d', 'D'])?;
-    let digits = mantissa.contains(|c: char| c.is_ascii_digit());
-    digits.then(|| format!("{mantissa}e{exponent}").parse().ok())?
+/// Reads a number with a decimal point. Fortran writes double precision exponents with D.
+pub(super) fn parse_plain(text: &str) -> Option<f64> {
+    text.parse().ok().or_else(|| {
+        let (mantissa, exponent) = text.split_once(['d', 'D'])?;
+        format!("{mantissa}e{exponent}").parse().ok()
+    })
 }
 
 /// A decimal comma has digits on both sides, unlike a comma that separates.
-fn parse_with_comma(cell: &[u8]) -> Option<f64> {
-    let at = cell.iter().position(|byte| *byte == b',')?;
-    let before = cell.get(at.checked_sub(1)?)?;
-    let after = cell.get(at + 1)?;
-    if !before.is_ascii_digit() || !after.is_ascii_digit() || cell.len() > 64 {
-        return None;
-    }
-    let mut with_point = [0_u8; 64];
-    let with_point = with_point.get_mut(..cell.len())?;
-    with_point.copy_from_slice(cell);
-    *with_point.get_mut(at)? = b'.';
-    parse_plain(with_point)
+fn parse_with_comma(text: &str) -> Option<f64> {
+    let (before, after) = text.split_once(',')?;
+    let is_decimal = before.ends_with(|c: char| c.is_ascii_digit())
+        && after.starts_with(|c: char| c.is_ascii_digit());
+    is_decimal.then(|| parse_plain(&format!("{before}.{after}")))?
 }
 
 /// Bytes of a text file as characters: UTF-8 where it is valid, else latin-1.
@@ -190,7 +159,7 @@ pub(super) fn shown(cell: &[u8]) -> String {
     short.replace(char::is_control, " ")
 }
 
-/// Whether a line is a comment, of a kind that recorders and numerical programs write.
+/// Returns `true` for a comment, of a kind that recorders and numerical programs write.
 pub(super) fn is_comment(line: &[u8]) -> bool {
     let line = line.trim_ascii_start();
     line.starts_with(b"#") || line.starts_with(b"%") || line.starts_with(b"//")

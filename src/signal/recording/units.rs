@@ -7,92 +7,55 @@ use num_complex::Complex64;
 /// Standard acceleration of free fall (m/s2), by definition: what "g" means for an acceleration.
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
 
-/// One kind of quantity: its SI unit and the spellings that lead to it.
-struct Quantity {
-    si: &'static str,
-    spellings: &'static [(&'static str, f64)],
-}
-
-/// Case counts: mN is a thousandth of a newton, MN a million.
-const QUANTITIES: &[Quantity] = &[
-    Quantity {
-        si: "N",
-        spellings: &[
-            ("N", 1.0),
-            ("mN", 1e-3),
-            ("kN", 1e3),
-            ("MN", 1e6),
-            ("newton", 1.0),
-            // Pound-force: 0.45359237 kg times standard gravity.
-            ("lbf", 4.448_221_615_260_5),
-        ],
-    },
-    Quantity {
-        si: "V",
-        spellings: &[
-            ("V", 1.0),
-            ("mV", 1e-3),
-            ("uV", 1e-6),
-            ("kV", 1e3),
-            ("volt", 1.0),
-            ("volts", 1.0),
-        ],
-    },
-    Quantity {
-        si: "m/s2",
-        spellings: &[
-            ("m/s2", 1.0),
-            ("mm/s2", 1e-3),
-            ("um/s2", 1e-6),
-            ("m/s/s", 1.0),
-            ("ms-2", 1.0),
-            ("m/(s2)", 1.0),
-            ("g", STANDARD_GRAVITY),
-            ("gn", STANDARD_GRAVITY),
-            ("mg", 1e-3 * STANDARD_GRAVITY),
-        ],
-    },
-    Quantity {
-        si: "m/s",
-        spellings: &[("m/s", 1.0), ("mm/s", 1e-3), ("um/s", 1e-6), ("ms-1", 1.0)],
-    },
-    Quantity {
-        si: "m",
-        spellings: &[
-            ("m", 1.0),
-            ("cm", 1e-2),
-            ("mm", 1e-3),
-            ("um", 1e-6),
-            ("nm", 1e-9),
-        ],
-    },
-    Quantity {
-        si: "Pa",
-        spellings: &[
-            ("Pa", 1.0),
-            ("mPa", 1e-3),
-            ("uPa", 1e-6),
-            ("hPa", 1e2),
-            ("kPa", 1e3),
-        ],
-    },
-    Quantity {
-        si: "s",
-        spellings: &[
-            ("s", 1.0),
-            ("sec", 1.0),
-            ("seconds", 1.0),
-            ("ms", 1e-3),
-            ("us", 1e-6),
-            ("ns", 1e-9),
-            ("min", 60.0),
-            ("h", 3600.0),
-        ],
-    },
-    Quantity {
-        si: "1",
-        spellings: &[("1", 1.0), ("-", 1.0)],
-    },
+/// Spellings of units, their factors to SI, and the SI units. Case counts: mN is a thousandth of a newton, MN a
+/// million.
+const UNITS: &[(&str, f64, &str)] = &[
+    ("N", 1.0, "N"),
+    ("mN", 1e-3, "N"),
+    ("kN", 1e3, "N"),
+    ("MN", 1e6, "N"),
+    ("newton", 1.0, "N"),
+    // Pound-force: 0.45359237 kg times standard gravity.
+    ("lbf", 4.448_221_615_260_5, "N"),
+    ("V", 1.0, "V"),
+    ("mV", 1e-3, "V"),
+    ("uV", 1e-6, "V"),
+    ("kV", 1e3, "V"),
+    ("volt", 1.0, "V"),
+    ("volts", 1.0, "V"),
+    ("m/s2", 1.0, "m/s2"),
+    ("mm/s2", 1e-3, "m/s2"),
+    ("um/s2", 1e-6, "m/s2"),
+    ("m/s/s", 1.0, "m/s2"),
+    ("ms-2", 1.0, "m/s2"),
+    ("m/(s2)", 1.0, "m/s2"),
+    ("g", STANDARD_GRAVITY, "m/s2"),
+    ("gn", STANDARD_GRAVITY, "m/s2"),
+    ("mg", 1e-3 * STANDARD_GRAVITY, "m/s2"),
+    ("m/s", 1.0, "m/s"),
+    ("mm/s", 1e-3, "m/s"),
+    ("um/s", 1e-6, "m/s"),
+    ("ms-1", 1.0, "m/s"),
+    ("m", 1.0, "m"),
+    ("cm", 1e-2, "m"),
+    ("mm", 1e-3, "m"),
+    ("um", 1e-6, "m"),
+    ("nm", 1e-9, "m"),
+    ("Pa", 1.0, "Pa"),
+    ("mPa", 1e-3, "Pa"),
+    ("uPa", 1e-6, "Pa"),
+    ("hPa", 1e2, "Pa"),
+    ("kPa", 1e3, "Pa"),
+    ("s", 1.0, "s"),
+    ("sec", 1.0, "s"),
+    ("seconds", 1.0, "s"),
+    ("ms", 1e-3, "s"),
+    ("us", 1e-6, "s"),
+    ("ns", 1e-9, "s"),
+    ("min", 60.0, "s"),
+    ("h", 3600.0, "s"),
+    ("1", 1.0, "1"),
+    ("-", 1.0, "1"),
 ];
 
 /// Factor to SI and the SI unit's name of a channel's unit, `None` for an unknown one.
@@ -108,10 +71,8 @@ const QUANTITIES: &[Quantity] = &[
 /// ```
 pub fn channel_unit(text: &str) -> Option<(f64, &'static str)> {
     let plain = plain_spelling(text);
-    QUANTITIES.iter().find_map(|quantity| {
-        let spelling = quantity.spellings.iter().find(|(name, _)| *name == plain);
-        spelling.map(|(_, factor)| (*factor, quantity.si))
-    })
+    let unit = UNITS.iter().find(|(spelling, ..)| *spelling == plain);
+    unit.map(|(_, factor, si)| (*factor, *si))
 }
 
 /// One spelling for the many ways to type a power, a micro sign or a product.
@@ -287,21 +248,17 @@ pub(super) fn quotient(motion: &str, force: &str) -> Option<(f64, ResponseForm)>
 /// Numerator and denominator of a quotient.
 fn split_quotient(text: &str) -> Option<(&str, &str)> {
     let outside = outside_brackets(text);
-    let at = |wanted: &[char]| {
-        let places = outside.iter().rev();
-        places.copied().find(|(_, c)| wanted.contains(c))
-    };
     // "(1/N)*(m/s2)": a product with a reciprocal, in either order.
-    if let Some((place, mark)) = at(&['*', '\u{b7}']) {
-        let (first, second) = (text.get(..place)?, text.get(place + mark.len_utf8()..)?);
+    if let Some((place, mark)) = outside.iter().rfind(|(_, c)| ['*', '\u{b7}'].contains(c)) {
+        let (first, second) = (text.get(..*place)?, text.get(place + mark.len_utf8()..)?);
         return match (reciprocal(first), reciprocal(second)) {
             (Some(force), None) => Some((second, force)),
             (None, Some(force)) => Some((first, force)),
             _ => None,
         };
     }
-    if let Some((place, _)) = at(&['/']) {
-        return Some((text.get(..place)?, text.get(place + 1..)?));
+    if let Some((place, _)) = outside.iter().rfind(|(_, c)| *c == '/') {
+        return Some((text.get(..*place)?, text.get(place + 1..)?));
     }
     // "(m/s2)(N)": two brackets side by side.
     let place = text.find(")(")?;

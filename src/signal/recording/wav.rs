@@ -1,21 +1,18 @@
 //! WAV files: the chunks, the coding of the samples, and the samples as numbers (full scale = 1 for integers).
 //!
-//! The chunks are walked here, because files from recorders break rules that hound insists on: odd chunks
-//! without or with their pad byte, 64-bit sizes (RF64, BW64), sizes that a crash left at 0,
-//! 0xFFFFFFFF or beyond the end of the file. No size is believed without comparing it with the file.
-//! The samples are then decoded by hound, which is given a plain header of our own in front of each
-//! block. Codings that hound cannot decode (64-bit float, integers that do not fill their containers)
-//! are decoded here.
+//! Files from recorders break rules that the crate hound insists on: odd chunks without or with their pad byte,
+//! 64-bit sizes (RF64, BW64), sizes that a crash left at 0, 0xFFFFFFFF or beyond the end of the file, 64-bit float,
+//! integers that do not fill their containers. No size is believed without comparing it with the file.
 
 use std::fs::File;
-use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::io::{Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::error::{RecordingError, WavError};
-use super::file_type::{read_fully, unreadable};
 use super::health::{HealthMeter, check_finite};
 use super::warning::RecordingWarning;
 use super::{ChannelInfo, Format, MAX_CHANNELS, ReadSettings, Recording, Source};
+use super::{read_fully, unreadable};
 
 /// More chunks than this are taken for garbage: real files have a dozen.
 const MAX_CHUNKS: usize = 10_000;
@@ -46,10 +43,8 @@ pub(super) fn open_wav(
     let mut warnings = header.warnings.clone();
     warnings.extend(settings.ignored_rate(sample_rate));
     let format = match header.coding {
-        Coding::Integer { bits } => Format::WavInteger { bits },
-        Coding::PaddedInteger { valid, .. } => Format::WavInteger { bits: valid },
-        Coding::Float32 => Format::WavFloat { bits: 32 },
-        Coding::Float64 => Format::WavFloat { bits: 64 },
+        Coding::Integer { valid, .. } => Format::WavInteger { bits: valid },
+        Coding::Float { bits } => Format::WavFloat { bits },
     };
     let all: Vec<usize> = (0..header.channels).collect();
     let mut meters = vec![HealthMeter::new(header.coding.full_scale()); header.channels];
@@ -136,9 +131,12 @@ impl WavSource {
     /// At the high end the low bits are all zero. When they are not, and every value fits into the
     /// valid bits, the writer used the low end; when neither holds, all bits are taken as valid.
     fn settle_alignment(&mut self) -> Result<(), RecordingError> {
-        let Coding::PaddedInteger { bits, valid, .. } = self.header.coding else {
+        let Coding::Integer { bits, valid, .. } = self.header.coding else {
             return Ok(());
         };
+        if bits == valid {
+            return Ok(());
+        }
         let limit = 2_f64.powi(-i32::from(bits - valid));
         let (mut low_bits_zero, mut fits) = (true, true);
         let mut cursor = self.cursor(0)?;
@@ -154,10 +152,10 @@ impl WavSource {
             }
         }
         if !low_bits_zero && fits {
-            self.header.coding = Coding::PaddedInteger {
+            self.header.coding = Coding::Integer {
                 bits,
                 valid,
-                right_aligned: RightAligned::Yes,
+                full: valid,
             };
             self.header.warnings.push(RecordingWarning::RightAligned {
                 bits: valid,
@@ -213,84 +211,10 @@ impl WavCursor<'_> {
                 frame: self.at + got as u64 / header.frame_bytes,
             });
         }
-        decode(header.coding, &self.bytes, &mut self.values)
-            .map_err(|error| unreadable(&self.source.file, std::io::Error::other(error)))?;
+        header.coding.decode(&self.bytes, &mut self.values);
         self.at += frames;
         Ok(&self.values)
     }
-}
-
-/// Decodes whole samples; integers with full scale 1.
-fn decode(coding: Coding, bytes: &[u8], into: &mut Vec<f64>) -> Result<(), hound::Error> {
-    match coding {
-        // hound takes at most 2^32 bytes and a block is far smaller, so the length fits.
-        Coding::Integer { bits } => {
-            let full_scale = 2_f64.powi(i32::from(bits) - 1);
-            let mut reader = hound_reader(1, bits, bytes)?;
-            for sample in reader.samples::<i32>() {
-                into.push(f64::from(sample?) / full_scale);
-            }
-        }
-        Coding::Float32 => {
-            let mut reader = hound_reader(3, 32, bytes)?;
-            for sample in reader.samples::<f32>() {
-                into.push(f64::from(sample?));
-            }
-        }
-        Coding::Float64 => {
-            let (samples, _) = bytes.as_chunks::<8>();
-            into.extend(samples.iter().map(|sample| f64::from_le_bytes(*sample)));
-        }
-        Coding::PaddedInteger {
-            bits,
-            valid,
-            right_aligned,
-        } => {
-            let used = match right_aligned {
-                RightAligned::No => bits,
-                RightAligned::Yes => valid,
-            };
-            let full_scale = 2_f64.powi(i32::from(used) - 1);
-            let samples = bytes.chunks_exact(usize::from(bits / 8));
-            into.extend(samples.map(|sample| signed(sample) as f64 / full_scale));
-        }
-    }
-    Ok(())
-}
-
-/// A little-endian signed integer of up to 8 bytes.
-fn signed(bytes: &[u8]) -> i64 {
-    let mut padded = [0_u8; 8];
-    let unused = 8_usize.saturating_sub(bytes.len());
-    // Filled from the high end and shifted down again, so that the sign extends itself.
-    for (to, from) in padded.iter_mut().skip(unused).zip(bytes) {
-        *to = *from;
-    }
-    i64::from_le_bytes(padded) >> (8 * unused.min(7))
-}
-
-/// hound over one block of samples behind a minimal header: one channel, since the order of the
-/// samples is all that matters here.
-fn hound_reader(
-    tag: u16,
-    bits: u16,
-    bytes: &[u8],
-) -> Result<hound::WavReader<impl Read + '_>, hound::Error> {
-    let length = bytes.len() as u32;
-    let mut header = Vec::with_capacity(44);
-    header.extend(b"RIFF");
-    header.extend((36 + length).to_le_bytes());
-    header.extend(b"WAVEfmt ");
-    header.extend(16_u32.to_le_bytes());
-    header.extend(tag.to_le_bytes());
-    header.extend(1_u16.to_le_bytes());
-    header.extend(1_u32.to_le_bytes());
-    header.extend(u32::from(bits / 8).to_le_bytes());
-    header.extend((bits / 8).to_le_bytes());
-    header.extend(bits.to_le_bytes());
-    header.extend(b"data");
-    header.extend(length.to_le_bytes());
-    hound::WavReader::new(Cursor::new(header).chain(bytes))
 }
 
 /// Everything the header says, checked against the file.
@@ -375,6 +299,7 @@ impl ChunkWalker<'_> {
         Ok(if unpadded { end } else { end.saturating_add(1) })
     }
 
+    /// Reads the "fmt " chunk at `at`.
     fn read_format(&mut self, at: u64, size: u32) -> Result<WaveFormat, RecordingError> {
         let mut bytes = [0_u8; 40];
         let wanted = bytes.len().min(size as usize);
@@ -382,26 +307,18 @@ impl ChunkWalker<'_> {
         if got < 16 {
             return Err(self.bad_header("bytes in the \"fmt \" chunk", got as u64, "16 or more"));
         }
-        let mut words = [0_u16; 20];
-        for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<2>().0) {
-            *word = u16::from_le_bytes(*bytes);
-        }
+        let words = bytes.as_chunks::<2>().0;
         let [
             tag,
             channels,
             rate_low,
             rate_high,
-            _,
-            _,
             frame_bytes,
             bits,
-            _,
             valid,
-            _,
-            _,
             subformat,
-            ..,
-        ] = words;
+        ] = [0, 1, 2, 3, 6, 7, 9, 12]
+            .map(|at| words.get(at).map_or(0, |word| u16::from_le_bytes(*word)));
         let sample_rate = u32::from(rate_low) | u32::from(rate_high) << 16;
         if channels == 0 {
             return Err(self.bad_header("channels", 0, "1 or more"));
@@ -410,71 +327,34 @@ impl ChunkWalker<'_> {
             return Err(self.bad_header("sample rate (Hz)", 0, "1 or more"));
         }
         // In the extensible header valid bits stand at 18 and the real tag begins the subformat.
-        let extensible = tag == 0xfffe && got >= 26;
-        let fields = FormatFields {
-            tag: if extensible { subformat } else { tag },
-            channels,
-            frame_bytes,
-            bits,
-            valid: if extensible { valid } else { bits },
-        };
-        Ok(WaveFormat {
-            channels,
-            sample_rate,
-            coding: self.coding(fields)?,
-        })
-    }
-
-    /// Returns the coding, or why it cannot be read.
-    fn coding(&self, fields: FormatFields) -> Result<Coding, RecordingError> {
-        let FormatFields { tag, bits, .. } = fields;
-        // Only of these two is it known how samples lie in a frame.
-        let bytes = match tag {
-            1 | 3 => self.sample_bytes(fields)?,
-            _ => 0,
+        let (tag, valid) = match tag == 0xfffe && got >= 26 {
+            true => (subformat, valid),
+            false => (tag, bits),
         };
         // Writers that leave the valid bits at 0, or above the container, mean all of them.
-        let valid = match fields.valid {
-            0 => bits,
-            valid => valid.min(bits),
-        };
-        match (tag, bytes) {
-            (1, 1..=4) if valid == 8 * bytes => Ok(Coding::Integer { bits: valid }),
-            // One byte is unsigned and cannot be shifted about; fewer than 2 bits are no signal.
-            (1, 2..=4) if valid >= 2 => Ok(Coding::PaddedInteger {
-                bits: 8 * bytes,
-                valid,
-                right_aligned: RightAligned::No,
-            }),
-            (3, 4) if bits == 32 => Ok(Coding::Float32),
-            (3, 8) if bits == 64 => Ok(Coding::Float64),
-            _ => Err(WavError::UnsupportedCoding {
+        let valid = if valid == 0 { bits } else { valid.min(bits) };
+        // Bytes of one sample of one channel: from the frame size, or from the bits where that is 0. Only of these
+        // two tags is it known how samples lie in a frame.
+        let mut bytes = bits.div_ceil(8);
+        if matches!(tag, 1 | 3) && frame_bytes > 0 {
+            if frame_bytes / channels < bytes || !frame_bytes.is_multiple_of(channels) {
+                let allowed = "channels times bytes per sample";
+                return Err(self.bad_header("bytes per frame", u64::from(frame_bytes), allowed));
+            }
+            bytes = frame_bytes / channels;
+        }
+        let coding =
+            Coding::new(tag, bits, valid, bytes).ok_or_else(|| WavError::UnsupportedCoding {
                 file: self.file.to_owned(),
                 tag,
                 name: coding_name(tag),
                 bits,
-            }
-            .into()),
-        }
-    }
-
-    /// Bytes of one sample of one channel: from the frame size, or from the bits where that is 0.
-    fn sample_bytes(&self, fields: FormatFields) -> Result<u16, RecordingError> {
-        let FormatFields {
+            })?;
+        Ok(WaveFormat {
             channels,
-            frame_bytes,
-            ..
-        } = fields;
-        let needed = fields.bits.div_ceil(8);
-        if frame_bytes == 0 {
-            return Ok(needed);
-        }
-        let bytes = frame_bytes / channels.max(1);
-        if bytes < needed || !frame_bytes.is_multiple_of(channels.max(1)) {
-            let allowed = "channels times bytes per sample";
-            return Err(self.bad_header("bytes per frame", u64::from(frame_bytes), allowed));
-        }
-        Ok(bytes)
+            sample_rate,
+            coding,
+        })
     }
 
     /// Returns the header of the samples that begin at `start`.
@@ -597,60 +477,76 @@ impl ChunkWalker<'_> {
 /// Coding of the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Coding {
-    /// Integers that fill their containers of `bits` bits; 8 bits are unsigned.
-    Integer { bits: u16 },
-    /// Integers of `valid` bits in wider containers of `bits` bits.
-    PaddedInteger {
+    /// Integers of `valid` bits in containers of `bits` bits; 8 bits are unsigned.
+    Integer {
         bits: u16,
         valid: u16,
-        right_aligned: RightAligned,
+        /// Bits of the full scale. The format demands that the valid bits sit at the high end of their containers,
+        /// then these are the container's; some writers use the low end, with the sign extended.
+        full: u16,
     },
-    /// 32-bit float.
-    Float32,
-    /// 64-bit float.
-    Float64,
-}
-
-/// The end of the container at which the valid bits sit. The format demands the high end; some writers
-/// use the low one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum RightAligned {
-    /// At the high end, as the format demands.
-    No,
-    /// At the low end, with the sign extended.
-    Yes,
+    /// Floating-point numbers of 32 or 64 bits.
+    Float { bits: u16 },
 }
 
 impl Coding {
+    /// Returns the coding of samples in containers of so many bytes; `None` where it is not read.
+    fn new(tag: u16, bits: u16, valid: u16, bytes: u16) -> Option<Self> {
+        match (tag, bytes) {
+            // One byte is unsigned and cannot be shifted about; fewer than 2 bits are no signal.
+            (1, 1..=4) if valid == 8 * bytes || (bytes > 1 && valid >= 2) => Some(Self::Integer {
+                bits: 8 * bytes,
+                valid,
+                full: 8 * bytes,
+            }),
+            (3, 4) if bits == 32 => Some(Self::Float { bits }),
+            (3, 8) if bits == 64 => Some(Self::Float { bits }),
+            _ => None,
+        }
+    }
+
     /// Bytes per sample.
     fn bytes(self) -> u64 {
-        match self {
-            Self::Integer { bits } | Self::PaddedInteger { bits, .. } => u64::from(bits / 8),
-            Self::Float32 => 4,
-            Self::Float64 => 8,
-        }
+        let (Self::Integer { bits, .. } | Self::Float { bits }) = self;
+        u64::from(bits / 8)
     }
 
     /// Magnitude from which on a sample sits at the end of the integer range (full scale = 1).
     fn full_scale(self) -> Option<f64> {
-        let bits = match self {
-            Self::Integer { bits } => bits,
-            Self::PaddedInteger { valid, .. } => valid,
-            Self::Float32 | Self::Float64 => return None,
-        };
-        // The largest positive integer is 2^(bits-1) - 1.
-        Some(1.0 - 0.5_f64.powi(i32::from(bits) - 1))
+        match self {
+            // The largest positive integer is 2^(bits-1) - 1.
+            Self::Integer { valid, .. } => Some(1.0 - 0.5_f64.powi(i32::from(valid) - 1)),
+            Self::Float { .. } => None,
+        }
     }
-}
 
-/// The numbers of a "fmt " chunk that decide the coding.
-#[derive(Debug, Clone, Copy)]
-struct FormatFields {
-    tag: u16,
-    channels: u16,
-    frame_bytes: u16,
-    bits: u16,
-    valid: u16,
+    /// Decodes whole samples; integers with full scale 1.
+    fn decode(self, bytes: &[u8], into: &mut Vec<f64>) {
+        match self {
+            Self::Float { bits: 32 } => {
+                let (samples, _) = bytes.as_chunks::<4>();
+                into.extend(samples.iter().map(|x| f64::from(f32::from_le_bytes(*x))));
+            }
+            Self::Float { .. } => {
+                let (samples, _) = bytes.as_chunks::<8>();
+                into.extend(samples.iter().map(|x| f64::from_le_bytes(*x)));
+            }
+            Self::Integer { bits: 8, .. } => {
+                into.extend(bytes.iter().map(|x| (f64::from(*x) - 128.0) / 128.0));
+            }
+            Self::Integer { bits, full, .. } => {
+                let full_scale = 2_f64.powi(i32::from(full) - 1);
+                let width = usize::from(bits / 8);
+                for sample in bytes.chunks_exact(width) {
+                    // Filled from the high end and shifted down again, so that the sign extends itself.
+                    let mut padded = [0_u8; 4];
+                    padded[4 - width..].copy_from_slice(sample);
+                    let value = i32::from_le_bytes(padded) >> (32 - bits);
+                    into.push(f64::from(value) / full_scale);
+                }
+            }
+        }
+    }
 }
 
 /// Names of the codings that occur in WAV files (mmreg.h).

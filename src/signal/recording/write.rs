@@ -6,7 +6,7 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use super::error::{RecordingError, UffError};
-use super::health::{check_finite, check_samples};
+use super::health::{check_finite, check_rate, check_samples};
 use super::responses::{FrequencyResponse, FrequencyResponses};
 use super::uff::Point;
 use super::units::ResponseForm;
@@ -53,7 +53,7 @@ impl WavLayout {
         channels: &[Vec<f64>],
         format: WavFormat,
     ) -> Result<Self, RecordingError> {
-        check_sample_rate(name, sample_rate)?;
+        check_rate(name, f64::from(sample_rate))?;
         let slices = channels.iter().map(Vec::as_slice);
         let frames = check_samples(name, f64::from(sample_rate), slices)?;
         Ok(Self {
@@ -79,16 +79,6 @@ impl WavLayout {
             });
         }
         Ok(())
-    }
-}
-
-fn check_sample_rate(name: &str, sample_rate: u32) -> Result<(), RecordingError> {
-    match sample_rate {
-        0 => Err(RecordingError::BadSampleRate {
-            file: name.to_owned(),
-            value: 0.0,
-        }),
-        _ => Ok(()),
     }
 }
 
@@ -149,7 +139,7 @@ impl WavStream {
     /// More than the format can hold, a sample rate of 0, a folder that cannot be written.
     pub fn create(path: &Path, layout: WavLayout) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
-        check_sample_rate(&name, layout.sample_rate)?;
+        check_rate(&name, f64::from(layout.sample_rate))?;
         layout.check_size(&name, layout.frames)?;
         let folder = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -245,30 +235,22 @@ impl<W: Write + Seek> WavEncoder<W> {
             });
         }
         let rate = f64::from(self.layout.sample_rate);
+        let full_scale = 2_f64.powi(i32::from(self.layout.format.bits()) - 1);
         for (channel, value) in frame.iter().enumerate() {
-            check_finite(
-                &self.name,
-                rate,
-                channel,
-                self.written,
-                std::slice::from_ref(value),
-            )?;
-            self.write_value(*value)
-                .map_err(|error| unwritable(&self.name, error))?;
+            let sample = std::slice::from_ref(value);
+            check_finite(&self.name, rate, channel, self.written, sample)?;
+            let written = if self.layout.format == WavFormat::Float32 {
+                self.wav.write_sample(*value as f32)
+            } else {
+                let wanted = (value * full_scale).round();
+                let stored = wanted.clamp(-full_scale, full_scale - 1.0);
+                self.clipped += u64::from(stored != wanted);
+                self.wav.write_sample(stored as i32)
+            };
+            written.map_err(|error| unwritable(&self.name, error))?;
         }
         self.written += 1;
         self.layout.check_size(&self.name, self.written)
-    }
-
-    fn write_value(&mut self, value: f64) -> Result<(), hound::Error> {
-        if self.layout.format == WavFormat::Float32 {
-            return self.wav.write_sample(value as f32);
-        }
-        let full_scale = 2_f64.powi(i32::from(self.layout.format.bits()) - 1);
-        let wanted = (value * full_scale).round();
-        let stored = wanted.clamp(-full_scale, full_scale - 1.0);
-        self.clipped += u64::from(stored != wanted);
-        self.wav.write_sample(stored as i32)
     }
 
     /// Completes the header. Returns the bytes of all samples, and how many samples were clipped.
@@ -356,12 +338,24 @@ pub fn encode_frequency_responses_uff(
             .flat_map(|value| [value.re, value.im]);
         let values: Vec<f64> = parts.collect();
         check_values(responses, number, 2, &values)?;
-        let header = response_header(responses, response);
-        write_dataset(&mut bytes, &header, &values, format);
+        // Values are in SI units where the form is known; else the unit is the file's.
+        let force = axis(13, "Force", "N");
+        let axes = match response.form {
+            Some(ResponseForm::Accelerance) => axis(12, "Acceleration", "m/s2") + &force,
+            Some(ResponseForm::Mobility) => axis(11, "Velocity", "m/s") + &force,
+            Some(ResponseForm::Receptance) => axis(8, "Displacement", "m") + &force,
+            None => {
+                let unit = response.unit.as_deref().unwrap_or("NONE");
+                axis(0, "Response", unit) + &axis(0, "NONE", "NONE")
+            }
+        };
+        let records = header(responses, response, 4, 6, axes);
+        write_dataset(&mut bytes, &records, &values, format);
         if let Some(coherence) = &response.coherence {
             check_values(responses, number, 1, coherence)?;
-            let header = coherence_header(responses, response);
-            write_dataset(&mut bytes, &header, coherence, format);
+            let axes = axis(0, "Coherence", "NONE") + &axis(0, "NONE", "NONE");
+            let records = header(responses, response, 6, 4, axes);
+            write_dataset(&mut bytes, &records, coherence, format);
         }
     }
     Ok(bytes)
@@ -392,26 +386,6 @@ fn check_values(
             value: values.get(at).copied().unwrap_or(f64::NAN),
         }),
     }
-}
-
-/// The header of a response. Values are in SI units where the form is known; else the unit is the file's.
-fn response_header(responses: &FrequencyResponses, response: &FrequencyResponse) -> String {
-    let numerator = match response.form {
-        Some(ResponseForm::Accelerance) => axis(12, "Acceleration", "m/s2"),
-        Some(ResponseForm::Mobility) => axis(11, "Velocity", "m/s"),
-        Some(ResponseForm::Receptance) => axis(8, "Displacement", "m"),
-        None => axis(0, "Response", response.unit.as_deref().unwrap_or("NONE")),
-    };
-    let denominator = match response.form {
-        Some(_) => axis(13, "Force", "N"),
-        None => axis(0, "NONE", "NONE"),
-    };
-    header(responses, response, 4, 6, numerator + &denominator)
-}
-
-fn coherence_header(responses: &FrequencyResponses, response: &FrequencyResponse) -> String {
-    let axes = axis(0, "Coherence", "NONE") + &axis(0, "NONE", "NONE");
-    header(responses, response, 6, 4, axes)
 }
 
 /// The eleven header records, `ordinate_axes` being records 9 and 10.

@@ -1,8 +1,7 @@
-//! Averages over taps: power spectra, cross spectra and H1.
+//! Averages over taps: power spectra, cross spectra and H1; estimators of a frequency response function from them, and
+//! its accuracy.
 //!
-//! Estimators of a frequency response function from averaged spectra, and how well it is known.
-//!
-//! All take the averaged spectra of one force and one response on one line: Gff = mean |F|^2,
+//! All estimators take the averaged spectra of one force and one response on one line: Gff = mean |F|^2,
 //! Gxx = mean |X|^2 and Gfx = mean conj(F) X, in the convention e^{+j omega t}.
 
 use num_complex::Complex64;
@@ -10,7 +9,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::lines::Lines;
+use super::Lines;
 use super::transform::{Transformer, Workspace};
 
 /// Sums of spectra over taps, one tap at a time, so that only one record is in memory.
@@ -88,6 +87,21 @@ impl SpectralAverager {
         }
     }
 
+    /// Gfx/Gff of each response, 0 where the force has no power at all.
+    fn h1(&self) -> Vec<Vec<Complex64>> {
+        let mut h1 = self.cross.clone();
+        for values in &mut h1 {
+            for (value, &power) in values.iter_mut().zip(&self.force_power) {
+                *value = if power > 0.0 {
+                    *value / power
+                } else {
+                    Complex64::ZERO
+                };
+            }
+        }
+        h1
+    }
+
     /// The averages; `None` before the first tap.
     pub fn finish(mut self) -> Option<AveragedSpectra> {
         if self.taps == 0 {
@@ -100,15 +114,13 @@ impl SpectralAverager {
             .chain([&mut self.force_power]);
         powers.flatten().for_each(|power| *power *= share);
         self.cross.iter_mut().flatten().for_each(|x| *x *= share);
-        let root = |power: &Vec<f64>| power.iter().map(|p| p.sqrt()).collect::<Vec<_>>();
         let has_force = self.force_power.iter().any(|&power| power > 0.0);
-        let h1 = |cross: &Vec<Complex64>| divide(cross, &self.force_power);
         Some(AveragedSpectra {
             lines: self.lines,
             taps: self.taps,
-            force: has_force.then(|| root(&self.force_power)),
-            responses: self.response_power.iter().map(root).collect(),
-            h1: has_force.then(|| self.cross.iter().map(h1).collect()),
+            force: has_force.then(|| roots(&self.force_power)),
+            responses: self.response_power.iter().map(|g| roots(g)).collect(),
+            h1: has_force.then(|| self.h1()),
             response_power: self.response_power,
             cross: has_force.then_some(self.cross),
             force_power: has_force.then_some(self.force_power),
@@ -128,13 +140,8 @@ fn add_all<T: std::ops::AddAssign + Copy>(sums: &mut [T], values: &[T]) {
     }
 }
 
-/// cross/power, 0 where the force has no power at all.
-fn divide(cross: &[Complex64], power: &[f64]) -> Vec<Complex64> {
-    cross
-        .iter()
-        .zip(power)
-        .map(|(c, &p)| if p > 0.0 { c / p } else { Complex64::ZERO })
-        .collect()
+fn roots(powers: &[f64]) -> Vec<f64> {
+    powers.iter().map(|power| power.sqrt()).collect()
 }
 
 impl AveragedSpectra {
@@ -177,47 +184,32 @@ pub fn average_records(
 ) -> Option<AveragedSpectra> {
     let responses = records.first()?.responses.len();
     let share = records.len().div_ceil(MOST_SHARES).max(LEAST_SHARE);
-    let empty = || SpectralAverager::new(*transformer.lines(), responses);
     let parts: Vec<SpectralAverager> = records
         .par_chunks(share)
         .map(|records| {
-            let mut sum = empty();
-            let mut room = (Workspace::default(), Vec::new());
-            let mut transforms = vec![Vec::new(); responses];
+            let mut sum = SpectralAverager::new(*transformer.lines(), responses);
+            let mut workspace = Workspace::default();
+            let mut of_force = Vec::new();
+            let mut of_responses = vec![Vec::new(); responses];
             for record in records {
-                add_record(&mut sum, transformer, record, (&mut room, &mut transforms));
+                for (samples, values) in record.responses.iter().zip(&mut of_responses) {
+                    transformer.transform_into(samples, &mut workspace, values);
+                }
+                let force = record.force.map(|samples| {
+                    transformer.transform_into(samples, &mut workspace, &mut of_force);
+                    of_force.as_slice()
+                });
+                sum.add(force, &of_responses);
             }
             sum
         })
         .collect();
-    let mut sum = empty();
+    let mut sum = SpectralAverager::new(*transformer.lines(), responses);
     parts.iter().for_each(|part| sum.merge(part));
     sum.finish()
 }
 
-/// Room for the force's transform and for those of the responses.
-type Room<'a> = (
-    &'a mut (Workspace, Vec<Complex64>),
-    &'a mut [Vec<Complex64>],
-);
-
-fn add_record(
-    sum: &mut SpectralAverager,
-    transformer: &Transformer,
-    record: &TapRecord<'_>,
-    ((workspace, of_force), of_responses): Room<'_>,
-) {
-    for (samples, values) in record.responses.iter().zip(of_responses.iter_mut()) {
-        transformer.transform_into(samples, workspace, values);
-    }
-    let force = record.force.map(|samples| {
-        transformer.transform_into(samples, workspace, of_force);
-        of_force.as_slice()
-    });
-    sum.add(force, of_responses);
-}
-
-/// Which noise an estimator takes to be there.
+/// Estimator of a frequency response function, by the noise that it assumes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FrfEstimator {
     /// Gfx/Gff: right where noise is on the response alone; of noise on the force it reads low. The
@@ -333,16 +325,18 @@ impl AveragedSpectra {
             let stated = self.h1.as_ref().filter(|_| estimator == FrfEstimator::H1);
             return Some(stated?.get(response)?.iter().copied().map(Some).collect());
         }
-        let value = |line| self.powers(response, line)?.frf(estimator);
-        Some((0..self.lines.points()).map(value).collect())
+        let lines = 0..self.lines.points();
+        let values = lines.map(|line| self.powers(response, line)?.frf(estimator));
+        Some(values.collect())
     }
 
     /// Coherence of one response with the force on each line; `None` below two averages and without a
     /// hammer.
     pub fn coherence(&self, response: usize) -> Option<Vec<Option<f64>>> {
         self.powers(response, 0).filter(|_| self.taps >= 2)?;
-        let value = |line| self.powers(response, line)?.coherence(self.taps);
-        Some((0..self.lines.points()).map(value).collect())
+        let lines = 0..self.lines.points();
+        let values = lines.map(|line| self.powers(response, line)?.coherence(self.taps));
+        Some(values.collect())
     }
 
     /// Coherence and random error of one response on the line nearest to `frequency` (Hz).
@@ -355,13 +349,13 @@ impl AveragedSpectra {
         }
     }
 
-    /// The same of the response that knows the line best: a sensor on a node tells nothing of a mode.
+    /// Quality of the response with the highest coherence: a sensor on a node tells nothing of a mode.
     pub fn best_quality(&self, frequency: f64) -> LineQuality {
         (0..self.response_power.len())
             .map(|response| self.quality(response, frequency))
             .max_by(|a, b| {
-                let rank = |quality: &LineQuality| quality.coherence.unwrap_or(-1.0);
-                rank(a).total_cmp(&rank(b))
+                let [a, b] = [a, b].map(|quality| quality.coherence.unwrap_or(-1.0));
+                a.total_cmp(&b)
             })
             .unwrap_or_default()
     }

@@ -1,8 +1,5 @@
-//! The Fourier transform of tap records on given lines.
-//!
-//! Zooming into a band as an analyser does: mix, low-pass, decimate.
-//!
-//! Chirp z-transform (Bluestein): a transform on lines of any start and spacing.
+//! The Fourier transform of tap records on given lines: a real FFT over the full band; into a band an analyser's zoom
+//! (mix, low-pass, decimate) and a chirp z-transform (Bluestein) on lines of any start and spacing.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt;
@@ -12,7 +9,7 @@ use num_complex::Complex64;
 use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
-use super::lines::{DISPLAY_RATIO, Lines, smallest_smooth_block};
+use super::{DISPLAY_RATIO, Lines, smallest_smooth_block};
 
 /// The Fourier transform X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate} of windowed records (unit of
 /// the samples times s) on given lines; time zero is a record's first sample.
@@ -135,19 +132,20 @@ impl Plan {
             let step = lines.spacing / sample_rate;
             return Plan::Lines(Chirp::new(length, lines.low / sample_rate, step, points));
         }
-        let decimator = Decimator::new(sample_rate, (centre, width), factor, length);
+        let decimator = Decimator::new(sample_rate, centre, width, factor, length);
         let rate = sample_rate / factor as f64;
         let start = (lines.low - centre) / rate;
         let outputs = decimator.outputs(length);
-        let turn = |index: usize| {
+        let mut turns = Vec::with_capacity(points);
+        for index in 0..points {
             // The first decimated sample lies `delay` samples before the record's start.
             let offset = lines.frequency(index) - centre;
             let angle = TAU * offset * decimator.delay() as f64 / sample_rate;
-            Complex64::from_polar(factor as f64, angle)
-        };
+            turns.push(Complex64::from_polar(factor as f64, angle));
+        }
         Plan::Zoom {
             chirp: Chirp::new(outputs, start, lines.spacing / rate, points),
-            turns: (0..points).map(turn).collect(),
+            turns,
             decimator,
         }
     }
@@ -173,12 +171,6 @@ pub fn transform_block(samples: &[f64], sample_rate: f64, lines: &Lines) -> Vec<
 /// recorders once the decimated lines add up.
 const STOP_BAND_DB: f64 = 100.0;
 
-/// Kaiser's relation between attenuation (dB) and the shape parameter beta, above 50 dB
-/// (Oppenheim & Schafer).
-fn kaiser_beta(attenuation: f64) -> f64 {
-    0.1102 * (attenuation - 8.7)
-}
-
 /// Modified Bessel function I0, by its power series: converges for every argument used here.
 fn bessel_i0(x: f64) -> f64 {
     let quarter = x * x / 4.0;
@@ -198,7 +190,8 @@ fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
     // Kaiser's length: (A - 7.95)/(2.285 transition).
     let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
     let cut_off = PI * (pass + stop) / sample_rate;
-    let beta = kaiser_beta(STOP_BAND_DB);
+    // Kaiser's shape parameter for an attenuation above 50 dB (Oppenheim & Schafer).
+    let beta = 0.1102 * (STOP_BAND_DB - 8.7);
     let taps: Vec<f64> = (-half..=half)
         .map(|n| {
             let sinc = if n == 0 {
@@ -235,14 +228,16 @@ impl Decimator {
     /// that `width` (Hz) around it survives.
     pub(crate) fn new(
         sample_rate: f64,
-        (centre, width): (f64, f64),
+        centre: f64,
+        width: f64,
         factor: usize,
         length: usize,
     ) -> Self {
         let rate = sample_rate / factor as f64;
-        let turn = |n| Complex64::from_polar(1.0, phase(centre / sample_rate, n as f64));
         Decimator {
-            oscillator: (0..length).map(turn).collect(),
+            oscillator: (0..length)
+                .map(|n| Complex64::from_polar(1.0, phase(centre / sample_rate, n as f64)))
+                .collect(),
             filter: low_pass(width / 2.0, rate - width / 2.0, sample_rate),
             factor,
         }
@@ -280,13 +275,14 @@ impl Decimator {
 /// Magnitude over time of what `samples` have between `low` and `high` (Hz): mixed down, filtered and
 /// decimated, the filter's tails cut off; the samples themselves where the band is most of what
 /// there is.
-pub fn band_limited(samples: &[f64], sample_rate: f64, (low, high): (f64, f64)) -> Vec<f64> {
+pub fn band_limited(samples: &[f64], sample_rate: f64, band: (f64, f64)) -> Vec<f64> {
+    let (low, high) = band;
     let factor = decimation_factor(sample_rate, high - low);
     if factor < 3 {
         return samples.to_vec();
     }
-    let band = (0.5 * (low + high), high - low);
-    let decimator = Decimator::new(sample_rate, band, factor, samples.len());
+    let (centre, width) = (0.5 * (low + high), high - low);
+    let decimator = Decimator::new(sample_rate, centre, width, factor, samples.len());
     let skip = decimator.delay() / factor;
     let keep = samples.len() / factor;
     // A real oscillation of amplitude a leaves a magnitude of a/2.
@@ -338,17 +334,12 @@ impl Chirp {
     /// For at most `samples` samples and `count` lines; `start` and `step` in cycles per sample.
     pub(super) fn new(samples: usize, start: f64, step: f64, count: usize) -> Self {
         let length = smallest_smooth_block(samples + count);
-        // e^{-j pi step k^2}: half the chirp, so that nk = (n^2 + k^2 - (k-n)^2)/2.
-        let chirp = |k: usize| {
-            let square = k as f64 * k as f64;
-            Complex64::from_polar(1.0, phase(step / 2.0, square))
-        };
         let mut kernel = vec![Complex64::ZERO; length];
         for (k, value) in kernel.iter_mut().take(count).enumerate() {
-            *value = chirp(k).conj();
+            *value = half_chirp(step, k).conj();
         }
         for i in 1..samples {
-            kernel[length - i] = chirp(i).conj();
+            kernel[length - i] = half_chirp(step, i).conj();
         }
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(length);
@@ -356,10 +347,10 @@ impl Chirp {
         let scale = 1.0 / length as f64;
         Chirp {
             before: (0..samples)
-                .map(|i| Complex64::from_polar(1.0, phase(start, i as f64)) * chirp(i))
+                .map(|i| Complex64::from_polar(1.0, phase(start, i as f64)) * half_chirp(step, i))
                 .collect(),
             kernel,
-            after: (0..count).map(|k| chirp(k) * scale).collect(),
+            after: (0..count).map(|k| half_chirp(step, k) * scale).collect(),
             forward,
             inverse: planner.plan_fft_inverse(length),
         }
@@ -376,6 +367,11 @@ impl Chirp {
         self.inverse.process(&mut signal);
         signal.iter().zip(&self.after).map(|(x, a)| x * a).collect()
     }
+}
+
+/// Half the chirp, e^{-j pi step k^2}, so that nk = (n^2 + k^2 - (k-n)^2)/2.
+fn half_chirp(step: f64, k: usize) -> Complex64 {
+    Complex64::from_polar(1.0, phase(step / 2.0, k as f64 * k as f64))
 }
 
 impl fmt::Debug for Chirp {

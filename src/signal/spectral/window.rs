@@ -1,15 +1,12 @@
-//! Windows over a tap record.
-//!
-//! How far a tap record rings down, and the window that follows from it.
-//!
-//! Noise of a channel, line by line, from a quiet stretch before the taps.
+//! Windows over a tap record, chosen by how far it rings down; and the noise of a channel, line by line, from a quiet
+//! stretch before the taps.
 
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use tapjoint_numerics::stats::median;
 
-use super::lines::Lines;
+use super::Lines;
 use super::transform::transform_block;
 
 /// A window as applied.

@@ -5,8 +5,6 @@
 //! weaker copy of the tap's own pulse is looked for: the same thing as a ripple of period 1/delay and
 //! depth (1 + r)/(1 - r) in the force spectrum, for |1 + r e^{-j omega d}| swings between 1 + r and
 //! 1 - r, but without the spectrum's trouble to tell a ripple of long period from the pulse's own fall.
-//!
-//! Whether a stretch of force is a weaker copy of the tap's own pulse.
 
 use super::hammer::{Force, half_width};
 use super::{Event, TapSettings};
@@ -40,8 +38,8 @@ pub struct SecondHit {
     pub ratio: f64,
 }
 
-/// Deepest ripple that is told, as a ratio (1): 60 dB. Two equal hits cancel to nothing between their crests, and what
-/// is left there is noise.
+/// Deepest ripple that is reported, as a ratio (1): 60 dB. Two equal hits cancel to nothing between their crests, and
+/// only noise is left there.
 const DEEPEST_RIPPLE: f64 = 1000.0;
 
 impl SecondHit {
@@ -50,8 +48,8 @@ impl SecondHit {
         1.0 / self.delay
     }
 
-    /// Largest over smallest force within a ripple, (1 + r)/(1 - r); of two hits that are as good as equal,
-    /// [`SecondHit::is_deepest`], the 1000 (60 dB) that noise lets one see.
+    /// Largest over smallest force within a ripple, (1 + r)/(1 - r); for two nearly equal hits
+    /// ([`SecondHit::is_deepest`]) the 1000 (60 dB) that noise lets one see.
     pub fn ripple_depth(&self) -> f64 {
         match self.is_deepest() {
             true => DEEPEST_RIPPLE,
@@ -59,7 +57,7 @@ impl SecondHit {
         }
     }
 
-    /// Whether both hits are so equal that the force vanishes within a ripple.
+    /// Returns `true` where both hits are so equal that the force vanishes within a ripple.
     pub fn is_deepest(&self) -> bool {
         1.0 + self.ratio >= DEEPEST_RIPPLE * (1.0 - self.ratio)
     }
@@ -70,7 +68,8 @@ impl SecondHit {
 /// `own` ends where the next event may begin; only there an excursion counts whatever its form.
 pub(super) fn second_hit(
     force: &Force,
-    (event, own): (&Event, usize),
+    event: &Event,
+    own: usize,
     settings: &TapSettings,
 ) -> Option<SecondHit> {
     let start = force.index(event.trigger);
@@ -83,59 +82,61 @@ pub(super) fn second_hit(
         .rev()
         .max_by(|a, b| a.1.total_cmp(b.1))?;
     let main = Pulse::new(samples, start + offset);
-    let copies = copies(&main, settings.double_hit_warning);
-    let excursion = excursion(&main, force.noise, (own, settings));
+    let mut found = copies(&main, settings.double_hit_warning);
     // A copy has been fitted where an excursion has only been looked at.
-    let excursion = excursion.filter(|other| {
-        let same = |copy: &PulseCopy| (copy.place - other.place).abs() <= main.width + 1.0;
-        !copies.iter().any(same)
+    let excursion = excursion(&main, force.noise, own, settings).filter(|other| {
+        let mut places = found.iter().map(|copy| copy.place);
+        !places.any(|place| (place - other.place).abs() <= main.width + 1.0)
     });
-    copies
+    found.extend(excursion);
+    let largest = found
         .into_iter()
-        .chain(excursion)
         .max_by(|a, b| a.ratio.total_cmp(&b.ratio))
-        .filter(|copy| copy.ratio >= settings.double_hit_warning)
-        .map(|copy| SecondHit {
-            delay: (copy.place - main.crest as f64).abs() / force.rate,
-            ratio: smaller_over_larger(main.size_of(&copy)),
-        })
+        .filter(|copy| copy.ratio >= settings.double_hit_warning)?;
+    let size = main.size_of(&largest);
+    Some(SecondHit {
+        delay: (largest.place - main.crest as f64).abs() / force.rate,
+        // The crest that is read higher may have the smaller impulse.
+        ratio: size.min(size.recip()),
+    })
 }
 
-/// A ratio of two sizes the way round that makes it at most 1: the crest that is read higher may have the smaller
-/// impulse.
-fn smaller_over_larger(ratio: f64) -> f64 {
-    ratio.min(ratio.recip())
-}
-
-/// The tap's main pulse in its surroundings.
+/// The tap's main pulse in its surroundings; its samples about the crest are the template of its copies.
 struct Pulse<'a> {
     samples: &'a [f64],
     crest: usize,
     peak: f64,
     /// Width at half height (samples).
     width: f64,
+    /// Samples to either side of the crest that belong to it. A pulse of 1.3 times the width has ended there too:
+    /// half a sine ends 0.75 half widths from its crest, sin^2 one.
+    reach: usize,
+    /// Variance of the channel's noise from sample to sample.
+    noise_power: f64,
 }
 
 impl<'a> Pulse<'a> {
     fn new(samples: &'a [f64], crest: usize) -> Self {
+        let width = half_width(samples, crest).max(1.0);
         Pulse {
             samples,
             crest,
             peak: samples.get(crest).copied().unwrap_or(0.0),
-            width: half_width(samples, crest).max(1.0),
+            width,
+            reach: (2.0 * width).ceil() as usize + 1,
+            noise_power: noise_power(samples),
         }
     }
 
-    /// A second hit's size, by what the samples tell of it. Of a pulse two samples wide the height between them is
-    /// anybody's guess (a narrower and higher copy fits as well), but an anti-alias filter keeps its impulse, which
-    /// is also what the spectrum ripples by.
+    /// A second hit's size. The height of a pulse two samples wide between them is not known (a narrower and higher
+    /// copy fits as well), but an anti-alias filter keeps its impulse, which is also what the spectrum ripples by.
     fn size_of(&self, copy: &PulseCopy) -> f64 {
         if self.width >= FORM_SHOWS {
             return copy.ratio;
         }
         let place = copy.place.round().max(0.0) as usize;
         // An anti-alias filter rings for some samples about each pulse; half the way to the other is its own.
-        let reach = (3 * reach(self.width)).min(self.crest.abs_diff(place) / 2);
+        let reach = (3 * self.reach).min(self.crest.abs_diff(place) / 2);
         let ratio = self.impulse(place, reach) / self.impulse(self.crest, reach);
         // Beyond that something else lies beside one of the two.
         let is_alike = (0.5..=2.0).contains(&(ratio / copy.ratio));
@@ -145,14 +146,24 @@ impl<'a> Pulse<'a> {
     /// Sum of the samples within the reach of a crest, above the median of as many beyond it; those at its ends
     /// count half, so that a ringing from sample to sample leaves nothing.
     fn impulse(&self, crest: usize, reach: usize) -> f64 {
-        let last = self.samples.len().saturating_sub(1);
-        let sample = |index: usize| self.samples.get(index.min(last)).copied().unwrap_or(0.0);
-        let pair = |step: usize| [sample(crest.saturating_sub(step)), sample(crest + step)];
-        let mut beyond: Vec<f64> = (reach + 1..=2 * reach).flat_map(pair).collect();
+        let mut beyond = Vec::with_capacity(2 * reach);
+        for step in reach + 1..=2 * reach {
+            beyond.extend(self.beside(crest, step));
+        }
         let base = median(&mut beyond);
-        let height = |step: usize| pair(step).iter().map(|x| x - base).sum::<f64>();
-        let inside: f64 = (1..reach).map(height).sum();
-        sample(crest) - base + inside + 0.5 * height(reach)
+        let (mut inside, mut ends) = (0.0, 0.0);
+        for step in 1..=reach {
+            inside += ends;
+            let [before, after] = self.beside(crest, step);
+            ends = (before - base) + (after - base);
+        }
+        clamped(self.samples, crest as i64) - base + inside + 0.5 * ends
+    }
+
+    /// The samples so many steps before and after a crest, the outermost ones beyond the ends.
+    fn beside(&self, crest: usize, step: usize) -> [f64; 2] {
+        let (crest, step) = (crest as i64, step as i64);
+        [crest - step, crest + step].map(|index| clamped(self.samples, index))
     }
 
     fn is_clear(&self, index: usize) -> bool {
@@ -165,56 +176,43 @@ fn copies(main: &Pulse, least: f64) -> Vec<PulseCopy> {
     let crests = crests(main);
     let own = crests.get(main.crest).copied().unwrap_or(0.0);
     let limit = (CANDIDATE * least * own).max(OVER_NOISE * disturbance(main, &crests));
-    let template = Template::new(main.samples, main.crest, main.width);
-    let fitted = |sign: f64| -> Vec<PulseCopy> {
-        candidates(main, (&crests, sign), limit)
-            .into_iter()
-            .filter_map(|place| template.fit(place))
-            .filter(|copy| copy.ratio * sign > 0.0)
-            .collect()
-    };
-    let upward = fitted(1.0);
+    let mut upward = fitted(main, &crests, 1.0, limit);
     if upward.is_empty() {
         return upward;
     }
-    let deepest = fitted(-1.0).iter().map(|c| -c.ratio).fold(0.0, f64::max);
+    let downward = fitted(main, &crests, -1.0, limit);
+    let deepest = downward.iter().map(|copy| -copy.ratio).fold(0.0, f64::max);
+    upward.retain(|copy| {
+        let crest = Crest {
+            place: (copy.place.round().max(0.0) as usize).min(main.samples.len() - 1),
+            peak: copy.ratio * main.peak,
+            base: copy.base,
+        };
+        copy.ratio >= OVER_DOWNWARD * deepest && !is_ringing(main, &crest)
+    });
     upward
-        .into_iter()
-        .filter(|copy| copy.ratio >= OVER_DOWNWARD * deepest)
-        .filter(|copy| {
-            let crest = Crest {
-                place: (copy.place.round().max(0.0) as usize).min(main.samples.len() - 1),
-                peak: copy.ratio * main.peak,
-                base: copy.base,
-            };
-            !is_ringing(main, &crest)
-        })
-        .collect()
 }
 
-/// How far the force, smoothed over half a width, stands above its mean at the reach to either side,
+/// Height of the force, smoothed over half a width, above its mean at the reach to either side,
 /// c(t) = s(t) - (s(t - k) + s(t + k))/2: offset and slope drop out, a pulse keeps its height.
 fn crests(main: &Pulse) -> Vec<f64> {
     let smooth = smoothed(main.samples, (main.width / 4.0).round() as usize);
-    let reach = reach(main.width);
     let last = smooth.len().saturating_sub(1);
-    let height = |(index, x): (usize, &f64)| {
-        let before = smooth[index.saturating_sub(reach)];
-        let after = smooth[(index + reach).min(last)];
-        x - 0.5 * (before + after)
-    };
-    smooth.iter().enumerate().map(height).collect()
+    let mut crests = Vec::with_capacity(smooth.len());
+    for (index, x) in smooth.iter().enumerate() {
+        let before = smooth[index.saturating_sub(main.reach)];
+        let after = smooth[(index + main.reach).min(last)];
+        crests.push(x - 0.5 * (before + after));
+    }
+    crests
 }
 
 /// Mean over `reach` samples to either side.
 fn smoothed(samples: &[f64], reach: usize) -> Vec<f64> {
-    let mut sum = 0.0;
-    let sums: Vec<f64> = std::iter::once(0.0)
-        .chain(samples.iter().map(|x| {
-            sum += x;
-            sum
-        }))
-        .collect();
+    let mut sums = vec![0.0];
+    for x in samples {
+        sums.push(sums[sums.len() - 1] + x);
+    }
     (0..samples.len())
         .map(|index| {
             let first = index.saturating_sub(reach);
@@ -236,36 +234,37 @@ fn disturbance(main: &Pulse, crests: &[f64]) -> f64 {
     1.4826 * median(&mut magnitudes)
 }
 
-/// Places of the highest crests above `limit` (with `sign` -1: of the deepest below).
-fn candidates(main: &Pulse, (crests, sign): (&[f64], f64), limit: f64) -> Vec<usize> {
+/// Copies at the highest crests above `limit`; with `sign` -1 at the deepest below, pointing down.
+fn fitted(main: &Pulse, crests: &[f64], sign: f64, limit: f64) -> Vec<PulseCopy> {
     let width = main.width.ceil() as usize;
-    let mut found: Vec<usize> = Vec::new();
+    let mut places: Vec<usize> = Vec::new();
     for (index, crest) in crests.iter().enumerate() {
         if sign * crest <= limit || !main.is_clear(index) {
             continue;
         }
-        match found.last_mut() {
+        match places.last_mut() {
             // Within one width there is one crest, the highest.
             Some(last) if index - *last <= width => {
                 if sign * crest > sign * crests[*last] {
                     *last = index;
                 }
             }
-            _ => found.push(index),
+            _ => places.push(index),
         }
     }
-    found.sort_by(|&a, &b| (sign * crests[b]).total_cmp(&(sign * crests[a])));
-    found.truncate(MOST_CANDIDATES);
-    found
+    places.sort_by(|&a, &b| (sign * crests[b]).total_cmp(&(sign * crests[a])));
+    places.truncate(MOST_CANDIDATES);
+    let mut copies: Vec<PulseCopy> = places
+        .into_iter()
+        .filter_map(|place| main.fit(place))
+        .collect();
+    copies.retain(|copy| copy.ratio * sign > 0.0);
+    copies
 }
 
 /// The largest second excursion above `double_hit` of the peak after the force has fallen below
 /// `rearm` of it.
-fn excursion(
-    main: &Pulse,
-    noise: f64,
-    (own, settings): (usize, &TapSettings),
-) -> Option<PulseCopy> {
+fn excursion(main: &Pulse, noise: f64, own: usize, settings: &TapSettings) -> Option<PulseCopy> {
     let limit = (settings.double_hit * main.peak).max(OVER_NOISE * noise);
     let rearm = (settings.rearm * main.peak).max(3.0 * noise);
     let samples = main.samples.get(..own)?;
@@ -293,22 +292,29 @@ struct Crest {
     base: f64,
 }
 
+impl Crest {
+    /// Returns `true` for a force above half of the crest's height.
+    fn is_above_half(&self, force: f64) -> bool {
+        force - self.base > 0.5 * self.peak
+    }
+}
+
 fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Crest> {
     let mut found: Vec<Crest> = Vec::new();
     let mut armed = true;
-    let crest = |place: usize, peak: f64| Crest {
-        place,
-        peak,
-        base: 0.0,
-    };
-    for (place, &x) in force.iter().enumerate() {
-        if armed && x > limit {
-            found.push(crest(place, x));
+    for (place, &peak) in force.iter().enumerate() {
+        let crest = Crest {
+            place,
+            peak,
+            base: 0.0,
+        };
+        if armed && peak > limit {
+            found.push(crest);
             armed = false;
-        } else if !armed && x < rearm {
+        } else if !armed && peak < rearm {
             armed = true;
-        } else if let Some(open) = found.last_mut().filter(|open| !armed && x > open.peak) {
-            *open = crest(place, x);
+        } else if let Some(open) = found.last_mut().filter(|open| !armed && peak > open.peak) {
+            *open = crest;
         }
     }
     found
@@ -319,11 +325,10 @@ fn excursions(force: &[f64], limit: f64, rearm: f64) -> Vec<Crest> {
 /// such ringing: within twice its own width, or three samples, on either side.
 fn is_ringing(main: &Pulse, other: &Crest) -> bool {
     let force = main.samples;
-    let height = |x: &f64| x - other.base;
-    let above = |x: &&f64| height(x) > 0.5 * other.peak;
     let (before, after) = force.split_at(other.place.min(force.len()));
-    let width =
-        after.iter().take_while(above).count() + before.iter().rev().take_while(above).count();
+    let right = after.iter().take_while(|x| other.is_above_half(**x));
+    let left = before.iter().rev().take_while(|x| other.is_above_half(**x));
+    let width = right.count() + left.count();
     // Not beyond the crest of the pulse itself.
     let reach = (2 * width).max(3).min(main.crest.abs_diff(other.place));
     let beside = before
@@ -331,7 +336,7 @@ fn is_ringing(main: &Pulse, other: &Crest) -> bool {
         .rev()
         .take(reach)
         .chain(after.iter().take(reach));
-    let lowest = beside.map(height).fold(0.0, f64::min);
+    let lowest = beside.map(|x| x - other.base).fold(0.0, f64::min);
     -lowest > 0.5 * other.peak
 }
 
@@ -351,39 +356,16 @@ const STEPS: i32 = 4;
 
 /// A weaker copy of a pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PulseCopy {
+struct PulseCopy {
     /// Where its crest is (samples from the start, with a fraction).
-    pub place: f64,
+    place: f64,
     /// Its height over the pulse's; negative where it points downwards.
-    pub ratio: f64,
+    ratio: f64,
     /// The force on which it stands.
-    pub base: f64,
+    base: f64,
 }
 
-/// The tap's pulse as a template: its samples about the crest.
-pub(super) struct Template<'a> {
-    samples: &'a [f64],
-    crest: usize,
-    /// Samples to either side of the crest that belong to it.
-    reach: usize,
-    /// Width at half height (samples).
-    width: f64,
-    /// Variance of the channel's noise from sample to sample.
-    noise_power: f64,
-}
-
-impl<'a> Template<'a> {
-    /// The pulse with this crest; `width` is its width at half height (samples).
-    pub(super) fn new(samples: &'a [f64], crest: usize, width: f64) -> Self {
-        Template {
-            samples,
-            crest,
-            reach: reach(width),
-            width,
-            noise_power: noise_power(samples),
-        }
-    }
-
+impl Pulse<'_> {
     /// The pulse at `offset` samples from its crest; 0 beyond its reach.
     fn at(&self, offset: f64) -> f64 {
         if offset.abs() > self.reach as f64 {
@@ -393,30 +375,20 @@ impl<'a> Template<'a> {
     }
 
     /// The copy near `place`; `None` where the force there has another shape or width.
-    pub(super) fn fit(&self, place: usize) -> Option<PulseCopy> {
+    fn fit(&self, place: usize) -> Option<PulseCopy> {
         // The first search runs over all widths with a coarse delay, the second over the best alone.
-        let coarse = (self.width / 8.0).max(0.25);
+        let mut step = (self.width / 8.0).max(0.25);
         let mut best: Option<(Fit, f64)> = None;
         for width in WIDTHS {
-            for step in -STEPS..=STEPS {
-                let fit = self.compare(place, coarse * f64::from(step), width);
+            for steps in -STEPS..=STEPS {
+                let fit = self.compare(place, step * f64::from(steps), width);
                 if best.is_none_or(|(best, _)| fit.left < best.left) {
                     best = Some((fit, width));
                 }
             }
         }
-        let (best, width) = best?;
-        let fit = self.refine(place, best, (width, coarse));
-        let is_copy = LIKE_THE_FIRST.contains(&width) && self.explains(&fit);
-        is_copy.then_some(PulseCopy {
-            place: place as f64 + fit.offset,
-            ratio: fit.ratio,
-            base: fit.base,
-        })
-    }
-
-    /// Halves the step of the delay about the best fit, down to a hundredth of a sample.
-    fn refine(&self, place: usize, mut best: Fit, (width, mut step): (f64, f64)) -> Fit {
+        let (mut best, width) = best?;
+        // The step of the delay is halved down to a hundredth of a sample.
         while step > 0.01 {
             step *= 0.5;
             for side in [-step, step] {
@@ -426,13 +398,14 @@ impl<'a> Template<'a> {
                 }
             }
         }
-        best
-    }
-
-    /// Whether what the copy leaves is little, the noise taken out of both.
-    fn explains(&self, fit: &Fit) -> bool {
+        // A copy leaves little, the noise taken out of both sums.
         let noise = self.noise_power * (2 * self.reach + 1) as f64;
-        fit.left - noise <= (1.0 - EXPLAINED) * (fit.all - noise).max(0.0)
+        let explains = best.left - noise <= (1.0 - EXPLAINED) * (best.all - noise).max(0.0);
+        (explains && LIKE_THE_FIRST.contains(&width)).then_some(PulseCopy {
+            place: place as f64 + best.offset,
+            ratio: best.ratio,
+            base: best.base,
+        })
     }
 
     /// Least squares of y(t) = r p((t - offset)/width) + a + b t over the reach about `place`.
@@ -441,14 +414,14 @@ impl<'a> Template<'a> {
     /// orthogonal to each other, so that they come out of y and p one by one, and r = <p, y>/<p, p>.
     fn compare(&self, place: usize, offset: f64, width: f64) -> Fit {
         let reach = self.reach as i64;
-        let times = || (-reach..=reach).map(|t| t as f64);
         let count = (2 * reach + 1) as f64;
-        let spread: f64 = times().map(|t| t * t).sum();
+        let spread: f64 = (-reach..=reach).map(|t| (t * t) as f64).sum();
         let (mut p_sum, mut p_slope, mut y_sum, mut y_slope) = (0.0, 0.0, 0.0, 0.0);
         let (mut pp, mut py, mut yy) = (0.0, 0.0, 0.0);
-        for t in times() {
+        for step in -reach..=reach {
+            let t = step as f64;
             let p = self.at((t - offset) / width);
-            let y = clamped(self.samples, place as i64 + t as i64);
+            let y = clamped(self.samples, place as i64 + step);
             p_sum += p;
             p_slope += p * t;
             y_sum += y;
@@ -484,12 +457,6 @@ struct Fit {
     all: f64,
 }
 
-/// Samples to either side of a crest within which its pulse has ended, one of 1.3 times the width too:
-/// half a sine ends 0.75 half widths from its crest, sin^2 one.
-pub(super) fn reach(width: f64) -> usize {
-    (2.0 * width).ceil() as usize + 1
-}
-
 fn clamped(samples: &[f64], index: i64) -> f64 {
     let last = samples.len().saturating_sub(1) as i64;
     samples
@@ -502,8 +469,7 @@ fn clamped(samples: &[f64], index: i64) -> f64 {
 fn interpolate(samples: &[f64], place: f64) -> f64 {
     let index = place.floor();
     let u = place - index;
-    let x = |step: i64| clamped(samples, index as i64 + step);
-    let (a, b, c, d) = (x(-1), x(0), x(1), x(2));
+    let [a, b, c, d] = [-1, 0, 1, 2].map(|step| clamped(samples, index as i64 + step));
     let slope = c - a;
     let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
     let third = 3.0 * (b - c) + d - a;
@@ -519,6 +485,6 @@ fn noise_power(samples: &[f64]) -> f64 {
         .step_by(stride)
         .map(|pair| (pair[1] - pair[0]).abs())
         .collect();
-    let deviation = 1.4826 * tapjoint_numerics::stats::median(&mut steps);
+    let deviation = 1.4826 * median(&mut steps);
     0.5 * deviation * deviation
 }

@@ -1,6 +1,5 @@
-//! Pulses of force: a threshold over noise and drift, with hysteresis.
-//!
-//! The force about one tap: drift taken out, pulses upwards.
+//! Pulses of force: a threshold over noise and drift, with hysteresis; and the force about one tap, drift taken out
+//! and pulses upwards.
 
 use std::ops::Range;
 
@@ -11,7 +10,7 @@ use tapjoint_numerics::stats::{median, root_mean_square};
 /// Length of the pieces in which drift and noise are surveyed (s). A pulse of a few milliseconds
 /// does not move the median of 0.1 s.
 const PIECE: f64 = 0.1;
-/// Fewest pieces from which a usual one is told: a recording that is shorter is cut finer for its noise,
+/// Fewest pieces that show a usual one: a recording that is shorter is cut finer for its noise,
 /// so that its only pulse is not taken for what goes on all the time.
 const FEWEST_PIECES: usize = 20;
 /// An excursion longer than this is no hammer pulse but a moving cable or hand (s).
@@ -33,18 +32,15 @@ pub(super) struct Baseline {
 }
 
 impl Baseline {
-    pub(super) fn at(&self, frame: u64) -> f64 {
+    fn at(&self, frame: u64) -> f64 {
         let position = frame as f64 / self.frames - 0.5;
         let index = position.floor().max(0.0);
         let share = (position - index).clamp(0.0, 1.0);
-        let value = |i: usize| {
-            self.medians
-                .get(i)
-                .or(self.medians.last())
-                .copied()
-                .unwrap_or(0.0)
-        };
-        value(index as usize) * (1.0 - share) + value(index as usize + 1) * share
+        let [before, after] = [index as usize, index as usize + 1].map(|piece| {
+            let median = self.medians.get(piece).or(self.medians.last());
+            median.copied().unwrap_or(0.0)
+        });
+        before * (1.0 - share) + after * share
     }
 }
 
@@ -52,7 +48,7 @@ impl Baseline {
 pub(super) struct Survey {
     pub baseline: Baseline,
     pub noise: f64,
-    /// What a usual piece reaches: between taps, noise and hum.
+    /// Reach of a usual piece: between taps, noise and hum.
     pub usual: f64,
     pub polarity: f64,
     /// Largest excursion from the baseline, in the pulses' direction.
@@ -102,9 +98,9 @@ pub(super) fn survey(recording: &Recording, channel: usize) -> Result<Survey, Re
     })
 }
 
-/// What a usual piece reaches, and the rms of one, of a recording of fewer than [`FEWEST_PIECES`] pieces:
-/// told from finer ones, so that its only pulse is not taken for what goes on all the time. They are
-/// measured from the baseline, so that drift counts.
+/// Returns the reach and the rms of a usual piece for a recording of fewer than [`FEWEST_PIECES`] pieces: from finer
+/// pieces, so that its only pulse is not taken for what goes on all the time. They are measured from the baseline, so
+/// that drift counts.
 fn usual_of_short(
     recording: &Recording,
     channel: usize,
@@ -115,8 +111,10 @@ fn usual_of_short(
         *x -= baseline.at(frame as u64);
     }
     let length = (samples.len() / FEWEST_PIECES).max(32);
-    let reach = |piece: &[f64]| piece.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let mut reached: Vec<f64> = samples.chunks(length).map(reach).collect();
+    let mut reached: Vec<f64> = samples
+        .chunks(length)
+        .map(|piece| piece.iter().fold(0.0, |most, x| x.abs().max(most)))
+        .collect();
     let mut roots: Vec<f64> = samples.chunks(length).map(root_mean_square).collect();
     Ok((median(&mut reached), median(&mut roots)))
 }
@@ -228,9 +226,10 @@ pub(super) fn group(excursions: &[Excursion], distance: u64, hit: f64) -> Vec<Ev
     let mut rest = excursions;
     while let Some(first) = rest.first() {
         // At least the first itself, however small the distance.
-        let near = |excursion: &&Excursion| excursion.start - first.start < distance;
-        let count = rest.iter().take_while(near).count().max(1);
-        let (event, later) = rest.split_at(count);
+        let near = rest
+            .iter()
+            .take_while(|excursion| excursion.start - first.start < distance);
+        let (event, later) = rest.split_at(near.count().max(1));
         let peak = event
             .iter()
             .map(|excursion| excursion.peak)
@@ -239,37 +238,11 @@ pub(super) fn group(excursions: &[Excursion], distance: u64, hit: f64) -> Vec<Ev
         events.push(Event {
             trigger: trigger.unwrap_or(first).start,
             peak,
+            answered: true,
         });
         rest = later;
     }
     events
-}
-
-/// The hammer channel, with its drift and noise.
-pub(super) struct Hammer<'a> {
-    pub recording: &'a Recording,
-    pub channel: usize,
-    pub survey: &'a Survey,
-}
-
-impl Hammer<'_> {
-    /// The force in these frames.
-    pub(super) fn force(&self, frames: Range<u64>) -> Result<Force, RecordingError> {
-        let first = frames.start;
-        let samples = self.recording.read(self.channel, frames)?;
-        let drift = |frame: usize| self.survey.baseline.at(first + frame as u64);
-        let samples = samples
-            .iter()
-            .enumerate()
-            .map(|(i, x)| self.survey.polarity * (x - drift(i)))
-            .collect();
-        Ok(Force {
-            first,
-            samples,
-            noise: self.survey.noise,
-            rate: self.recording.sample_rate(),
-        })
-    }
 }
 
 /// The force about one event.
@@ -285,6 +258,26 @@ pub(super) struct Force {
 }
 
 impl Force {
+    /// Reads the force in these frames.
+    pub(super) fn read(
+        recording: &Recording,
+        channel: usize,
+        survey: &Survey,
+        frames: Range<u64>,
+    ) -> Result<Self, RecordingError> {
+        let first = frames.start;
+        let mut samples = recording.read(channel, frames)?;
+        for (frame, x) in (first..).zip(&mut samples) {
+            *x = survey.polarity * (*x - survey.baseline.at(frame));
+        }
+        Ok(Force {
+            first,
+            samples,
+            noise: survey.noise,
+            rate: recording.sample_rate(),
+        })
+    }
+
     /// Index of a frame among the samples.
     pub(super) fn index(&self, frame: u64) -> usize {
         (frame.saturating_sub(self.first) as usize).min(self.samples.len())
@@ -310,20 +303,21 @@ impl Force {
 /// Width of the crest at `index` at half its height (samples), the flanks interpolated.
 pub(super) fn half_width(samples: &[f64], index: usize) -> f64 {
     let half = 0.5 * samples.get(index).copied().unwrap_or(0.0);
-    // Distance at which the flank that steps through `flank` crosses the half: n below, n-1 above.
-    let crossing = |flank: &mut dyn Iterator<Item = f64>| {
-        let mut above = 2.0 * half;
-        let mut distance = 0.0;
-        for x in flank {
-            if x <= half {
-                return distance + (above - half) / (above - x).max(f64::MIN_POSITIVE);
-            }
-            above = x;
-            distance += 1.0;
+    let right = samples.iter().skip(index + 1);
+    let left = samples.iter().take(index).rev();
+    distance_to(half, right) + distance_to(half, left)
+}
+
+/// Distance at which a flank crosses half the height of its crest (samples): n below, n - 1 above.
+fn distance_to<'a>(half: f64, flank: impl Iterator<Item = &'a f64>) -> f64 {
+    let mut above = 2.0 * half;
+    let mut distance = 0.0;
+    for &x in flank {
+        if x <= half {
+            return distance + (above - half) / (above - x).max(f64::MIN_POSITIVE);
         }
-        distance
-    };
-    let right = samples.iter().skip(index + 1).copied();
-    let left = samples.iter().take(index).rev().copied();
-    crossing(&mut { right }) + crossing(&mut { left })
+        above = x;
+        distance += 1.0;
+    }
+    distance
 }

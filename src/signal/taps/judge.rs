@@ -1,11 +1,9 @@
 //! Accepting and rejecting taps, each with its reason.
-//!
-//! Whether the structure answers a pulse of the force channel.
 
 use std::ops::Range;
 
-use super::double_hit::{SecondHit, second_hit};
-use super::hammer::{Force, Hammer};
+use super::double_hit::second_hit;
+use super::hammer::Force;
 use super::{Event, Found, Rejection, Tap, TapSettings, TapSource, Taps};
 use crate::recording::{Recording, RecordingError};
 use tapjoint_numerics::stats::{median, root_mean_square};
@@ -22,52 +20,20 @@ const CUT_OF_SHORTEST: f64 = 0.8;
 pub(super) fn judge(
     recording: &Recording,
     source: &TapSource,
-    found: Found,
+    mut found: Found,
     settings: &TapSettings,
 ) -> Result<Taps, RecordingError> {
-    let answered = answers(recording, source, &found.events)?;
-    let real = |(event, answered): (&Event, &bool)| answered.then_some(event.peak);
-    let mut peaks: Vec<f64> = found
-        .events
-        .iter()
-        .zip(&answered)
-        .filter_map(real)
-        .collect();
+    if let TapSource::Hammer { responses, .. } = source {
+        for event in &mut found.events {
+            event.answered = is_answered(recording, responses, event)?;
+        }
+    }
+    let real = found.events.iter().filter(|event| event.answered);
+    let mut peaks: Vec<f64> = real.map(|event| event.peak).collect();
     let weakest = settings.weak * median(&mut peaks);
-    let counts: Vec<bool> = found
-        .events
-        .iter()
-        .zip(&answered)
-        .map(|(event, &answered)| answered && event.peak >= weakest)
-        .collect();
-    let records = records(recording, (&found.events, &counts), settings);
     let mut taps = Vec::with_capacity(found.events.len());
-    for (index, (event, record)) in found.events.iter().zip(records).enumerate() {
-        let place = (index, &record);
-        let force = force_of(recording, source, (&found, &answered), place, settings)?;
-        let own_end = record.end.min(event.trigger + least(recording, settings));
-        let pulse_end = force.as_ref().map(|f| f.pulse_end(event, f.index(own_end)));
-        let second = force.and_then(|f| second_hit(&f, (event, f.index(own_end)), settings));
-        let rejection = if !answered[index] {
-            Some(Rejection::NoResponse)
-        } else if event.peak < weakest {
-            Some(Rejection::TooWeak {
-                peak: event.peak,
-                limit: weakest,
-            })
-        } else if let Some(double) = second.and_then(|second| double(second, settings)) {
-            Some(double)
-        } else {
-            overload(recording, source, &record)?
-        };
-        taps.push(Tap {
-            time: event.trigger as f64 / recording.sample_rate(),
-            peak: event.peak,
-            pulse_end,
-            record,
-            second_hit: second,
-            rejection,
-        });
+    for index in 0..found.events.len() {
+        taps.push(tap(recording, source, &found, index, weakest, settings)?);
     }
     reject_short(&mut taps, recording.sample_rate(), settings.wanted);
     Ok(Taps {
@@ -77,53 +43,73 @@ pub(super) fn judge(
     })
 }
 
-/// Whether a sensor answers each event; without a hammer the answer is the event.
-fn answers(
+/// Judges one event. Peaks below `weakest` are too weak.
+fn tap(
     recording: &Recording,
     source: &TapSource,
-    events: &[Event],
-) -> Result<Vec<bool>, RecordingError> {
-    match source {
-        TapSource::Hammer { responses, .. } => events
-            .iter()
-            .map(|event| is_answered(recording, responses, event))
-            .collect(),
-        TapSource::Responses(_) => Ok(vec![true; events.len()]),
+    found: &Found,
+    index: usize,
+    weakest: f64,
+    settings: &TapSettings,
+) -> Result<Tap, RecordingError> {
+    let rate = recording.sample_rate();
+    let event = &found.events[index];
+    // The record ends with the pre-trigger of the next tap, or with the file. What moves no sensor, or stays below a
+    // tenth of the usual tap, disturbs a record no more than is tolerated of a second excursion, and does not end it.
+    let before = ((settings.pre_trigger * rate) as u64).max(16);
+    let mut later = found.events.iter().skip(index + 1);
+    let next = later.find(|next| next.answered && next.peak >= weakest);
+    let end = next.map_or(recording.frames(), |next| {
+        next.trigger.saturating_sub(before)
+    });
+    let start = event.trigger.saturating_sub(before);
+    let record = start..end.max(start);
+    // Least distance of two taps (frames).
+    let least = (settings.least_distance * rate) as u64;
+    let (mut pulse_end, mut second) = (None, None);
+    if let Some(force) = force_of(recording, source, found, index, &record, least)? {
+        let own = force.index(record.end.min(event.trigger + least));
+        pulse_end = Some(force.pulse_end(event, own));
+        second = second_hit(&force, event, own, settings);
     }
-}
-
-/// Least distance of two taps (frames).
-fn least(recording: &Recording, settings: &TapSettings) -> u64 {
-    (settings.least_distance * recording.sample_rate()) as u64
-}
-
-/// A second hit that is large enough to reject its tap.
-fn double(second: SecondHit, settings: &TapSettings) -> Option<Rejection> {
-    (second.ratio >= settings.double_hit).then_some(Rejection::DoubleHit {
-        delay: second.delay,
-        ratio: second.ratio,
-        limit: settings.double_hit,
+    let rejection = match second.filter(|second| second.ratio >= settings.double_hit) {
+        _ if !event.answered => Some(Rejection::NoResponse),
+        _ if event.peak < weakest => Some(Rejection::TooWeak {
+            peak: event.peak,
+            limit: weakest,
+        }),
+        Some(double) => Some(Rejection::DoubleHit {
+            delay: double.delay,
+            ratio: double.ratio,
+            limit: settings.double_hit,
+        }),
+        None => overload(recording, source, &record)?,
+    };
+    Ok(Tap {
+        time: event.trigger as f64 / rate,
+        peak: event.peak,
+        pulse_end,
+        record,
+        second_hit: second,
+        rejection,
     })
 }
 
 /// The force over an event's record and ahead of it, as far as that belongs to no other event; `None`
-/// without a hammer. What no sensor answers is taken out: no hit of the structure.
+/// without a hammer. `least` is the least distance of two taps (frames). Pulses that no sensor answers are taken out:
+/// they are no hits of the structure.
 fn force_of(
     recording: &Recording,
     source: &TapSource,
-    (found, answered): (&Found, &[bool]),
-    (index, record): (usize, &Range<u64>),
-    settings: &TapSettings,
+    found: &Found,
+    index: usize,
+    record: &Range<u64>,
+    least: u64,
 ) -> Result<Option<Force>, RecordingError> {
     let (TapSource::Hammer { channel, .. }, Some(survey)) = (source, &found.survey) else {
         return Ok(None);
     };
-    let hammer = Hammer {
-        recording,
-        channel: *channel,
-        survey,
-    };
-    let (events, least) = (&found.events, least(recording, settings));
+    let events = &found.events;
     let trigger = events[index].trigger;
     // Another hit of this event comes less than the least distance ahead, and after all of the last.
     let before = index.checked_sub(1).and_then(|last| events.get(last));
@@ -135,33 +121,16 @@ fn force_of(
         end = end.saturating_sub(least).max(end.min(trigger + least));
     }
     let longest = (SEARCHED * recording.sample_rate()) as u64;
-    let mut force = hammer.force(first..end.min(trigger + longest))?;
-    let others = events.iter().zip(answered).enumerate();
-    for (_, (other, _)) in others.filter(|(other, (_, answered))| *other != index && !**answered) {
-        let range = force.index(other.trigger.saturating_sub(least / 100))
-            ..force.index(other.trigger + least);
-        force.samples[range].fill(0.0);
+    let frames = first..end.min(trigger + longest);
+    let mut force = Force::read(recording, *channel, survey, frames)?;
+    for (other, event) in events.iter().enumerate() {
+        if other != index && !event.answered {
+            let start = force.index(event.trigger.saturating_sub(least / 100));
+            let end = force.index(event.trigger + least);
+            force.samples[start..end].fill(0.0);
+        }
     }
     Ok(Some(force))
-}
-
-/// Each event's record: from the pre-trigger to that of the next event that `counts`, or the file's
-/// end. What moves no sensor, or stays below a tenth of the usual tap, disturbs a record no more than
-/// is tolerated of a second excursion, and does not end it.
-fn records(
-    recording: &Recording,
-    (events, counts): (&[Event], &[bool]),
-    settings: &TapSettings,
-) -> Vec<Range<u64>> {
-    let before = ((settings.pre_trigger * recording.sample_rate()) as u64).max(16);
-    let start = |event: &Event| event.trigger.saturating_sub(before);
-    let record = |(index, event): (usize, &Event)| {
-        let mut later = events.iter().zip(counts).skip(index + 1);
-        let next = later.find(|(_, counts)| **counts);
-        let end = next.map_or(recording.frames(), |(next, _)| start(next));
-        start(event)..end.max(start(event))
-    };
-    events.iter().enumerate().map(record).collect()
 }
 
 /// Samples at a channel's limit: at the integer format's full scale, or at the level of its flat
@@ -172,9 +141,28 @@ fn overload(
     record: &Range<u64>,
 ) -> Result<Option<Rejection>, RecordingError> {
     for channel in source.channels() {
-        let Some((low, high)) = limits(recording, channel) else {
+        let Some(info) = recording.channels().get(channel) else {
             continue;
         };
+        let health = &info.health;
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for top in &health.flat_tops {
+            if top.value > health.mean {
+                high = high.min(top.value);
+            } else {
+                low = low.max(top.value);
+            }
+        }
+        if health.full_scale_samples > 0 {
+            high = high.min(health.peak);
+            low = low.max(-health.peak);
+        }
+        if low.is_infinite() && high.is_infinite() {
+            continue;
+        }
+        // A hair inside, so that rescaling by a unit cannot make a flat top slip through.
+        let hair = 1e-9 * health.peak;
+        let (low, high) = (low + hair, high - hair);
         let samples = recording.read(channel, record.clone())?;
         let count = samples.iter().filter(|&&x| x >= high || x <= low).count();
         if count > 0 {
@@ -185,26 +173,6 @@ fn overload(
         }
     }
     Ok(None)
-}
-
-/// The levels at which a channel is cut off; `None` where it never was.
-fn limits(recording: &Recording, channel: usize) -> Option<(f64, f64)> {
-    let health = &recording.channels().get(channel)?.health;
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    for top in &health.flat_tops {
-        if top.value > health.mean {
-            high = high.min(top.value);
-        } else {
-            low = low.max(top.value);
-        }
-    }
-    if health.full_scale_samples > 0 {
-        high = high.min(health.peak);
-        low = low.max(-health.peak);
-    }
-    // A hair inside, so that rescaling by a unit cannot make a flat top slip through.
-    let hair = 1e-9 * health.peak;
-    (high.is_finite() || low.is_finite()).then_some((low + hair, high - hair))
 }
 
 /// Rejects records much shorter than the others: all averages share one block, and the shortest
@@ -218,14 +186,10 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
         .collect();
     let typical = median(&mut lengths);
     let needed = wanted.map_or(typical, |wanted| wanted.min(typical));
-    for (index, tap) in taps
-        .iter_mut()
-        .enumerate()
-        .filter(|(_, tap)| tap.rejection.is_none())
-    {
+    for (index, tap) in taps.iter_mut().enumerate() {
         let available = tap.frames() as f64 / rate;
         // Equal only where there is nothing at all: taps nearer than the pre-trigger of a slow file.
-        if available <= SHORT_OF_MEDIAN * needed {
+        if tap.accepted() && available <= SHORT_OF_MEDIAN * needed {
             tap.rejection = Some(if index == last {
                 Rejection::CutOff { available, needed }
             } else {
@@ -239,7 +203,7 @@ fn reject_short(taps: &mut [Tap], rate: f64, wanted: Option<f64>) {
         .map(|tap| tap.frames() as f64 / rate)
         .fold(f64::INFINITY, f64::min);
     let needed = wanted.map_or(shortest, |wanted| wanted.min(shortest));
-    if let Some(tap) = taps.last_mut().filter(|tap| tap.rejection.is_none()) {
+    if let Some(tap) = taps.last_mut().filter(|tap| tap.accepted()) {
         let available = tap.frames() as f64 / rate;
         if needed.is_finite() && available < CUT_OF_SHORTEST * needed {
             tap.rejection = Some(Rejection::CutOff { available, needed });
@@ -254,10 +218,10 @@ const STRETCH: f64 = 0.05;
 /// is still ringing and is of no use.
 const RISE: f64 = 1.5;
 
-/// Whether any response rises when the force does. A hammer laid down, a swinging hammer and an
+/// Returns `true` where any response rises when the force does. A hammer laid down, a swinging hammer and an
 /// electrical spike move no sensor. Without responses, or at the very start of the recording, the
 /// benefit of the doubt is given.
-pub(super) fn is_answered(
+fn is_answered(
     recording: &Recording,
     responses: &[usize],
     event: &Event,
@@ -273,8 +237,9 @@ pub(super) fn is_answered(
     for &response in responses {
         let quiet = recording.read(response, before.clone())?;
         let loud = recording.read(response, after.clone())?;
-        let rises = |measure: fn(&[f64]) -> f64| measure(&loud) > RISE * measure(&quiet);
-        if rises(rms_about_mean) || rises(rms_of_change) {
+        if rms_about_mean(&loud) > RISE * rms_about_mean(&quiet)
+            || rms_of_change(&loud) > RISE * rms_of_change(&quiet)
+        {
             return Ok(true);
         }
     }

@@ -106,7 +106,7 @@ pub struct Tap {
 }
 
 impl Tap {
-    /// Whether it enters the averages.
+    /// Returns `true` for a tap that enters the averages.
     pub fn accepted(&self) -> bool {
         self.rejection.is_none()
     }
@@ -204,7 +204,7 @@ impl fmt::Display for Rejection {
     }
 }
 
-/// What is odd about the search itself.
+/// Oddity of the search itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TapRemark {
     /// The force pulses point downwards.
@@ -268,11 +268,14 @@ impl Taps {
     }
 }
 
-/// An event before it is judged: where it triggered and how high it went.
+/// An event before it is judged.
 #[derive(Debug, Clone, PartialEq)]
 struct Event {
+    /// Frame of the trigger.
     trigger: u64,
     peak: f64,
+    /// A sensor answers it; without a hammer the answer is the event.
+    answered: bool,
 }
 
 /// Finds the taps of a recording.
@@ -291,11 +294,11 @@ pub fn find_taps(
     judge::judge(recording, source, found, settings)
 }
 
-/// What a search hands to the judge.
+/// Result of a search, before it is judged.
 struct Found {
     events: Vec<Event>,
     noise: f64,
-    /// Of the force channel, where there is one.
+    /// Survey of the force channel, where there is one.
     survey: Option<hammer::Survey>,
     remarks: Vec<TapRemark>,
 }

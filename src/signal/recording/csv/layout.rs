@@ -72,14 +72,6 @@ impl Column {
         }
     }
 
-    /// Joins a name and a cell of the line of units below it.
-    fn from_cells(name: &str, unit: &str) -> Self {
-        match split_unit(unit) {
-            ("", Some(inner)) => Self::new(name, inner),
-            _ => Self::new(name, unit),
-        }
-    }
-
     fn new(name: &str, unit: &str) -> Self {
         let [name, unit] = [name, unit].map(|text| Some(text.trim().to_owned()));
         Self {
@@ -146,28 +138,21 @@ impl<'a> Head<'a> {
             .iter()
             .rev()
             .max_by_key(|candidate| (candidate.rows, candidate.header_fits(), candidate.cells));
-        match best {
-            Some(best) if best.rows > 0 => best.layout(file),
-            _ => Err(self.no_numbers(file)),
+        if let Some(best) = best.filter(|best| best.rows > 0) {
+            return best.layout(file);
         }
-    }
-
-    /// Returns the error of a text without rows, with the line that has most digits.
-    fn no_numbers(&self, file: &str) -> RecordingError {
-        let mut nearest = (1, &b""[..]);
-        let mut most = None;
-        for ((_, text), line) in self.lines.iter().zip(1..) {
-            let digits = text.iter().filter(|byte| byte.is_ascii_digit()).count();
-            if most < Some(digits) {
-                nearest = (line, text);
-                most = Some(digits);
-            }
-        }
-        RecordingError::NoNumbers {
+        // The line with most digits, the first of several.
+        let lines = self.lines.iter().enumerate().rev();
+        let nearest = lines.max_by_key(|(_, (_, text))| {
+            let digits = text.iter().filter(|byte| byte.is_ascii_digit());
+            digits.count()
+        });
+        let (at, text) = nearest.map_or((0, &b""[..]), |(at, (_, text))| (at, text));
+        Err(RecordingError::NoNumbers {
             file: file.to_owned(),
-            line: nearest.0,
-            value: shown(nearest.1.trim_ascii()),
-        }
+            line: at as u64 + 1,
+            value: shown(text.trim_ascii()),
+        })
     }
 
     /// Returns the readable numbers of one column, rows of any kind included.
@@ -180,8 +165,9 @@ impl<'a> Head<'a> {
             }
             split_cells(line, layout.separator, &mut cells);
             let text = cells.get(column).and_then(|cell| line.get(cell.clone()));
-            let value = text.and_then(|text| parse_number(text, &mut None).ok());
-            if let (Some(text), Some(value)) = (text, value) {
+            if let Some(text) = text
+                && let Ok(value) = parse_number(text, &mut None)
+            {
                 numbers.push(HeadNumber {
                     line: number,
                     value,
@@ -442,9 +428,11 @@ impl<'a> Candidate<'a> {
             Some(above) if here.iter().all(|cell| is_unit_cell(cell)) => {
                 let names = self.texts(above);
                 let cells = names.iter().zip(&here);
-                cells
-                    .map(|(name, unit)| Column::from_cells(name, unit))
-                    .collect()
+                let columns = cells.map(|(name, unit)| match split_unit(unit) {
+                    ("", Some(inner)) => Column::new(name, inner),
+                    _ => Column::new(name, unit),
+                });
+                columns.collect()
             }
             _ => here.iter().map(|cell| Column::from_cell(cell)).collect(),
         }

@@ -1,18 +1,18 @@
 //! Text files of numbers: rows checked line by line, with a sparse index for jumping.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Seek, SeekFrom};
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::{RecordingError, ResponseError};
-use super::file_type::{read_head, unreadable};
 use super::health::{HealthMeter, check_rate};
 use super::spacing::{TimeCheck, UnevenStep};
 use super::text::{Cell, CellProblem, is_comment, parse_number, shown, split_cells};
 use super::units::channel_unit;
 use super::warning::{ChannelLabel, RecordingWarning};
 use super::{ChannelInfo, Format, MAX_CHANNELS, ReadSettings, Recording, Source, Timing};
+use super::{read_head, unreadable};
 
 mod layout;
 
@@ -389,16 +389,12 @@ fn uneven_error(
     let expected = check.reference();
     let steps = uneven.step / expected;
     let whole = steps.round();
+    let mut lost = String::new();
     // A gap within a tenth of a whole number of steps is one of lost rows.
-    let lost = (2.0..1e9).contains(&whole) && (steps - whole).abs() <= 0.1;
-    let lost = match lost {
-        true => format!(
-            " (as if {} row{} were missing)",
-            whole - 1.0,
-            if whole > 2.0 { "s" } else { "" }
-        ),
-        false => String::new(),
-    };
+    if (2.0..1e9).contains(&whole) && (steps - whole).abs() <= 0.1 {
+        let plural = if whole > 2.0 { "s" } else { "" };
+        lost = format!(" (as if {} row{plural} were missing)", whole - 1.0);
+    }
     RecordingError::UnevenSampling {
         file: source.file.clone(),
         line: uneven.line,
@@ -454,14 +450,12 @@ impl RowReader<'_> {
             self.check_count()?;
             self.values.clear();
             for column in wanted {
-                let cell = self.cells.get(*column).cloned();
-                let cell = cell
-                    .and_then(|cell| self.line.get(cell))
-                    .unwrap_or_default();
-                match parse_number(cell, &mut self.decimal) {
+                let mut decimal = self.decimal;
+                match parse_number(self.cell(*column), &mut decimal) {
                     Ok(value) => self.values.push(value),
                     Err(problem) => return Err(self.error(*column, problem)),
                 }
+                self.decimal = decimal;
             }
             return Ok(true);
         }
@@ -472,33 +466,20 @@ impl RowReader<'_> {
     fn next_line(&mut self) -> Result<bool, RecordingError> {
         self.place = self.next;
         self.line.clear();
-        loop {
-            let available = match self.reader.fill_buf() {
-                Ok(available) => available,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(unreadable(&self.source.file, error)),
-            };
-            let end = available
-                .iter()
-                .position(|byte| *byte == self.source.layout.line_end);
-            let taken = end.map_or(available.len(), |at| at + 1);
-            self.line
-                .extend_from_slice(available.get(..taken).unwrap_or_default());
-            self.reader.consume(taken);
-            self.next.offset += taken as u64;
-            if self.line.len() > MAX_LINE_BYTES {
-                return Err(RecordingError::LineTooLong {
-                    file: self.source.file.clone(),
-                    line: self.place.lines_before + 1,
-                    limit: MAX_LINE_BYTES,
-                });
-            }
-            if end.is_some() || taken == 0 {
-                break;
-            }
+        let mut bytes = self.reader.by_ref().take(MAX_LINE_BYTES as u64 + 1);
+        let taken = bytes
+            .read_until(self.source.layout.line_end, &mut self.line)
+            .map_err(|error| unreadable(&self.source.file, error))?;
+        if taken > MAX_LINE_BYTES {
+            return Err(RecordingError::LineTooLong {
+                file: self.source.file.clone(),
+                line: self.place.lines_before + 1,
+                limit: MAX_LINE_BYTES,
+            });
         }
-        self.next.lines_before += u64::from(!self.line.is_empty());
-        Ok(!self.line.is_empty())
+        self.next.offset += taken as u64;
+        self.next.lines_before += u64::from(taken > 0);
+        Ok(taken > 0)
     }
 
     /// A cell of the row read last; empty where the row has fewer.
@@ -529,41 +510,29 @@ impl RowReader<'_> {
 
     /// Returns the error of a cell of the row read last.
     fn error(&self, column: usize, problem: CellProblem) -> RecordingError {
-        let file = self.source.file.clone();
-        let line = self.place.lines_before + 1;
-        let name = self.source.layout.shown_name(column);
         let value = shown(self.cell(column));
-        let column = column + 1;
-        match problem {
-            CellProblem::Missing => RecordingError::MissingCell {
-                file,
-                line,
-                column,
-                name,
-                columns: self.source.layout.columns.len(),
-            },
-            CellProblem::Text => RecordingError::TextInCell {
-                file,
-                line,
-                column,
-                name,
-                value,
-            },
-            CellProblem::NotFinite => RecordingError::CellNotFinite {
-                file,
-                line,
-                column,
-                name,
-                value,
-            },
-            CellProblem::MixedDecimal(decimal) => RecordingError::MixedDecimal {
-                file,
-                line,
-                column,
-                name,
-                value,
-                decimal: char::from(decimal),
-            },
+        let problem = match problem {
+            CellProblem::Missing => format!(
+                "is missing; every row needs {} numbers; fill the cell or remove the column",
+                self.source.layout.columns.len()
+            ),
+            CellProblem::Text => format!(
+                "holds \"{value}\", which is not a number; allowed: numbers such as -1.25e-3; correct or remove this line"
+            ),
+            CellProblem::NotFinite => format!(
+                "holds \"{value}\"; allowed: finite numbers of magnitude up to 1e100; remove the damaged rows and take what stays connected"
+            ),
+            CellProblem::MixedDecimal(decimal) => format!(
+                "holds \"{value}\", but the numbers before use \"{}\" as decimal mark; allowed: one decimal mark, no thousands separators",
+                char::from(decimal)
+            ),
+        };
+        RecordingError::BadCell {
+            file: self.source.file.clone(),
+            line: self.place.lines_before + 1,
+            column: column + 1,
+            name: self.source.layout.shown_name(column),
+            problem,
         }
     }
 }

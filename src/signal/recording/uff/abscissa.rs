@@ -1,10 +1,10 @@
 //! Points of a function along time or frequency, and functions that lie on the same points.
 
-use super::header::{Abscissa, Function, Ordinate};
 use super::list::{Dataset, Entry, UniversalFile};
 use super::values::Values;
+use super::{Abscissa, Function, Ordinate};
 use crate::recording::error::{RecordingError, UffError, short};
-use crate::recording::spacing::{TimeCheck, UnevenStep};
+use crate::recording::spacing::TimeCheck;
 use crate::recording::units::label_unit;
 
 /// Points that settle the reference step of an uneven abscissa.
@@ -25,7 +25,7 @@ pub(in crate::recording) struct EvenPoints {
 }
 
 impl EvenPoints {
-    /// Whether values on these and on other points belong together: equal in number and distance,
+    /// Returns `true` where values on these and on other points belong together: equal in number and distance,
     /// beginning within half a step, as channels of one converter do.
     pub(in crate::recording) fn matches(&self, other: &Self) -> bool {
         let step = (self.step / other.step - 1.0).abs() <= SAME_STEP;
@@ -150,7 +150,7 @@ impl<'a> FunctionGroup<'a> {
     }
 }
 
-/// Settles where the points of a function lie, or why that cannot be said. A stored abscissa is read and must be even.
+/// Settles where the points of a function lie; `Err` inside says why that is not known. A stored abscissa is read and must be even.
 ///
 /// The header prints the step with six digits. Where a simpler number lies within that rounding, it
 /// is used: for time a whole sample rate, for frequency a whole number of 2^-12 Hz.
@@ -174,23 +174,9 @@ pub(in crate::recording) fn even_points(
             };
             (start * factor, simple.unwrap_or(step))
         }
-        Abscissa::Uneven => match stored_abscissa(file, dataset, function)? {
-            StoredAbscissa::Even { start, step } => (start * factor, step * factor),
-            StoredAbscissa::Uneven { found, expected } => {
-                return Err(UffError::Uneven {
-                    file: file.name.clone(),
-                    dataset: dataset.number,
-                    point: found.line,
-                    value: found.time * factor,
-                    step: found.step * factor,
-                    expected: expected * factor,
-                    unit: unit.name(),
-                }
-                .into());
-            }
-            StoredAbscissa::TooShort => {
-                return Ok(Err("it has fewer than two points and no step".to_owned()));
-            }
+        Abscissa::Uneven => match stored_abscissa(file, dataset, function, unit)? {
+            Some((start, step)) => (start * factor, step * factor),
+            None => return Ok(Err("it has fewer than two points and no step".to_owned())),
         },
     };
     if !(step > 0.0 && step.is_finite() && start.is_finite()) {
@@ -225,26 +211,13 @@ fn dyadic(step: f64, digit: f64) -> Option<f64> {
     })
 }
 
-/// Spacing of an abscissa that is stored with every point (file units).
-enum StoredAbscissa {
-    Even {
-        start: f64,
-        step: f64,
-    },
-    /// The first uneven step, its line being the point, and the step elsewhere.
-    Uneven {
-        found: UnevenStep,
-        expected: f64,
-    },
-    /// Fewer than two points.
-    TooShort,
-}
-
+/// Returns start and step of an abscissa that is stored with every point (file units); `None` for fewer than two points.
 fn stored_abscissa(
     file: &UniversalFile,
     dataset: &Dataset,
     function: &Function,
-) -> Result<StoredAbscissa, RecordingError> {
+    unit: AbscissaUnit,
+) -> Result<Option<(f64, f64)>, RecordingError> {
     let values = Values::new(file, dataset, function)?;
     let mut opened = values.open()?;
     let mut reader = values.reader(0, &mut opened)?;
@@ -271,19 +244,22 @@ fn stored_abscissa(
             point += 1;
             start = if point == 1 { x } else { start };
             if let Err(found) = check.add(x, cell, point) {
-                let expected = check.reference();
-                return Ok(StoredAbscissa::Uneven { found, expected });
+                let factor = unit.factor(function);
+                return Err(UffError::Uneven {
+                    file: file.name.clone(),
+                    dataset: dataset.number,
+                    point: found.line,
+                    value: found.time * factor,
+                    step: found.step * factor,
+                    expected: check.reference() * factor,
+                    unit: unit.name(),
+                }
+                .into());
             }
         }
     }
     let rate = check.and_then(|check| check.sample_rate(1.0));
-    Ok(match rate {
-        Some((_, used)) => StoredAbscissa::Even {
-            start,
-            step: 1.0 / used,
-        },
-        None => StoredAbscissa::TooShort,
-    })
+    Ok(rate.map(|(_, used)| (start, 1.0 / used)))
 }
 
 /// An abscissa as it may have been printed: with the digits of single precision, which is what the

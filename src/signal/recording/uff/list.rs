@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use memchr::memchr;
 use memchr::memmem::Finder;
 
-use super::header::{
-    Abscissa, BadField, Function, HEADER_LINES, Precision, TypeLine, UffCoding, UnitSystem,
-    parse_header, parse_type_line,
-};
 use super::numbers;
+use super::{
+    Abscissa, Function, HEADER_LINES, Precision, TypeLine, UffCoding, UnitSystem, parse_header,
+    parse_type_line,
+};
 use crate::recording::error::{RecordingError, UffError};
-use crate::recording::file_type::{read_fully, unreadable};
+use crate::recording::{read_fully, unreadable};
 
 /// More datasets than any file has; the limit keeps a file of nothing but marks out of memory.
 const MAX_DATASETS: usize = 1_000_000;
@@ -247,19 +247,16 @@ impl Listing {
         }
         match parse_header(&lines, kind.coding) {
             Ok(function) => Ok(Some(function)),
-            Err(bad) => Err(self.bad_record(bad, number, line_start).into()),
-        }
-    }
-
-    fn bad_record(&self, bad: BadField, dataset: usize, line_start: u64) -> UffError {
-        UffError::BadRecord {
-            file: self.found.name.clone(),
-            line: line_number(&self.found.path, line_start) + bad.record as u64,
-            dataset,
-            record: bad.record,
-            field: bad.field,
-            value: bad.value,
-            allowed: bad.allowed,
+            Err(bad) => Err(UffError::BadRecord {
+                file: self.found.name.clone(),
+                line: line_number(&self.found.path, line_start) + bad.record as u64,
+                dataset: number,
+                record: bad.record,
+                field: bad.field,
+                value: bad.value,
+                allowed: bad.allowed,
+            }
+            .into()),
         }
     }
 
@@ -282,7 +279,7 @@ impl Listing {
     }
 }
 
-/// Whether a line holds -1 in columns 5 and 6 and nothing else.
+/// Returns `true` for a line that holds -1 in columns 5 and 6 and nothing else.
 fn is_mark(line: &[u8]) -> bool {
     line.trim_ascii_end() == MARK
 }
@@ -430,7 +427,7 @@ impl Scanner {
         }
     }
 
-    /// Whether a dataset ends at `place`: at the end of the file, or at a mark with at most one line
+    /// Returns `true` where a dataset ends at `place`: at the end of the file, or at a mark with at most one line
     /// end before it. The scanner then stands at the mark.
     pub(super) fn ends_at(&mut self, place: u64) -> io::Result<bool> {
         if place >= self.length {
@@ -472,7 +469,7 @@ impl Scanner {
     }
 }
 
-/// Whether only blanks stand before the end of the line or of the file.
+/// Returns `true` where only blanks stand before the end of the line or of the file.
 fn is_blank_to_line_end(behind: &[u8]) -> bool {
     let first = behind.iter().find(|byte| **byte != b' ');
     matches!(first, None | Some(b'\r' | b'\n'))

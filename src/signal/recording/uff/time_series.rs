@@ -11,9 +11,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::abscissa::{AbscissaUnit, FunctionGroup};
-use super::header::{Function, FunctionType, UffCoding, UnitSystem};
-use super::list::{Entry, UniversalFile, describe, list_datasets};
+use super::list::{Dataset, Entry, UniversalFile, describe, list_datasets};
 use super::values::{ValueReader, Values};
+use super::{Function, FunctionType, UffCoding, UnitSystem};
 use crate::recording::error::{RecordingError, UffError};
 use crate::recording::health::{HealthMeter, check_finite, check_rate};
 use crate::recording::units::label_unit;
@@ -52,26 +52,27 @@ pub(in crate::recording) fn open_uff(
     group
         .left_out
         .sort_by_key(|((dataset, _), _)| dataset.number);
-    for (entry, reason) in group.left_out {
-        warnings.push(left_out(entry, reason));
+    for ((dataset, function), reason) in group.left_out {
+        warnings.push(left_out(dataset, function, reason));
     }
     let sample_rate = 1.0 / points.step;
     check_rate(&file, sample_rate)?;
     warnings.extend(settings.ignored_rate(sample_rate));
+    let mut functions = Vec::with_capacity(group.functions.len());
     let mut measured = Vec::with_capacity(group.functions.len());
     let mut room = KEPT_SAMPLES;
-    for (at, entry) in group.functions.into_iter().enumerate() {
-        let values = Values::new(&listed, entry.0, entry.1)?;
-        let channel = Measured::read(&file, sample_rate, at, values, &mut room)?;
-        match channel.count {
-            0 => {
-                let reason = "the file ends before its first value".to_owned();
-                warnings.push(left_out(entry, reason));
-            }
-            _ => measured.push((entry, channel)),
+    for (at, (dataset, function)) in group.functions.into_iter().enumerate() {
+        let values = Values::new(&listed, dataset, function)?;
+        let channel = Measured::read(&file, sample_rate, at, values, u64::MAX, &mut room)?;
+        if channel.count == 0 {
+            let reason = "the file ends before its first value".to_owned();
+            warnings.push(left_out(dataset, function, reason));
+        } else {
+            functions.push(function);
+            measured.push(channel);
         }
     }
-    let Some(frames) = measured.iter().map(|(_, channel)| channel.count).min() else {
+    let Some(frames) = measured.iter().map(|channel| channel.count).min() else {
         return Err(RecordingError::NoSamples { file });
     };
     if frames < points.points {
@@ -80,19 +81,17 @@ pub(in crate::recording) fn open_uff(
             promised: points.points,
         });
     }
-    let functions: Vec<&Function> = measured
-        .iter()
-        .map(|((_, function), _)| *function)
-        .collect();
     let names = channel_names(&functions);
     let (mut channels, mut values) = (Vec::new(), Vec::new());
-    for (at, ((entry, mut channel), name)) in measured.into_iter().zip(names).enumerate() {
-        channel.cut(&file, sample_rate, at, frames)?;
-        let label = ChannelLabel {
-            number: at + 1,
-            name,
-        };
-        let info = channel_info(listed.units, label, entry.1, channel.meter, &mut warnings);
+    for (at, (mut channel, name)) in measured.into_iter().zip(names).enumerate() {
+        // What is beyond the shortest channel is no part of the recording's health either.
+        if channel.count > frames {
+            channel = Measured::read(&file, sample_rate, at, channel.values, frames, &mut 0)?;
+        }
+        let number = at + 1;
+        let label = ChannelLabel { number, name };
+        let function = functions[at];
+        let info = channel_info(listed.units, label, function, channel.meter, &mut warnings);
         channels.push(info);
         values.push(channel.values);
     }
@@ -112,7 +111,7 @@ pub(in crate::recording) fn open_uff(
     })
 }
 
-fn left_out((dataset, function): Entry<'_>, reason: String) -> RecordingWarning {
+fn left_out(dataset: &Dataset, function: &Function, reason: String) -> RecordingWarning {
     RecordingWarning::DatasetLeftOut {
         dataset: dataset.number,
         name: describe(function),
@@ -261,50 +260,20 @@ struct Measured {
 }
 
 impl Measured {
-    /// Reads a channel (0-based) once: checks the samples, gathers their health, and remembers where text
+    /// Reads a channel (0-based) up to so many samples: checks them, gathers their health, and remembers where text
     /// can be read from. Text is kept where `room` (samples) has room for it.
     fn read(
         name: &str,
         sample_rate: f64,
         channel: usize,
-        values: Values,
+        mut values: Values,
+        frames: u64,
         room: &mut usize,
     ) -> Result<Self, RecordingError> {
-        let mut measured = Self {
-            values,
-            count: 0,
-            meter: HealthMeter::new(None),
-        };
-        measured.pass(name, sample_rate, channel, u64::MAX, room)?;
-        Ok(measured)
-    }
-
-    /// Ends the channel after so many samples: what is beyond them is no part of the recording's health either.
-    fn cut(
-        &mut self,
-        name: &str,
-        sample_rate: f64,
-        channel: usize,
-        frames: u64,
-    ) -> Result<(), RecordingError> {
-        match self.count > frames {
-            true => self.pass(name, sample_rate, channel, frames, &mut 0),
-            false => Ok(()),
-        }
-    }
-
-    fn pass(
-        &mut self,
-        name: &str,
-        sample_rate: f64,
-        channel: usize,
-        frames: u64,
-        room: &mut usize,
-    ) -> Result<(), RecordingError> {
-        self.meter = HealthMeter::new(None);
-        let mut kept = self.values.is_text().then(Vec::new);
-        let mut file = self.values.open()?;
-        let mut reader = self.values.reader(0, &mut file)?;
+        let mut meter = HealthMeter::new(None);
+        let mut kept = values.is_text().then(Vec::new);
+        let mut file = values.open()?;
+        let mut reader = values.reader(0, &mut file)?;
         let mut places = vec![reader.block];
         let mut samples = Vec::new();
         while reader.at < frames {
@@ -318,19 +287,23 @@ impl Measured {
                 places.push(reader.block);
             }
             check_finite(name, sample_rate, channel, at, &samples)?;
-            self.meter.add(&samples);
+            meter.add(&samples);
             kept = kept.filter(|kept: &Vec<f64>| kept.len() + samples.len() <= *room);
             if let Some(kept) = &mut kept {
                 kept.extend_from_slice(&samples);
             }
         }
-        self.count = reader.at;
-        self.values.checkpoints = Arc::new(places);
+        let count = reader.at;
+        values.checkpoints = Arc::new(places);
         if let Some(kept) = kept {
             *room -= kept.len();
-            self.values.kept = Some(Arc::new(kept));
+            values.kept = Some(Arc::new(kept));
         }
-        Ok(())
+        Ok(Self {
+            values,
+            count,
+            meter,
+        })
     }
 }
 
@@ -440,7 +413,7 @@ mod tests {
         let listed = list_datasets(file.path()).unwrap();
         let (dataset, function) = listed.functions().next().unwrap();
         let values = Values::new(&listed, dataset, function).unwrap();
-        let measured = Measured::read("file", 1000.0, 0, values, &mut 0).unwrap();
+        let measured = Measured::read("file", 1000.0, 0, values, u64::MAX, &mut 0).unwrap();
         let (values, count) = (measured.values, measured.count);
         assert_eq!(count, 50_000);
         // 660 kB of text in blocks of 64 kB.

@@ -7,12 +7,12 @@ use std::sync::Arc;
 
 use memchr::memchr;
 
-use super::header::{Function, Ordinate, UffCoding};
 use super::list::{DataPlace, Dataset, MAX_LINE_BYTES, UniversalFile, line_number};
 use super::numbers;
+use super::{Function, Ordinate, UffCoding};
 use crate::recording::error::{RecordingError, UffError};
-use crate::recording::file_type::{read_fully, unreadable};
 use crate::recording::text::shown;
+use crate::recording::{read_fully, unreadable};
 
 /// Bytes read at a time: large enough for speed, small against any memory.
 const BLOCK_BYTES: usize = 1 << 16;
@@ -139,7 +139,7 @@ impl Values {
         let place = dataset.place;
         let layout = match function.coding {
             UffCoding::Ascii => Layout::Ascii {
-                widths: numbers::column_widths(function),
+                widths: function.column_widths(),
             },
             UffCoding::Binary {
                 order: order @ (1 | 2),

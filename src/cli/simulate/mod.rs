@@ -24,9 +24,10 @@ use tapjoint::description::TestDescription;
 use tapjoint::effects::Effect;
 use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::simulate::{
-    GivenJoint, Laboratory, TestPlan, VirtualRecording, VirtualTest, believed_description,
-    plan_test, truth_of, wav_name,
+    Laboratory, TestPlan, VirtualRecording, VirtualTest, nominal_description, plan_test, truth_of,
+    wav_name,
 };
+use tapjoint::structure::JointStiffness;
 use tapjoint::study::updated_model::described_effects;
 
 /// Make the recordings of a virtual test: what a laboratory would record of a described structure.
@@ -67,7 +68,7 @@ struct Request {
     effects: Vec<Effect>,
     laboratory: Laboratory,
     format: WavFormat,
-    joint: Option<GivenJoint>,
+    joint: Option<JointStiffness>,
 }
 
 fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result<Request> {
@@ -88,11 +89,7 @@ fn resolve(arguments: &SimulateArguments, terminal: &Terminal) -> anyhow::Result
             24 => WavFormat::Pcm24,
             _ => WavFormat::Float32,
         },
-        joint: given.map(|given| GivenJoint {
-            kx: given.kx,
-            ky: given.ky,
-            cross_compliance: given.cross_compliance,
-        }),
+        joint: given,
         laboratory,
         file,
         text,
@@ -137,7 +134,7 @@ pub(super) fn run(
     let test = plan_test(&plan).map_err(|error| anyhow!("{}: {error}", request.file.name))?;
     let truth = truth_of(&plan, &test);
     let clipped = record(&request, &test)?;
-    let believed = believed_description(&request.text, &request.file.test, &test)?;
+    let believed = nominal_description(&request.text, &request.file.test, &test)?;
     request.output.add(DESCRIPTION, believed.as_bytes())?;
     if !arguments.no_truth {
         let mut text = serde_json::to_string_pretty(&truth)?;
@@ -176,16 +173,16 @@ fn write(
     path: &Path,
     format: WavFormat,
 ) -> anyhow::Result<u64> {
-    let mut take = recording.begin(laboratory);
+    let mut run = recording.begin(laboratory);
     let layout = WavLayout {
-        sample_rate: recording.take.sample_rate,
-        channels: recording.take.channels.len(),
-        frames: recording.take.frames,
+        sample_rate: recording.plan.sample_rate,
+        channels: recording.plan.channels.len(),
+        frames: recording.plan.frames,
         format,
     };
     let mut stream = WavStream::create(path, layout)?;
     let mut frame = vec![0.0; layout.channels];
-    while take.next_frame(&mut frame) {
+    while run.next_frame(&mut frame) {
         stream.write(&frame)?;
     }
     Ok(stream.finish()?)

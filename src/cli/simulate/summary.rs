@@ -18,7 +18,7 @@ pub(super) fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> Strin
         folder.display()
     );
     for (recording, made) in truth.recordings.iter().zip(&test.recordings) {
-        let line = of_recording(recording, made.take.taps.pulse.0);
+        let line = of_recording(recording, made.plan.taps.pulse_length);
         text.push_str(&wrapped(&line, 2));
     }
     if let Some(joint) = &truth.joint {

@@ -539,9 +539,6 @@ fn spectra_of_functions(
     }
 }
 
-    }
-}
-
 /// Shown before a tap's trigger (s).
 const BEFORE: f64 = 2e-3;
 /// Shown after it (s): the pulse, and how the response sets out.

@@ -4,7 +4,8 @@ use super::Outcome;
 use super::terminal::Terminal;
 use clap::Args;
 use tapjoint::report::document::VERSION;
-use tapjoint::study::publication::{render, reproduce};
+use tapjoint::report::render_reproduction;
+use tapjoint::study::publication::reproduce;
 
 /// Print the tables of the paper (Ingole & Chatterjee) beside tapjoint's numbers.
 ///
@@ -15,7 +16,7 @@ pub(super) struct ReproduceArguments {}
 
 pub(super) fn run(_arguments: &ReproduceArguments, terminal: Terminal) -> anyhow::Result<Outcome> {
     let reproduction = reproduce()?;
-    terminal.say(&render(&reproduction))?;
+    terminal.say(&render_reproduction(&reproduction))?;
     terminal.write_json(&serde_json::json!({
         "version": VERSION,
         "reproduction": reproduction,

@@ -23,8 +23,8 @@ use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
 use tapjoint::report::text::wrapped;
 use tapjoint::simulate::{
-    AntiAlias, Damping, GivenJoint, JointTruth, Laboratory, RecordingTruth, TestPlan, Truth,
-    VirtualRecording, VirtualTest, believed_description, plan_test, truth_of, wav_name,
+    AntiAlias, Damping, JointTruth, Laboratory, RecordingTruth, TestPlan, Truth,
+    VirtualRecording, VirtualTest, nominal_description, plan_test, truth_of, wav_name,
 };
 use tapjoint::study::updated_model::described_effects;
 
@@ -144,11 +144,7 @@ pub(super) fn run(
         description: &file.test,
         effects: &effects,
         laboratory: &laboratory,
-        joint: given.map(|given| GivenJoint {
-            kx: given.kx,
-            ky: given.ky,
-            cross_compliance: given.cross_compliance,
-        }),
+        joint: given,
         seed,
     };
     let test = plan_test(&plan).map_err(|error| anyhow!("{}: {error}", file.name))?;
@@ -161,7 +157,7 @@ pub(super) fn run(
                 .with_context(|| format!("{}: could not be written", recording.file))
         })
         .collect::<anyhow::Result<Vec<u64>>>()?;
-    let believed = believed_description(&text, &file.test, &test)?;
+    let believed = nominal_description(&text, &file.test, &test)?;
     output.add(DESCRIPTION, believed.as_bytes())?;
     if !arguments.no_truth {
         let mut text = serde_json::to_string_pretty(&truth)?;
@@ -188,11 +184,11 @@ fn write_recording(
     laboratory: &Laboratory,
     path: &Path,
 ) -> anyhow::Result<u64> {
-    let mut take = recording.begin(laboratory);
+    let mut run = recording.begin(laboratory);
     let layout = WavLayout {
-        sample_rate: recording.take.sample_rate,
-        channels: recording.take.channels.len(),
-        frames: recording.take.frames,
+        sample_rate: recording.plan.sample_rate,
+        channels: recording.plan.channels.len(),
+        frames: recording.plan.frames,
         format: match laboratory.recorder.bits {
             16 => WavFormat::Pcm16,
             24 => WavFormat::Pcm24,
@@ -201,7 +197,7 @@ fn write_recording(
     };
     let mut stream = WavStream::create(path, layout)?;
     let mut frame = vec![0.0; layout.channels];
-    while take.next_frame(&mut frame) {
+    while run.next_frame(&mut frame) {
         stream.write(&frame)?;
     }
     Ok(stream.finish()?)
@@ -215,7 +211,7 @@ fn summary(truth: &Truth, test: &VirtualTest, folder: &Path) -> String {
         folder.display()
     );
     for (recording, made) in truth.recordings.iter().zip(&test.recordings) {
-        let line = recording_line(recording, made.take.taps.pulse.0);
+        let line = recording_line(recording, made.plan.taps.pulse_length);
         text.push_str(&wrapped(&line, 2));
     }
     if let Some(joint) = &truth.joint {

@@ -15,6 +15,7 @@ pub mod tables;
 pub mod text;
 pub mod words;
 
+mod publication;
 mod report_json;
 mod resolution;
 mod run;
@@ -30,6 +31,7 @@ pub use document::{
 };
 pub use figures::{figures as figures_of, frf_figure};
 pub use html::render_html;
+pub use publication::render_reproduction;
 pub use report_json::{MODEL_FILE, earlier_files, render_json, render_schema};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
 pub use run::{render_cloud_picture, render_frf_picture, render_run, render_spectrum_picture};

@@ -1,6 +1,5 @@
-//! What becomes of a signal between the beam and the file: one channel's sensor, cable and converter.
-//!
-//! Filters of the measuring chain, at the rate of the simulation.
+//! One channel between the beam and the file: sensor, cable and converter, with their filters at the rate
+//! of the simulation.
 
 use super::laboratory::{AntiAlias, Laboratory};
 use super::observed_structure::Sensed;
@@ -67,8 +66,10 @@ struct Disturbance {
     drift_memory: f64,
     drifted: f64,
     hum: f64,
-    /// Angle of the mains (rad), and its step.
-    mains: (f64, f64),
+    /// Angle of the mains (rad).
+    mains_angle: f64,
+    /// Step of that angle from sample to sample (rad).
+    mains_step: f64,
 }
 
 /// The rates of a channel (Hz): of the simulation, and of the file in true seconds.
@@ -86,20 +87,20 @@ impl Chain {
         scale: f64,
         laboratory: &Laboratory,
         rates: Rates,
-        (mut random, gains): (ChaCha8Rng, &mut ChaCha8Rng),
+        mut random: ChaCha8Rng,
+        gains: &mut ChaCha8Rng,
     ) -> Self {
         let (sensors, recorder) = (&laboratory.sensors, &laboratory.recorder);
         let inner = rates.file * rates.factor as f64;
-        let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
-        let gain = 1.0 + sensors.sensitivity_error * normal(gains);
+        let sensitivity_error: f64 = StandardNormal.sample(gains);
         let accelerometer = signal == Signal::Response(Sensed::Acceleration);
         let mounting = accelerometer && sensors.mounting_resonance > 0.0;
         let full_scale = scale.abs();
-        let offset = recorder.offset * full_scale * normal(&mut random);
-        let drifted = recorder.drift * full_scale * normal(&mut random);
-        let angle = random.random_range(0.0..TAU);
+        let [offset, drifted]: [f64; 2] =
+            std::array::from_fn(|_| StandardNormal.sample(&mut random));
+        let mains_angle = random.random_range(0.0..TAU);
         Self {
-            gain,
+            gain: 1.0 + sensors.sensitivity_error * sensitivity_error,
             mounting: mounting
                 .then(|| Resonance::new(sensors.mounting_resonance, MOUNTING_QUALITY, inner)),
             coupling: (sensors.ac_coupling > 0.0)
@@ -111,12 +112,13 @@ impl Chain {
             disturbance: Disturbance {
                 random,
                 noise: sensors.noise * signal.good_noise(),
-                offset,
+                offset: recorder.offset * full_scale * offset,
                 drift: recorder.drift * full_scale,
                 drift_memory: (-1.0 / (DRIFT_TIME * rates.file)).exp(),
-                drifted,
+                drifted: recorder.drift * full_scale * drifted,
                 hum: recorder.hum * full_scale,
-                mains: (angle, TAU * recorder.mains / rates.file),
+                mains_angle,
+                mains_step: TAU * recorder.mains / rates.file,
             },
             scale,
         }
@@ -165,9 +167,9 @@ impl Disturbance {
             sum += self.drifted;
         }
         if self.hum > 0.0 {
-            let (angle, step) = &mut self.mains;
-            sum += self.hum * (angle.sin() + THIRD_HARMONIC * (3.0 * *angle).sin());
-            *angle = (*angle + *step) % TAU;
+            let angle = self.mains_angle;
+            sum += self.hum * (angle.sin() + THIRD_HARMONIC * (3.0 * angle).sin());
+            self.mains_angle = (angle + self.mains_step) % TAU;
         }
         sum
     }
@@ -205,8 +207,8 @@ impl HighPass {
 #[derive(Debug, Clone)]
 pub(super) struct Resonance {
     feedback: [f64; 2],
-    forward: [f64; 3],
-    inputs: [f64; 2],
+    forward: [f64; 2],
+    input: f64,
     outputs: [f64; 2],
 }
 
@@ -230,19 +232,17 @@ impl Resonance {
         let b0 = 0.5 * (b0_square.sqrt() + b1_square.sqrt());
         Self {
             feedback,
-            forward: [b0, b0_square.sqrt() - b0, 0.0],
-            inputs: [0.0; 2],
+            forward: [b0, b0_square.sqrt() - b0],
+            input: 0.0,
             outputs: [0.0; 2],
         }
     }
 
     pub(super) fn push(&mut self, input: f64) -> f64 {
-        let [b0, b1, b2] = self.forward;
+        let [b0, b1] = self.forward;
         let [a1, a2] = self.feedback;
-        let output = b0 * input + b1 * self.inputs[0] + b2 * self.inputs[1]
-            - a1 * self.outputs[0]
-            - a2 * self.outputs[1];
-        self.inputs = [input, self.inputs[0]];
+        let output = b0 * input + b1 * self.input - a1 * self.outputs[0] - a2 * self.outputs[1];
+        self.input = input;
         self.outputs = [output, self.outputs[0]];
         output
     }

@@ -1,6 +1,5 @@
-//! The hand that swings the hammer: when, where and how hard it strikes.
-//!
-//! Hammer pulses in closed form, so that whatever they drive can be integrated exactly.
+//! The hand that swings the hammer (when, where and how hard it strikes), and the pulses of its taps in
+//! closed form, so that the motion they cause can be integrated exactly.
 
 use num_complex::Complex64;
 use rand::RngExt;
@@ -25,11 +24,11 @@ pub struct Tap {
     pub peak_force: f64,
     /// Length of the pulse (s).
     pub length: f64,
-    /// Whether it strikes properly.
+    /// Clean, weak or double.
     pub kind: TapKind,
 }
 
-/// Whether a tap strikes properly.
+/// Quality of a tap.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TapKind {
@@ -53,12 +52,16 @@ pub struct TapPlan {
     pub taps: usize,
     /// Time from tap to tap (s).
     pub interval: f64,
-    /// Marked place (m) and length of the beam (m).
-    pub place: (f64, f64),
+    /// Marked place (m).
+    pub position: f64,
+    /// Length of the beam (m).
+    pub beam_length: f64,
     /// Mean peak force (N).
     pub peak_force: f64,
-    /// Mean length (s) and shape of the pulse.
-    pub pulse: (f64, PulseShape),
+    /// Mean length of the pulse (s).
+    pub pulse_length: f64,
+    /// Shape of the pulse.
+    pub pulse_shape: PulseShape,
 }
 
 /// Taps of a recording, one after the other.
@@ -118,28 +121,28 @@ impl Iterator for Hammer {
         let time = self.settings.lead
             + self.index as f64 * self.plan.interval
             + self.random.random_range(0.0..1.0) * late;
-        let (place, length) = self.plan.place;
-        let position = place + self.settings.place_scatter * self.deviation();
+        let position = self.plan.position + self.settings.place_scatter * self.deviation();
         let peak = self.plan.peak_force * self.scattered(self.settings.level_scatter).max(0.05);
-        let pulse = self.plan.pulse.0 * self.scattered(self.settings.length_scatter).max(0.05);
+        let length_factor = self.scattered(self.settings.length_scatter).max(0.05);
+        let length = self.plan.pulse_length * length_factor;
         let kind = self.kind();
         self.index += 1;
         Some(Tap {
             time,
-            position: position.clamp(0.0, length),
+            position: position.clamp(0.0, self.plan.beam_length),
             peak_force: if kind == TapKind::Weak {
                 WEAK * peak
             } else {
                 peak
             },
-            length: pulse,
+            length,
             kind,
         })
     }
 }
 
 impl Tap {
-    /// The tap's pulses, one or two.
+    /// Returns the tap's one or two pulses.
     pub fn pulses(&self, shape: PulseShape) -> Vec<Pulse> {
         let first = Pulse {
             start: self.time,
@@ -209,13 +212,9 @@ impl Pulse {
         self.start + self.length
     }
 
-    fn covers(&self, time: f64) -> bool {
-        self.start < time && time < self.end()
-    }
-
     /// Force (N) and its first and second derivative (N/s, N/s2) at a time (s).
     pub fn force(&self, time: f64) -> [f64; 3] {
-        if !self.covers(time) {
+        if time <= self.start || time >= self.end() {
             return [0.0; 3];
         }
         let mut sum = [0.0; 3];
@@ -235,9 +234,9 @@ impl Pulse {
         2.0 * PI * n as f64 / self.length
     }
 
-    /// What the pulse leaves in z' = pole z + F at the end of a step: the integral of
-    /// e^{pole (to - s)} F(s) ds over `from`..`to` (s).
-    pub(super) fn drive(&self, pole: Complex64, (from, to): (f64, f64)) -> Complex64 {
+    /// Returns what the pulse adds to the state of z' = pole z + F by the end of a step: the integral
+    /// of e^{pole (to - s)} F(s) ds over `from`..`to` (s).
+    pub(super) fn drive(&self, pole: Complex64, from: f64, to: f64) -> Complex64 {
         let (begin, end) = (from.max(self.start), to.min(self.end()));
         if begin >= end {
             return Complex64::ZERO;
@@ -299,13 +298,15 @@ impl Tip {
         }
     }
 
-    /// The softest that excites to this frequency (Hz): what good practice takes.
+    /// Returns the softest tip that excites up to this frequency (Hz), as good practice recommends.
     pub fn softest_for(frequency: f64) -> Self {
-        let reaches = |tip: &Self| {
+        for tip in Self::ALL {
             let (length, shape) = tip.pulse();
-            shape.half_amplitude_frequency(length) >= frequency
-        };
-        Self::ALL.into_iter().find(reaches).unwrap_or(Self::Steel)
+            if shape.half_amplitude_frequency(length) >= frequency {
+                return tip;
+            }
+        }
+        Self::Steel
     }
 }
 

@@ -1,6 +1,5 @@
-//! Moments of a joint's rotation that are no linear spring, as what they add to one.
-//!
-//! Exact response of the modes to a moment that is a cubic polynomial over one step.
+//! The moment of a non-linear joint, as an addition to a linear spring, and the exact response of the modes
+//! to a moment that is a cubic polynomial over one step.
 //!
 //! The linear structure is integrated exactly; what is approximated is one scalar, the joint's extra
 //! moment u. It is taken as the polynomial through its values at Lobatto's four nodes 0,
@@ -73,7 +72,7 @@ impl JointMoment {
             JointLawKind::Elastic => Self::elastic(stiffness, coefficient, law.exponent),
             JointLawKind::MicroSlip => Self::MicroSlip {
                 stiffness,
-                sliders: sliders(law, stiffness, (hardest, coefficient)),
+                sliders: sliders(law, stiffness, hardest, coefficient),
             },
         }
     }
@@ -132,7 +131,7 @@ impl JointMoment {
             Self::MicroSlip { sliders, .. } => {
                 let mut extra = Extra::default();
                 for ((slider, &from), to) in sliders.iter().zip(from).zip(to) {
-                    slider.follow(rotation, (from, to), &mut extra);
+                    slider.follow(rotation, from, to, &mut extra);
                 }
                 extra
             }
@@ -167,17 +166,20 @@ impl JointMoment {
 }
 
 /// Sliders whose moment on first loading is k theta (1 + c theta^p), c negative.
-fn sliders(law: &JointLaw, stiffness: f64, (hardest, c): (f64, f64)) -> Vec<Slider> {
+fn sliders(law: &JointLaw, stiffness: f64, hardest: f64, c: f64) -> Vec<Slider> {
     let p = law.exponent;
     // The slope 1 + c (p + 1) theta^p vanishes where everything slips.
     let all_slip = (-1.0 / (c * (p + 1.0))).powf(p.recip());
     let last = all_slip.min(BEYOND_HARDEST * hardest);
     // Between two rotations that stiffness slips by which the slope falls. Closer together near zero,
     // because a ring-down ends there.
-    let edge = |n: usize| last * (n as f64 / SLIDERS as f64).powi(2);
-    (0..SLIDERS)
-        .map(|n| {
-            let (low, high) = (edge(n), edge(n + 1));
+    let edges: Vec<f64> = (0..=SLIDERS)
+        .map(|n| last * (n as f64 / SLIDERS as f64).powi(2))
+        .collect();
+    edges
+        .windows(2)
+        .map(|edges| {
+            let (low, high) = (edges[0], edges[1]);
             let part = -c * (p + 1.0) * (high.powf(p) - low.powf(p)) * stiffness;
             Slider {
                 stiffness: part,
@@ -197,7 +199,7 @@ fn power(base: f64, exponent: f64) -> f64 {
 }
 
 impl Slider {
-    fn follow(&self, rotation: f64, (from, to): (f64, &mut f64), extra: &mut Extra) {
+    fn follow(&self, rotation: f64, from: f64, to: &mut f64, extra: &mut Extra) {
         let stick = self.stiffness * (rotation - from);
         if stick.abs() <= self.slip {
             *to = from;

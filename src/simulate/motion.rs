@@ -1,10 +1,8 @@
-//! The structure in motion: states of its modes, stepped exactly; pulses that strike it; what the
-//! sensors feel.
+//! The structure in motion: the states of its modes, stepped exactly, the pulses that strike it, and the
+//! signals at the sensors.
 //!
-//! The joint's extra moment in time: solved for at the nodes of each step, with steps halved until
-//! the polynomial between the nodes is the moment.
-//!
-//! The structure as hammer, sensors and joint see it: modes, and what the modes left out would add.
+//! The extra moment of a non-linear joint is solved for at the nodes of each step. Steps are halved until
+//! the polynomial through the nodes follows the moment.
 
 use super::hammer::Pulse;
 use super::joint_moment::{
@@ -32,10 +30,8 @@ pub struct Strike {
 /// A structure moving in equal steps of time.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    pub(super) structure: ReducedStructure,
-    pub(super) oscillators: Vec<Oscillator>,
-    /// State of each mode.
-    pub(super) states: Vec<Complex64>,
+    structure: ReducedStructure,
+    modes: MovingModes,
     step: f64,
     start: f64,
     steps: u64,
@@ -46,7 +42,25 @@ pub struct Motion {
     joint: Option<Box<JointMotion>>,
 }
 
-/// What one sensor feels.
+/// The modes and their present states.
+#[derive(Debug, Clone)]
+struct MovingModes {
+    oscillators: Vec<Oscillator>,
+    /// State of each mode.
+    states: Vec<Complex64>,
+}
+
+impl MovingModes {
+    /// Adds to every state what a strike causes between two times (s).
+    fn drive(&mut self, strike: &Strike, from: f64, to: f64) {
+        let modes = self.oscillators.iter().zip(&strike.place.at_modes);
+        for (state, (oscillator, at)) in self.states.iter_mut().zip(modes) {
+            *state += *at * strike.pulse.drive(oscillator.pole, from, to);
+        }
+    }
+}
+
+/// How the signal of one sensor follows from the states.
 #[derive(Debug, Clone)]
 struct SensorRow {
     derivative: usize,
@@ -55,12 +69,13 @@ struct SensorRow {
 }
 
 impl Motion {
-    /// At rest at time `start` (s), to be moved in steps of `step` (s); `sensed` says what each
-    /// sensor senses.
+    /// Returns the structure at rest at time `start` (s), to be moved in steps of `step` (s). `sensed` is
+    /// the quantity of each sensor.
     pub fn new(
         structure: ReducedStructure,
         sensed: &[Sensed],
-        (start, step): (f64, f64),
+        start: f64,
+        step: f64,
         joint: Option<JointMoment>,
     ) -> Self {
         let oscillators: Vec<_> = structure.modes.iter().map(Oscillator::new).collect();
@@ -71,13 +86,15 @@ impl Motion {
             sensors: sensors
                 .map(|(index, sensed)| SensorRow::new(index, *sensed, &structure, &oscillators))
                 .collect(),
-            states: vec![Complex64::ZERO; oscillators.len()],
             advance: oscillators
                 .iter()
                 .map(|oscillator| (oscillator.pole * step).exp())
                 .collect(),
+            modes: MovingModes {
+                states: vec![Complex64::ZERO; oscillators.len()],
+                oscillators,
+            },
             structure,
-            oscillators,
             step,
             start,
             steps: 0,
@@ -103,39 +120,31 @@ impl Motion {
 
     /// Moves on by one step.
     pub fn advance(&mut self) {
-        let (from, to) = (
-            self.time(),
-            self.start + (self.steps + 1) as f64 * self.step,
-        );
+        let from = self.time();
+        let to = self.start + (self.steps + 1) as f64 * self.step;
         self.strikes.retain(|strike| strike.pulse.end() > from);
         match &mut self.joint {
-            Some(joint) => {
-                joint.advance((&self.oscillators, &mut self.states), &self.strikes, from)
-            }
+            Some(joint) => joint.advance(&mut self.modes, &self.strikes, from),
             None => {
-                for (state, advance) in self.states.iter_mut().zip(&self.advance) {
+                for (state, advance) in self.modes.states.iter_mut().zip(&self.advance) {
                     *state *= advance;
                 }
                 let under_way = self.strikes.iter().filter(|strike| strike.pulse.start < to);
                 for strike in under_way {
-                    drive(&self.oscillators, strike, (from, to), &mut self.states);
+                    self.modes.drive(strike, from, to);
                 }
             }
         }
         self.steps += 1;
         if self.steps.is_multiple_of(FORGET_EVERY) {
-            self.forget_what_has_died_down();
+            // States that have decayed would end as the smallest numbers there are: rounding keeps these
+            // from vanishing, and processors handle them slowly.
+            for state in &mut self.modes.states {
+                if state.norm_sqr() < NOTHING {
+                    *state = Complex64::ZERO;
+                }
+            }
         }
-    }
-
-    /// Sets states to zero that have decayed beyond all meaning. Left alone they would end as the
-    /// smallest numbers there are, which rounding keeps from vanishing and processors handle slowly.
-    fn forget_what_has_died_down(&mut self) {
-        let gone = self
-            .states
-            .iter_mut()
-            .filter(|state| state.norm_sqr() < NOTHING);
-        gone.for_each(|state| *state = Complex64::ZERO);
     }
 
     /// Force of the hammer now (N).
@@ -151,56 +160,33 @@ impl Motion {
     /// What each sensor feels now, in SI units.
     pub fn responses(&self, out: &mut [f64]) {
         for (row, out) in self.sensors.iter().zip(out.iter_mut()) {
-            *out = seen(&row.of_states, &self.states);
+            *out = seen(&row.of_states, &self.modes.states);
         }
         let time = self.time();
         for strike in &self.strikes {
             let force = strike.pulse.force(time);
             if force[0] != 0.0 || force[2] != 0.0 {
-                self.add_direct(
-                    &strike.place.to_sensors,
-                    (&strike.place.at_modes, force),
-                    out,
-                );
+                self.add_direct(&strike.place, force, out);
             }
         }
         if let Some(joint) = &self.joint {
-            self.add_joint(joint, out);
-        }
-    }
-
-    /// What a force brings to the sensors at once: through the modes' acceleration, and through the
-    /// modes left out, which follow it like springs.
-    fn add_direct(
-        &self,
-        compliance: &[f64],
-        (at_modes, force): (&[f64], [f64; 3]),
-        out: &mut [f64],
-    ) {
-        for (sensor, (row, out)) in self.sensors.iter().zip(out.iter_mut()).enumerate() {
-            *out += compliance.get(sensor).copied().unwrap_or(0.0) * force[row.derivative];
-            if row.derivative == 2 {
-                let modes = self.structure.modes.iter().zip(at_modes);
-                let share: f64 = modes.map(|(mode, at)| mode.at_sensors[sensor] * at).sum();
-                *out += share * force[0];
+            let moment = joint.moment();
+            if moment != [0.0; 3] {
+                self.add_direct(&joint.place, moment, out);
             }
         }
     }
 
-    fn add_joint(&self, joint: &JointMotion, out: &mut [f64]) {
-        let moment = joint.moment();
-        if moment == [0.0; 3] {
-            return;
-        }
+    /// Adds what a force, given with its first and second derivative, brings to the sensors at once: through
+    /// the modes' acceleration, and through the modes left out, which follow it like springs.
+    fn add_direct(&self, place: &StruckPlace, force: [f64; 3], out: &mut [f64]) {
         for (sensor, (row, out)) in self.sensors.iter().zip(out.iter_mut()).enumerate() {
-            let compliance = self.structure.joint_to_sensors.get(sensor);
-            *out += compliance.copied().unwrap_or(0.0) * moment[row.derivative];
+            let compliance = place.to_sensors.get(sensor).copied().unwrap_or(0.0);
+            *out += compliance * force[row.derivative];
             if row.derivative == 2 {
-                let modes = self.structure.modes.iter();
-                let share: f64 = modes
-                    .map(|mode| mode.at_sensors[sensor] * mode.at_joint)
-                    .sum();
-                *out += share * moment[0];
+                let modes = self.structure.modes.iter().zip(&place.at_modes);
+                let share: f64 = modes.map(|(mode, at)| mode.at_sensors[sensor] * at).sum();
+                *out += share * force[0];
             }
         }
     }
@@ -211,7 +197,7 @@ impl Motion {
             .structure
             .modes
             .iter()
-            .zip(self.oscillators.iter().zip(&self.states))
+            .zip(self.modes.oscillators.iter().zip(&self.modes.states))
             .map(|(mode, (oscillator, state))| mode.at_joint * oscillator.motion(*state, 0.0)[0])
             .sum();
         let moment = self.joint.as_ref().map_or(0.0, |joint| joint.moment()[0]);
@@ -222,38 +208,27 @@ impl Motion {
     /// modes left out, and what the joint stores beyond its linear spring.
     pub fn energy(&self) -> f64 {
         let modes: f64 = self
+            .modes
             .oscillators
             .iter()
-            .zip(&self.states)
+            .zip(&self.modes.states)
             .map(|(oscillator, state)| oscillator.energy(*state))
             .sum();
         let joint = self.joint.as_ref().map_or(0.0, |joint| {
-            joint.stored() + 0.5 * self.structure.joint_compliance * joint.moment()[0].powi(2)
+            joint.law.stored(joint.rotation, &joint.memory)
+                + 0.5 * self.structure.joint_compliance * joint.moment()[0].powi(2)
         });
         modes + joint
     }
 
     /// Energy lost in the joint's slip so far (J).
     pub fn joint_loss(&self) -> f64 {
-        self.joint.as_ref().map_or(0.0, |joint| joint.loss())
+        self.joint.as_ref().map_or(0.0, |joint| joint.loss)
     }
 
     /// Steps that met the finest division before they met their tolerance: kinks of the sliders.
     pub fn forced_steps(&self) -> u64 {
-        self.joint.as_ref().map_or(0, |joint| joint.forced_steps())
-    }
-}
-
-/// Adds to every state what a strike does over a span of time (s).
-pub(super) fn drive(
-    oscillators: &[Oscillator],
-    strike: &Strike,
-    span: (f64, f64),
-    states: &mut [Complex64],
-) {
-    let modes = oscillators.iter().zip(&strike.place.at_modes);
-    for (state, (oscillator, at)) in states.iter_mut().zip(modes) {
-        *state += *at * strike.pulse.drive(oscillator.pole, span);
+        self.joint.as_ref().map_or(0, |joint| joint.forced)
     }
 }
 
@@ -295,6 +270,8 @@ const ITERATIONS: usize = 12;
 #[derive(Debug, Clone)]
 struct JointMotion {
     law: JointMoment,
+    /// The joint as a place on which its moment acts.
+    place: StruckPlace,
     tolerance: f64,
     /// For each division of the step.
     collocations: Vec<Collocation>,
@@ -323,7 +300,7 @@ struct Solved {
 }
 
 impl JointMotion {
-    pub(super) fn new(
+    fn new(
         law: JointMoment,
         structure: &ReducedStructure,
         oscillators: &[Oscillator],
@@ -334,6 +311,11 @@ impl JointMotion {
             tolerance: match law {
                 JointMoment::Elastic { .. } => ELASTIC_TOLERANCE,
                 JointMoment::MicroSlip { .. } => SLIP_TOLERANCE,
+            },
+            place: StruckPlace {
+                at_modes: structure.modes.iter().map(|mode| mode.at_joint).collect(),
+                to_sensors: structure.joint_to_sensors.clone(),
+                to_joint: structure.joint_compliance,
             },
             collocations: (0..=FINEST)
                 .map(|division| {
@@ -360,19 +342,14 @@ impl JointMotion {
     }
 
     /// Moves modes and joint on by the whole step that begins at `time` (s).
-    pub(super) fn advance(
-        &mut self,
-        (oscillators, states): (&[Oscillator], &mut [Complex64]),
-        strikes: &[Strike],
-        time: f64,
-    ) {
+    fn advance(&mut self, modes: &mut MovingModes, strikes: &[Strike], time: f64) {
         const WHOLE: usize = 1 << FINEST;
         let mut ticks = 0;
         while ticks < WHOLE {
             let step = self.collocations[self.division].step;
             let now = time + ticks as f64 * self.collocations[FINEST].step;
-            let solved = self.solve((oscillators, states), strikes, now);
-            let allowed = self.tolerance * self.law.stiffness() * self.amplitude(states);
+            let solved = self.solve(modes, strikes, now);
+            let allowed = self.tolerance * self.law.stiffness() * self.amplitude(&modes.states);
             let fine = solved.as_ref().is_some_and(|solved| {
                 // Where nothing moves there is nothing to be accurate about.
                 solved.defect <= allowed.max(f64::MIN_POSITIVE)
@@ -385,7 +362,7 @@ impl JointMotion {
                 .as_ref()
                 .map_or(f64::INFINITY, |solved| solved.defect);
             self.forced += u64::from(!fine);
-            self.accept(solved, (oscillators, states), strikes, (now, now + step));
+            self.accept(solved, modes, strikes, now, now + step);
             ticks += WHOLE >> self.division;
             // Halving the step divides the defect by 16; a coarser one must begin at its own tick.
             let coarser = WHOLE >> self.division.saturating_sub(1);
@@ -402,16 +379,11 @@ impl JointMotion {
     }
 
     /// Rotation at each place without the joint's extra moment of this step, but that at its start.
-    fn free_rotations(
-        &self,
-        (oscillators, states): (&[Oscillator], &[Complex64]),
-        strikes: &[Strike],
-        time: f64,
-    ) -> [f64; PLACES] {
+    fn free_rotations(&self, modes: &MovingModes, strikes: &[Strike], time: f64) -> [f64; PLACES] {
         let collocation = &self.collocations[self.division];
         let mut rotations = [0.0; PLACES];
         for (place, rotation) in rotations.iter_mut().enumerate() {
-            *rotation = seen(&collocation.rotation[place], states)
+            *rotation = seen(&collocation.rotation[place], &modes.states)
                 + collocation.influence[place][0] * self.moments[NODES - 1];
         }
         let end = time + collocation.step;
@@ -419,9 +391,9 @@ impl JointMotion {
             for (rotation, part) in rotations.iter_mut().zip(places()) {
                 let at = time + part * collocation.step;
                 *rotation += strike.place.to_joint * strike.pulse.force(at)[0];
-                let modes = oscillators.iter().zip(&strike.place.at_modes);
-                for ((oscillator, at_mode), of) in modes.zip(&self.rotation_of) {
-                    let driven = strike.pulse.drive(oscillator.pole, (time, at));
+                let struck = modes.oscillators.iter().zip(&strike.place.at_modes);
+                for ((oscillator, at_mode), of) in struck.zip(&self.rotation_of) {
+                    let driven = strike.pulse.drive(oscillator.pole, time, at);
                     *rotation += of * at_mode * driven.im;
                 }
             }
@@ -430,15 +402,10 @@ impl JointMotion {
     }
 
     /// Solves for the moments at the nodes by Newton's method; `None` where it does not settle.
-    fn solve(
-        &mut self,
-        (oscillators, states): (&[Oscillator], &[Complex64]),
-        strikes: &[Strike],
-        time: f64,
-    ) -> Option<Solved> {
-        let free = self.free_rotations((oscillators, states), strikes, time);
+    fn solve(&mut self, modes: &MovingModes, strikes: &[Strike], time: f64) -> Option<Solved> {
+        let free = self.free_rotations(modes, strikes, time);
         let influence = self.collocations[self.division].influence;
-        let scale = self.amplitude(states).max(free[2].abs());
+        let scale = self.amplitude(&modes.states).max(free[2].abs());
         let mut rotations = Vector3::new(free[0], free[1], free[2]);
         let mut settled = false;
         let mut extras = [Extra::default(); 3];
@@ -499,23 +466,24 @@ impl JointMotion {
     fn accept(
         &mut self,
         solved: Option<Solved>,
-        (oscillators, states): (&[Oscillator], &mut [Complex64]),
+        modes: &mut MovingModes,
         strikes: &[Strike],
-        (from, to): (f64, f64),
+        from: f64,
+        to: f64,
     ) {
         let collocation = &self.collocations[self.division];
         // What did not settle on the finest step keeps its moment.
         let held = [self.moments[NODES - 1]; NODES];
         let moments = solved.as_ref().map_or(held, |solved| solved.moments);
-        let modes = collocation.advance.iter().zip(&collocation.drive);
-        for (state, (advance, drive)) in states.iter_mut().zip(modes) {
+        let factors = collocation.advance.iter().zip(&collocation.drive);
+        for (state, (advance, drive)) in modes.states.iter_mut().zip(factors) {
             *state *= advance;
             for (factor, moment) in drive.iter().zip(moments) {
                 *state += factor * moment;
             }
         }
         for strike in strikes.iter().filter(|strike| strike.pulse.start < to) {
-            drive(oscillators, strike, (from, to), states);
+            modes.drive(strike, from, to);
         }
         self.moments = moments;
         self.last_step = collocation.step;
@@ -527,7 +495,7 @@ impl JointMotion {
     }
 
     /// The moment on the structure now (N m) with its first and second derivative in time.
-    pub(super) fn moment(&self) -> [f64; 3] {
+    fn moment(&self) -> [f64; 3] {
         let [first, second] = derivatives_at_end().map(|factors| {
             let terms = factors.iter().zip(self.moments);
             terms.map(|(factor, moment)| factor * moment).sum::<f64>()
@@ -538,17 +506,5 @@ impl JointMotion {
             first / step,
             second / (step * step),
         ]
-    }
-
-    pub(super) fn stored(&self) -> f64 {
-        self.law.stored(self.rotation, &self.memory)
-    }
-
-    pub(super) fn loss(&self) -> f64 {
-        self.loss
-    }
-
-    pub(super) fn forced_steps(&self) -> u64 {
-        self.forced
     }
 }

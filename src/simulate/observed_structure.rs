@@ -1,15 +1,16 @@
-//! Structures of a virtual test: as planted, as the sensors observe it, and as the description gives it.
+//! The structure of a virtual test: as planted, as the sensors observe it, and as described.
 
-use super::laboratory::SimulateError;
-use super::laboratory::SpecimenSettings;
+use super::laboratory::{SimulateError, SpecimenSettings};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use tapjoint_beam::StructureError;
 use tapjoint_beam::effects::SensorPlace;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
-use tapjoint_description::described::{coupling, described_beam, described_specimen};
+use tapjoint_beam::{JointStiffness, StructureError};
+use tapjoint_description::described::{
+    coupling, described_beam, described_specimen,
+};
 use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
@@ -24,20 +25,18 @@ const SUSPENSION_DAMPING: f64 = 0.03;
 
 /// A structure and the test's view of it.
 #[derive(Debug, Clone)]
-pub struct SeenStructure {
+pub struct ObservedStructure {
     /// Motions on the suspension first, then the elastic modes.
     modes: Arc<SpecimenModes>,
     /// How many of them are motions on the suspension.
     suspended: usize,
     sensors: Vec<f64>,
     reduced: ReducedStructure,
-    /// How many of the modes move in time.
-    moving: usize,
 }
 
-impl SeenStructure {
-    /// The structure with `sensors` at these places (m) and this `joint_loss` factor (1); modes up to
-    /// `highest` (Hz) move in time.
+impl ObservedStructure {
+    /// Returns the structure with `sensors` at these positions (m) and this `joint_loss` factor (1). Modes up
+    /// to `highest` (Hz) move in time.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
@@ -45,50 +44,62 @@ impl SeenStructure {
         specimen: &Specimen,
         settings: &SpecimenSettings,
         sensors: &[f64],
-        (joint_loss, highest): (f64, f64),
+        joint_loss: f64,
+        highest: f64,
     ) -> Result<Self, StructureError> {
-        let count = count_below(specimen, highest) + COMPLIANT_MODES;
-        let elastic = specimen.modes(count.min(MOST_MODES), Mesh::SIMULATION)?;
-        let unseen = joint_compliance(specimen, &elastic);
-        let (modes, suspended) = hang(specimen, settings, elastic)?;
-        let damping = |mode: usize| {
-            let Some(elastic) = mode.checked_sub(suspended) else {
-                return SUSPENSION_DAMPING;
-            };
-            // The joint's loss acts on its share of the strain energy: zeta = eta/2 share.
-            settings.damping.ratio(elastic, modes.frequencies()[mode])
-                + 0.5 * joint_loss * modes.joint_energy_share(mode)
+        // About how many modes lie below the highest frequency: lambda grows by pi from mode to mode.
+        let beams = specimen.body.beams().iter();
+        let lambda: f64 = beams.map(|beam| beam.lambda_of(highest)).sum();
+        let below = (lambda / std::f64::consts::PI) as usize + 2;
+        let count = (below + COMPLIANT_MODES).min(MOST_MODES);
+        let elastic = specimen.modes(count, Mesh::SIMULATION)?;
+        // Compliance of the joint by the modes that are not even computed.
+        let beyond_computed = match specimen.joint {
+            SpecimenJoint::Free => 0.0,
+            SpecimenJoint::Springs { .. } => elastic.joint_compliance_beyond(),
         };
-        let moving = (0..modes.len())
-            .take_while(|&mode| {
-                modes.frequencies()[mode] <= highest && damping(mode) < MOST_DAMPING
-            })
-            .count();
+        let (modes, suspended) = hang(specimen, settings, elastic)?;
+        let mut moving = Vec::new();
+        for mode in 0..modes.len() {
+            let frequency = modes.frequencies()[mode];
+            let damping_ratio = match mode.checked_sub(suspended) {
+                None => SUSPENSION_DAMPING,
+                // The joint's loss acts on its share of the strain energy: zeta = eta/2 share.
+                Some(elastic) => {
+                    settings.damping.ratio(elastic, frequency)
+                        + 0.5 * joint_loss * modes.joint_energy_share(mode)
+                }
+            };
+            let moves = frequency <= highest && damping_ratio < MOST_DAMPING;
+            if !moves {
+                break;
+            }
+            moving.push(ReducedMode {
+                frequency,
+                damping_ratio,
+                at_sensors: sensors
+                    .iter()
+                    .map(|&x| modes.displacement(mode, x))
+                    .collect(),
+                at_joint: modes.joint_motion(mode)[1],
+            });
+        }
         let reduced = ReducedStructure {
-            modes: (0..moving)
-                .map(|mode| ReducedMode {
-                    frequency: modes.frequencies()[mode],
-                    damping_ratio: damping(mode),
-                    at_sensors: sensors
-                        .iter()
-                        .map(|&x| modes.displacement(mode, x))
-                        .collect(),
-                    at_joint: modes.joint_motion(mode)[1],
-                })
-                .collect(),
-            joint_compliance: unseen
-                + beyond(&modes, moving, |mode| modes.joint_motion(mode)[1].powi(2)),
+            joint_compliance: beyond_computed
+                + beyond(&modes, moving.len(), |mode| {
+                    modes.joint_motion(mode)[1].powi(2)
+                }),
             joint_to_sensors: sensors
                 .iter()
-                .map(|&x| joint_to(&modes, moving, x))
+                .map(|&x| joint_to(&modes, moving.len(), x))
                 .collect(),
+            modes: moving,
         };
         Ok(Self {
             modes: Arc::new(modes),
             suspended,
             sensors: sensors.to_vec(),
             reduced,
-            moving,
         })
     }
 
@@ -112,20 +123,21 @@ impl SeenStructure {
 
     /// How it feels a strike at a position (m).
     pub fn struck(&self, position: f64) -> StruckPlace {
+        let moving = self.reduced.modes.len();
         StruckPlace {
-            at_modes: (0..self.moving)
+            at_modes: (0..moving)
                 .map(|mode| self.modes.displacement(mode, position))
                 .collect(),
             to_sensors: self
                 .sensors
                 .iter()
                 .map(|&x| {
-                    beyond(&self.modes, self.moving, |mode| {
+                    beyond(&self.modes, moving, |mode| {
                         self.modes.displacement(mode, x) * self.modes.displacement(mode, position)
                     })
                 })
                 .collect(),
-            to_joint: joint_to(&self.modes, self.moving, position),
+            to_joint: joint_to(&self.modes, moving, position),
         }
     }
 }
@@ -163,37 +175,12 @@ fn joint_to(modes: &SpecimenModes, moving: usize, position: f64) -> f64 {
     })
 }
 
-/// What the modes that are not even computed leave of the joint's compliance.
-fn joint_compliance(specimen: &Specimen, modes: &SpecimenModes) -> f64 {
-    match specimen.joint {
-        SpecimenJoint::Free => 0.0,
-        SpecimenJoint::Springs { .. } => modes.joint_compliance_beyond(),
-    }
-}
-
-/// About how many modes lie below a frequency (Hz): lambda grows by pi from mode to mode.
-fn count_below(specimen: &Specimen, frequency: f64) -> usize {
-    let beams = specimen.body.beams().iter();
-    let lambda: f64 = beams.map(|beam| beam.lambda_of(frequency)).sum();
-    (lambda / std::f64::consts::PI) as usize + 2
-}
-
-/// Non-dimensional stiffnesses of a joint, in place of the description's.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GivenJoint {
-    /// Kx (1).
-    pub kx: f64,
-    /// Ky (1).
-    pub ky: f64,
-    /// 1/Kz (1), 0 without coupling.
-    pub cross_compliance: f64,
-}
-
-/// The described specimen as one recording finds it.
+/// The described specimen with the sensors and masses of one recording. `given` is a joint in place of the
+/// described one.
 pub(super) fn nominal_specimen(
     test: &TestDescription,
     recording: &RecordingDescription,
-    given: Option<GivenJoint>,
+    given: Option<JointStiffness>,
 ) -> Result<Specimen, SimulateError> {
     let mut specimen = described_specimen(test, joint(test, given)?);
     for place in sensor_places(test, recording)? {
@@ -211,7 +198,7 @@ pub(super) fn nominal_specimen(
 
 fn joint(
     test: &TestDescription,
-    given: Option<GivenJoint>,
+    given: Option<JointStiffness>,
 ) -> Result<SpecimenJoint, SimulateError> {
     if test.joint.kind == Assembly::Free {
         return Ok(SpecimenJoint::Free);

@@ -1,21 +1,18 @@
-//! From a described test and what is planted in it to recordings ready to be made.
-//!
-//! Whether a laboratory can be, and what it is asked to plant.
+//! From a described test and the effects planted in it to recordings ready to be made, with the checks of
+//! laboratory and effects.
 
 use super::chain::Signal;
-use super::hammer::TapPlan;
-use super::hammer::Tip;
+use super::hammer::{TapPlan, Tip};
 use super::joint_moment::{JointMoment, LEAST_SLOPE};
-use super::laboratory::SimulateError;
-use super::laboratory::{Damping, Laboratory};
-use super::observed_structure::Sensed;
-use super::observed_structure::{GivenJoint, nominal_specimen, sensor_places};
-use super::observed_structure::{SeenStructure, hangs};
-use super::recording_run::{Take, TakePlan};
-use super::recording_run::{Trial, round_scale, try_out};
+use super::laboratory::{Damping, Laboratory, SimulateError};
+use super::observed_structure::{
+    ObservedStructure, Sensed, hangs, nominal_specimen, sensor_places,
+};
+use super::recording_run::{RecordingPlan, RecordingRun, Trial, round_scale, try_out};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use tapjoint_beam::JointStiffness;
 use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
 use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
 use tapjoint_description::{RecordingDescription, Scale, SensorKind, TestDescription};
@@ -30,7 +27,7 @@ pub struct TestPlan<'a> {
     /// How the test is carried out.
     pub laboratory: &'a Laboratory,
     /// The joint, where it is not the description's.
-    pub joint: Option<GivenJoint>,
+    pub joint: Option<JointStiffness>,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -62,9 +59,9 @@ pub struct VirtualRecording {
     /// What is seen of the structure: at rest, where its joint is not linear.
     pub seen: Seen,
     /// The structure in its modes.
-    pub structure: SeenStructure,
+    pub structure: ObservedStructure,
     /// How it is recorded.
-    pub take: TakePlan,
+    pub plan: RecordingPlan,
 }
 
 /// Prepares a virtual test.
@@ -79,11 +76,11 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     check_softening(plan.effects)?;
     let mut recordings = Vec::new();
     let mut trials = Vec::new();
-    for (visit, recording) in described.iter().enumerate() {
-        let recording = prepare(plan, recording, visit)?;
+    for (visit, file) in described.iter().enumerate() {
+        let recording = prepare(plan, file, visit)?;
         trials.push(try_out(
             &recording.structure,
-            &recording.take,
+            &recording.plan,
             plan.laboratory,
         ));
         recordings.push(recording);
@@ -91,7 +88,7 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
     let scales = scales(test, &trials);
     let joint_law = hardest(&recordings, &trials);
     for recording in &mut recordings {
-        let channels = recording.take.channels.iter_mut();
+        let channels = recording.plan.channels.iter_mut();
         for ((_, scale), wanted) in channels.zip(&scales) {
             *scale = match wanted {
                 Scale::PerUnit(scale) | Scale::PerVolt(scale) => *scale,
@@ -99,10 +96,10 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
         }
         if let Some((law, hardest)) = &joint_law {
             let stiffness = turning_stiffness(&recording.seen.specimen)?;
-            recording.take.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
+            recording.plan.joint = Some(JointMoment::of_law(law, stiffness, *hardest));
         }
     }
-    let nominal = nominal_specimen(test, described[0].0, plan.joint)?;
+    let nominal = nominal_specimen(test, described[0].recording, plan.joint)?;
     let suspension = plan.laboratory.specimen.suspension;
     Ok(VirtualTest {
         suspension: suspension.filter(|_| hangs(&nominal)),
@@ -115,23 +112,31 @@ pub fn plan_test(plan: &TestPlan<'_>) -> Result<VirtualTest, SimulateError> {
 
 impl VirtualRecording {
     /// Begins the recording.
-    pub fn begin(&self, laboratory: &Laboratory) -> Take {
-        Take::new(self.structure.clone(), &self.take, laboratory)
+    pub fn begin(&self, laboratory: &Laboratory) -> RecordingRun {
+        RecordingRun::new(self.structure.clone(), &self.plan, laboratory)
     }
 }
 
-/// Each file once, with its name as a WAV file and the highest frequency (Hz) and the longest block (s)
-/// that are wanted of it.
-type Wanted<'a> = (&'a RecordingDescription, String, Option<f64>, f64);
+/// A file that is to be recorded, however often it is described.
+struct WantedFile<'a> {
+    /// Its first description.
+    recording: &'a RecordingDescription,
+    /// Its name as a WAV file.
+    name: String,
+    /// Highest frequency that is wanted of it (Hz); `None` without a band.
+    highest: Option<f64>,
+    /// Longest block that is wanted of it (s), where it does not depend on the sample rate.
+    block_seconds: f64,
+}
 
-fn distinct_files(test: &TestDescription) -> Result<Vec<Wanted<'_>>, SimulateError> {
+fn distinct_files(test: &TestDescription) -> Result<Vec<WantedFile<'_>>, SimulateError> {
     if test.recordings.is_empty() {
         return Err(SimulateError::NoRecordings);
     }
     if test.sensors.is_empty() {
         return Err(SimulateError::NoSensors);
     }
-    let mut distinct: Vec<Wanted<'_>> = Vec::new();
+    let mut distinct: Vec<WantedFile<'_>> = Vec::new();
     for recording in &test.recordings {
         let file = wav_name(recording);
         let line = recording.line;
@@ -139,19 +144,32 @@ fn distinct_files(test: &TestDescription) -> Result<Vec<Wanted<'_>>, SimulateErr
             return Err(SimulateError::Responses { file, line });
         }
         let highest = recording.band.map(|(_, high)| high);
-        let seconds = block_seconds(recording);
-        let Some(found) = distinct.iter_mut().find(|(_, name, ..)| *name == file) else {
-            distinct.push((recording, file, highest, seconds));
+        let block_seconds = match (recording.block, recording.band) {
+            // block/2.56 lines over the band.
+            (Some(block), Some((low, high))) => block as f64 / (2.56 * (high - low)),
+            _ => 0.0,
+        };
+        let Some(found) = distinct.iter_mut().find(|found| found.name == file) else {
+            distinct.push(WantedFile {
+                recording,
+                name: file,
+                highest,
+                block_seconds,
+            });
             continue;
         };
-        let first = found.0;
-        let arranged =
-            |one: &RecordingDescription| (one.tap, one.level, one.at.clone(), one.masses.clone());
-        if arranged(first) != arranged(recording) {
+        let first = found.recording;
+        if (first.tap, first.level) != (recording.tap, recording.level)
+            || first.at != recording.at
+            || first.masses != recording.masses
+        {
             return Err(SimulateError::SameFile { file, line });
         }
-        found.2 = [found.2, highest].into_iter().flatten().reduce(f64::max);
-        found.3 = found.3.max(seconds);
+        found.highest = [found.highest, highest]
+            .into_iter()
+            .flatten()
+            .reduce(f64::max);
+        found.block_seconds = found.block_seconds.max(block_seconds);
     }
     Ok(distinct)
 }
@@ -162,34 +180,27 @@ pub fn wav_name(recording: &RecordingDescription) -> String {
     format!("{}.wav", stem.to_string_lossy())
 }
 
-/// Length (s) of a described block, where it does not depend on the sample rate.
-fn block_seconds(recording: &RecordingDescription) -> f64 {
-    match (recording.block, recording.band) {
-        // block/2.56 lines over the band.
-        (Some(block), Some((low, high))) => block as f64 / (2.56 * (high - low)),
-        _ => 0.0,
-    }
-}
-
 fn prepare(
     plan: &TestPlan<'_>,
-    (described, file, highest, block_seconds): &Wanted<'_>,
+    wanted: &WantedFile<'_>,
     visit: usize,
 ) -> Result<VirtualRecording, SimulateError> {
-    let (test, laboratory) = (plan.description, plan.laboratory);
+    let (test, laboratory, described) = (plan.description, plan.laboratory, wanted.recording);
     let tap = described.tap.ok_or_else(|| SimulateError::NoTap {
-        file: file.clone(),
+        file: wanted.name.clone(),
         line: described.line,
     })?;
     let places = sensor_places(test, described)?;
     let nominal = nominal_specimen(test, described, plan.joint)?;
     let level = described.level.unwrap_or(1.0);
     let seen = see(plan, &nominal, &places, visit);
-    // Places are marked in proportion to the length, which may not be the described one.
-    let length = seen.specimen.body.length();
-    let stretched = |position: f64| (position * length / nominal.body.length()).min(length);
-    let sample_rate = sample_rate(laboratory, file, *highest)?;
-    let mut take = TakePlan {
+    let (nominal_length, length) = (nominal.body.length(), seen.specimen.body.length());
+    let sample_rate = sample_rate(laboratory, &wanted.name, wanted.highest)?;
+    let reach = f64::from(sample_rate) / 2.56;
+    let tip = laboratory.hammer.tip;
+    let tip = tip.unwrap_or_else(|| Tip::softest_for(wanted.highest.unwrap_or(reach)));
+    let (pulse_length, pulse_shape) = tip.pulse();
+    let mut recording = RecordingPlan {
         sample_rate,
         frames: 0,
         frequency_scale: seen.frequency_scale * (1.0 + laboratory.recorder.clock_error),
@@ -197,47 +208,49 @@ fn prepare(
         taps: TapPlan {
             taps: laboratory.hammer.taps,
             interval: 0.0,
-            place: (stretched(tap), length),
+            position: marked_position(tap, nominal_length, length),
+            beam_length: length,
             peak_force: laboratory.hammer.peak_force * level,
-            pulse: tip(laboratory, *highest, sample_rate).pulse(),
+            pulse_length,
+            pulse_shape,
         },
         joint: None,
-        seed: (plan.seed, visit as u64),
+        seed: plan.seed,
+        number: visit as u64,
     };
     let positions: Vec<f64> = places
         .iter()
-        .map(|place| stretched(place.position))
+        .map(|place| marked_position(place.position, nominal_length, length))
         .collect();
-    let structure = SeenStructure::new(
+    let structure = ObservedStructure::new(
         &seen.specimen,
         &laboratory.specimen,
         &positions,
-        (seen.joint_loss_factor, take.highest_mode(laboratory)),
+        seen.joint_loss_factor,
+        recording.highest_mode(laboratory),
     )?;
-    let block = described.block.filter(|_| described.band.is_none());
-    let block = block.map_or(*block_seconds, |block| {
-        block as f64 / f64::from(sample_rate)
-    });
-    let interval = interval(laboratory, &structure, block);
-    take.taps.interval = interval;
-    let seconds = laboratory.hammer.lead + laboratory.hammer.taps as f64 * interval;
-    // The hand that stops the recorder goes by true time, like the taps: whatever the clock makes of
-    // it, the last tap rings down in the file.
-    take.frames = (seconds * take.true_rate()).round() as u64;
+    let block = match described.block.filter(|_| described.band.is_none()) {
+        Some(block) => block as f64 / f64::from(sample_rate),
+        None => wanted.block_seconds,
+    };
+    recording.taps.interval = interval(laboratory, &structure, block);
+    let seconds = laboratory.hammer.lead + laboratory.hammer.taps as f64 * recording.taps.interval;
+    // The hand that stops the recorder goes by true time, like the taps: the last tap rings down in the
+    // file, however wrong the clock is.
+    recording.frames = (seconds * recording.true_rate()).round() as u64;
     Ok(VirtualRecording {
-        file: file.clone(),
+        file: wanted.name.clone(),
         level,
         seen,
         structure,
-        take,
+        plan: recording,
     })
 }
 
-/// The tip that is asked for, or the softest for the band.
-fn tip(laboratory: &Laboratory, highest: Option<f64>, sample_rate: u32) -> Tip {
-    let reach = f64::from(sample_rate) / 2.56;
-    let softest = || Tip::softest_for(highest.unwrap_or(reach));
-    laboratory.hammer.tip.unwrap_or_else(softest)
+/// Position (m) on a beam of this length that a position on the nominal beam stands for: positions are
+/// marked in proportion to the length.
+fn marked_position(position: f64, nominal_length: f64, length: f64) -> f64 {
+    (position * length / nominal_length).min(length)
 }
 
 /// What is seen of the specimen on one visit; a joint that is not linear is seen at rest.
@@ -283,7 +296,7 @@ fn sample_rate(
     Ok(rate)
 }
 
-fn interval(laboratory: &Laboratory, structure: &SeenStructure, block: f64) -> f64 {
+fn interval(laboratory: &Laboratory, structure: &ObservedStructure, block: f64) -> f64 {
     laboratory.hammer.interval.unwrap_or_else(|| {
         // e^{-zeta omega t} = 0.001 after 6.9/(zeta omega).
         let ring = structure
@@ -332,16 +345,15 @@ fn hardest(recordings: &[VirtualRecording], trials: &[Trial]) -> Option<(JointLa
 /// Refuses a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would
 /// then be simulated is not what the ratio says.
 fn check_softening(effects: &[Effect]) -> Result<(), SimulateError> {
-    let of = |effect: &Effect| {
+    let mut nonlinear = effects
+        .iter()
+        .filter(|effect| effect.id == EffectId::JointNonlinearity);
+    let Some(law) = nonlinear.find_map(|effect| {
         Some(JointLaw {
             ratio: effect.value("ratio")?,
             exponent: effect.value("exponent")?,
         })
-    };
-    let mut nonlinear = effects
-        .iter()
-        .filter(|effect| effect.id == EffectId::JointNonlinearity);
-    let Some(law) = nonlinear.find_map(of) else {
+    }) else {
         return Ok(());
     };
     let least = -(1.0 - LEAST_SLOPE) / (law.exponent + 1.0);
@@ -419,12 +431,13 @@ fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {
 
 /// Refuses effects that would change nothing or that no recording contains: the truth would say what is not so.
 fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), SimulateError> {
-    let planted = |id: EffectId| effects.iter().any(|effect| effect.id == id);
-    if planted(EffectId::Resolution) {
+    let planted: Vec<EffectId> = effects.iter().map(|effect| effect.id).collect();
+    if planted.contains(&EffectId::Resolution) {
         return Err(SimulateError::Resolution);
     }
-    let stated = |mass: Option<f64>| mass.is_some_and(|mass| mass > 0.0);
-    if planted(EffectId::SensorMass) && test.sensors.iter().all(|one| stated(one.mass)) {
+    let mut masses = test.sensors.iter().map(|sensor| sensor.mass);
+    let all_stated = masses.all(|mass| mass.is_some_and(|mass| mass > 0.0));
+    if planted.contains(&EffectId::SensorMass) && all_stated {
         return Err(SimulateError::NothingToWeigh);
     }
     Ok(())

@@ -1,27 +1,21 @@
-//! One recording as it is made: the structure moves, the hammer strikes, the recorder takes samples.
-//! Nothing is kept that grows with the recording.
+//! One recording as it is made: the structure moves, the hammer strikes, the recorder takes samples. Memory
+//! does not grow with the length of the recording.
 //!
-//! Time series of given modes, in memory: what tests of the measuring stages need.
-//!
+//! Beside it a simpler simulator for tests of the measuring stages: time series of given modes, in memory.
 //! A linear structure is given by its modes (natural frequency, damping ratio, shape at sensors and
 //! tap, unit modal mass); hammer pulses drive each mode, whose response is computed by the exact
 //! recursion for a force that is linear between samples. (Such a force is the sampled one times
 //! sinc^2(f/rate): poles are exact, and amplitudes at a fifth of the sample rate 1.1 dB low.) Noise is
-//! added and the channels are scaled
-//! to a recorder's full scale. What the diagnosis must not see stays here: the truth is an argument,
-//! never a part of the recording.
-//!
-//! One mean tap on the linear structure: how far channels and joint will be driven.
+//! added and the channels are scaled to a recorder's full scale. The truth is an argument and never a part
+//! of the recording.
 
-use super::chain::HALF_LENGTH;
-use super::chain::{Chain, Rates, Signal};
-use super::hammer::Pulse;
-use super::hammer::{Hammer, Tap, TapPlan};
+use super::chain::{Chain, HALF_LENGTH, Rates, Signal};
+use super::hammer::{Hammer, Pulse, PulseShape, Tap, TapPlan};
 use super::joint_moment::JointMoment;
 use super::laboratory::{AntiAlias, Laboratory};
 use super::motion::{Motion, Strike};
-use super::observed_structure::SeenStructure;
-use super::observed_structure::Sensed;
+use super::observed_structure::{ObservedStructure, Sensed};
+use num_complex::Complex64;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -39,7 +33,7 @@ const RATE_OVER_RESONANCE: f64 = 2.3;
 
 /// A recording to be made.
 #[derive(Debug, Clone)]
-pub struct TakePlan {
+pub struct RecordingPlan {
     /// Sample rate that the file states (Hz).
     pub sample_rate: u32,
     /// Samples per channel.
@@ -53,14 +47,16 @@ pub struct TakePlan {
     pub taps: TapPlan,
     /// Joint that is no linear spring.
     pub joint: Option<JointMoment>,
-    /// Seed of everything random, and the recording's number, which gives it random numbers of its own.
-    pub seed: (u64, u64),
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Number of the recording, which gives it random numbers of its own.
+    pub number: u64,
 }
 
 /// Streams of the channels' sensitivities, behind those of the recordings.
 const SENSITIVITIES: u64 = 1 << 42;
 
-impl TakePlan {
+impl RecordingPlan {
     /// Samples per true second (Hz): the clock's seconds are too long where frequencies read high.
     pub fn true_rate(&self) -> f64 {
         f64::from(self.sample_rate) / self.frequency_scale
@@ -81,15 +77,33 @@ impl TakePlan {
         let inner = self.true_rate() * self.steps_per_sample(laboratory) as f64;
         (1.8 * self.true_rate()).min(0.45 * inner)
     }
+
+    /// Quantities of the sensors.
+    fn sensed(&self) -> Vec<Sensed> {
+        let channels = self.channels.iter();
+        channels
+            .filter_map(|(signal, _)| match signal {
+                Signal::Force => None,
+                Signal::Response(sensed) => Some(*sensed),
+            })
+            .collect()
+    }
+
+    /// Random numbers for one purpose of this recording.
+    fn random(&self, purpose: u64) -> ChaCha8Rng {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(self.number << 16 | purpose);
+        random
+    }
 }
 
 /// A recording in the making.
 #[derive(Debug, Clone)]
-pub struct Take {
+pub struct RecordingRun {
     motion: Motion,
-    structure: SeenStructure,
+    structure: ObservedStructure,
     hammer: std::iter::Peekable<Hammer>,
-    shape: crate::hammer::PulseShape,
+    shape: PulseShape,
     chains: Vec<Chain>,
     /// For each channel the sensor it belongs to; `None` = the hammer.
     sources: Vec<Option<usize>>,
@@ -99,9 +113,13 @@ pub struct Take {
     responses: Vec<f64>,
 }
 
-impl Take {
+impl RecordingRun {
     /// Prepares a recording of a structure.
-    pub fn new(structure: SeenStructure, plan: &TakePlan, laboratory: &Laboratory) -> Self {
+    pub fn new(
+        structure: ObservedStructure,
+        plan: &RecordingPlan,
+        laboratory: &Laboratory,
+    ) -> Self {
         let factor = plan.steps_per_sample(laboratory);
         let file_rate = plan.true_rate();
         let step = 1.0 / (file_rate * factor as f64);
@@ -109,19 +127,7 @@ impl Take {
             AntiAlias::On => HALF_LENGTH * factor,
             AntiAlias::Off => 0,
         };
-        let sensed: Vec<Sensed> = plan
-            .channels
-            .iter()
-            .filter_map(|(signal, _)| match signal {
-                Signal::Force => None,
-                Signal::Response(sensed) => Some(*sensed),
-            })
-            .collect();
-        let random = |purpose: u64| {
-            let mut random = ChaCha8Rng::seed_from_u64(plan.seed.0);
-            random.set_stream(plan.seed.1 << 16 | purpose);
-            random
-        };
+        let sensed = plan.sensed();
         let rates = Rates {
             factor,
             file: file_rate,
@@ -129,24 +135,20 @@ impl Take {
         let channels = plan.channels.iter().zip(1..);
         let chains = channels
             .map(|((signal, scale), number)| {
-                let mut gains = ChaCha8Rng::seed_from_u64(plan.seed.0);
+                let mut gains = ChaCha8Rng::seed_from_u64(plan.seed);
                 gains.set_stream(SENSITIVITIES | number);
-                let random = (random(number), &mut gains);
-                Chain::new(*signal, *scale, laboratory, rates, random)
+                let random = plan.random(number);
+                Chain::new(*signal, *scale, laboratory, rates, random, &mut gains)
             })
             .collect();
-        // The filter looks ahead by half its length: the simulation begins so much earlier.
-        let start = (-(delay as f64) * step, step);
+        // The filter looks ahead by half its length: the simulation begins that much earlier.
+        let start = -(delay as f64) * step;
+        let reduced = structure.reduced().clone();
         Self {
-            motion: Motion::new(
-                structure.reduced().clone(),
-                &sensed,
-                start,
-                plan.joint.clone(),
-            ),
+            motion: Motion::new(reduced, &sensed, start, step, plan.joint.clone()),
             structure,
-            hammer: Hammer::new(&laboratory.hammer, &plan.taps, random(0)).peekable(),
-            shape: plan.taps.pulse.1,
+            hammer: Hammer::new(&laboratory.hammer, &plan.taps, plan.random(0)).peekable(),
+            shape: plan.taps.pulse_shape,
             chains,
             sources: sources(plan),
             factor,
@@ -218,7 +220,7 @@ impl Take {
 }
 
 /// For each channel the sensor it belongs to.
-fn sources(plan: &TakePlan) -> Vec<Option<usize>> {
+fn sources(plan: &RecordingPlan) -> Vec<Option<usize>> {
     let mut sensors = 0..;
     let channels = plan.channels.iter();
     channels
@@ -308,7 +310,14 @@ pub fn simulate_tap_test(
         let time = settings.lead + tap as f64 * settings.interval + random.random_range(0.0..0.02);
         let peak = settings.peak_force * (1.0 + random.random_range(-0.2..0.2));
         let pulse = settings.pulse * (1.0 + random.random_range(-0.1..0.1));
-        add_pulse(&mut force, settings.sample_rate, time, (pulse, peak));
+        // peak sin^2(pi t/pulse)
+        let rate = settings.sample_rate;
+        let first = (time * rate).ceil() as usize;
+        let last = ((time + pulse) * rate) as usize;
+        for index in first..=last.min(samples.saturating_sub(1)) {
+            let phase = PI * (index as f64 / rate - time) / pulse;
+            force[index] += peak * phase.sin().powi(2);
+        }
         tap_times.push(time);
     }
     let sensors = modes.first().map_or(0, |mode| mode.shape_at_sensors.len());
@@ -322,26 +331,20 @@ pub fn simulate_tap_test(
         }
     }
     for response in &mut responses {
-        let level = root_mean_square(response) * decibels(-settings.signal_to_noise_db);
-        add_noise(response, level, &mut random);
+        let level = below(root_mean_square(response), settings.signal_to_noise_db);
+        if level > 0.0 {
+            add_noise(response, level, &mut random);
+        }
     }
-    let level = settings.peak_force * decibels(-settings.force_to_noise_db);
-    add_noise(&mut force, level, &mut random);
+    let level = below(settings.peak_force, settings.force_to_noise_db);
+    if level > 0.0 {
+        add_noise(&mut force, level, &mut random);
+    }
     TapTest {
         sample_rate: settings.sample_rate,
         tap_times,
         force,
         responses,
-    }
-}
-
-/// Adds the pulse peak sin^2(pi t/pulse) that begins at `time` (s).
-fn add_pulse(force: &mut [f64], sample_rate: f64, time: f64, (pulse, peak): (f64, f64)) {
-    let first = (time * sample_rate).ceil() as usize;
-    let last = ((time + pulse) * sample_rate) as usize;
-    for index in first..=last.min(force.len().saturating_sub(1)) {
-        let phase = PI * (index as f64 / sample_rate - time) / pulse;
-        force[index] += peak * phase.sin().powi(2);
     }
 }
 
@@ -351,7 +354,6 @@ fn add_pulse(force: &mut [f64], sample_rate: f64, time: f64, (pulse, peak): (f64
 /// With p = -zeta omega + j omega_d, z = q' - conj(p) q obeys z' = p z + F, which integrates exactly
 /// over a step; q = Im z/omega_d, and q'' follows from the equation itself.
 fn modal_acceleration(mode: &SimulatedMode, force: &[f64], sample_rate: f64) -> Vec<f64> {
-    use num_complex::Complex64;
     let omega = TAU * mode.frequency;
     let damped = omega * (1.0 - mode.damping_ratio.powi(2)).sqrt();
     let pole = Complex64::new(-mode.damping_ratio * omega, damped);
@@ -375,28 +377,29 @@ fn modal_acceleration(mode: &SimulatedMode, force: &[f64], sample_rate: f64) -> 
         .collect()
 }
 
-fn decibels(level: f64) -> f64 {
-    10f64.powf(level / 20.0)
+/// Returns the level that lies so many decibels below another one.
+pub fn below(level: f64, decibels: f64) -> f64 {
+    level * 10f64.powf(-decibels / 20.0)
 }
 
-fn add_noise(samples: &mut [f64], level: f64, random: &mut impl Rng) {
-    if level > 0.0 {
-        for x in samples {
-            let noise: f64 = StandardNormal.sample(random);
-            *x += level * noise;
-        }
+/// Adds white noise of this rms.
+pub fn add_noise(samples: &mut [f64], rms: f64, random: &mut impl Rng) {
+    for x in samples {
+        let noise: f64 = StandardNormal.sample(random);
+        *x += rms * noise;
     }
 }
 
-/// The modes of a beam as a test with these positions sees them.
+/// Returns the modes of a beam as a test observes them at these positions.
 ///
 /// `shapes` are the structure's, `damping_ratios` one for each (the last one for all beyond);
 /// `tap` and `sensors` are positions along the beam (m). Modes beyond `highest` (Hz) are left out:
 /// nothing above half the sample rate may be simulated.
-pub fn seen_modes(
+pub fn observed_modes(
     shapes: &[ModeShape],
     damping_ratios: &[f64],
-    (tap, sensors): (f64, &[f64]),
+    tap: f64,
+    sensors: &[f64],
     highest: f64,
 ) -> Vec<SimulatedMode> {
     let last = damping_ratios.last().copied().unwrap_or(0.0);
@@ -417,18 +420,15 @@ impl TapTest {
     /// Force and responses as channels in file units: divided by these scales (N, and m/s2, per
     /// unit of the file).
     pub fn channels(&self, force_scale: f64, response_scale: f64) -> Vec<Vec<f64>> {
-        let scaled = |samples: &[f64], scale: f64| samples.iter().map(|x| x / scale).collect();
-        std::iter::once(scaled(&self.force, force_scale))
-            .chain(
-                self.responses
-                    .iter()
-                    .map(|response| scaled(response, response_scale)),
-            )
+        let responses = self.responses.iter().map(|x| (x, response_scale));
+        std::iter::once((&self.force, force_scale))
+            .chain(responses)
+            .map(|(samples, scale)| samples.iter().map(|x| x / scale).collect())
             .collect()
     }
 }
 
-/// What a mean tap brings.
+/// Response to one mean tap.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trial {
     /// Largest value of each channel (SI).
@@ -440,31 +440,24 @@ pub(super) struct Trial {
 /// So long the tap is followed: some periods of the lowest mode of beams that are tapped by hand (s).
 const FOLLOWED: f64 = 0.3;
 
+/// Strikes the linear structure once, to find how far channels and joint will be driven.
 pub(super) fn try_out(
-    structure: &SeenStructure,
-    plan: &TakePlan,
+    structure: &ObservedStructure,
+    plan: &RecordingPlan,
     laboratory: &Laboratory,
 ) -> Trial {
-    let sensed: Vec<Sensed> = plan
-        .channels
-        .iter()
-        .filter_map(|(signal, _)| match signal {
-            Signal::Force => None,
-            Signal::Response(sensed) => Some(*sensed),
-        })
-        .collect();
+    let sensed = plan.sensed();
     let rate = plan.true_rate() * plan.steps_per_sample(laboratory) as f64;
     let step = 1.0 / rate;
-    let mut motion = Motion::new(structure.reduced().clone(), &sensed, (0.0, step), None);
-    let (length, shape) = plan.taps.pulse;
+    let mut motion = Motion::new(structure.reduced().clone(), &sensed, 0.0, step, None);
     motion.strike(Strike {
         pulse: Pulse {
             start: 0.5 * step,
-            length,
+            length: plan.taps.pulse_length,
             peak: plan.taps.peak_force,
-            shape,
+            shape: plan.taps.pulse_shape,
         },
-        place: structure.struck(plan.taps.place.0),
+        place: structure.struck(plan.taps.position),
     });
     let mut largest = vec![0.0; sensed.len()];
     let mut responses = largest.clone();

@@ -2,12 +2,13 @@
 
 use super::hammer::Tap;
 use super::laboratory::Laboratory;
-use super::plan::{TestPlan, VirtualRecording, VirtualTest};
+use super::plan::{TestPlan, VirtualRecording, VirtualTest, wav_name};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use tapjoint_beam::effects::Effect;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
+use tapjoint_description::described::described_beam;
 use tapjoint_description::{Scale, TestDescription};
 use toml::{Table, Value};
 
@@ -108,9 +109,7 @@ pub struct ModeTruth {
 
 /// The truth about a virtual test.
 pub fn truth_of(plan: &TestPlan<'_>, test: &VirtualTest) -> Truth {
-    let units = StiffnessUnits::of(&tapjoint_description::described::described_beam(
-        plan.description,
-    ));
+    let units = StiffnessUnits::of(&described_beam(plan.description));
     Truth {
         version: 1,
         name: plan.description.name.clone(),
@@ -141,13 +140,16 @@ fn planted(effect: &Effect) -> PlantedEffect {
     }
 }
 
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
 fn joint_of(specimen: &Specimen, units: &StiffnessUnits) -> Option<JointTruth> {
     let SpecimenJoint::Springs { kt, kr, coupling } = specimen.joint else {
         return None;
     };
     // 1/Ktr = coupling/sqrt(Kt Kr).
     let ktr = kt.sqrt() * kr.sqrt() / coupling;
-    let finite = |value: f64| value.is_finite().then_some(value);
     Some(JointTruth {
         kt: finite(kt),
         kr: finite(kr),
@@ -164,9 +166,9 @@ fn recording_of(
     laboratory: &Laboratory,
     units: &StiffnessUnits,
 ) -> RecordingTruth {
-    let plan = &recording.take;
+    let plan = &recording.plan;
     let reach = f64::from(plan.sample_rate) / 2.56;
-    let take = recording.begin(laboratory);
+    let run = recording.begin(laboratory);
     let modes = recording.structure.elastic_modes().zip(1..);
     RecordingTruth {
         file: recording.file.clone(),
@@ -183,26 +185,26 @@ fn recording_of(
                 damping,
             })
             .collect(),
-        taps: take.taps(),
-        gains: take.gains(),
+        taps: run.taps(),
+        gains: run.gains(),
     }
 }
 
 /// What stands at the head of the description.
 const HEAD: &str = "# Recordings of a virtual test, made by `tapjoint simulate`.\n\n";
 
-/// The description's text with recordings as written; the joint's stiffnesses left out, so that they
-/// are fitted. `text` is the description that was simulated.
+/// Returns the nominal description, as its user has it: the recordings as they were written, no effects, and
+/// no joint stiffnesses, so that these are fitted. `text` is the description that was simulated.
 ///
 /// # Errors
 /// A text that is no TOML; it was read before.
-pub fn believed_description(
+pub fn nominal_description(
     text: &str,
     test: &TestDescription,
     simulated: &VirtualTest,
 ) -> Result<String, toml::de::Error> {
     let mut table: Table = text.parse()?;
-    // What is planted the user does not know.
+    // The user does not know the planted effects.
     table.remove("effect");
     if let Some(Value::Table(joint)) = table.get_mut("joint") {
         for key in ["kt", "kr", "ktr"] {
@@ -219,7 +221,7 @@ pub fn believed_description(
         describe_channel(sensor, scales.next());
     }
     for (recording, described) in tables(&mut table, "recording").zip(&test.recordings) {
-        let file = crate::plan::wav_name(described);
+        let file = wav_name(described);
         if let (Some(band), false) = (band_above(simulated, &file), recording.contains_key("band"))
         {
             recording.insert("band".into(), Value::Array(band.map(Value::Float).to_vec()));
@@ -239,7 +241,7 @@ fn band_above(simulated: &VirtualTest, file: &str) -> Option<[f64; 2]> {
     // The suspension as the user chose it: what cables add to it belongs to what is planted.
     let [up, rock] = simulated.suspension?;
     let highest = up.max(rock);
-    let reach = f64::from(recording.take.sample_rate) / 2.56;
+    let reach = f64::from(recording.plan.sample_rate) / 2.56;
     // Five times the suspension's frequency, in whole hertz: it is 4 % of a resonance there.
     Some([(5.0 * highest).ceil(), reach])
 }

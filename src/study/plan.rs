@@ -1,4 +1,4 @@
-//! What a planned test could tell apart: effects are drawn, the plan observes them, and the diagnosis
+//! The effects that a planned test could tell apart: effects are drawn, the plan observes them, and the diagnosis
 //! that will judge the real test judges these.
 //!
 //! Observations are drawn, not recordings: the plan states how well frequencies, shapes, damping and
@@ -9,8 +9,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::blind_check::{Answer, Case, GROUPS, Planted, Truth, draw_effect};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use tapjoint_analysis::nominal_with;
-use tapjoint_beam::effects::{Effect, EffectError, EffectId};
+use tapjoint_beam::effects::{EffectError, EffectId};
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_description::{Assembly, TestDescription};
 use tapjoint_diagnosis::{
@@ -37,7 +38,7 @@ pub struct PlanSettings {
     pub drift: f64,
     /// A joint that the description does not state.
     pub joint: Option<JointStiffness>,
-    /// Seed of what is drawn.
+    /// Seed of the draws.
     pub seed: u64,
 }
 
@@ -55,7 +56,7 @@ impl Default for PlanSettings {
     }
 }
 
-/// Why a plan cannot be judged.
+/// Reasons for which a plan cannot be judged.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// The description names no recordings.
@@ -83,10 +84,10 @@ pub enum PlanError {
     Gap(#[from] GapError),
 }
 
-/// Draws, observes and diagnoses; `progress` is told how many tests are done.
+/// Draws, observes and diagnoses tests. `progress` is called with the number of tests done and of all.
 ///
 /// # Errors
-/// [`PlanError`]: what the description must say and does not.
+/// [`PlanError`] where the description lacks something or an effect is out of range.
 pub fn judge_plan(
     test: &TestDescription,
     settings: &PlanSettings,
@@ -96,13 +97,14 @@ pub fn judge_plan(
     let plan = plan_of(test, settings)?;
     let groups = groups_of(test.joint.kind);
     let total = (groups.len() + 1) * settings.draws;
-    let done = std::sync::atomic::AtomicUsize::new(0);
+    let done = AtomicUsize::new(0);
     (0..total)
         .into_par_iter()
         .map(|number| {
-            let case = case(&plan, &nominal, (number, &groups), settings)?;
-            let before = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            progress(before + 1, total);
+            // No effect after the last group.
+            let group = groups.get(number / settings.draws).copied();
+            let case = case(&plan, &nominal, number, group, settings)?;
+            progress(1 + done.fetch_add(1, Ordering::Relaxed), total);
             Ok(case)
         })
         .collect()
@@ -155,34 +157,43 @@ pub(super) fn plan_of(
     })
 }
 
+/// Draws test `number` with one effect of the group, and diagnoses it.
 fn case(
     plan: &TestPlan,
     nominal: &Nominal,
-    (number, groups): (usize, &[&[EffectId]]),
+    number: usize,
+    group: Option<&[EffectId]>,
     settings: &PlanSettings,
 ) -> Result<Case, PlanError> {
     let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
     random.set_stream(number as u64 + 1);
-    let effects: Vec<Effect> = match groups.get(number / settings.draws) {
-        Some(group) => vec![draw_effect(&whole(nominal), group, &mut random)?],
-        None => Vec::new(),
-    };
+    let mut effects = Vec::new();
+    if let Some(group) = group {
+        // Sizes refer to the whole: of a lap joint the first beam, as long as both.
+        let body = &nominal.specimen.body;
+        let beam = Beam {
+            length: body.length(),
+            ..body.beams()[0]
+        };
+        effects.push(draw_effect(&beam, group, &mut random)?);
+    }
     let observed = observe(plan, nominal, &effects, random.random())?;
     let exact = TestPlan {
         scatter: 0.0,
         drift: 0.0,
         ..plan.clone()
     };
-    let mut truth = truth(number, &effects);
     let exact = observe(&exact, nominal, &effects, 0)?;
     let chi_square = nominal_chi_square(&exact, nominal, &GapSettings::default())?;
-    truth.detectable = (!effects.is_empty()).then_some(chi_square > NOTICED);
-    Ok(
-        match diagnose(&observed, nominal, &GapSettings::default()) {
-            Ok(diagnosis) => (truth, Answer::of(&diagnosis)),
-            Err(_) => (truth, Answer::none()),
-        },
-    )
+    let truth = Truth {
+        name: format!("draw-{number:03}"),
+        effects: effects.iter().map(Planted::of).collect(),
+        detectable: (!effects.is_empty()).then_some(chi_square > NOTICED),
+        refutable: None,
+    };
+    let diagnosis = diagnose(&observed, nominal, &GapSettings::default());
+    let answer = diagnosis.map_or_else(|_| Answer::none(), |found| Answer::of(&found));
+    Ok((truth, answer))
 }
 
 /// Groups of effects that a structure can have: a lap joint has no coupling and no fixture, a beam by itself
@@ -207,27 +218,4 @@ fn groups_of(kind: Assembly) -> Vec<&'static [EffectId]> {
     let mut groups = GROUPS.to_vec();
     groups.retain(|group| !cannot.contains(&group[0]));
     groups
-}
-
-/// The beam from which sizes are taken: of a lap joint the first one, as long as both.
-fn whole(nominal: &Nominal) -> Beam {
-    let body = &nominal.specimen.body;
-    Beam {
-        length: body.length(),
-        ..body.beams()[0]
-    }
-}
-
-fn truth(number: usize, effects: &[Effect]) -> Truth {
-    let planted = |effect: &Effect| {
-        let values = effect.values();
-        let values = values.map(|(info, value)| (info.name.to_owned(), value));
-        Planted::Catalogue(effect.id, values.collect())
-    };
-    Truth {
-        name: format!("draw-{number:03}"),
-        effects: effects.iter().map(planted).collect(),
-        detectable: None,
-        refutable: None,
-    }
 }

@@ -1,6 +1,6 @@
-//! The described model with what the diagnosis found: as a description that can be predicted with, and its
-//! natural frequencies. What the diagnosis leaves open of shear and rotary inertia, 2 %, has no place in a description
-//! and stays out.
+//! The described model brought up to date by a diagnosis: as a description for predictions, and its natural
+//! frequencies. The 2 % of shear and rotary inertia that the diagnosis leaves open have no place in a description and
+//! are left out.
 
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::StructureError;
@@ -8,7 +8,7 @@ use tapjoint_beam::effects::{
     Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply,
 };
 use tapjoint_beam::specimen::{Mesh, PointMass};
-use tapjoint_description::{Assembly, SensorDescription, SensorKind, TestDescription};
+use tapjoint_description::{Assembly, BeamTheory, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
 use tapjoint_identify::observation::effective_share;
 use toml::Value;
@@ -16,17 +16,17 @@ use toml::Value;
 /// A model brought up to date.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UpdatedModel {
-    /// The hypothesis that it takes for true.
+    /// The hypothesis that it assumes.
     pub hypothesis: String,
     /// A test description with the joint as found and `[[effect]]` tables.
     pub text: String,
 }
 
-/// Why a described structure, or an effect that is described with it, cannot be had.
+/// Reason for which there is no such structure, or no effect that is described with it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}{cause}", line.map_or_else(String::new, |line| format!("line {line}: ")))]
 pub struct DescribedEffectError {
-    /// Line of the effect's table; `None` where the structure cannot be had without effects either.
+    /// Line of the effect's table; `None` where there is no such structure without effects either.
     pub line: Option<usize>,
     /// What is wrong with it.
     pub cause: EffectCause,
@@ -43,11 +43,15 @@ pub enum EffectCause {
     Structure(#[from] StructureError),
 }
 
-/// The model that a diagnosis makes of the described one: with what it names, else with the most probable
-/// hypothesis that predicts anything. `None` where nothing predicts, where the diagnosis has refused all that does,
-/// and where a mass counts of which nobody said where it sits.
+/// Returns the described model with the effects that a diagnosis names, or else with the most probable hypothesis that
+/// predicts anything. `None` where no hypothesis predicts, where the diagnosis refused all that do, and where a sensor
+/// has mass but no position.
 pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<UpdatedModel> {
-    if test.sensors.iter().any(|sensor| is_unplaced(test, sensor)) {
+    let mut loads = test
+        .sensors
+        .iter()
+        .filter(|sensor| sensor.kind != SensorKind::Sound && sensor.mass > Some(0.0));
+    if loads.any(|sensor| test.place_of(sensor).is_none()) {
         return None;
     }
     let wanted = match &diagnosis.verdict {
@@ -66,7 +70,8 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
     let mut text = heading(diagnosis, found);
     text.push_str(&described(test, found));
     for effect in &effects {
-        text.push_str(&table_of(effect));
+        let values = effect.values().map(|(info, value)| line(info.name, value));
+        text.push_str(&effect_table(effect.id, &values.collect::<String>()));
     }
     Some(UpdatedModel {
         hypothesis: found.hypothesis.name(),
@@ -74,12 +79,7 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
     })
 }
 
-fn is_unplaced(test: &TestDescription, sensor: &SensorDescription) -> bool {
-    let loads = sensor.kind != SensorKind::Sound && sensor.mass.is_some_and(|mass| mass > 0.0);
-    loads && test.place_of(sensor).is_none()
-}
-
-/// A coupling that the joint's own model has stands among the effects: descriptions have none.
+/// Adds the coupling of the joint's own model to the effects, because descriptions have none.
 fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
     if held == 0.0 {
         return Some(());
@@ -87,11 +87,8 @@ fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
     let own = effects
         .iter_mut()
         .find(|one| one.id == EffectId::CrossCoupling);
-    let total = held
-        + own
-            .as_ref()
-            .and_then(|one| one.value("coupling"))
-            .unwrap_or(0.0);
+    let found = own.as_ref().and_then(|one| one.value("coupling"));
+    let total = held + found.unwrap_or(0.0);
     let whole = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", total)]).ok()?;
     match own {
         Some(own) => *own = whole,
@@ -137,7 +134,12 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
     text.push_str(&line("modulus", beam.modulus));
     // The common factor s on all frequencies that the geometry's tolerance left open: f ~ rho^-1/2.
     if found.scale != 0.0 {
-        text.push_str(&scaled_density(beam.density, found.scale));
+        text.push_str(&format!(
+            "# Described: {}. What the dimensions' tolerance leaves open moves all frequencies by a common\n\
+             # factor, here {:+.2e} % as the readings ask for; a description says that by its density.\n",
+            beam.density,
+            100.0 * found.scale.exp_m1()
+        ));
     }
     text.push_str(&line("density", beam.density * (-2.0 * found.scale).exp()));
     let poisson = beam.poisson.map(|poisson| line("poisson", poisson));
@@ -150,15 +152,6 @@ fn described(test: &TestDescription, found: &HypothesisResult) -> String {
         text.push_str("\n[analysis]\nsensor_mass = false\n");
     }
     text
-}
-
-/// Why the density is not the described one.
-fn scaled_density(described: f64, scale: f64) -> String {
-    format!(
-        "# Described: {described}. What the dimensions' tolerance leaves open moves all frequencies by a common\n\
-         # factor, here {:+.2e} % as the readings ask for; a description says that by its density.\n",
-        100.0 * scale.exp_m1()
-    )
 }
 
 fn right_half(test: &TestDescription, scale: f64) -> String {
@@ -182,7 +175,6 @@ fn right_half(test: &TestDescription, scale: f64) -> String {
 }
 
 fn joint(test: &TestDescription, found: &HypothesisResult) -> String {
-    use tapjoint_description::BeamTheory;
     let kind = match test.joint.kind {
         Assembly::Cantilever => "cantilever",
         Assembly::Lap => "lap",
@@ -239,28 +231,19 @@ const KNOWN_MASSES: &str = "\n# Known, not found: what was fastened in the first
 /// What is fastened in the first recording: no recording describes it any more.
 fn fastened(test: &TestDescription) -> String {
     let masses = test.recordings.first().map(|recording| &recording.masses);
-    let table = |fastened: &PointMass| {
-        let (mass, position) = (fastened.mass, fastened.position);
-        let values = line("mass", mass) + &line("position", position);
-        format!(
-            "\n[[effect]]\nid = \"{}\"\n{values}",
-            EffectId::AddedMass.name()
-        )
-    };
-    let tables: String = masses.into_iter().flatten().map(table).collect();
+    let mut tables = String::new();
+    for fastened in masses.into_iter().flatten() {
+        let values = line("mass", fastened.mass) + &line("position", fastened.position);
+        tables.push_str(&effect_table(EffectId::AddedMass, &values));
+    }
     match tables.is_empty() {
         true => tables,
         false => format!("{KNOWN_MASSES}{tables}"),
     }
 }
 
-fn table_of(effect: &Effect) -> String {
-    let values = effect.values().map(|(info, value)| line(info.name, value));
-    format!(
-        "\n[[effect]]\nid = \"{}\"\n{}",
-        effect.id.name(),
-        values.collect::<String>()
-    )
+fn effect_table(id: EffectId, values: &str) -> String {
+    format!("\n[[effect]]\nid = \"{}\"\n{values}", id.name())
 }
 
 /// The effects that a description adds to its structure.
@@ -268,19 +251,19 @@ fn table_of(effect: &Effect) -> String {
 /// # Errors
 /// The first that there is not, with the line of its table.
 pub fn described_effects(test: &TestDescription) -> Result<Vec<Effect>, DescribedEffectError> {
-    let read = |described: &tapjoint_description::EffectDescription| {
-        let at = |cause: EffectError| DescribedEffectError {
-            line: Some(described.line),
-            cause: cause.into(),
-        };
+    let mut effects = Vec::new();
+    for described in &test.effects {
         let values = described.values.iter();
         let pairs: Vec<(&str, f64)> = values
             .map(|(name, value)| (name.as_str(), *value))
             .collect();
-        let id = EffectId::parse(&described.id).map_err(at)?;
-        Effect::from_pairs(id, &pairs).map_err(at)
-    };
-    test.effects.iter().map(read).collect()
+        let effect = EffectId::parse(&described.id).and_then(|id| Effect::from_pairs(id, &pairs));
+        effects.push(effect.map_err(|cause| DescribedEffectError {
+            line: Some(described.line),
+            cause: cause.into(),
+        })?);
+    }
+    Ok(effects)
 }
 
 /// The lowest natural frequencies (Hz), as they would be read, of a described structure with the effects that
@@ -309,8 +292,10 @@ pub fn described_structure(
     let effects = described_effects(test)?;
     structure_with(test, &effects, count).map_err(|error| {
         // The first effect with which there is no such structure is the one to be mended.
-        let cause = |held: usize| structure_with(test, &effects[..held], count).err();
-        let first = (0..=effects.len()).find_map(|held| Some((held, cause(held)?)));
+        let first = (0..=effects.len()).find_map(|held| {
+            let cause = structure_with(test, &effects[..held], count).err()?;
+            Some((held, cause))
+        });
         let (held, error) = first.unwrap_or((effects.len(), error));
         let described = held
             .checked_sub(1)

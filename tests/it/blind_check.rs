@@ -24,7 +24,7 @@ fn planted(name: &str, effects: &[EffectId], size: f64) -> Truth {
 fn outside(name: &str) -> Truth {
     Truth {
         name: name.to_owned(),
-        effects: vec![Planted::Outside("second support".to_owned())],
+        effects: vec![Planted::OutOfCatalogue("second support".to_owned())],
         detectable: Some(true),
         refutable: Some(true),
     }

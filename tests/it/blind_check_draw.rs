@@ -31,7 +31,7 @@ fn prop_a_campaign_holds_what_was_asked_for() {
                 0
             }
             CaseKind::Null => 1,
-            CaseKind::Outside => 2,
+            CaseKind::OutOfCatalogue => 2,
             CaseKind::Several => 3,
         };
         counts[place] += 1;
@@ -94,7 +94,7 @@ fn limit_what_a_test_can_show_is_said_of_what_was_planted() {
                 let truth = test.with_limits().unwrap();
                 assert_eq!((truth.detectable, truth.refutable), (None, None));
             }
-            CaseKind::Outside | CaseKind::Several => {}
+            CaseKind::OutOfCatalogue | CaseKind::Several => {}
         }
     }
     assert_eq!(detectable.len(), GROUPS.len());

@@ -12,7 +12,7 @@ use tapjoint::gap::{
 };
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
 use tapjoint::recording::{WavFormat, write_wav};
-use tapjoint::simulate::{Laboratory, TestPlan, VirtualTest, believed_description, plan_test};
+use tapjoint::simulate::{Laboratory, TestPlan, VirtualTest, nominal_description, plan_test};
 
 const CANTILEVER: &str = virtual_strip!(
     r#"model = "2p"
@@ -46,10 +46,10 @@ fn diagnosed(text: &str, folder: &Path) -> Diagnosis {
 
 fn record(test: &VirtualTest, laboratory: &Laboratory, folder: &Path) {
     for recording in &test.recordings {
-        let mut take = recording.begin(laboratory);
+        let mut run = recording.begin(laboratory);
         let mut frame = vec![0.0; test.scales.len()];
         let mut channels = vec![Vec::new(); frame.len()];
-        while take.next_frame(&mut frame) {
+        while run.next_frame(&mut frame) {
             for (channel, value) in channels.iter_mut().zip(&frame) {
                 channel.push(*value);
             }
@@ -57,7 +57,7 @@ fn record(test: &VirtualTest, laboratory: &Laboratory, folder: &Path) {
         let path = folder.join(&recording.file);
         write_wav(
             &path,
-            recording.take.sample_rate,
+            recording.plan.sample_rate,
             &channels,
             WavFormat::Pcm24,
         )
@@ -79,7 +79,7 @@ fn virtual_test(effects: &[Effect], seed: u64) -> Diagnosis {
     };
     let test = plan_test(&plan).unwrap();
     record(&test, &laboratory, folder.path());
-    let text = believed_description(CANTILEVER, &description, &test).unwrap();
+    let text = nominal_description(CANTILEVER, &description, &test).unwrap();
     diagnosed(&text, folder.path())
 }
 

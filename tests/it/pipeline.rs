@@ -13,7 +13,7 @@ use tapjoint::pipeline::{
     run_test,
 };
 use tapjoint::recording::{Channel, Recording};
-use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
+use tapjoint::simulate::{TapTestSettings, observed_modes, simulate_tap_test};
 use tapjoint::structure::specimen::PointMass;
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
 
@@ -52,10 +52,11 @@ fn virtual_test(seed: u64) -> VirtualTest {
                 pulse,
                 ..Default::default()
             };
-            let seen = seen_modes(
+            let seen = observed_modes(
                 &shapes,
                 &damping,
-                (positions.0, &positions.1),
+                positions.0,
+                &positions.1,
                 0.45 * sample_rate,
             );
             let test = simulate_tap_test(&seen, &settings, 2 * seed + number);
@@ -199,7 +200,7 @@ fn prop_a_sensitivity_is_per_volt_whatever_the_header_says() {
         4,
     )
     .unwrap();
-    let seen = seen_modes(&shapes, &[0.02], (0.385, &[0.338]), 900.0);
+    let seen = observed_modes(&shapes, &[0.02], 0.385, &[0.338], 900.0);
     let settings = TapTestSettings {
         sample_rate: 2048.0,
         taps: 2,
@@ -458,7 +459,7 @@ fn without_mode_1(
         taps: 2,
         ..Default::default()
     };
-    let seen = seen_modes(&shapes, &[0.004], (0.4, &[0.42]), 0.45 * 2560.0);
+    let seen = observed_modes(&shapes, &[0.004], 0.4, &[0.42], 0.45 * 2560.0);
     let test = simulate_tap_test(&seen, &settings, 3);
     let channels = test.channels(1.0, 1.0).into_iter();
     let channels = channels.map(|samples| Channel {

@@ -37,7 +37,7 @@ fn groups(cases: &[Case]) -> Vec<Group> {
     let planted = cases.iter().flat_map(|(truth, _)| &truth.effects);
     let group = |planted: &Planted| match planted {
         Planted::Catalogue(id, _) => Some(id.group()),
-        Planted::Outside(_) => None,
+        Planted::OutOfCatalogue(_) => None,
     };
     planted.filter_map(group).collect()
 }

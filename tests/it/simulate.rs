@@ -7,7 +7,9 @@ use num_complex::Complex64;
 use proptest::prelude::*;
 use tapjoint::pipeline::{MeasureSettings, measure};
 use tapjoint::recording::{Channel, Recording, WavFormat, encode_wav};
-use tapjoint::simulate::{SimulatedMode, TapTest, TapTestSettings, seen_modes, simulate_tap_test};
+use tapjoint::simulate::{
+    SimulatedMode, TapTest, TapTestSettings, observed_modes, simulate_tap_test,
+};
 use tapjoint::structure::{Assembly, Beam, JointStiffness, mode_shapes};
 use tapjoint::taps::TapSource;
 
@@ -139,12 +141,7 @@ fn limit_static_compliance_of_a_clamped_beam() {
     // Sum over modes of shape^2/omega^2 at the tip is the static L^3/(3 E I).
     let beam = steel_strip();
     let shapes = mode_shapes(&beam, Assembly::Cantilever, &JointStiffness::RIGID, 20).unwrap();
-    let seen = seen_modes(
-        &shapes,
-        &[0.01],
-        (beam.length, &[beam.length]),
-        f64::INFINITY,
-    );
+    let seen = observed_modes(&shapes, &[0.01], beam.length, &[beam.length], f64::INFINITY);
     let compliance: f64 = seen
         .iter()
         .map(|mode| mode.shape_at_tap * mode.shape_at_sensors[0] / (TAU * mode.frequency).powi(2))
@@ -158,7 +155,7 @@ fn limit_static_compliance_of_a_clamped_beam() {
 }
 
 #[test]
-fn regress_seen_modes_leave_out_what_lies_beyond_and_repeat_the_last_damping() {
+fn regress_observed_modes_leave_out_what_lies_beyond_and_repeat_the_last_damping() {
     let beam = Beam {
         length: 0.4,
         width: 0.03,
@@ -170,7 +167,7 @@ fn regress_seen_modes_leave_out_what_lies_beyond_and_repeat_the_last_damping() {
     let joint = JointStiffness::two_parameter(800.0, 5.0);
     let shapes = mode_shapes(&beam, Assembly::Cantilever, &joint, 8).unwrap();
     let highest = shapes[5].frequency;
-    let seen = seen_modes(&shapes, &[0.01, 0.02], (0.1, &[0.2, 0.3]), highest);
+    let seen = observed_modes(&shapes, &[0.01, 0.02], 0.1, &[0.2, 0.3], highest);
     assert_eq!(seen.len(), 5);
     let damping: Vec<f64> = seen.iter().map(|mode| mode.damping_ratio).collect();
     assert_eq!(damping, [0.01, 0.02, 0.02, 0.02, 0.02]);

@@ -75,7 +75,7 @@ fn struck(
     joint: Option<JointMoment>,
     pulse: Pulse,
 ) -> Motion {
-    let mut motion = Motion::new(structure.clone(), &[sensed], (0.0, step), joint);
+    let mut motion = Motion::new(structure.clone(), &[sensed], 0.0, step, joint);
     motion.strike(Strike {
         pulse,
         place: place.clone(),

@@ -4,7 +4,7 @@ use crate::shared::steel_strip;
 use crate::simulate_test::ClosedForm;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
-use tapjoint::simulate::{SeenStructure, SpecimenSettings};
+use tapjoint::simulate::{ObservedStructure, SpecimenSettings};
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::{Body, PointSpring, Specimen, SpecimenJoint};
@@ -39,7 +39,7 @@ fn halves() -> Body {
 
 /// Rotation of the joint's spring per moment on its ends: of the modes that move, and of the rest.
 fn joint_compliance(specimen: &Specimen, suspension: Option<[f64; 2]>) -> f64 {
-    let seen = SeenStructure::new(specimen, &hung(suspension), &[], (0.0, HIGHEST)).unwrap();
+    let seen = ObservedStructure::new(specimen, &hung(suspension), &[], 0.0, HIGHEST).unwrap();
     let reduced = seen.reduced();
     let modes = reduced.modes.iter();
     let moving: f64 = modes
@@ -154,7 +154,7 @@ fn regress_a_pivot_has_a_finite_joint_compliance() {
         coupling: 0.0,
     };
     let specimen = Specimen::new(Body::One(steel_strip()), joint);
-    let seen = SeenStructure::new(&specimen, &hung(None), &[], (0.0, HIGHEST)).unwrap();
+    let seen = ObservedStructure::new(&specimen, &hung(None), &[], 0.0, HIGHEST).unwrap();
     let left = seen.reduced().joint_compliance;
     // Less than that of a beam hinged at both ends, L/(3 E I), and more than nothing.
     let hinged = steel_strip().length / (3.0 * steel_strip().bending_stiffness());
@@ -216,7 +216,7 @@ impl Hanging {
         self.bare(x, force, omega) - column(x).dot(&borne)
     }
 
-    fn seen(&self, sensors: &[f64]) -> SeenStructure {
+    fn seen(&self, sensors: &[f64]) -> ObservedStructure {
         let joint = if self.pivot > 0.0 {
             SpecimenJoint::Springs {
                 kt: self.pivot,
@@ -236,7 +236,7 @@ impl Hanging {
             })
             .collect();
         let settings = hung(Some(self.suspension));
-        SeenStructure::new(&specimen, &settings, sensors, (0.0, HIGHEST)).unwrap()
+        ObservedStructure::new(&specimen, &settings, sensors, 0.0, HIGHEST).unwrap()
     }
 
     fn agrees(&self, case: &str) {
@@ -359,7 +359,7 @@ fn val_tension_adds_to_rocking_and_not_to_up_and_down() {
     let beam = steel_strip();
     let mut specimen = Specimen::new(Body::One(beam), SpecimenJoint::Free);
     specimen.axial_force = 0.5;
-    let seen = SeenStructure::new(&specimen, &hung(Some([1.5, 2.0])), &[], (0.0, HIGHEST));
+    let seen = ObservedStructure::new(&specimen, &hung(Some([1.5, 2.0])), &[], 0.0, HIGHEST);
     let found: Vec<f64> = seen.unwrap().suspension_frequencies().collect();
     // P L theta^2/2 with the inertia m L^2/12.
     let tension = 12.0 * specimen.axial_force / (beam.mass() * beam.length);

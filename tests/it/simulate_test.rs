@@ -8,9 +8,9 @@ use tapjoint::description::TestDescription;
 use tapjoint::effects::{Effect, EffectId, JointLaw};
 use tapjoint::recording::{ReadSettings, Recording, WavFormat, WavLayout, WavStream, write_wav};
 use tapjoint::simulate::{
-    AntiAlias, Damping, JointMoment, Laboratory, Motion, Pulse, PulseShape, ReducedMode,
-    ReducedStructure, Sensed, SimulateError, SpecimenSettings, Strike, StruckPlace, Take, TapKind,
-    TestPlan, Tip, VirtualTest, plan_test, truth_of,
+    AntiAlias, Damping, JointMoment, Laboratory, Motion, Pulse, PulseShape, RecordingRun,
+    ReducedMode, ReducedStructure, Sensed, SimulateError, SpecimenSettings, Strike, StruckPlace,
+    TapKind, TestPlan, Tip, VirtualTest, plan_test, truth_of,
 };
 
 const CANTILEVER: &str = tapped_strip!(
@@ -40,10 +40,10 @@ fn plan<'a>(
 }
 
 /// All samples in SI units, channel by channel.
-fn samples(mut take: Take, scales: &[f64]) -> Vec<Vec<f64>> {
+fn samples(mut run: RecordingRun, scales: &[f64]) -> Vec<Vec<f64>> {
     let mut channels = vec![Vec::new(); scales.len()];
     let mut frame = vec![0.0; scales.len()];
-    while take.next_frame(&mut frame) {
+    while run.next_frame(&mut frame) {
         for ((channel, value), scale) in channels.iter_mut().zip(&frame).zip(scales) {
             channel.push(value * scale);
         }
@@ -53,7 +53,7 @@ fn samples(mut take: Take, scales: &[f64]) -> Vec<Vec<f64>> {
 
 fn recorded(test: &VirtualTest, laboratory: &Laboratory) -> Vec<Vec<f64>> {
     let recording = &test.recordings[0];
-    let scales = recording.take.channels.iter();
+    let scales = recording.plan.channels.iter();
     let scales: Vec<f64> = scales.map(|(_, scale)| *scale).collect();
     samples(recording.begin(laboratory), &scales)
 }
@@ -219,7 +219,7 @@ fn val_a_clock_error_is_a_pure_scaling_of_time() {
     laboratory.recorder.hum = 1e-3;
     let test = plan_test(&plan(&description, &[], &laboratory, 1)).unwrap();
     let recording = &test.recordings[0];
-    let mut fast = recording.take.clone();
+    let mut fast = recording.plan.clone();
     fast.frames = 3000;
     fast.frequency_scale = 1.25;
     let mut slow = fast.clone();
@@ -227,7 +227,7 @@ fn val_a_clock_error_is_a_pure_scaling_of_time() {
     slow.sample_rate = 4096;
     let [a, b] = [fast, slow].map(|plan| {
         samples(
-            Take::new(recording.structure.clone(), &plan, &laboratory),
+            RecordingRun::new(recording.structure.clone(), &plan, &laboratory),
             &[1.0, 1.0],
         )
     });
@@ -262,7 +262,7 @@ fn val_sliders_lose_what_masings_loop_encloses() {
         to_joint: 0.0,
     };
     let joint = JointMoment::of_law(&law, stiffness, hardest);
-    let mut motion = Motion::new(structure, &[Sensed::Displacement], (0.0, 1e-4), Some(joint));
+    let mut motion = Motion::new(structure, &[Sensed::Displacement], 0.0, 1e-4, Some(joint));
     let pulse = Pulse {
         start: 1e-5,
         length: 2e-3,
@@ -355,8 +355,8 @@ fn prop_effects_change_neither_taps_nor_gains_nor_noise() {
     laboratory.recorder.anti_alias = AntiAlias::Off;
     let run = |effects: &[Effect]| {
         let test = plan_test(&plan(&description, effects, &laboratory, 11)).unwrap();
-        let take = test.recordings[0].begin(&laboratory);
-        (take.taps(), take.gains(), recorded(&test, &laboratory))
+        let run = test.recordings[0].begin(&laboratory);
+        (run.taps(), run.gains(), recorded(&test, &laboratory))
     };
     let (taps, gains, bare) = run(&[]);
     let rate = 5120.0;
@@ -448,14 +448,14 @@ fn regress_a_streamed_file_is_the_file_written_at_once() {
     laboratory.hammer.taps = 1;
     laboratory.hammer.interval = Some(0.3);
     let test = plan_test(&plan(&description, &[], &laboratory, 3)).unwrap();
-    let take = &test.recordings[0].take;
+    let plan = &test.recordings[0].plan;
     let folder = tempfile::tempdir().unwrap();
     for format in [WavFormat::Pcm16, WavFormat::Pcm24, WavFormat::Float32] {
         let (one, other) = (folder.path().join("a.wav"), folder.path().join("b.wav"));
         // An odd number of bytes at 24 bits, so that the pad byte is tried.
-        let frames = take.frames - 1 + take.frames % 2;
+        let frames = plan.frames - 1 + plan.frames % 2;
         let layout = WavLayout {
-            sample_rate: take.sample_rate,
+            sample_rate: plan.sample_rate,
             channels: 2,
             frames,
             format,
@@ -475,7 +475,7 @@ fn regress_a_streamed_file_is_the_file_written_at_once() {
         let clipped = stream.finish().unwrap();
         assert_eq!(
             clipped,
-            write_wav(&other, take.sample_rate, &channels, format).unwrap()
+            write_wav(&other, plan.sample_rate, &channels, format).unwrap()
         );
         assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
         let read = Recording::open(&one, &ReadSettings::default()).unwrap();

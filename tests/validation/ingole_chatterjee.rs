@@ -6,11 +6,12 @@
 use tapjoint::identify::{
     ModeLambda, PairsEstimate, PairsModel, estimate_pairs, single_mode_stiffness,
 };
+use tapjoint::report::render_reproduction;
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, natural_frequencies, natural_lambdas,
     natural_lambdas_of_any_joint,
 };
-use tapjoint::study::publication::{Printed, Reproduction, Table, Verdict, render, reproduce};
+use tapjoint::study::publication::{Printed, Reproduction, Table, Verdict, reproduce};
 
 /// A printed table as (header, rows of text).
 fn read(text: &'static str) -> (Vec<&'static str>, Vec<Vec<&'static str>>) {
@@ -295,7 +296,7 @@ fn val_table_9_changes_lambdas_where_it_says_frequencies() {
 
 #[test]
 fn val_reproduction_fits_a_terminal_of_80_columns() {
-    let text = render(&reproduce().unwrap());
+    let text = render_reproduction(&reproduce().unwrap());
     for line in text.lines() {
         assert!(line.chars().count() <= 80, "{line}");
     }

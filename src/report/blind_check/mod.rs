@@ -97,7 +97,7 @@ fn truth_json(truth: &Truth) -> Value {
 fn name_of(planted: &Planted) -> &str {
     match planted {
         Planted::Catalogue(id, _) => id.name(),
-        Planted::Outside(name) => name,
+        Planted::OutOfCatalogue(name) => name,
     }
 }
 

@@ -1,12 +1,33 @@
-//! What was planted in a test, and what the diagnosis answered: all that the score sees.
-//!
-//! What the score needs of a diagnosis.
+//! The truth of a test and the answer of the diagnosis: all that the score sees.
 
 use std::collections::BTreeMap;
-use tapjoint_beam::effects::{EffectId, Group, Place};
+use tapjoint_beam::effects::{Effect, EffectId, Group, Place};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, Verdict};
 
-/// What a diagnosis chooses between.
+/// How many recordings a drawn test has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Five recordings: two sensors, one of them moved once; three tap positions; two levels; six
+    /// modes.
+    FiveRecordings,
+    /// One recording with one sensor, five modes.
+    OneRecording,
+}
+
+impl Extent {
+    /// Modes in the band.
+    pub(super) fn modes(self) -> usize {
+        match self {
+            Self::FiveRecordings => 6,
+            Self::OneRecording => 5,
+        }
+    }
+}
+
+/// A case: the truth and the answer.
+pub type Case = (Truth, Answer);
+
+/// A class between which a diagnosis chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     /// Nothing is missing.
@@ -34,21 +55,29 @@ pub enum Planted {
     /// Of the catalogue, with its parameters by name (SI).
     Catalogue(EffectId, BTreeMap<String, f64>),
     /// Of a kind that the catalogue does not have.
-    Outside(String),
+    OutOfCatalogue(String),
 }
 
-/// What was planted in one test.
+impl Planted {
+    /// Returns an effect of the catalogue with its parameters.
+    pub(crate) fn of(effect: &Effect) -> Self {
+        let values = effect.values();
+        let values = values.map(|(info, value)| (info.name.to_owned(), value));
+        Self::Catalogue(effect.id, values.collect())
+    }
+}
+
+/// The truth of one test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
     /// The test.
     pub name: String,
     /// Empty: nothing.
     pub effects: Vec<Planted>,
-    /// Whether readings of the usual uncertainty would show that something is missing, of several effects
-    /// each: see
-    /// [`DrawnTest::with_limits`](super::DrawnTest::with_limits); `None` where nobody said.
+    /// True where readings of the usual uncertainty show that something is missing, of several effects each:
+    /// see [`DrawnTest::with_limits`](super::DrawnTest::with_limits). `None` where it is not known.
     pub detectable: Option<bool>,
-    /// Whether they would show that nothing in the catalogue explains it.
+    /// True where such readings show that nothing in the catalogue explains them.
     pub refutable: Option<bool>,
 }
 
@@ -62,7 +91,7 @@ pub enum CaseKind {
     /// Several effects of the catalogue.
     Several,
     /// Something outside the catalogue.
-    Outside,
+    OutOfCatalogue,
 }
 
 impl Truth {
@@ -70,15 +99,17 @@ impl Truth {
     pub fn catalogue(&self) -> impl Iterator<Item = (EffectId, &BTreeMap<String, f64>)> {
         self.effects.iter().filter_map(|planted| match planted {
             Planted::Catalogue(id, values) => Some((*id, values)),
-            Planted::Outside(_) => None,
+            Planted::OutOfCatalogue(_) => None,
         })
     }
 
-    /// What kind of case this is.
+    /// Returns the kind of case.
     pub fn kind(&self) -> CaseKind {
         match &self.effects[..] {
             [] => CaseKind::Null,
-            all if all.iter().any(|p| matches!(p, Planted::Outside(_))) => CaseKind::Outside,
+            all if all.iter().any(|p| matches!(p, Planted::OutOfCatalogue(_))) => {
+                CaseKind::OutOfCatalogue
+            }
             [Planted::Catalogue(id, _)] => CaseKind::Single(*id),
             _ => CaseKind::Several,
         }
@@ -89,13 +120,13 @@ impl Truth {
         match self.kind() {
             CaseKind::Null => Some(Class::None),
             CaseKind::Single(id) => Some(Class::Group(id.group())),
-            CaseKind::Outside => Some(Class::Unknown),
+            CaseKind::OutOfCatalogue => Some(Class::Unknown),
             CaseKind::Several => None,
         }
     }
 }
 
-/// What the diagnosis said of one test.
+/// The answer of the diagnosis to one test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
     /// Verdict of the diagnosis; `None` where the test could not be analysed or diagnosed.
@@ -123,6 +154,11 @@ impl Answer {
         self.ranked().into_iter().next()
     }
 
+    /// Returns the stated probability of a class.
+    pub(super) fn stated(&self, class: Class) -> f64 {
+        self.classes.get(&class).copied().unwrap_or(0.0)
+    }
+
     /// All classes, the most probable first; equal ones in the catalogue's order.
     pub fn ranked(&self) -> Vec<(Class, f64)> {
         let mut ranked: Vec<(Class, f64)> = self.classes.iter().map(|(c, p)| (*c, *p)).collect();
@@ -132,11 +168,13 @@ impl Answer {
 
     /// The most probable effect groups, `none` and `unknown` left out.
     pub fn groups(&self) -> Vec<Group> {
-        let group = |(class, _): (Class, f64)| match class {
-            Class::Group(group) => Some(group),
-            Class::None | Class::Unknown => None,
-        };
-        self.ranked().into_iter().filter_map(group).collect()
+        let ranked = self.ranked().into_iter();
+        ranked
+            .filter_map(|(class, _)| match class {
+                Class::Group(group) => Some(group),
+                Class::None | Class::Unknown => None,
+            })
+            .collect()
     }
 
     /// The smallest set of classes that holds `share` (1) of the probability.
@@ -160,31 +198,34 @@ impl Answer {
         groups.dedup();
         groups
     }
-}
 
-impl Answer {
-    /// Of a diagnosis.
+    /// Returns the answer that a diagnosis gives.
     pub fn of(diagnosis: &Diagnosis) -> Self {
         let effects = match &diagnosis.verdict {
             Verdict::Named(effects) | Verdict::Group(effects) => effects.clone(),
-            Verdict::Set(list) => listed(list),
+            Verdict::Set(list) => {
+                let mut effects = Vec::new();
+                for hypothesis in list {
+                    if let Hypothesis::Effects(own) = hypothesis {
+                        effects.extend_from_slice(own);
+                    }
+                }
+                effects
+            }
             Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
         };
         let named = diagnosis
             .hypotheses
             .iter()
             .find(|found| matches!(&found.hypothesis, Hypothesis::Effects(own) if *own == effects));
-        let parameters = named.map(|found| {
-            let values = found.parameters.iter();
-            values
-                .map(|value| (value.effect, value.name.to_owned(), value.value))
-                .collect()
-        });
+        let parameters = named.into_iter().flat_map(|found| &found.parameters);
         Self {
             verdict: Some(diagnosis.verdict.clone()),
             classes: classes(diagnosis),
             places: places(diagnosis),
-            parameters: parameters.unwrap_or_default(),
+            parameters: parameters
+                .map(|value| (value.effect, value.name.to_owned(), value.value))
+                .collect(),
             closure: named
                 .and_then(|found| found.closure)
                 .map(|closure| closure.value),
@@ -192,7 +233,7 @@ impl Answer {
         }
     }
 
-    /// Of a test that could not be diagnosed: no verdict and no probabilities.
+    /// Returns the answer to a test that could not be diagnosed: no verdict and no probabilities.
     pub fn none() -> Self {
         Self {
             verdict: None,
@@ -203,14 +244,6 @@ impl Answer {
             closure: None,
         }
     }
-}
-
-fn listed(list: &[Hypothesis]) -> Vec<EffectId> {
-    let effects = list.iter().filter_map(|hypothesis| match hypothesis {
-        Hypothesis::Effects(effects) => Some(effects.as_slice()),
-        Hypothesis::None | Hypothesis::Unknown => None,
-    });
-    effects.flatten().copied().collect()
 }
 
 /// Probabilities by group. Hypotheses of two effects belong to no class; the rest is made to add to 1.

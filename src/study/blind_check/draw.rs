@@ -1,22 +1,16 @@
-//! Draws virtual tests: a structure, a plan of recordings, and an effect that its description leaves
-//! out.
+//! Draws virtual tests (a structure, a plan of recordings, and an effect that its description leaves out)
+//! and records them.
 //!
 //! All tests of a campaign look alike from outside: a cantilever that is described as an Euler beam
 //! with two springs and sensors without mass, so that the description does not give the effect away.
 //! Sizes are drawn from small to large as a test engineer meets them, positions off any grid.
-//!
-//! What the readings of a drawn test can show at all, by what was planted and not by what was answered.
-//!
-//! Records a drawn test.
 
-use super::case::{CaseKind, Planted, Truth};
-use super::planted_effects::{Fastened, GROUPS, OutsideKind, draw_effect};
+use super::case::{CaseKind, Extent, Planted, Truth};
+use super::planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect, log_uniform};
 use crate::plan::{NOTICED, PlanError, PlanSettings, plan_of};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::effects::{Effect, EffectError, EffectId};
 use tapjoint_beam::joint::StiffnessUnits;
@@ -30,29 +24,9 @@ use tapjoint_diagnosis::{
 use tapjoint_identify::observation::Observations;
 use tapjoint_numerics::stats::{chi_square_quantile, root_mean_square};
 use tapjoint_simulate::{
-    Damping, Laboratory, SeenStructure, SimulateError, TestPlan, VirtualRecording,
-    believed_description, plan_test,
+    Damping, Laboratory, ObservedStructure, SimulateError, TestPlan, VirtualRecording, add_noise,
+    below, nominal_description, plan_test,
 };
-
-/// How many recordings a drawn test has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Extent {
-    /// Five recordings: two sensors, one of them moved once; three tap positions; two levels; six
-    /// modes.
-    FiveRecordings,
-    /// One recording with one sensor, five modes.
-    OneRecording,
-}
-
-impl Extent {
-    /// Modes in the band.
-    fn modes(self) -> usize {
-        match self {
-            Self::FiveRecordings => 6,
-            Self::OneRecording => 5,
-        }
-    }
-}
 
 /// A blind check to be drawn.
 #[derive(Debug, Clone, PartialEq)]
@@ -91,12 +65,12 @@ impl Default for Campaign {
     }
 }
 
-/// What a test of a campaign is to hold.
+/// Content of a test of a campaign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Plant {
     Single(usize),
     Nothing,
-    Outside(usize),
+    OutOfCatalogue(usize),
     Pair,
 }
 
@@ -109,7 +83,7 @@ pub struct DrawnTest {
     pub description: TestDescription,
     /// The effects, the joint's drift among them.
     pub effects: Vec<Effect>,
-    /// What no effect of the catalogue describes.
+    /// Faults that no effect of the catalogue describes.
     pub fastened: Fastened,
     /// How it is recorded.
     pub laboratory: Laboratory,
@@ -122,6 +96,29 @@ pub struct DrawnTest {
     /// Seed of the recording.
     pub seed: u64,
 }
+
+/// The input of the diagnosis: recordings, and the description without the truth.
+#[derive(Debug, Clone)]
+pub struct RecordedTest {
+    /// The description's text.
+    pub description: String,
+    /// The recordings.
+    pub recordings: Vec<Recorded>,
+}
+
+/// One recording.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// Its file's name.
+    pub file: String,
+    /// Sample rate (Hz).
+    pub sample_rate: u32,
+    /// The channels, in units of the file.
+    pub channels: Vec<Vec<f64>>,
+}
+
+/// Noise of the hammer's channel lies so far below that of the responses, seen from the peak (dB).
+const FORCE_MARGIN_DB: f64 = 20.0;
 
 /// Why a test cannot be drawn or recorded: a defect of this module.
 #[derive(Debug, thiserror::Error)]
@@ -144,9 +141,9 @@ pub enum DrawError {
     /// What a drawn test can show cannot be said.
     #[error("what a drawn test can show cannot be said: {0}")]
     Limits(#[from] GapError),
-    /// The description as the user believes it cannot be written.
+    /// The nominal description cannot be written.
     #[error("a drawn description cannot be written: {0}")]
-    Believed(#[from] toml::de::Error),
+    Nominal(#[from] toml::de::Error),
 }
 
 impl Campaign {
@@ -155,7 +152,7 @@ impl Campaign {
         self.singles + self.nulls + self.outside + self.pairs
     }
 
-    /// Whether there is no test.
+    /// Returns true where there is no test.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -174,21 +171,20 @@ impl Campaign {
         let mut planted = Vec::new();
         let mut effects = Vec::new();
         let mut fastened = Fastened::default();
-        for group in groups_of(plant, &mut random) {
+        let groups = match plant {
+            Plant::Single(number) => vec![number % GROUPS.len()],
+            Plant::Nothing | Plant::OutOfCatalogue(_) => Vec::new(),
+            Plant::Pair => rand::seq::index::sample(&mut random, GROUPS.len(), 2).into_vec(),
+        };
+        for group in groups {
             let effect = draw_effect(&subject.beam, GROUPS[group], &mut random)?;
-            let values = effect
-                .values()
-                .map(|(info, value)| (info.name.to_owned(), value));
-            planted.push(Planted::Catalogue(
-                effect.id,
-                values.collect::<BTreeMap<_, _>>(),
-            ));
+            planted.push(Planted::of(&effect));
             effects.push(effect);
         }
-        if let Plant::Outside(number) = plant {
-            let kind = OutsideKind::ALL[number % OutsideKind::ALL.len()];
+        if let Plant::OutOfCatalogue(number) = plant {
+            let kind = OutOfCatalogueKind::ALL[number % OutOfCatalogueKind::ALL.len()];
             fastened = kind.draw(&subject.beam, &mut random);
-            planted.push(Planted::Outside(kind.name().to_owned()));
+            planted.push(Planted::OutOfCatalogue(kind.name().to_owned()));
         }
         let drift = random.random_range(0.0..=self.drift);
         effects.push(Effect::from_pairs(EffectId::JointDrift, &[("std", drift)])?);
@@ -215,7 +211,7 @@ impl Campaign {
     fn plants(&self) -> Vec<Plant> {
         let mut plants: Vec<Plant> = (0..self.singles).map(Plant::Single).collect();
         plants.extend(std::iter::repeat_n(Plant::Nothing, self.nulls));
-        plants.extend((0..self.outside).map(Plant::Outside));
+        plants.extend((0..self.outside).map(Plant::OutOfCatalogue));
         plants.extend(std::iter::repeat_n(Plant::Pair, self.pairs));
         use rand::seq::SliceRandom;
         plants.shuffle(&mut ChaCha8Rng::seed_from_u64(self.seed));
@@ -223,12 +219,18 @@ impl Campaign {
     }
 }
 
-fn groups_of(plant: Plant, random: &mut ChaCha8Rng) -> Vec<usize> {
-    match plant {
-        Plant::Single(number) => vec![number % GROUPS.len()],
-        Plant::Nothing | Plant::Outside(_) => Vec::new(),
-        Plant::Pair => rand::seq::index::sample(random, GROUPS.len(), 2).into_vec(),
-    }
+/// A random factor whose logarithm is normal, with this standard deviation.
+fn log_normal(spread: f64, random: &mut ChaCha8Rng) -> f64 {
+    let draw: f64 = StandardNormal.sample(random);
+    (spread * draw).exp()
+}
+
+fn sensor_table(name: &str, channel: usize, position: f64) -> String {
+    format!("\n[[sensor]]\nname = \"{name}\"\nchannel = {channel}\nposition = {position}\n")
+}
+
+fn recording_table(number: usize, tap: f64, more: &str) -> String {
+    format!("\n[[recording]]\nfile = \"r{number}.wav\"\ntap = {tap}\n{more}")
 }
 
 /// The structure of one test.
@@ -248,10 +250,6 @@ impl Subject {
         } else {
             (70e9, 2700.0, 0.33)
         };
-        let normal = |spread: f64, random: &mut ChaCha8Rng| {
-            let draw: f64 = StandardNormal.sample(random);
-            (spread * draw).exp()
-        };
         Self {
             beam: Beam {
                 length,
@@ -262,8 +260,8 @@ impl Subject {
                 poisson,
             },
             // About the joint of Ingole & Chatterjee.
-            kx: 1400.0 * normal(0.5, random),
-            ky: 4.8 * normal(0.3, random),
+            kx: 1400.0 * log_normal(0.5, random),
+            ky: 4.8 * log_normal(0.3, random),
         }
     }
 
@@ -284,34 +282,18 @@ impl Subject {
              kind = \"cantilever\"\nmodel = \"2p\"\nbeam = \"euler\"\nkt = {kt:e}\nkr = {kr:e}\n\n\
              [hammer]\nchannel = 1\n"
         );
-        let mut place = |share: f64| length * share * random.random_range(0.98..1.0);
-        let (a, b, moved) = (place(0.81), place(0.46), place(0.43));
-        let taps = [place(0.12), place(0.50), place(0.96)];
-        let sensor = |text: &mut String, name: &str, channel: usize, x: f64| {
-            // Writing to a string cannot fail.
-            let _ = write!(
-                text,
-                "\n[[sensor]]\nname = \"{name}\"\nchannel = {channel}\nposition = {x}\n"
-            );
-        };
-        let recording = |text: &mut String, number: usize, tap: f64, more: &str| {
-            let _ = write!(
-                text,
-                "\n[[recording]]\nfile = \"r{number}.wav\"\ntap = {tap}\n{more}"
-            );
-        };
-        sensor(&mut text, "A", 2, a);
+        let [a, b, moved, near, middle, far] = [0.81, 0.46, 0.43, 0.12, 0.50, 0.96]
+            .map(|share| length * share * random.random_range(0.98..1.0));
+        text += &sensor_table("A", 2, a);
         if extent == Extent::OneRecording {
-            recording(&mut text, 1, taps[2], "");
-            return text;
+            return text + &recording_table(1, far, "");
         }
-        sensor(&mut text, "B", 3, b);
-        for (number, tap) in taps.iter().enumerate() {
-            recording(&mut text, number + 1, *tap, "");
-        }
-        recording(&mut text, 4, taps[2], &format!("at = {{ A = {moved} }}\n"));
-        recording(&mut text, 5, taps[2], "level = 4\n");
-        text
+        text += &sensor_table("B", 3, b);
+        text += &recording_table(1, near, "");
+        text += &recording_table(2, middle, "");
+        text += &recording_table(3, far, "");
+        text += &recording_table(4, far, &format!("at = {{ A = {moved} }}\n"));
+        text + &recording_table(5, far, "level = 4\n")
     }
 
     /// A rate whose band ends between the last mode that is wanted and the next.
@@ -335,8 +317,8 @@ impl Subject {
         // White noise is added to the recording instead, so that its level is known.
         laboratory.sensors.noise = 0.0;
         laboratory.hammer.interval = Some(4.5);
-        let ratio = |_| random.random_range(0.0015f64.ln()..0.006f64.ln()).exp();
-        laboratory.specimen.damping = Damping::Modal((0..8).map(ratio).collect());
+        let ratios = (0..8).map(|_| log_uniform(0.0015, 0.006, random));
+        laboratory.specimen.damping = Damping::Modal(ratios.collect());
         Ok(laboratory)
     }
 }
@@ -346,53 +328,44 @@ impl Subject {
 const FREQUENCY_STD: f64 = 5e-5;
 
 impl DrawnTest {
-    /// The truth, with what readings without scatter show of it: whether the nominal model misses them by
-    /// what is noticed nine times out of ten (one effect), whether so do both of two effects alone (two
-    /// effects), and whether the best of the catalogue misses them so far that with the usual scatter chi
-    /// square would exceed its 1 % limit (outside it).
+    /// Returns the truth with the limits that readings without scatter set. One effect is detectable where the
+    /// nominal model misses them by an amount that is noticed nine times out of ten, two effects where it does
+    /// so for each of them alone. A fault outside the catalogue is refutable where the best of the catalogue
+    /// misses them so far that with the usual scatter chi square would exceed its 1 % limit.
     ///
     /// # Errors
     /// [`DrawError`]: a defect of the drawing.
     pub fn with_limits(&self) -> Result<Truth, DrawError> {
         let mut truth = self.truth.clone();
-        match truth.kind() {
-            CaseKind::Single(_) => truth.detectable = Some(self.is_detectable()?),
-            CaseKind::Outside => truth.refutable = self.is_refutable()?,
-            CaseKind::Several => truth.detectable = self.are_both_detectable()?,
-            CaseKind::Null => {}
+        let kind = truth.kind();
+        if kind == CaseKind::Null {
+            return Ok(truth);
         }
-        Ok(truth)
-    }
-
-    fn is_detectable(&self) -> Result<bool, DrawError> {
+        let (readings, settings) = (self.exact()?, GapSettings::default());
         let nominal = nominal_with(&self.description, None);
-        let chi_square = nominal_chi_square(&self.exact()?, &nominal, &GapSettings::default())?;
-        Ok(chi_square > NOTICED)
-    }
-
-    /// Whether readings without scatter are missed by each of the planted effects without the others;
-    /// `None` where an effect is no hypothesis of such a test.
-    fn are_both_detectable(&self) -> Result<Option<bool>, DrawError> {
-        let nominal = nominal_with(&self.description, None);
-        let found = diagnose(&self.exact()?, &nominal, &GapSettings::default())?;
-        let alone = |effect: &Effect| {
+        if let CaseKind::Single(_) = kind {
+            let chi_square = nominal_chi_square(&readings, &nominal, &settings)?;
+            truth.detectable = Some(chi_square > NOTICED);
+            return Ok(truth);
+        }
+        let found = diagnose(&readings, &nominal, &settings)?;
+        if kind == CaseKind::OutOfCatalogue {
+            // Scatter adds one for each degree of freedom.
+            truth.refutable = found.misfit.and_then(|misfit| {
+                let limit = chi_square_quantile(0.99, misfit.freedom)?;
+                Some(misfit.chi_square + misfit.freedom > limit)
+            });
+            return Ok(truth);
+        }
+        // The misfit of each effect without the others; none where one is no hypothesis of such a test.
+        let misfits = self.effects.iter().map(|effect| {
             let own = Hypothesis::Effects(vec![effect.id]);
             let mut all = found.hypotheses.iter();
-            let misfit = all.find(|one| one.hypothesis == own)?.misfit?;
-            Some(misfit.chi_square)
-        };
-        let misses: Option<Vec<f64>> = self.effects.iter().map(alone).collect();
-        Ok(misses.map(|misses| misses.iter().all(|miss| *miss > NOTICED)))
-    }
-
-    fn is_refutable(&self) -> Result<Option<bool>, DrawError> {
-        let nominal = nominal_with(&self.description, None);
-        let found = diagnose(&self.exact()?, &nominal, &GapSettings::default())?;
-        // Scatter adds one for each degree of freedom.
-        Ok(found.misfit.and_then(|misfit| {
-            let limit = chi_square_quantile(0.99, misfit.freedom)?;
-            Some(misfit.chi_square + misfit.freedom > limit)
-        }))
+            all.find(|one| one.hypothesis == own)?.misfit
+        });
+        let misfits: Option<Vec<_>> = misfits.collect();
+        truth.detectable = misfits.map(|all| all.iter().all(|misfit| misfit.chi_square > NOTICED));
+        Ok(truth)
     }
 
     /// Readings without scatter, on a mesh and by a code that the diagnosis does not use.
@@ -409,32 +382,7 @@ impl DrawnTest {
         self.fastened.add_to(&mut truth.specimen);
         Ok(observe(&plan, &truth, &self.effects, 0)?)
     }
-}
 
-/// What the diagnosis is given: recordings, and the description without the truth.
-#[derive(Debug, Clone)]
-pub struct RecordedTest {
-    /// The description's text.
-    pub description: String,
-    /// The recordings.
-    pub recordings: Vec<Recorded>,
-}
-
-/// One recording.
-#[derive(Debug, Clone)]
-pub struct Recorded {
-    /// Its file's name.
-    pub file: String,
-    /// Sample rate (Hz).
-    pub sample_rate: u32,
-    /// The channels, in units of the file.
-    pub channels: Vec<Vec<f64>>,
-}
-
-/// Noise of the hammer's channel lies so far below that of the responses, seen from the peak (dB).
-const FORCE_MARGIN_DB: f64 = 20.0;
-
-impl DrawnTest {
     /// Records the test.
     ///
     /// # Errors
@@ -455,7 +403,7 @@ impl DrawnTest {
         }
         let recordings = test.recordings.iter().enumerate();
         Ok(RecordedTest {
-            description: believed_description(&self.text, &self.description, &test)?,
+            description: nominal_description(&self.text, &self.description, &test)?,
             recordings: recordings
                 .map(|(n, recording)| self.take(recording, n))
                 .collect(),
@@ -465,29 +413,27 @@ impl DrawnTest {
     /// Adds what no effect describes, and looks at the structure again.
     fn fasten(&self, recording: &mut VirtualRecording, number: usize) -> Result<(), DrawError> {
         self.fastened.add_to(&mut recording.seen.specimen);
-        let moved = &self.description.recordings[number].at;
-        let place = |sensor: &tapjoint_description::SensorDescription| {
-            moved.get(&sensor.name).copied().or(sensor.position)
-        };
-        let places: Vec<f64> = self.description.sensors.iter().filter_map(place).collect();
-        recording.structure = SeenStructure::new(
+        let described = &self.description.recordings[number];
+        let sensors = self.description.sensors.iter();
+        let places: Vec<f64> = sensors
+            .filter_map(|sensor| described.place_of(sensor))
+            .collect();
+        recording.structure = ObservedStructure::new(
             &recording.seen.specimen,
             &self.laboratory.specimen,
             &places,
-            (
-                recording.seen.joint_loss_factor,
-                recording.take.highest_mode(&self.laboratory),
-            ),
+            recording.seen.joint_loss_factor,
+            recording.plan.highest_mode(&self.laboratory),
         )?;
         Ok(())
     }
 
     fn take(&self, recording: &VirtualRecording, number: usize) -> Recorded {
-        let mut session = recording.begin(&self.laboratory);
-        let count = recording.take.channels.len();
-        let mut channels = vec![Vec::with_capacity(recording.take.frames as usize); count];
+        let mut run = recording.begin(&self.laboratory);
+        let count = recording.plan.channels.len();
+        let mut channels = vec![Vec::with_capacity(recording.plan.frames as usize); count];
         let mut frame = vec![0.0; count];
-        while session.next_frame(&mut frame) {
+        while run.next_frame(&mut frame) {
             for (channel, value) in channels.iter_mut().zip(&frame) {
                 channel.push(*value);
             }
@@ -496,20 +442,17 @@ impl DrawnTest {
         // Beyond the streams of the recording itself.
         random.set_stream(1 << 50 | number as u64);
         for (index, channel) in channels.iter_mut().enumerate() {
-            let level = if index == 0 {
+            let rms = if index == 0 {
                 let peak = channel.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
-                peak * 10f64.powf(-(self.noise_db + FORCE_MARGIN_DB) / 20.0)
+                below(peak, self.noise_db + FORCE_MARGIN_DB)
             } else {
-                root_mean_square(channel) * 10f64.powf(-self.noise_db / 20.0)
+                below(root_mean_square(channel), self.noise_db)
             };
-            for value in channel {
-                let noise: f64 = StandardNormal.sample(&mut random);
-                *value += level * noise;
-            }
+            add_noise(channel, rms, &mut random);
         }
         Recorded {
             file: recording.file.clone(),
-            sample_rate: recording.take.sample_rate,
+            sample_rate: recording.plan.sample_rate,
             channels,
         }
     }

@@ -16,15 +16,11 @@ mod score;
 mod table;
 mod truth_file;
 
-pub use case::{Answer, CaseKind, Class, Planted, Truth};
-pub use draw::{Campaign, DrawError, DrawnTest, Extent};
-pub use draw::{Recorded, RecordedTest};
-pub use planted_effects::{Fastened, OutsideKind};
-pub use planted_effects::{GROUPS, draw_effect};
-pub use score::Rate;
-pub use score::{Calibration, ReliabilityBin};
-pub use score::{Case, SET_SHARE, Scores, score};
-pub use score::{Conduct, always_scale, shuffled};
+pub use case::{Answer, Case, CaseKind, Class, Extent, Planted, Truth};
+pub use draw::{Campaign, DrawError, DrawnTest, Recorded, RecordedTest};
+pub use planted_effects::{Fastened, GROUPS, OutOfCatalogueKind, draw_effect};
+pub use score::{
+    Calibration, Conduct, Rate, ReliabilityBin, SET_SHARE, Scores, always_scale, score, shuffled,
+};
 pub use table::{Row, Target, render_rows, rows};
-pub use truth_file::commitment;
-pub use truth_file::{TruthDoubt, TruthError, TruthFile, parse_truths};
+pub use truth_file::{TruthDoubt, TruthError, TruthFile, commitment, parse_truths};

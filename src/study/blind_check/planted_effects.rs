@@ -1,4 +1,5 @@
-//! What is planted in virtual tests: effects of the catalogue, from small to large as a test engineer meets\nthem, and faults that the catalogue does not have.
+//! Effects that are planted in virtual tests: those of the catalogue, from small to large as a test engineer
+//! meets them, and faults that the catalogue does not have.
 
 use rand::RngExt;
 use rand::seq::IndexedRandom;
@@ -35,14 +36,21 @@ pub fn draw_effect(
 ) -> Result<Effect, EffectError> {
     let id = *group.choose(random).unwrap_or(&group[0]);
     let sign = if random.random_bool(0.5) { 1.0 } else { -1.0 };
-    let share = |low: f64, high: f64, random: &mut ChaCha8Rng| random.random_range(low..high);
     let mut pairs = size(beam, id, sign, random);
-    match id {
-        EffectId::AddedMass => pairs.push(("position", beam.length * share(0.15, 1.0, random))),
-        EffectId::LocalCrack => pairs.push(("position", beam.length * share(0.08, 0.75, random))),
-        _ => {}
+    let places = match id {
+        EffectId::AddedMass => Some(0.15..1.0),
+        EffectId::LocalCrack => Some(0.08..0.75),
+        _ => None,
+    };
+    if let Some(places) = places {
+        pairs.push(("position", beam.length * random.random_range(places)));
     }
     Effect::from_pairs(id, &pairs)
+}
+
+/// A random size whose logarithm is uniform.
+pub(super) fn log_uniform(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
+    random.random_range(low.ln()..high.ln()).exp()
 }
 
 /// The parameters but for positions.
@@ -50,19 +58,23 @@ fn size(beam: &Beam, id: EffectId, sign: f64, random: &mut ChaCha8Rng) -> Vec<(&
     // Masses as they would be on a beam of 0.83 kg.
     let gram = 1e-3 * beam.mass() / 0.83;
     let (stiffness, length) = (beam.bending_stiffness(), beam.length);
-    let mut size = |low: f64, high: f64| random.random_range(low.ln()..high.ln()).exp();
     match id {
-        EffectId::SensorMass | EffectId::AddedMass => vec![("mass", gram * size(2.0, 24.0))],
-        EffectId::SensorCable => vec![("stiffness", size(0.01, 0.3) * stiffness / length.powi(3))],
-        EffectId::CrossCoupling => vec![("coupling", sign * size(0.03, 0.35))],
+        EffectId::SensorMass | EffectId::AddedMass => {
+            vec![("mass", gram * log_uniform(2.0, 24.0, random))]
+        }
+        EffectId::SensorCable => vec![(
+            "stiffness",
+            log_uniform(0.01, 0.3, random) * stiffness / length.powi(3),
+        )],
+        EffectId::CrossCoupling => vec![("coupling", sign * log_uniform(0.03, 0.35, random))],
         EffectId::JointMass => {
-            let mass = gram * size(10.0, 100.0);
+            let mass = gram * log_uniform(10.0, 100.0, random);
             // Bolts and washers: 15 mm radius of gyration.
             vec![("mass", mass), ("inertia", mass * 0.015f64.powi(2))]
         }
         EffectId::JointNonlinearity => {
-            let slips = size(0.1, 10.0) < 1.0;
-            let ratio = size(0.008, 0.08);
+            let slips = log_uniform(0.1, 10.0, random) < 1.0;
+            let ratio = log_uniform(0.008, 0.08, random);
             // A joint that slips softens; one that opens or closes may do either.
             let (signed, exponent) = if slips {
                 (-ratio, 1.0)
@@ -71,19 +83,22 @@ fn size(beam: &Beam, id: EffectId, sign: f64, random: &mut ChaCha8Rng) -> Vec<(&
             };
             vec![("ratio", signed), ("exponent", exponent)]
         }
-        EffectId::JointDamping => vec![("loss_factor", size(0.003, 0.05))],
+        EffectId::JointDamping => vec![("loss_factor", log_uniform(0.003, 0.05, random))],
         EffectId::Fixture => vec![
-            ("frequency", size(65.0, 800.0)),
-            ("ratio", size(0.005, 0.08)),
+            ("frequency", log_uniform(65.0, 800.0, random)),
+            ("ratio", log_uniform(0.005, 0.08, random)),
         ],
-        EffectId::Modulus => vec![("relative", sign * size(0.003, 0.03))],
-        EffectId::Length => vec![("relative", sign * size(0.0012, 0.007))],
-        EffectId::Timebase => vec![("relative", sign * size(2e-5, 1e-3))],
-        EffectId::LocalCrack => vec![("compliance", size(0.003, 0.04))],
+        EffectId::Modulus => vec![("relative", sign * log_uniform(0.003, 0.03, random))],
+        EffectId::Length => vec![("relative", sign * log_uniform(0.0012, 0.007, random))],
+        EffectId::Timebase => vec![("relative", sign * log_uniform(2e-5, 1e-3, random))],
+        EffectId::LocalCrack => vec![("compliance", log_uniform(0.003, 0.04, random))],
         EffectId::AxialLoad => {
-            vec![("force", sign * size(0.02, 0.5) * stiffness / length.powi(2))]
+            vec![(
+                "force",
+                sign * log_uniform(0.02, 0.5, random) * stiffness / length.powi(2),
+            )]
         }
-        EffectId::ShearRotary => vec![("factor", size(0.5, 3.0))],
+        EffectId::ShearRotary => vec![("factor", log_uniform(0.5, 3.0, random))],
         EffectId::JointDrift | EffectId::Resolution => Vec::new(),
     }
 }
@@ -100,7 +115,7 @@ pub struct Fastened {
 }
 
 impl Fastened {
-    /// Whether there is nothing.
+    /// Returns true where there is nothing.
     pub fn is_empty(&self) -> bool {
         self.masses.is_empty() && self.springs.is_empty() && self.hinges.is_empty()
     }
@@ -115,7 +130,7 @@ impl Fastened {
 
 /// Kinds of physics outside the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OutsideKind {
+pub enum OutOfCatalogueKind {
     /// Something touches the beam somewhere: a spring to the ground that stays where it is.
     SecondSupport,
     /// Mass spread over a part of the beam, such as tape or paint.
@@ -131,7 +146,7 @@ pub enum OutsideKind {
 /// Pieces into which a patch is divided: the spacing is far below a quarter wave of the sixth mode.
 const PIECES: usize = 12;
 
-impl OutsideKind {
+impl OutOfCatalogueKind {
     /// All kinds.
     pub const ALL: [Self; 5] = [
         Self::SecondSupport,
@@ -155,23 +170,20 @@ impl OutsideKind {
     /// Draws a size and a place.
     pub fn draw(self, beam: &Beam, random: &mut ChaCha8Rng) -> Fastened {
         let (length, stiffness) = (beam.length, beam.bending_stiffness());
-        let size = |low: f64, high: f64, random: &mut ChaCha8Rng| {
-            random.random_range(low.ln()..high.ln()).exp()
-        };
         let mut fastened = Fastened::default();
         match self {
             Self::SecondSupport => fastened.springs.push(PointSpring {
                 position: length * random.random_range(0.55..0.95),
-                stiffness: size(0.5, 8.0, random) * stiffness / length.powi(3),
+                stiffness: log_uniform(0.5, 8.0, random) * stiffness / length.powi(3),
             }),
             Self::MassPatch => {
-                let total = beam.mass() * size(0.01, 0.06, random);
+                let total = beam.mass() * log_uniform(0.01, 0.06, random);
                 for position in patch(length, random) {
                     fastened.masses.push(mass(position, total / PIECES as f64));
                 }
             }
             Self::SoftPatch => {
-                let total = size(0.01, 0.1, random) * length / stiffness;
+                let total = log_uniform(0.01, 0.1, random) * length / stiffness;
                 for position in patch(length, random) {
                     fastened.hinges.push(Hinge {
                         position,
@@ -182,13 +194,13 @@ impl OutsideKind {
             Self::RotaryLump => fastened.masses.push(PointMass {
                 position: length * random.random_range(0.3..1.0),
                 mass: 0.0,
-                inertia: size(2e-5, 1e-3, random) * beam.mass() * length * length,
+                inertia: log_uniform(2e-5, 1e-3, random) * beam.mass() * length * length,
             }),
             Self::TwoMasses => {
                 let near = length * random.random_range(0.2..0.5);
                 let far = near + length * random.random_range(0.2..0.45);
                 for position in [near, far] {
-                    let size = size(0.004, 0.03, random);
+                    let size = log_uniform(0.004, 0.03, random);
                     fastened.masses.push(mass(position, size * beam.mass()));
                 }
             }
@@ -209,6 +221,7 @@ fn mass(position: f64, mass: f64) -> PointMass {
 fn patch(length: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     let width = length * random.random_range(0.2..0.4);
     let start = random.random_range(0.05 * length..0.95 * length - width);
-    let at = |piece: usize| start + (piece as f64 + 0.5) / PIECES as f64 * width;
-    (0..PIECES).map(at).collect()
+    (0..PIECES)
+        .map(|piece| start + (piece as f64 + 0.5) / PIECES as f64 * width)
+        .collect()
 }

@@ -1,25 +1,18 @@
-//! The score of a blind check: how often the answers were right, each rate with its interval.
+//! The score of a blind check: how often the answers were right, each rate with its interval, and how far
+//! stated probabilities can be trusted (Brier's score and a reliability table).
 //!
-//! A rate of right answers and what so many cases can say of it.
-//!
-//! Whether stated probabilities are what they say: Brier's score and a reliability table.
-//!
-//! Checks of the check: answers that cannot know must score as if they did not know.
+//! Checks of the check: answers without knowledge must score as guesses do.
 
-use super::case::{Answer, CaseKind, Class, Planted, Truth};
-use super::draw::Extent;
+use super::case::{Answer, Case, CaseKind, Class, Extent, Truth};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{Beta, ContinuousCDF};
-use tapjoint_beam::effects::{EffectId, Group, Place};
+use tapjoint_beam::effects::{EffectId, Group};
 use tapjoint_diagnosis::Verdict;
 
 /// Share of the probability that an answer's set holds.
 pub const SET_SHARE: f64 = 0.9;
-
-/// A case: what was planted, and what was answered.
-pub type Case = (Truth, Answer);
 
 /// All rates of a blind check.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,68 +72,61 @@ pub struct Scores {
 
 /// Scores all cases.
 pub fn score(cases: &[Case]) -> Scores {
-    let kinds = [Kind::Null, Kind::Single, Kind::Several, Kind::Outside];
-    let of = |kind: Kind| {
-        cases
-            .iter()
-            .filter(move |(truth, _)| Kind::of(truth) == kind)
-    };
-    let closures = sorted(of(Kind::Single).filter_map(closure_of_named));
-    let sizes = sorted(of(Kind::Single).filter_map(size_error));
-    let sets: Vec<_> = cases
-        .iter()
-        .filter(|(truth, _)| truth.class().is_some())
-        .collect();
+    let (mut nulls, mut singles, mut several, mut outside) = (vec![], vec![], vec![], vec![]);
+    for (truth, answer) in cases {
+        let kind = match truth.kind() {
+            CaseKind::Null => &mut nulls,
+            CaseKind::Single(_) => &mut singles,
+            CaseKind::Several => &mut several,
+            CaseKind::OutOfCatalogue => &mut outside,
+        };
+        kind.push((truth, answer));
+    }
+    let named = singles.iter().filter(|(_, answer)| is_named(answer));
+    let closures = sorted(named.filter_map(|(_, answer)| answer.closure));
+    let sizes = sorted(singles.iter().filter_map(|(t, a)| size_error(t, a)));
+    let classed = cases.iter().filter_map(|(truth, answer)| {
+        let class = truth.class()?;
+        Some((class, answer.set(SET_SHARE)))
+    });
+    let sets: Vec<(Class, Vec<Class>)> = classed.collect();
+    let failed = cases.iter().filter(|(_, answer)| answer.verdict.is_none());
     Scores {
-        counts: kinds.map(|kind| of(kind).count()),
-        failed: cases
-            .iter()
-            .filter(|(_, answer)| answer.verdict.is_none())
-            .count(),
-        top_1: Rate::of(of(Kind::Single), |case| rank_within(case, 1)),
-        top_1_detectable: Rate::of(of(Kind::Single), |case| {
-            rank_within(case, 1).filter(|_| case.0.detectable == Some(true))
+        counts: [&nulls, &singles, &several, &outside].map(Vec::len),
+        failed: failed.count(),
+        top_1: Rate::of(&singles, |(t, a)| rank_within(t, a, 1)),
+        top_1_detectable: Rate::of(&singles, |(t, a)| {
+            rank_within(t, a, 1).filter(|_| t.detectable == Some(true))
         }),
-        top_3: Rate::of(of(Kind::Single), |case| rank_within(case, 3)),
-        top_1_of_all: Rate::of(of(Kind::Single), |(truth, answer)| {
-            Some(answer.first().map(|(class, _)| class) == truth.class())
+        top_3: Rate::of(&singles, |(t, a)| rank_within(t, a, 3)),
+        top_1_of_all: Rate::of(&singles, |(t, a)| {
+            Some(a.first().map(|(class, _)| class) == t.class())
         }),
-        place: Rate::of(of(Kind::Single), place_right),
-        named_right: Rate::of(of(Kind::Single), |case| {
-            is_named(&case.1).then(|| names_exactly(case))
+        place: Rate::of(&singles, |(t, a)| place_right(t, a)),
+        named_right: Rate::of(&singles, |(t, a)| is_named(a).then(|| names_exactly(t, a))),
+        named: Rate::of(&singles, |(_, a)| Some(is_named(a))),
+        named_right_of_all: Rate::of(cases, |(t, a)| is_named(a).then(|| names_exactly(t, a))),
+        null_called_effect: Rate::of(&nulls, |(_, a)| Some(calls_effect(a))),
+        null_false_alarm: Rate::of(&nulls, |(_, a)| {
+            Some(matches!(a.first(), Some((Class::Group(_), _))))
         }),
-        named: Rate::of(of(Kind::Single), |case| Some(is_named(&case.1))),
-        named_right_of_all: Rate::of(cases, |case| is_named(&case.1).then(|| names_exactly(case))),
-        null_called_effect: Rate::of(of(Kind::Null), |(_, answer)| Some(calls_effect(answer))),
-        null_false_alarm: Rate::of(of(Kind::Null), |(_, answer)| {
-            Some(matches!(answer.first(), Some((Class::Group(_), _))))
+        outside_named: Rate::of(&outside, |(_, a)| Some(is_named(a))),
+        outside_refused: Rate::of(&outside, |(t, a)| {
+            (t.refutable == Some(true)).then(|| is_refused(a))
         }),
-        outside_named: Rate::of(of(Kind::Outside), |(_, answer)| Some(is_named(answer))),
-        outside_refused: Rate::of(of(Kind::Outside), |(truth, answer)| {
-            (truth.refutable == Some(true)).then(|| is_refused(answer))
+        outside_unknown: Rate::of(&outside, |(_, a)| Some(a.verdict == Some(Verdict::Unknown))),
+        several_found_or_refused: Rate::of(&several, |(t, a)| Some(found_or_refused(t, a))),
+        several_detectable: Rate::of(&several, |(t, a)| {
+            (t.detectable == Some(true)).then(|| found_or_refused(t, a))
         }),
-        outside_unknown: Rate::of(of(Kind::Outside), |(_, answer)| {
-            Some(answer.verdict == Some(Verdict::Unknown))
-        }),
-        several_found_or_refused: Rate::of(of(Kind::Several), |case| Some(found_or_refused(case))),
-        several_detectable: Rate::of(of(Kind::Several), |case| {
-            (case.0.detectable == Some(true)).then(|| found_or_refused(case))
-        }),
-        several_found: Rate::of(of(Kind::Several), |case| {
-            Some(is_named(&case.1) && names_exactly(case))
-        }),
-        set_coverage: Rate::of(&sets, |(truth, answer)| {
-            Some(answer.set(SET_SHARE).contains(&truth.class()?))
-        }),
-        set_size: mean(
-            sets.iter()
-                .map(|(_, answer)| answer.set(SET_SHARE).len() as f64),
-        ),
-        truth_probability: mean(of(Kind::Single).filter_map(|(truth, answer)| {
+        several_found: Rate::of(&several, |(t, a)| Some(is_named(a) && names_exactly(t, a))),
+        set_coverage: Rate::of(&sets, |(class, set)| Some(set.contains(class))),
+        set_size: mean(sets.iter().map(|(_, set)| set.len() as f64)),
+        truth_probability: mean(singles.iter().filter_map(|(truth, answer)| {
             let class = truth
                 .class()
                 .filter(|_| answer.verdict != Some(Verdict::NoGap))?;
-            Some(answer.classes.get(&class).copied().unwrap_or(0.0))
+            Some(answer.stated(class))
         })),
         calibration: calibrate(cases),
         closures: closures.len(),
@@ -149,31 +135,11 @@ pub fn score(cases: &[Case]) -> Scores {
     }
 }
 
-/// Kinds of cases without what was planted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Null,
-    Single,
-    Several,
-    Outside,
-}
-
-impl Kind {
-    fn of(truth: &Truth) -> Self {
-        match truth.kind() {
-            CaseKind::Null => Self::Null,
-            CaseKind::Single(_) => Self::Single,
-            CaseKind::Several => Self::Several,
-            CaseKind::Outside => Self::Outside,
-        }
-    }
-}
-
 fn is_named(answer: &Answer) -> bool {
     matches!(answer.verdict, Some(Verdict::Named(_)))
 }
 
-/// Whether somebody who reads the verdict believes in an effect.
+/// Returns true where the verdict makes its reader believe in an effect.
 fn calls_effect(answer: &Answer) -> bool {
     match &answer.verdict {
         Some(Verdict::Named(_) | Verdict::Group(_)) => true,
@@ -182,7 +148,7 @@ fn calls_effect(answer: &Answer) -> bool {
     }
 }
 
-/// Neither a name nor a clean bill: the user is told that the catalogue does not decide it.
+/// Returns true where the verdict leaves the case open: neither an effect nor "nothing is missing".
 fn is_refused(answer: &Answer) -> bool {
     matches!(
         answer.verdict,
@@ -190,11 +156,11 @@ fn is_refused(answer: &Answer) -> bool {
     )
 }
 
-fn found_or_refused(case: &Case) -> bool {
-    is_refused(&case.1) || is_named(&case.1) && names_exactly(case)
+fn found_or_refused(truth: &Truth, answer: &Answer) -> bool {
+    is_refused(answer) || is_named(answer) && names_exactly(truth, answer)
 }
 
-fn rank_within((truth, answer): &Case, most: usize) -> Option<bool> {
+fn rank_within(truth: &Truth, answer: &Answer, most: usize) -> Option<bool> {
     let Some(Class::Group(group)) = truth.class() else {
         return None;
     };
@@ -203,36 +169,24 @@ fn rank_within((truth, answer): &Case, most: usize) -> Option<bool> {
             .groups()
             .iter()
             .take(most)
-            .any(|found| *found == group),
+            .any(|&found| found == group),
     )
 }
 
 /// A group over two places counts as right in either.
-fn place_right((truth, answer): &Case) -> Option<bool> {
+fn place_right(truth: &Truth, answer: &Answer) -> Option<bool> {
     let Some(Class::Group(group)) = truth.class() else {
         return None;
     };
-    let places: Vec<Place> = places_of(group);
     let found = answer.places.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    Some(
-        found
-            .and_then(|(place, _)| *place)
-            .is_some_and(|place| places.contains(&place)),
-    )
+    let place = found.and_then(|(place, _)| *place);
+    let mut members = EffectId::ALL.iter().filter(|id| id.group() == group);
+    Some(members.any(|id| Some(id.place()) == place))
 }
 
-fn places_of(group: Group) -> Vec<Place> {
-    let members = EffectId::ALL.iter().filter(|id| id.group() == group);
-    members.map(|id| id.place()).collect()
-}
-
-/// Whether the verdict names the groups of all that was planted, and no other.
-fn names_exactly((truth, answer): &Case) -> bool {
-    if truth
-        .effects
-        .iter()
-        .any(|p| matches!(p, Planted::Outside(_)))
-    {
+/// Returns true where the verdict names the groups of all that was planted, and no other.
+fn names_exactly(truth: &Truth, answer: &Answer) -> bool {
+    if truth.kind() == CaseKind::OutOfCatalogue {
         return false;
     }
     let mut groups: Vec<Group> = truth.catalogue().map(|(id, _)| id.group()).collect();
@@ -241,13 +195,9 @@ fn names_exactly((truth, answer): &Case) -> bool {
     groups == answer.named_groups()
 }
 
-fn closure_of_named((_, answer): &Case) -> Option<f64> {
-    answer.closure.filter(|_| is_named(answer))
-}
-
 /// abs ln(estimate/truth) of the effect's size where that very effect is named; infinite where the
 /// sign is wrong.
-fn size_error((truth, answer): &Case) -> Option<f64> {
+fn size_error(truth: &Truth, answer: &Answer) -> Option<f64> {
     let (id, values) = truth.catalogue().next()?;
     if !is_named(answer) || answer.effects != [id] {
         return None;
@@ -326,18 +276,10 @@ impl Rate {
         if self.of == 0 {
             return None;
         }
-        let quantile = |first: usize, second: usize, chance: f64| {
-            Beta::new(first as f64, second as f64).map(|beta| beta.inverse_cdf(chance))
-        };
-        let misses = self.of - self.hits;
-        let low = match self.hits {
-            0 => 0.0,
-            hits => quantile(hits, misses + 1, 0.025).unwrap_or(0.0),
-        };
-        let high = match misses {
-            0 => 1.0,
-            misses => quantile(self.hits + 1, misses, 0.975).unwrap_or(1.0),
-        };
+        let (hits, misses) = (self.hits as f64, (self.of - self.hits) as f64);
+        // There is no such distribution without a hit, or without a miss.
+        let low = Beta::new(hits, misses + 1.0).map_or(0.0, |beta| beta.inverse_cdf(0.025));
+        let high = Beta::new(hits + 1.0, misses).map_or(1.0, |beta| beta.inverse_cdf(0.975));
         Some((low, high))
     }
 }
@@ -371,58 +313,53 @@ pub struct Calibration {
 }
 
 /// Judges the probabilities of all cases with one right class.
-pub fn calibrate(cases: &[(Truth, Answer)]) -> Calibration {
+pub fn calibrate(cases: &[Case]) -> Calibration {
     let cases: Vec<(Class, &Answer)> = cases
         .iter()
         .filter_map(|(truth, answer)| Some((truth.class()?, answer)))
         .collect();
     let reliability: Vec<ReliabilityBin> = (0..BINS).map(|bin| row(bin, &cases)).collect();
     let total = cases.len() as f64;
-    let distance = |bin: &ReliabilityBin| {
-        let (stated, right) = bin.stated.zip(bin.right)?;
-        Some(bin.cases as f64 / total * (stated - right).abs())
-    };
+    let mut error = 0.0;
+    for bin in &reliability {
+        if let Some((stated, right)) = bin.stated.zip(bin.right) {
+            error += bin.cases as f64 / total * (stated - right).abs();
+        }
+    }
     Calibration {
-        brier: (!cases.is_empty()).then(|| {
-            cases
-                .iter()
-                .map(|(class, answer)| brier(*class, answer))
-                .sum::<f64>()
-                / total
-        }),
-        expected_calibration_error: (!cases.is_empty())
-            .then(|| reliability.iter().filter_map(distance).sum()),
+        brier: mean(cases.iter().map(|(class, answer)| brier(*class, answer))),
+        expected_calibration_error: (!cases.is_empty()).then_some(error),
         reliability,
     }
 }
 
 /// sum over classes of (p - 1 or 0)^2.
 fn brier(truth: Class, answer: &Answer) -> f64 {
-    let stated = |class: &Class| answer.classes.get(class).copied().unwrap_or(0.0);
     let others = answer.classes.iter().filter(|(class, _)| **class != truth);
-    (1.0 - stated(&truth)).powi(2) + others.map(|(_, p)| p * p).sum::<f64>()
+    (1.0 - answer.stated(truth)).powi(2) + others.map(|(_, p)| p * p).sum::<f64>()
 }
 
 fn row(bin: usize, cases: &[(Class, &Answer)]) -> ReliabilityBin {
-    let inside: Vec<(bool, f64)> = cases
-        .iter()
-        .filter_map(|(truth, answer)| {
-            let (class, probability) = answer.first()?;
-            let own = ((probability * BINS as f64) as usize).min(BINS - 1);
-            (own == bin).then_some((class == *truth, probability))
-        })
-        .collect();
-    let count = inside.len() as f64;
-    let mean = |sum: f64| (!inside.is_empty()).then(|| sum / count);
+    let (mut inside, mut stated, mut right) = (0, 0.0, 0);
+    for (truth, answer) in cases {
+        let Some((class, probability)) = answer.first() else {
+            continue;
+        };
+        if ((probability * BINS as f64) as usize).min(BINS - 1) == bin {
+            inside += 1;
+            stated += probability;
+            right += usize::from(class == *truth);
+        }
+    }
     ReliabilityBin {
         from: bin as f64 / BINS as f64,
-        cases: inside.len(),
-        stated: mean(inside.iter().map(|(_, p)| p).sum()),
-        right: mean(inside.iter().filter(|(right, _)| *right).count() as f64),
+        cases: inside,
+        stated: (inside > 0).then(|| stated / inside as f64),
+        right: (inside > 0).then(|| right as f64 / inside as f64),
     }
 }
 
-/// How a check was conducted, and what answers earn that cannot know.
+/// How a check was conducted, and the score of answers without knowledge.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Conduct {
     /// Recordings of each test; `None` of tests made elsewhere.
@@ -448,16 +385,18 @@ impl Conduct {
     }
 }
 
-/// The same answers, dealt out to other cases: what is left is what guessing earns.
+/// The answers dealt out to other cases: their score is what guessing earns.
 pub fn shuffled(cases: &[Case], seed: u64) -> Vec<Case> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut order: Vec<usize> = (0..cases.len()).collect();
     order.shuffle(&mut random);
-    let with = |((truth, _), from): (&Case, &usize)| (truth.clone(), cases[*from].1.clone());
-    cases.iter().zip(&order).map(with).collect()
+    let pairs = cases.iter().zip(order);
+    pairs
+        .map(|((truth, _), from)| (truth.clone(), cases[from].1.clone()))
+        .collect()
 }
 
-/// What somebody would score who always answers with one common factor on all frequencies.
+/// The same answer to every case: one common factor on all frequencies.
 pub fn always_scale(cases: &[Case]) -> Vec<Case> {
     let answer = Answer {
         verdict: Some(Verdict::Named(vec![EffectId::Modulus])),
@@ -467,8 +406,10 @@ pub fn always_scale(cases: &[Case]) -> Vec<Case> {
         parameters: Vec::new(),
         closure: None,
     };
-    let with = |(truth, _): &(Truth, Answer)| (truth.clone(), answer.clone());
-    cases.iter().map(with).collect()
+    let truths = cases.iter().map(|(truth, _)| truth);
+    truths
+        .map(|truth| (truth.clone(), answer.clone()))
+        .collect()
 }
 
 #[cfg(test)]

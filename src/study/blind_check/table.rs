@@ -1,16 +1,14 @@
-//! The score as rows: what each rate means, what was reached, what was aimed at.
+//! The score as rows: the meaning, value and target of each rate, beside the figures of an ideal observer.
 //!
-//! What an ideal observer reaches, to hold the score against.
+//! Those come from a Monte Carlo study of 840 cases with frequencies good to 0.03 % and effects of the sizes drawn here,
+//! diagnosed by the very model that made them. A diagnosis from recordings whose frequencies are better known than that
+//! may surpass it.
 //!
-//! A Monte Carlo study of 840 cases with frequencies good to 0.03 % and effects of the sizes drawn here, diagnosed by
-//! the very model that made them: nothing is left to reach but what the readings do not hold. A diagnosis from
-//! recordings whose frequencies are better known than that may surpass it.
-//!
-//! What it names is by a definition near to the one used here, but not the same: an effect of a probability above 0.8
-//! whose model fits, from five modes, where the diagnosis gives a verdict on five of six modes and the one withheld. The
-//! shares that rest on it (something is named, nothing is called an effect) compare in size alone.
+//! The ideal observer names an effect by a slightly different definition: a probability above 0.8 whose model fits, from
+//! five modes, where the diagnosis gives a verdict on five of six modes and the one withheld. The shares that rest on it
+//! (something is named, nothing is called an effect) compare in size alone.
 
-use super::draw::Extent;
+use super::case::Extent;
 use super::score::{Rate, Scores};
 
 /// Which side of its target a figure has to stay on.
@@ -25,7 +23,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// Whether a figure meets it.
+    /// Returns true where a figure meets it.
     pub fn is_met(&self, value: f64) -> bool {
         match *self {
             Self::AtLeast(limit) => value >= limit,
@@ -64,7 +62,7 @@ pub fn rows(scores: &Scores, extent: Option<Extent>) -> Vec<Row> {
     let mut rows = all_rows(scores);
     for row in &mut rows {
         row.ideal = extent.and_then(|extent| ideal_observer(row.key, extent));
-        if extent == Some(Extent::OneRecording) && row.key != "no_answer" {
+        if extent == Some(Extent::OneRecording) && row.key != NO_ANSWER {
             row.target = Target::None;
         }
     }

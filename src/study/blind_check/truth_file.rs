@@ -3,13 +3,13 @@
 //! An empty list of effects means that nothing was planted; an id that the catalogue does not have
 //! means something outside it. Parameters may stand under their effect's id, or by themselves where
 //! there is but one effect. `"detectable"` and `"refutable"` say whether the effect could be noticed, and
-//! whether the catalogue could be seen not to explain it; both may be left out. What a slip of the pen may
-//! have left is told as a doubt: it would change the score without a word.
+//! whether the catalogue could be seen not to explain it; both may be left out. A likely slip of the pen is
+//! reported as a doubt, because it would change the score unnoticed.
 //!
-//! A promise that the answers are not changed after the diagnosis has been seen.
+//! [`commitment`] seals the truths, so that they cannot be changed once the diagnosis has been seen.
 
 use super::case::{Planted, Truth};
-use super::planted_effects::OutsideKind;
+use super::planted_effects::OutOfCatalogueKind;
 use serde::Deserialize;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -54,7 +54,7 @@ pub enum TruthDoubt {
         "the test \"{test}\": the catalogue has no effect `{effect}`, so that it counts as something outside \
          the catalogue{hint}"
     )]
-    Outside {
+    OutOfCatalogue {
         /// The test.
         test: String,
         /// The id.
@@ -101,17 +101,20 @@ struct Entry {
 }
 
 impl Entry {
+    /// Returns the effects of the catalogue.
+    fn known_effects(&self) -> Vec<EffectId> {
+        let names = self.effects.iter();
+        names
+            .filter_map(|name| EffectId::parse(name).ok())
+            .collect()
+    }
+
     /// Gives parameters to the effect that has them: those written as `effect.parameter`, and of several effects those
     /// that only one of them knows, unless one lies outside the catalogue and has parameters of its own. What is given
     /// twice stays where it is, and is told.
     fn sort_parameters(&mut self) {
-        let effects: Vec<EffectId> = self
-            .effects
-            .iter()
-            .filter_map(|name| EffectId::parse(name).ok())
-            .collect();
+        let effects = self.known_effects();
         let all_known = effects.len() == self.effects.len() && effects.len() > 1;
-        let has = |id: &EffectId, name: &str| id.parameters().iter().any(|info| info.name == name);
         let flat: Vec<(String, Value)> = self
             .params
             .iter()
@@ -124,9 +127,10 @@ impl Entry {
                 None if all_known => (None, key.as_str()),
                 None => continue,
             };
-            let owners = effects
-                .iter()
-                .filter(|id| effect.is_none_or(|effect| id.name() == effect) && has(id, name));
+            let owners = effects.iter().filter(|id| {
+                effect.is_none_or(|effect| id.name() == effect)
+                    && parameter_names(**id).contains(&name)
+            });
             let owners: Vec<&EffectId> = owners.collect();
             let [owner] = owners[..] else { continue };
             let own = self
@@ -164,37 +168,39 @@ pub fn parse_truths(text: &str) -> Result<TruthFile, TruthError> {
 }
 
 fn doubts_of(entry: &Entry) -> Vec<TruthDoubt> {
-    let test = || entry.name.clone();
-    let keys = entry.unknown.keys().map(|key| TruthDoubt::Key {
-        test: test(),
-        key: key.clone(),
-    });
-    let effects = entry.effects.iter().filter_map(|effect| {
-        Some(TruthDoubt::Outside {
-            test: test(),
-            effect: effect.clone(),
-            hint: hint(effect)?,
-        })
-    });
-    let known: Vec<EffectId> = entry
-        .effects
-        .iter()
-        .filter_map(|name| EffectId::parse(name).ok())
-        .collect();
-    let mut all: Vec<TruthDoubt> = effects.chain(keys).collect();
-    // What lies outside the catalogue has parameters of its own.
-    if known.len() == entry.effects.len() {
-        all.extend(
-            unused_parameters(entry, &known)
-                .into_iter()
-                .map(|(parameter, allowed)| TruthDoubt::Parameter {
-                    test: test(),
-                    parameter,
-                    allowed,
-                }),
-        );
+    let mut doubts = Vec::new();
+    for effect in &entry.effects {
+        if let Some(hint) = hint(effect) {
+            doubts.push(TruthDoubt::OutOfCatalogue {
+                test: entry.name.clone(),
+                effect: effect.clone(),
+                hint,
+            });
+        }
     }
-    all
+    for key in entry.unknown.keys() {
+        doubts.push(TruthDoubt::Key {
+            test: entry.name.clone(),
+            key: key.clone(),
+        });
+    }
+    let known = entry.known_effects();
+    // Faults outside the catalogue have parameters of their own.
+    if known.len() == entry.effects.len() {
+        for (parameter, allowed) in unused_parameters(entry, &known) {
+            doubts.push(TruthDoubt::Parameter {
+                test: entry.name.clone(),
+                parameter,
+                allowed,
+            });
+        }
+    }
+    doubts
+}
+
+/// The names of an effect's parameters.
+fn parameter_names(id: EffectId) -> Vec<&'static str> {
+    id.parameters().iter().map(|info| info.name).collect()
 }
 
 /// What may have been meant by an id outside the catalogue; `None` where nothing speaks for a slip: of an id in it,
@@ -203,7 +209,10 @@ fn hint(effect: &str) -> Option<String> {
     let Err(error) = EffectId::parse(effect) else {
         return None;
     };
-    if OutsideKind::ALL.iter().any(|kind| kind.name() == effect) {
+    if OutOfCatalogueKind::ALL
+        .iter()
+        .any(|kind| kind.name() == effect)
+    {
         return None;
     }
     if effect.is_empty() || effect == "none" {
@@ -219,63 +228,68 @@ fn hint(effect: &str) -> Option<String> {
 
 /// Parameters that no effect of the entry takes up, each with those that would be.
 fn unused_parameters(entry: &Entry, effects: &[EffectId]) -> Vec<(String, String)> {
-    let names = |id: EffectId| id.parameters().iter().map(|info| info.name);
     let mut unused = Vec::new();
     for (key, value) in &entry.params {
-        let own = effects.iter().find(|id| id.name() == key);
-        match (own, value, effects) {
-            (Some(&id), Value::Object(values), _) => {
-                let odd = values.iter().filter(|(name, value)| {
-                    !(names(id).any(|known| known == *name) && value.is_number())
-                });
-                let allowed = || names(id).collect::<Vec<_>>().join(", ");
-                unused.extend(odd.map(|(name, _)| (name.clone(), allowed())));
+        if let Some(&id) = effects.iter().find(|id| id.name() == key)
+            && let Value::Object(values) = value
+        {
+            let names = parameter_names(id);
+            for (name, value) in values {
+                if !(names.contains(&name.as_str()) && value.is_number()) {
+                    unused.push((name.clone(), names.join(", ")));
+                }
             }
-            (_, value, [id]) if names(*id).any(|known| known == key) && value.is_number() => {}
-            (_, _, [id]) => unused.push((key.clone(), names(*id).collect::<Vec<_>>().join(", "))),
-            (_, _, []) => unused.push((key.clone(), "none, for nothing was planted".to_owned())),
+            continue;
+        }
+        let allowed = match effects {
+            [] => "none, for nothing was planted".to_owned(),
+            [id] => {
+                let names = parameter_names(*id);
+                if names.contains(&key.as_str()) && value.is_number() {
+                    continue;
+                }
+                names.join(", ")
+            }
             _ => {
                 let ids: Vec<&str> = effects.iter().map(|id| id.name()).collect();
-                let allowed = format!(
+                format!(
                     "{} with their own parameters in braces, and what only one of them has",
                     ids.join(", ")
-                );
-                unused.push((key.clone(), allowed));
+                )
             }
-        }
+        };
+        unused.push((key.clone(), allowed));
     }
     unused
 }
 
 fn truth_of(entry: Entry) -> Truth {
-    let alone = entry.effects.len() == 1;
-    let planted = |name: &String| match EffectId::parse(name) {
-        Ok(id) => Planted::Catalogue(id, parameters_of(name, &entry.params, alone)),
-        Err(_) => Planted::Outside(name.clone()),
-    };
+    let mut planted = Vec::new();
+    for name in &entry.effects {
+        planted.push(match EffectId::parse(name) {
+            Ok(id) => Planted::Catalogue(id, parameters_of(&entry, name)),
+            Err(_) => Planted::OutOfCatalogue(name.clone()),
+        });
+    }
     Truth {
-        effects: entry.effects.iter().map(planted).collect(),
+        effects: planted,
         name: entry.name,
         detectable: entry.detectable,
         refutable: entry.refutable,
     }
 }
 
-fn parameters_of(
-    effect: &str,
-    params: &BTreeMap<String, Value>,
-    alone: bool,
-) -> BTreeMap<String, f64> {
-    let numbers = |values: &mut dyn Iterator<Item = (&String, &Value)>| {
-        values
-            .filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)))
-            .collect()
+/// The numbers given for an effect: under its name, or by themselves where there is but one effect.
+fn parameters_of(entry: &Entry, effect: &str) -> BTreeMap<String, f64> {
+    let values: Vec<(&String, &Value)> = match entry.params.get(effect) {
+        Some(Value::Object(own)) => own.iter().collect(),
+        _ if entry.effects.len() == 1 => entry.params.iter().collect(),
+        _ => Vec::new(),
     };
-    match params.get(effect) {
-        Some(Value::Object(own)) => numbers(&mut own.iter()),
-        _ if alone => numbers(&mut params.iter()),
-        _ => BTreeMap::new(),
-    }
+    let numbers = values.into_iter();
+    numbers
+        .filter_map(|(name, value)| Some((name.clone(), value.as_f64()?)))
+        .collect()
 }
 
 /// SHA-256 of a text, in hexadecimal digits. Printed before the diagnosis begins; whoever has the

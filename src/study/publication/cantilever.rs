@@ -1,7 +1,8 @@
 //! Tables 1 to 9: the cantilever, simulated and measured.
 
 use super::table::{
-    PaperError, Printed, PrintedTable, Row, Table, Verdict, estimate_from_printed, joint_label,
+    Printed, PrintedTable, PublicationError, Row, Table, Verdict, estimate_from_printed,
+    joint_label,
 };
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{
@@ -44,7 +45,7 @@ const NOT_FREQUENCIES: &str = "Not had by changing the measured frequencies. Kx 
 const NOT_EVEN_LAMBDAS: &str = "Not had from the printed lambdas either, though Kx and Ky of the \
     same fits are, all but one.";
 
-pub(super) fn tables() -> Result<Vec<Table>, PaperError> {
+pub(super) fn tables() -> Result<Vec<Table>, PublicationError> {
     Ok(vec![
         table_1a()?,
         table_1b()?,
@@ -61,20 +62,19 @@ pub(super) fn tables() -> Result<Vec<Table>, PaperError> {
 }
 
 /// The specimen of table 2.
-fn specimen() -> Result<Beam, PaperError> {
+fn specimen() -> Result<Beam, PublicationError> {
     let table = PrintedTable::new(TABLE_2);
-    let value = |row: usize| table.value(row, "printed");
     Ok(Beam {
-        length: value(0)?,
-        width: value(1)?,
-        thickness: value(2)?,
-        modulus: value(3)?,
-        density: value(4)?,
+        length: table.value(0, "printed")?,
+        width: table.value(1, "printed")?,
+        thickness: table.value(2, "printed")?,
+        modulus: table.value(3, "printed")?,
+        density: table.value(4, "printed")?,
         poisson: 0.3,
     })
 }
 
-fn table_2() -> Result<Table, PaperError> {
+fn table_2() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_2);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -95,7 +95,7 @@ fn table_2() -> Result<Table, PaperError> {
     })
 }
 
-fn table_3() -> Result<Table, PaperError> {
+fn table_3() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_3);
     let beam = Beam {
         length: 0.5,
@@ -116,7 +116,7 @@ fn table_3() -> Result<Table, PaperError> {
     })
 }
 
-fn table_4() -> Result<Table, PaperError> {
+fn table_4() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_4);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -134,27 +134,33 @@ fn table_4() -> Result<Table, PaperError> {
 }
 
 /// The estimate of table 5 or 7 from the frequencies of table 4, with these changed by a factor.
-fn measured_estimate(model: PairsModel, factor: f64) -> Result<Option<Stiffnesses>, PaperError> {
+fn measured_estimate(
+    model: PairsModel,
+    factor: f64,
+) -> Result<Option<Stiffnesses>, PublicationError> {
     let table = PrintedTable::new(TABLE_4);
     let frequencies = table.column("measured_hz")?;
-    let lambda =
-        |frequency: &Printed| (PAPER_LAMBDA_SQUARED_PER_HERTZ * factor * frequency.value).sqrt();
-    let lambdas: Vec<f64> = frequencies.iter().take(FIT_MODES).map(lambda).collect();
+    let lambdas: Vec<f64> = frequencies
+        .iter()
+        .take(FIT_MODES)
+        .map(|frequency| (PAPER_LAMBDA_SQUARED_PER_HERTZ * factor * frequency.value).sqrt())
+        .collect();
     Ok(estimate_pairs(model, &ModeLambda::numbered(&lambdas))?.stiffnesses())
 }
 
 /// Conversion of a printed stiffness to SI, beside the printed one.
-fn converted(case: &str, pairs: &[(&str, &str, f64)]) -> Result<Vec<Row>, PaperError> {
+fn converted(case: &str, pairs: &[(&str, &str, f64)]) -> Result<Vec<Row>, PublicationError> {
     let table = PrintedTable::new(TABLE_5_7);
-    let convert = |&(from, to, unit): &(&str, &str, f64)| {
+    let mut rows = Vec::new();
+    for (from, to, unit) in pairs {
         let ours = table.named(case, from)?.value * unit;
         let label = format!("{} from {}", to.replace('k', "K"), from.replace('k', "K"));
-        Ok(Row::to_last_digit(label, table.named(case, to)?, ours))
-    };
-    pairs.iter().map(convert).collect()
+        rows.push(Row::to_last_digit(label, table.named(case, to)?, ours));
+    }
+    Ok(rows)
 }
 
-fn table_5() -> Result<Table, PaperError> {
+fn table_5() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_5_7);
     let model = PairsModel::TwoParameter;
     let ours = measured_estimate(model, 1.0)?;
@@ -184,7 +190,7 @@ fn table_5() -> Result<Table, PaperError> {
     })
 }
 
-fn table_6() -> Result<Table, PaperError> {
+fn table_6() -> Result<Table, PublicationError> {
     let joint = PrintedTable::new(TABLE_5_7);
     let (kx, ky) = (joint.named("2p", "kx")?, joint.named("2p", "ky")?);
     let joint = JointStiffness::two_parameter(kx.value, ky.value);
@@ -198,35 +204,38 @@ fn table_6() -> Result<Table, PaperError> {
 }
 
 /// Frequencies of the specimen on a joint beside a printed column.
-fn predicted(joint: &JointStiffness, column: &str, label: &str) -> Result<Vec<Row>, PaperError> {
+fn predicted(
+    joint: &JointStiffness,
+    column: &str,
+    label: &str,
+) -> Result<Vec<Row>, PublicationError> {
     let table = PrintedTable::new(TABLE_6_8);
     let beam = specimen()?;
     let ours = natural_lambdas(Assembly::Cantilever, joint, table.len())?;
-    let row = |(row, lambda): (usize, f64)| {
+    let mut rows = Vec::new();
+    for (row, lambda) in ours.into_iter().enumerate() {
         let printed = table.number(row, column)?;
         let label = format!("mode {} (Hz), {label}", row + 1);
-        Ok(Row::to_last_digit(
-            label,
-            printed,
-            beam.frequency_of(lambda),
-        ))
-    };
-    ours.into_iter().enumerate().map(row).collect()
+        let ours = beam.frequency_of(lambda);
+        rows.push(Row::to_last_digit(label, printed, ours));
+    }
+    Ok(rows)
 }
 
 /// The printed error column from the printed frequencies: 100 (measured - computed)/measured.
-fn errors(computed: &str, column: &str) -> Result<Vec<Row>, PaperError> {
+fn errors(computed: &str, column: &str) -> Result<Vec<Row>, PublicationError> {
     let table = PrintedTable::new(TABLE_6_8);
-    let row = |row: usize| {
+    let mut rows = Vec::new();
+    for row in 0..table.len() {
         let measured = table.value(row, "measured_hz")?;
         let error = 100.0 * (measured - table.value(row, computed)?) / measured;
         let label = format!("mode {} error (%), from printed Hz", row + 1);
-        Ok(Row::to_last_digit(label, table.number(row, column)?, error))
-    };
-    (0..table.len()).map(row).collect()
+        rows.push(Row::to_last_digit(label, table.number(row, column)?, error));
+    }
+    Ok(rows)
 }
 
-fn table_7() -> Result<Table, PaperError> {
+fn table_7() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_5_7);
     let ours = measured_estimate(PairsModel::ThreeParameter, 1.0)?;
     let values = [
@@ -256,10 +265,11 @@ fn table_7() -> Result<Table, PaperError> {
     })
 }
 
-fn table_8() -> Result<Table, PaperError> {
+fn table_8() -> Result<Table, PublicationError> {
     let joint = PrintedTable::new(TABLE_5_7);
-    let value = |name: &str| Ok::<f64, PaperError>(joint.named("3p", name)?.value);
-    let (kx, ky, kz) = (value("kx")?, value("ky")?, value("kz")?);
+    let kx = joint.named("3p", "kx")?.value;
+    let ky = joint.named("3p", "ky")?.value;
+    let kz = joint.named("3p", "kz")?.value;
     let coupled = JointStiffness::three_parameter(kx, ky, kz);
     let uncoupled = JointStiffness::two_parameter(kx, ky);
     let mut rows: Vec<Row> = predicted(&coupled, "fe_3p_hz", "table 7's joint")?
@@ -277,7 +287,7 @@ fn table_8() -> Result<Table, PaperError> {
 }
 
 /// The frequencies' estimate, and that of table 4's printed lambdas, changed alike.
-fn table_9(number: &'static str, percent: f64) -> Result<Table, PaperError> {
+fn table_9(number: &'static str, percent: f64) -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_9);
     let mut rows = Vec::new();
     let sources: [(&str, Source, &str); 2] = [
@@ -299,11 +309,11 @@ fn table_9(number: &'static str, percent: f64) -> Result<Table, PaperError> {
         }
         rows.extend(average_rows(percent, what, source, remark)?);
     }
-    let printed = |change| Ok(printed_row_9(change));
+    let source = |change| Ok(printed_row_9(change));
     rows.extend(average_rows(
         percent,
         "of printed",
-        printed,
+        source,
         NOT_FREQUENCIES,
     )?);
     Ok(Table {
@@ -314,16 +324,19 @@ fn table_9(number: &'static str, percent: f64) -> Result<Table, PaperError> {
 }
 
 /// An estimate as a function of the change (%).
-type Source = fn(f64) -> Result<Option<Stiffnesses>, PaperError>;
+type Source = fn(f64) -> Result<Option<Stiffnesses>, PublicationError>;
 
-fn measured_estimate_changed(percent: f64) -> Result<Option<Stiffnesses>, PaperError> {
+fn measured_estimate_changed(percent: f64) -> Result<Option<Stiffnesses>, PublicationError> {
     measured_estimate(PairsModel::ThreeParameter, 1.0 + percent / 100.0)
 }
 
-fn printed_estimate_changed(percent: f64) -> Result<Option<Stiffnesses>, PaperError> {
+fn printed_estimate_changed(percent: f64) -> Result<Option<Stiffnesses>, PublicationError> {
     let lambdas = PrintedTable::new(TABLE_4).column("lambda")?;
-    let changed = |lambda: &Printed| lambda.value * (1.0 + percent / 100.0);
-    let lambdas: Vec<f64> = lambdas.iter().take(FIT_MODES).map(changed).collect();
+    let lambdas: Vec<f64> = lambdas
+        .iter()
+        .take(FIT_MODES)
+        .map(|lambda| lambda.value * (1.0 + percent / 100.0))
+        .collect();
     let model = PairsModel::ThreeParameter;
     Ok(estimate_pairs(model, &ModeLambda::numbered(&lambdas))?.stiffnesses())
 }
@@ -331,8 +344,8 @@ fn printed_estimate_changed(percent: f64) -> Result<Option<Stiffnesses>, PaperEr
 /// The estimates of table 9 as printed.
 fn printed_row_9(percent: f64) -> Option<Stiffnesses> {
     let table = PrintedTable::new(TABLE_9);
-    let at = |&row: &usize| table.value(row, "perturbation_percent") == Ok(percent);
-    let row = (0..table.len()).find(at)?;
+    let row =
+        (0..table.len()).find(|&row| table.value(row, "perturbation_percent") == Ok(percent))?;
     Some(Stiffnesses {
         kx: table.value(row, "kx").ok()?,
         ky: table.value(row, "ky").ok()?,
@@ -344,9 +357,9 @@ fn printed_row_9(percent: f64) -> Option<Stiffnesses> {
 fn average_rows(
     percent: f64,
     what: &str,
-    source: impl Fn(f64) -> Result<Option<Stiffnesses>, PaperError>,
+    source: impl Fn(f64) -> Result<Option<Stiffnesses>, PublicationError>,
     remark: &'static str,
-) -> Result<Vec<Row>, PaperError> {
+) -> Result<Vec<Row>, PublicationError> {
     let table = PrintedTable::new(TABLE_9_AVERAGES);
     let place = usize::from(percent != PAPER_PERCENTS[0]);
     // Errors count from the identified values, table 7's.
@@ -401,7 +414,7 @@ fn forward(
     label: &str,
     printed: Vec<Printed>,
     joint: &JointStiffness,
-) -> Result<Vec<Row>, PaperError> {
+) -> Result<Vec<Row>, PublicationError> {
     let ours = natural_lambdas(Assembly::Cantilever, joint, printed.len())?;
     let rows = printed.into_iter().zip(ours).enumerate();
     Ok(rows
@@ -417,7 +430,7 @@ fn estimated(
     row: usize,
     model: PairsModel,
     lambdas: &[Printed],
-) -> Result<Vec<Row>, PaperError> {
+) -> Result<Vec<Row>, PublicationError> {
     let (estimate, spans) = estimate_from_printed(model, lambdas)?;
     let (suffix, words) = match model {
         PairsModel::ThreeParameter => ("3p", "3 parameters"),
@@ -447,7 +460,7 @@ fn estimated(
     Ok(rows)
 }
 
-fn table_1a() -> Result<Table, PaperError> {
+fn table_1a() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_1A);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -466,7 +479,7 @@ fn table_1a() -> Result<Table, PaperError> {
     })
 }
 
-fn table_1b() -> Result<Table, PaperError> {
+fn table_1b() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_1B);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -497,10 +510,12 @@ fn table_1b() -> Result<Table, PaperError> {
 }
 
 /// The printed lambdas of the fitted modes; for a misprinted one ours, rounded alike.
-fn usable(rows: &[Row]) -> Result<Vec<Printed>, PaperError> {
-    let lambda = |row: &Row| match (row.verdict, row.ours) {
-        (Verdict::DoesNotReproduce, Some(ours)) => Printed::parse(&format!("{ours:.4}")),
-        _ => Ok(row.printed.clone()),
-    };
-    rows.iter().take(FIT_MODES).map(lambda).collect()
+fn usable(rows: &[Row]) -> Result<Vec<Printed>, PublicationError> {
+    let fitted = rows.iter().take(FIT_MODES);
+    fitted
+        .map(|row| match (row.verdict, row.ours) {
+            (Verdict::DoesNotReproduce, Some(ours)) => Printed::parse(&format!("{ours:.4}")),
+            _ => Ok(row.printed.clone()),
+        })
+        .collect()
 }

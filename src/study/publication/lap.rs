@@ -1,7 +1,8 @@
 //! Tables 10 to 14: the lap joint, simulated and measured.
 
 use super::table::{
-    PaperError, Printed, PrintedTable, Row, Table, Verdict, estimate_from_printed, joint_label,
+    Printed, PrintedTable, PublicationError, Row, Table, Verdict, estimate_from_printed,
+    joint_label,
 };
 use tapjoint_beam::{Assembly, JointStiffness, natural_lambdas};
 use tapjoint_identify::{
@@ -43,7 +44,7 @@ const UNSTATED: &str = "The bounds by which the frequencies were changed are not
     line of 800 over 0 to 1000 Hz, 0.625 Hz, is taken here.";
 const OWN_ERROR: &str = "The printed Kx differ by 0.07 %, the printed K1 by 0.15 %.";
 
-pub(super) fn tables() -> Result<Vec<Table>, PaperError> {
+pub(super) fn tables() -> Result<Vec<Table>, PublicationError> {
     Ok(vec![
         table_10a()?,
         table_10b()?,
@@ -54,7 +55,7 @@ pub(super) fn tables() -> Result<Vec<Table>, PaperError> {
     ])
 }
 
-fn table_10a() -> Result<Table, PaperError> {
+fn table_10a() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_10);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -81,7 +82,7 @@ fn table_10a() -> Result<Table, PaperError> {
     })
 }
 
-fn table_10b() -> Result<Table, PaperError> {
+fn table_10b() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_10);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -103,7 +104,7 @@ fn table_10b() -> Result<Table, PaperError> {
     })
 }
 
-fn table_11() -> Result<Table, PaperError> {
+fn table_11() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_11_13);
     let mut rows = Vec::new();
     for row in 0..table.len() {
@@ -124,19 +125,22 @@ fn table_11() -> Result<Table, PaperError> {
 }
 
 /// The first four measured frequencies, changed by `shift` (Hz), as lambda.
-fn measured_lambdas(factor: f64, shift: f64) -> Result<Vec<ModeLambda>, PaperError> {
+fn measured_lambdas(factor: f64, shift: f64) -> Result<Vec<ModeLambda>, PublicationError> {
     let frequencies = PrintedTable::new(TABLE_11_13).column("measured_hz")?;
-    let lambda = |frequency: &Printed| (factor * (frequency.value + shift)).sqrt();
-    let lambdas: Vec<f64> = frequencies.iter().take(FIT_MODES).map(lambda).collect();
+    let lambdas: Vec<f64> = frequencies
+        .iter()
+        .take(FIT_MODES)
+        .map(|frequency| (factor * (frequency.value + shift)).sqrt())
+        .collect();
     Ok(ModeLambda::numbered(&lambdas))
 }
 
-fn measured_estimate(factor: f64, shift: f64) -> Result<Option<Stiffnesses>, PaperError> {
+fn measured_estimate(factor: f64, shift: f64) -> Result<Option<Stiffnesses>, PublicationError> {
     let lambdas = measured_lambdas(factor, shift)?;
     Ok(estimate_pairs(PairsModel::Lap, &lambdas)?.stiffnesses())
 }
 
-fn table_12() -> Result<Table, PaperError> {
+fn table_12() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_12_14);
     let mut rows = Vec::new();
     for factor in [FACTOR_OF_TABLE_11, FACTOR_OF_TABLE_12] {
@@ -179,7 +183,7 @@ fn table_12() -> Result<Table, PaperError> {
 }
 
 /// K1 and K2 from the printed Kx and Ky.
-fn converted(table: &PrintedTable, case: &str) -> Result<Vec<Row>, PaperError> {
+fn converted(table: &PrintedTable, case: &str) -> Result<Vec<Row>, PublicationError> {
     let units = [
         (
             "kx",
@@ -194,20 +198,21 @@ fn converted(table: &PrintedTable, case: &str) -> Result<Vec<Row>, PaperError> {
             BENDING_STIFFNESS / LENGTH,
         ),
     ];
-    let convert = |(from, to, label, unit): (&str, &str, &str, f64)| {
+    let mut rows = Vec::new();
+    for (from, to, label, unit) in units {
         let ours = table.named(case, from)?.value * unit;
         let printed = table.named(case, to)?;
         let tolerance = printed.unit.max(CONVERSION_TOLERANCE * printed.value);
         let row = Row::within(label.to_owned(), printed, ours, tolerance);
-        Ok(row.noting(
+        rows.push(row.noting(
             "With L = 0.6 m and E I = 140.2 N m2, which follow from this table's two columns \
              themselves; the paper does not state them.",
-        ))
-    };
-    units.into_iter().map(convert).collect()
+        ));
+    }
+    Ok(rows)
 }
 
-fn table_13() -> Result<Table, PaperError> {
+fn table_13() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_11_13);
     let joint = PrintedTable::new(TABLE_12_14);
     let (kx, ky) = (
@@ -230,18 +235,17 @@ fn table_13() -> Result<Table, PaperError> {
     })
 }
 
-fn table_14() -> Result<Table, PaperError> {
+fn table_14() -> Result<Table, PublicationError> {
     let table = PrintedTable::new(TABLE_12_14);
     // Half a line of 800 over 1000 Hz.
     const HALF_LINE: f64 = 0.625;
     let high = measured_estimate(FACTOR_OF_TABLE_12, HALF_LINE)?;
     let low = measured_estimate(FACTOR_OF_TABLE_12, -HALF_LINE)?;
-    let mean = |pick: fn(Stiffnesses) -> f64| match (high, low) {
-        (Some(high), Some(low)) => 0.5 * (pick(high) + pick(low)),
-        _ => f64::NAN,
-    };
     let mut rows = Vec::new();
-    let values = [("kx", mean(|k| k.kx)), ("ky", mean(|k| k.ky))];
+    let values = match high.zip(low) {
+        Some((a, b)) => [("kx", 0.5 * (a.kx + b.kx)), ("ky", 0.5 * (a.ky + b.ky))],
+        None => [("kx", f64::NAN), ("ky", f64::NAN)],
+    };
     for (name, ours) in values {
         let label = format!("{}, mean of all high, all low", name.replace('k', "K"));
         let printed = table.named("perturbed", name)?;

@@ -1,19 +1,19 @@
-//! Every table of Ingole & Chatterjee beside our numbers, and why some cannot be had again.
+//! Every table of Ingole & Chatterjee beside our numbers.
 //!
-//! The printed digits are in `tests/validation/tables`, as printed. Each row carries a verdict;
-//! a row that does not reproduce carries a remark that says why, as far as it can be told.
+//! The printed digits are in `tests/validation/tables`. Each row carries a verdict. A row that does not reproduce
+//! carries a remark with the reason, as far as it is known.
 
 mod cantilever;
 mod lap;
 mod table;
 
-pub use table::{PaperError, Printed, Reproduction, Row, Table, Verdict, render};
+pub use table::{Printed, PublicationError, Reproduction, Row, Table, Verdict};
 
 /// Computes every table of the paper and sets it beside the printed one.
 ///
 /// # Errors
-/// [`PaperError`]; none for the tables as they are.
-pub fn reproduce() -> Result<Reproduction, PaperError> {
+/// [`PublicationError`]; none for the tables as they are.
+pub fn reproduce() -> Result<Reproduction, PublicationError> {
     let mut tables = cantilever::tables()?;
     tables.extend(lap::tables()?);
     Ok(Reproduction { tables })

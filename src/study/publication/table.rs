@@ -1,4 +1,4 @@
-//! Printed tables, their numbers beside ours, and both as text for a terminal of 80 columns.
+//! Printed tables, and their numbers beside ours.
 
 use tapjoint_beam::StructureError;
 use tapjoint_identify::perturbation::{Span, sign_pattern_spans};
@@ -6,9 +6,9 @@ use tapjoint_identify::{
     IdentifyError, ModeLambda, PairsEstimate, PairsModel, Stiffnesses, estimate_pairs,
 };
 
-/// Why the tables cannot be set beside ours. Both would be defects of this crate.
+/// Reasons for which the tables cannot be compared. All would be defects of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PaperError {
+pub enum PublicationError {
     /// A printed number that is none.
     #[error("\"{text}\" in the printed tables is not a number")]
     Number {
@@ -31,7 +31,7 @@ pub enum PaperError {
     Structure(#[from] StructureError),
 }
 
-/// How a printed number compares with ours.
+/// Agreement of a printed number with ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -113,13 +113,11 @@ impl Row {
     /// Takes a row that differs as explained by the rounding of its input, if the printed number
     /// lies in this span of what that rounding makes of ours.
     pub(super) fn or_within(mut self, span: Option<Span>) -> Self {
-        let inside = |span: Span| {
-            let value = self.printed.value;
-            // Half a unit on either side: the printed number is rounded too.
-            let half = 0.5 * self.printed.unit;
-            span.low - half <= value && value <= span.high + half
-        };
-        if self.verdict == Verdict::DoesNotReproduce && span.is_some_and(inside) {
+        let value = self.printed.value;
+        // Half a unit on either side: the printed number is rounded too.
+        let half = 0.5 * self.printed.unit;
+        let inside = span.is_some_and(|s| s.low - half <= value && value <= s.high + half);
+        if self.verdict == Verdict::DoesNotReproduce && inside {
             self.verdict = Verdict::WithinRounding;
         }
         self
@@ -128,8 +126,8 @@ impl Row {
     /// The same for Kz, by way of its reciprocal.
     pub(super) fn or_reciprocal_within(mut self, span: Option<Span>) -> Self {
         let compliance = 1.0 / self.printed.value;
-        let inside = |span: Span| span.low <= compliance && compliance <= span.high;
-        if self.verdict == Verdict::DoesNotReproduce && span.is_some_and(inside) {
+        let inside = span.is_some_and(|s| s.low <= compliance && compliance <= s.high);
+        if self.verdict == Verdict::DoesNotReproduce && inside {
             self.verdict = Verdict::WithinRounding;
         }
         self
@@ -198,18 +196,14 @@ pub(super) fn joint_label(kx: &Printed, ky: &Printed) -> String {
 pub(super) fn estimate_from_printed(
     model: PairsModel,
     lambdas: &[Printed],
-) -> Result<(PairsEstimate, Spans), PaperError> {
+) -> Result<(PairsEstimate, Spans), PublicationError> {
     let values: Vec<f64> = lambdas.iter().map(|lambda| lambda.value).collect();
     let halves: Vec<f64> = lambdas.iter().map(|lambda| 0.5 * lambda.unit).collect();
     let estimate = estimate_pairs(model, &ModeLambda::numbered(&values))?;
-    let at = |values: &[f64]| {
-        let found = estimate_pairs(model, &ModeLambda::numbered(values)).ok()?;
-        found.stiffnesses()
-    };
-    let direct = sign_pattern_spans(&values, &halves, at)?;
+    let direct = sign_pattern_spans(&values, &halves, |values| stiffnesses(model, values))?;
     // Through the slot of Kx, which may change its sign without harm.
     let reciprocal = sign_pattern_spans(&values, &halves, |values| {
-        let found = at(values)?;
+        let found = stiffnesses(model, values)?;
         Some(Stiffnesses {
             kx: found.kz?.recip(),
             ..found
@@ -221,6 +215,12 @@ pub(super) fn estimate_from_printed(
         cross_compliance: reciprocal.kx,
     };
     Ok((estimate, spans))
+}
+
+/// The stiffnesses estimated from these lambdas of modes 1, 2, ...
+fn stiffnesses(model: PairsModel, lambdas: &[f64]) -> Option<Stiffnesses> {
+    let found = estimate_pairs(model, &ModeLambda::numbered(lambdas)).ok()?;
+    found.stiffnesses()
 }
 
 /// Spans of an estimate.
@@ -245,18 +245,17 @@ impl Printed {
     /// Reads a decimal number with an optional exponent.
     ///
     /// # Errors
-    /// [`PaperError::Number`] for any other text.
-    pub fn parse(text: &str) -> Result<Self, PaperError> {
-        let wrong = || PaperError::Number {
-            text: text.to_owned(),
-        };
-        let value: f64 = text.parse().map_err(|_| wrong())?;
+    /// [`PublicationError::Number`] for any other text.
+    pub fn parse(text: &str) -> Result<Self, PublicationError> {
         let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
-        let exponent: i32 = exponent.parse().map_err(|_| wrong())?;
         let decimals = mantissa
             .split_once('.')
-            .map_or(0, |(_, digits)| digits.len());
-        let decimals = i32::try_from(decimals).map_err(|_| wrong())?;
+            .map_or(0, |(_, digits)| digits.len() as i32);
+        let (Ok(value), Ok(exponent)) = (text.parse::<f64>(), exponent.parse::<i32>()) else {
+            return Err(PublicationError::Number {
+                text: text.to_owned(),
+            });
+        };
         Ok(Self {
             text: text.to_owned(),
             value,
@@ -266,19 +265,14 @@ impl Printed {
 
     /// Another value with one digit more than this number was printed with.
     pub fn format_like(&self, value: f64) -> String {
-        if self.text.contains(['e', 'E']) {
+        if self.text.contains(['e', 'E']) || value.abs() >= 1e7 {
             return format!("{value:.3e}");
         }
         let decimals = self
             .text
             .split_once('.')
             .map_or(0, |(_, digits)| digits.len());
-        let large = value.abs() >= 1e7;
-        if large {
-            format!("{value:.3e}")
-        } else {
-            format!("{value:.*}", decimals + 1)
-        }
+        format!("{value:.*}", decimals + 1)
     }
 }
 
@@ -303,143 +297,50 @@ impl PrintedTable {
         self.rows.len()
     }
 
-    pub(super) fn text(&self, row: usize, column: &str) -> Result<&'static str, PaperError> {
+    pub(super) fn text(&self, row: usize, column: &str) -> Result<&'static str, PublicationError> {
         let place = self.header.iter().position(|&name| name == column);
         place
             .and_then(|place| self.rows.get(row)?.get(place).copied())
-            .ok_or_else(|| PaperError::Cell {
+            .ok_or_else(|| PublicationError::Cell {
                 row,
                 column: column.to_owned(),
             })
     }
 
-    pub(super) fn number(&self, row: usize, column: &str) -> Result<Printed, PaperError> {
+    pub(super) fn number(&self, row: usize, column: &str) -> Result<Printed, PublicationError> {
         Printed::parse(self.text(row, column)?)
     }
 
-    pub(super) fn value(&self, row: usize, column: &str) -> Result<f64, PaperError> {
+    pub(super) fn value(&self, row: usize, column: &str) -> Result<f64, PublicationError> {
         Ok(self.number(row, column)?.value)
     }
 
     /// A whole column.
-    pub(super) fn column(&self, column: &str) -> Result<Vec<Printed>, PaperError> {
+    pub(super) fn column(&self, column: &str) -> Result<Vec<Printed>, PublicationError> {
         (0..self.len())
             .map(|row| self.number(row, column))
             .collect()
     }
 
     /// lambda1 to lambda5 of one row.
-    pub(super) fn lambdas(&self, row: usize) -> Result<Vec<Printed>, PaperError> {
+    pub(super) fn lambdas(&self, row: usize) -> Result<Vec<Printed>, PublicationError> {
         (1..=5)
             .map(|mode| self.number(row, &format!("lambda{mode}")))
             .collect()
     }
 
     /// The number in column "printed" of the row whose first two cells are these.
-    pub(super) fn named(&self, case: &str, quantity: &str) -> Result<Printed, PaperError> {
+    pub(super) fn named(&self, case: &str, quantity: &str) -> Result<Printed, PublicationError> {
         let found = self
             .rows
             .iter()
             .position(|cells| cells.first() == Some(&case) && cells.get(1) == Some(&quantity));
         match found {
             Some(row) => self.number(row, "printed"),
-            None => Err(PaperError::Cell {
+            None => Err(PublicationError::Cell {
                 row: 0,
                 column: format!("{case} {quantity}"),
             }),
         }
     }
-}
-
-const WIDTH: usize = 80;
-
-/// All tables, each with its remarks, and a count of the verdicts.
-pub fn render(reproduction: &Reproduction) -> String {
-    let mut text = String::from(
-        "The tables of Ingole & Chatterjee beside our numbers\n\n\
-         reproduces: yes = equal within the row's tolerance (one unit in the last\n\
-         printed digit, unless the rounding of the input is known to leave more);\n\
-         rounding = different, but not beyond what that rounding does; NO (n) = see\n\
-         remark n; given = measured or chosen, nothing to compute.\n",
-    );
-    for table in &reproduction.tables {
-        text.push('\n');
-        text.push_str(&render_table(table));
-    }
-    let count = |verdict| reproduction.count(verdict);
-    text.push_str(&format!(
-        "\n{} rows reproduce, {} within the rounding of their input, {} do not,\n{} are given.\n",
-        count(Verdict::Reproduces),
-        count(Verdict::WithinRounding),
-        count(Verdict::DoesNotReproduce),
-        count(Verdict::Given),
-    ));
-    text
-}
-
-fn render_table(table: &Table) -> String {
-    let mut text = format!("Table {}: {}\n", table.number, table.title);
-    text.push_str(&line(&["", "printed", "ours", "diff %", "reproduces"]));
-    let mut remarks: Vec<&str> = Vec::new();
-    for row in &table.rows {
-        let number = row.remark.map(|remark| {
-            let known = remarks.iter().position(|known| *known == remark);
-            known.unwrap_or_else(|| {
-                remarks.push(remark);
-                remarks.len() - 1
-            }) + 1
-        });
-        text.push_str(&render_row(row, number));
-    }
-    for (index, remark) in remarks.iter().enumerate() {
-        text.push_str(&wrapped(&format!("({})", index + 1), remark));
-    }
-    text
-}
-
-fn render_row(row: &Row, remark: Option<usize>) -> String {
-    let ours = row
-        .ours
-        .map_or(String::new(), |ours| row.printed.format_like(ours));
-    let difference =
-        row.difference_percent()
-            .map_or(String::new(), |percent| match percent.abs() {
-                large if large >= 1000.0 => "> 1000".to_owned(),
-                large if large >= 10.0 => format!("{percent:+.1}"),
-                _ => format!("{percent:+.3}"),
-            });
-    let verdict = match row.verdict {
-        Verdict::Reproduces => "yes",
-        Verdict::WithinRounding => "rounding",
-        Verdict::DoesNotReproduce => "NO",
-        Verdict::Given => "given",
-    };
-    let verdict = match remark {
-        Some(number) => format!("{verdict} ({number})"),
-        None => verdict.to_owned(),
-    };
-    line(&[&row.label, &row.printed.text, &ours, &difference, &verdict])
-}
-
-fn line([label, printed, ours, difference, verdict]: &[&str; 5]) -> String {
-    let line = format!("{label:<37}{printed:>10} {ours:>10} {difference:>8} {verdict}");
-    format!("{}\n", line.trim_end())
-}
-
-/// A remark after its number, broken between words.
-fn wrapped(number: &str, remark: &str) -> String {
-    let mut text = String::new();
-    let mut line = number.to_owned();
-    for word in remark.split_whitespace() {
-        if line.len() + 1 + word.len() > WIDTH {
-            text.push_str(&line);
-            text.push('\n');
-            line = " ".repeat(number.len());
-        }
-        line.push(' ');
-        line.push_str(word);
-    }
-    text.push_str(&line);
-    text.push('\n');
-    text
 }

@@ -1,8 +1,9 @@
-//! From readings to stiffnesses, by both estimators, and how far they are from the draw's truth.
+//! From readings to stiffnesses, by both estimators, and the errors of these against the draw's truth.
 
 use super::plan::{BlockPlan, Layout};
+use super::reading::{BandReadings, index_of};
 use super::result::StudiedStiffness;
-use super::virtual_test::{Read, Truth, Truths, index_of};
+use super::virtual_test::Truth;
 use super::{ResolutionError, StudiedTest};
 use tapjoint_analysis::EstimateMethod;
 use tapjoint_beam::joint::StiffnessUnits;
@@ -19,95 +20,89 @@ use tapjoint_identify::{
 /// there is no estimate.
 pub(super) type ParameterErrors = Vec<Option<f64>>;
 
-/// A stiffness that is estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stiffness {
-    Kx,
-    Ky,
-    Kz,
-    Modulus,
+/// First-order errors of one stiffness (1) due to the line spacing.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LineErrors {
+    /// rms for frequency errors uniform over a line, of rms spacing/sqrt 12.
+    pub rms: f64,
+    /// Largest for frequency errors of half a line each.
+    pub bound: f64,
 }
 
-impl Stiffness {
-    pub fn name(self) -> &'static str {
-        match self {
-            Stiffness::Kx => "kx",
-            Stiffness::Ky => "ky",
-            Stiffness::Kz => "kz",
-            Stiffness::Modulus => "modulus",
-        }
+/// Returns the name of a stiffness that is estimated.
+pub(super) fn name_of(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::Kt => "kx",
+        Parameter::Kr => "ky",
+        Parameter::Coupling => "kz",
+        _ => "modulus",
     }
-}
-
-/// The tested structure as the estimator takes it.
-pub(super) fn jointed(test: &StudiedTest) -> JointedStructure {
-    let described = &test.structure;
-    let mut jointed = JointedStructure::new(described.theory, described.beam, described.assembly);
-    if described.assembly == Assembly::Lap {
-        jointed.lap = test.details.lap;
-    }
-    jointed.masses = test.details.masses.clone();
-    jointed
 }
 
 /// Both estimators, for the modes of the study.
 #[derive(Debug)]
-pub(super) struct Estimators {
-    /// What is estimated.
-    pub parameters: Vec<Stiffness>,
-    /// Numbers of all modes of the study.
-    pub numbers: Vec<usize>,
-    /// Sample rate of the recordings (Hz).
-    pub sample_rate: f64,
+pub(super) struct Estimators<'a> {
+    /// The stiffnesses that are estimated: Kx, Ky, Kz, or of a free beam the modulus.
+    pub parameters: Vec<Parameter>,
+    pub layout: &'a Layout,
     structure: JointedStructure,
     settings: ConsistentSettings,
     regression: Option<PairsModel>,
-    /// Indices of the modes that enter.
-    used: Vec<usize>,
     nominal: Truth,
 }
 
-impl Estimators {
-    pub fn new(test: &StudiedTest, layout: &Layout) -> Result<Self, ResolutionError> {
+impl<'a> Estimators<'a> {
+    pub fn new(
+        test: &StudiedTest,
+        layout: &'a Layout,
+        nominal: &Truth,
+    ) -> Result<Self, ResolutionError> {
         let parameters = parameters_of(test);
-        let used: Vec<usize> = layout.used().map(|(index, _)| index).collect();
         if parameters.is_empty() {
             return Err(IdentifyError::NothingToEstimate.into());
         }
-        if used.len() < parameters.len() {
+        let used = layout.used().count();
+        if used < parameters.len() {
             return Err(IdentifyError::TooFewFrequencies {
                 unknowns: parameters.len(),
-                found: used.len(),
+                found: used,
             }
             .into());
         }
+        let units = StiffnessUnits::of(&test.structure.beam);
+        let coupling = test.joint.coupling();
         Ok(Estimators {
-            settings: settings_of(test, &parameters),
+            settings: ConsistentSettings {
+                held: HeldJoint {
+                    kt: Some(test.joint.kx * units.kt),
+                    kr: Some(test.joint.ky * units.kr),
+                    coupling: Some(coupling).filter(|coupling| coupling.is_finite()),
+                },
+                ..ConsistentSettings::fitting(&parameters)
+            },
             parameters,
-            numbers: layout.modes.iter().map(|mode| mode.number).collect(),
-            sample_rate: layout.sample_rate,
-            structure: jointed(test),
+            layout,
+            structure: test.jointed(),
             regression: test.structure.regression,
-            used,
-            nominal: Truths::new(test)?.nominal(test),
+            nominal: nominal.clone(),
         })
     }
 
-    /// Errors of the stiffnesses from what one way of reading says of the modes, consistent estimate
-    /// first.
+    /// Returns the errors of the stiffnesses that follow from one way of reading the bands, for each of
+    /// [`EstimateMethod::ALL`].
     pub fn errors(
         &self,
         truth: &Truth,
-        (plan, bands): (&BlockPlan, &[Vec<[Option<Read>; 3]>]),
+        bands: &[BandReadings],
         reading: ReadBy,
     ) -> [ParameterErrors; 2] {
         let modes: Option<Vec<MeasuredMode>> = self
-            .used
-            .iter()
-            .map(|&mode| {
-                let read = read_of(plan, bands, mode)?[index_of(reading)]?;
+            .layout
+            .used()
+            .map(|(index, mode)| {
+                let read = bands[mode.band][index][index_of(reading)]?;
                 Some(MeasuredMode {
-                    mode: self.numbers[mode],
+                    mode: mode.number,
                     // The draw's beam is the nominal one but for a factor on its modulus, which is
                     // known: without that factor one model serves all draws.
                     frequency: read.frequency / truth.scale,
@@ -115,56 +110,56 @@ impl Estimators {
                 })
             })
             .collect();
-        EstimateMethod::ALL.map(|method| match &modes {
-            None => vec![None; self.parameters.len()],
-            Some(modes) => self.relative_errors(method, modes, truth),
+        EstimateMethod::ALL.map(|method| {
+            let both = modes.as_deref().and_then(|modes| match method {
+                EstimateMethod::Consistent => {
+                    let found = self.consistent(modes, truth)?;
+                    Some((found, self.true_values(&truth.joint)))
+                }
+                // The regression's own error on exact frequencies is not due to the reading.
+                EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
+                    Some((self.pairs(modes)?, self.pairs(&self.exact(truth))?))
+                }
+            });
+            let Some((found, exact)) = both else {
+                return vec![None; self.parameters.len()];
+            };
+            let pairs = found.iter().zip(exact);
+            pairs
+                .map(|(found, exact)| {
+                    let error = found / exact - 1.0;
+                    (error.is_finite() && exact != 0.0).then_some(error)
+                })
+                .collect()
         })
     }
 
-    fn relative_errors(
-        &self,
-        method: EstimateMethod,
-        modes: &[MeasuredMode],
-        truth: &Truth,
-    ) -> ParameterErrors {
-        // The regression's own error on exact frequencies is no reading's doing.
-        let (found, exact) = match method {
-            EstimateMethod::Consistent => (
-                self.consistent(modes, truth),
-                Some(self.true_values(&truth.joint)),
-            ),
-            EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
-                (self.pairs(modes), self.pairs(&self.exact(truth)))
-            }
-        };
-        let nothing = || vec![None; self.parameters.len()];
-        let Some((found, exact)) = found.zip(exact) else {
-            return nothing();
-        };
-        let error = |(found, exact): (&f64, &f64)| {
-            let error = found / exact - 1.0;
-            (error.is_finite() && *exact != 0.0).then_some(error)
-        };
-        found.iter().zip(&exact).map(error).collect()
-    }
-
-    /// The modes that enter, with their true frequencies (the factor on the modulus taken out).
+    /// Returns the modes that enter, with their true frequencies (the factor on the modulus taken out).
     fn exact(&self, truth: &Truth) -> Vec<MeasuredMode> {
-        let exact = |&mode: &usize| {
-            let number = self.numbers[mode];
-            MeasuredMode {
-                mode: number,
-                frequency: truth.frequencies[number - 1] / truth.scale,
-                std: None,
-            }
-        };
-        self.used.iter().map(exact).collect()
+        let used = self.layout.used();
+        used.map(|(_, mode)| MeasuredMode {
+            mode: mode.number,
+            frequency: truth.frequencies[mode.number - 1] / truth.scale,
+            std: None,
+        })
+        .collect()
     }
 
     fn true_values(&self, joint: &JointStiffness) -> Vec<f64> {
-        let modulus = self.structure.beam.modulus;
-        let value = |parameter: &Stiffness| value_of(joint, modulus, *parameter);
-        self.parameters.iter().map(value).collect()
+        self.values(joint, self.structure.beam.modulus)
+    }
+
+    /// The values of the estimated stiffnesses.
+    fn values(&self, joint: &JointStiffness, modulus: f64) -> Vec<f64> {
+        let parameters = self.parameters.iter();
+        parameters
+            .map(|parameter| match parameter {
+                Parameter::Kt => joint.kx,
+                Parameter::Kr => joint.ky,
+                Parameter::Coupling => joint.kz().unwrap_or(f64::INFINITY),
+                _ => modulus,
+            })
+            .collect()
     }
 
     fn consistent(&self, modes: &[MeasuredMode], truth: &Truth) -> Option<Vec<f64>> {
@@ -172,9 +167,7 @@ impl Estimators {
         let fit = estimator.refit(&estimator.frequencies(), &Neighbourhood::at(&[truth.point]));
         fit.stop.converged().then(|| {
             let modulus = fit.point[Parameter::Modulus as usize].exp();
-            let joint = fit.joint();
-            let value = |parameter: &Stiffness| value_of(&joint, modulus, *parameter);
-            self.parameters.iter().map(value).collect()
+            self.values(&fit.joint(), modulus)
         })
     }
 
@@ -187,144 +180,111 @@ impl Estimators {
         let numbers: Vec<usize> = modes.iter().map(|mode| mode.mode).collect();
         let frequencies: Vec<f64> = modes.iter().map(|mode| mode.frequency).collect();
         let found = pairs_estimator(model, &structure.beam, &numbers).ok()?(&frequencies)?;
-        let value = |parameter: &Stiffness| match parameter {
-            Stiffness::Kx => Some(found.kx),
-            Stiffness::Ky => Some(found.ky),
-            Stiffness::Kz => found.kz,
-            Stiffness::Modulus => None,
-        };
-        self.parameters.iter().map(value).collect()
-    }
-
-    /// The stiffnesses of the study with their nominal values.
-    pub fn described(&self, joint: &JointStiffness) -> Vec<StudiedStiffness> {
-        let values = self.true_values(joint);
-        let pairs = self.pairs(&self.exact(&self.nominal));
-        let one = |(index, (parameter, value)): (usize, (&Stiffness, f64))| StudiedStiffness {
-            parameter: parameter.name(),
-            value,
-            pairs_bias_percent: pairs
-                .as_ref()
-                .map(|found| 100.0 * (found[index] / value - 1.0)),
-        };
-        self.parameters
-            .iter()
-            .zip(values)
-            .enumerate()
-            .map(one)
+        let parameters = self.parameters.iter();
+        parameters
+            .map(|parameter| match parameter {
+                Parameter::Kt => Some(found.kx),
+                Parameter::Kr => Some(found.ky),
+                Parameter::Coupling => found.kz,
+                _ => None,
+            })
             .collect()
     }
 
-    /// What errors of the readings do to a stiffness to first order, relative to it: rms for errors
-    /// uniform over a line (of rms spacing/sqrt 12), and at most for errors of half a line each.
-    pub fn by_half_lines(
+    /// Returns the stiffnesses of the study with their nominal values.
+    pub fn described(&self) -> Vec<StudiedStiffness> {
+        let pairs = self.pairs(&self.exact(&self.nominal));
+        let values = self.true_values(&self.nominal.joint);
+        let parameters = self.parameters.iter().zip(values).enumerate();
+        parameters
+            .map(|(index, (&parameter, value))| StudiedStiffness {
+                parameter: name_of(parameter),
+                value,
+                pairs_bias_percent: pairs
+                    .as_ref()
+                    .map(|found| 100.0 * (found[index] / value - 1.0)),
+            })
+            .collect()
+    }
+
+    /// Returns the estimates from these frequencies of the modes used, each uncertain by its half line.
+    fn estimate(
         &self,
-        plan: &BlockPlan,
-        layout: &Layout,
-        (method, parameter): (EstimateMethod, usize),
-    ) -> Option<(f64, f64)> {
-        let modes = self.exact(&self.nominal);
-        let frequencies: Vec<f64> = modes.iter().map(|mode| mode.frequency).collect();
-        let half_lines: Vec<f64> = layout
-            .used()
+        method: EstimateMethod,
+        frequencies: &[f64],
+        half_lines: &[f64],
+    ) -> Option<Vec<f64>> {
+        let mut modes = self.exact(&self.nominal);
+        for (mode, (frequency, half)) in modes.iter_mut().zip(frequencies.iter().zip(half_lines)) {
+            mode.frequency = *frequency;
+            mode.std = Some(half / 3f64.sqrt());
+        }
+        match method {
+            EstimateMethod::Consistent => self.consistent(&modes, &self.nominal),
+            EstimateMethod::Pairs | EstimateMethod::FreeBeam => self.pairs(&modes),
+        }
+    }
+
+    /// Returns the first-order errors that the lines of a block cause in each stiffness; `None` where the
+    /// method has no estimate.
+    pub fn line_errors(&self, plan: &BlockPlan, method: EstimateMethod) -> Option<Vec<LineErrors>> {
+        let exact = self.exact(&self.nominal);
+        let frequencies: Vec<f64> = exact.iter().map(|mode| mode.frequency).collect();
+        let used = self.layout.used();
+        let half_lines: Vec<f64> = used
             .map(|(_, mode)| plan.bands[mode.band].lines.half_line())
             .collect();
-        let value = |shifted: &[f64]| {
-            let modes: Vec<MeasuredMode> = modes
-                .iter()
-                .zip(shifted.iter().zip(&half_lines))
-                .map(|(mode, (&frequency, half))| MeasuredMode {
-                    frequency,
-                    std: Some(half / 3f64.sqrt()),
-                    ..*mode
-                })
-                .collect();
-            let found = match method {
-                EstimateMethod::Consistent => self.consistent(&modes, &self.nominal)?,
-                EstimateMethod::Pairs | EstimateMethod::FreeBeam => self.pairs(&modes)?,
-            };
-            found.get(parameter).copied()
-        };
-        let exact = value(&frequencies)?.abs();
+        let values = self.estimate(method, &frequencies, &half_lines)?;
         // One mode's error at a time, by central differences: the rms of independent errors is the root
         // of their squares' sum, the bound the sum. Truncation is of the order 1e-10, rounding of 1e-8.
         const STEP: f64 = 1e-5;
         let mut shifted = frequencies.clone();
-        let (mut squares, mut sum) = (0.0f64, 0.0f64);
+        let mut sums = vec![
+            LineErrors {
+                rms: 0.0,
+                bound: 0.0
+            };
+            values.len()
+        ];
         for (index, (frequency, half)) in frequencies.iter().zip(&half_lines).enumerate() {
             let step = STEP * frequency;
             shifted[index] = frequency + step;
-            let above = value(&shifted)?;
+            let above = self.estimate(method, &shifted, &half_lines)?;
             shifted[index] = frequency - step;
-            let below = value(&shifted)?;
+            let below = self.estimate(method, &shifted, &half_lines)?;
             shifted[index] = *frequency;
-            let moved = (half * (above - below) / (2.0 * step)).abs();
-            squares += moved * moved / 3.0;
-            sum += moved;
+            for (sum, (above, below)) in sums.iter_mut().zip(above.iter().zip(below)) {
+                let moved = (half * (above - below) / (2.0 * step)).abs();
+                sum.rms += moved * moved / 3.0;
+                sum.bound += moved;
+            }
         }
-        Some((squares.sqrt() / exact, sum / exact))
-    }
-}
-
-/// What the readings of the band that estimates take say of a mode.
-fn read_of<'a>(
-    plan: &BlockPlan,
-    bands: &'a [Vec<[Option<Read>; 3]>],
-    mode: usize,
-) -> Option<&'a [Option<Read>; 3]> {
-    // Bands are ordered by width: the first that holds a mode is the narrowest.
-    let (band, place) = plan.bands.iter().enumerate().find_map(|(index, band)| {
-        let place = band.modes.iter().position(|&other| other == mode)?;
-        Some((index, place))
-    })?;
-    bands.get(band)?.get(place)
-}
-
-fn value_of(joint: &JointStiffness, modulus: f64, parameter: Stiffness) -> f64 {
-    match parameter {
-        Stiffness::Kx => joint.kx,
-        Stiffness::Ky => joint.ky,
-        Stiffness::Kz => joint.kz().unwrap_or(f64::INFINITY),
-        Stiffness::Modulus => modulus,
+        for (sum, value) in sums.iter_mut().zip(values) {
+            sum.rms = sum.rms.sqrt() / value.abs();
+            sum.bound /= value.abs();
+        }
+        Some(sums)
     }
 }
 
 /// Finite stiffnesses are estimated, rigid and absent ones are held.
-fn parameters_of(test: &StudiedTest) -> Vec<Stiffness> {
+fn parameters_of(test: &StudiedTest) -> Vec<Parameter> {
     if test.structure.assembly == Assembly::Free {
-        return vec![Stiffness::Modulus];
+        return vec![Parameter::Modulus];
     }
-    let finite = |value: f64| value > 0.0 && value.is_finite();
     let mut parameters = Vec::new();
-    if finite(test.joint.kx) {
-        parameters.push(Stiffness::Kx);
-    }
-    if finite(test.joint.ky) {
-        parameters.push(Stiffness::Ky);
+    let springs = [
+        (Parameter::Kt, test.joint.kx),
+        (Parameter::Kr, test.joint.ky),
+    ];
+    for (parameter, value) in springs {
+        if value > 0.0 && value.is_finite() {
+            parameters.push(parameter);
+        }
     }
     let three = test.structure.regression == Some(PairsModel::ThreeParameter);
     if three && test.joint.kz().is_some() {
-        parameters.push(Stiffness::Kz);
+        parameters.push(Parameter::Coupling);
     }
     parameters
-}
-
-fn settings_of(test: &StudiedTest, parameters: &[Stiffness]) -> ConsistentSettings {
-    let parameter = |stiffness: &Stiffness| match stiffness {
-        Stiffness::Kx => Parameter::Kt,
-        Stiffness::Ky => Parameter::Kr,
-        Stiffness::Kz => Parameter::Coupling,
-        Stiffness::Modulus => Parameter::Modulus,
-    };
-    let fit: Vec<Parameter> = parameters.iter().map(parameter).collect();
-    let units = StiffnessUnits::of(&test.structure.beam);
-    let coupling = test.joint.coupling();
-    ConsistentSettings {
-        held: HeldJoint {
-            kt: Some(test.joint.kx * units.kt),
-            kr: Some(test.joint.ky * units.kr),
-            coupling: Some(coupling).filter(|coupling| coupling.is_finite()),
-        },
-        ..ConsistentSettings::fitting(&fit)
-    }
 }

@@ -8,29 +8,34 @@
 
 mod estimate;
 mod plan;
+mod reading;
 mod result;
-mod statistics;
 mod virtual_test;
 
 pub use result::{
     Answer, BandLines, BlockLines, FrequencyError, Omitted, ResolutionStudy, StiffnessError,
-    StudiedMode, StudiedStiffness, WindowName,
+    StudiedMode, StudiedStiffness, WindowName, formula_percent,
 };
-pub use statistics::formula_percent;
 pub use tapjoint_analysis::EstimateMethod;
 pub use tapjoint_description::ReadBy;
 
+use estimate::{Estimators, ParameterErrors, name_of};
+use plan::{BlockPlan, Layout, ModePlan};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-
-use estimate::Estimators;
-use plan::{BlockPlan, Layout};
-use tapjoint_analysis::{StructureDetails, TestedStructure};
-use tapjoint_beam::{JointStiffness, StructureError};
+use reading::{BandReadings, Read, index_of, read_band};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use tapjoint_analysis::{StructureDetails, TestedStructure, structure_details};
+use tapjoint_beam::{Assembly, JointStiffness, StructureError};
+use tapjoint_description::TestDescription;
 use tapjoint_identify::IdentifyError;
+use tapjoint_identify::consistent::JointedStructure;
+use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::spectral::SpectralError;
-use virtual_test::{Truths, drawn};
+use virtual_test::{Truth, Truths, VirtualRecord};
 
-/// What is tested virtually.
+/// A test that is studied virtually.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudiedTest {
     /// The structure as described.
@@ -52,7 +57,71 @@ pub struct StudiedTest {
     pub fit_modes: Option<usize>,
 }
 
-/// How the study is made.
+/// Modes studied where the description says nothing: those of Ingole & Chatterjee.
+const USUAL_MODES: usize = 5;
+
+impl StudiedTest {
+    /// Returns the described test about this joint (1), in `bands` (Hz) or, where there are none, in those of
+    /// its recordings. Tap and sensors are those of the first recording. Where they are not given, both are
+    /// at the free right end, where no mode has a node.
+    pub fn of_description(
+        test: &TestDescription,
+        structure: &TestedStructure,
+        joint: JointStiffness,
+        bands: &[(f64, f64)],
+    ) -> Self {
+        let first = test.recordings.first();
+        let end = structure.beam.length;
+        let sensors: Vec<f64> = test
+            .sensors
+            .iter()
+            .filter_map(|sensor| test.place_of(sensor))
+            .collect();
+        let described = test
+            .recordings
+            .iter()
+            .filter_map(|recording| recording.band);
+        let measured = test.measured.as_ref();
+        StudiedTest {
+            structure: *structure,
+            details: structure_details(test, &structure.beam),
+            joint: match structure.assembly {
+                Assembly::Free => JointStiffness::FREE,
+                Assembly::Cantilever | Assembly::Lap => joint,
+            },
+            tap: first.and_then(|recording| recording.tap).unwrap_or(end),
+            sensors: if sensors.is_empty() {
+                vec![end]
+            } else {
+                sensors
+            },
+            bands: if bands.is_empty() {
+                described.collect()
+            } else {
+                bands.to_vec()
+            },
+            modes: measured
+                .and_then(|measured| measured.modes.iter().copied().max())
+                .or(test.analysis.fit_modes)
+                .unwrap_or(USUAL_MODES),
+            fit_modes: test.analysis.fit_modes,
+        }
+    }
+
+    /// The tested structure as the estimators take it.
+    fn jointed(&self) -> JointedStructure {
+        let described = &self.structure;
+        let mut jointed =
+            JointedStructure::new(described.theory, described.beam, described.assembly);
+        if described.assembly == Assembly::Lap {
+            jointed.lap = self.details.lap;
+        }
+        jointed.masses = self.details.masses.clone();
+        jointed
+    }
+}
+
+/// Settings of the study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResolutionSettings {
     /// Block sizes (samples). 512 to 65536 in octaves: 200 to 25600 displayed lines.
@@ -92,7 +161,7 @@ impl Default for ResolutionSettings {
     }
 }
 
-/// What stops a study.
+/// Reasons for which there is no study.
 #[derive(Debug, thiserror::Error)]
 pub enum ResolutionError {
     /// No band holds a mode.
@@ -136,8 +205,8 @@ pub enum ResolutionError {
     Spectral(#[from] SpectralError),
 }
 
-/// Makes the study. `progress` is told after each virtual test, from whatever thread, how many of all
-/// are done.
+/// Makes the study. `progress` is called after each virtual test, from any thread, with the number of tests done
+/// and of all.
 ///
 /// # Errors
 /// [`ResolutionError`] where bands, blocks or the joint cannot be.
@@ -148,38 +217,249 @@ pub fn study_resolution(
 ) -> Result<ResolutionStudy, ResolutionError> {
     let truths = Truths::new(test)?;
     let layout = Layout::new(test, &truths)?;
-    let estimators = Estimators::new(test, &layout)?;
+    let estimators = Estimators::new(test, &layout, &truths.nominal)?;
     let plans = settings
         .blocks
         .iter()
-        .map(|&block| BlockPlan::new(block, &layout, settings, (test, &truths)))
+        .map(|&block| BlockPlan::new(block, &layout, settings, &truths))
         .collect::<Result<Vec<_>, _>>()?;
-    let done = std::sync::atomic::AtomicUsize::new(0);
+    let done = AtomicUsize::new(0);
     let total = plans.len() * settings.draws;
-    let mut study = result::empty(test, settings, (&layout, &plans), &estimators);
+    let modes = layout.modes.iter().map(|mode| StudiedMode {
+        mode: mode.number,
+        frequency: mode.frequency,
+        band: layout.bands[mode.band].into(),
+        used: mode.used,
+    });
+    let mut study = ResolutionStudy {
+        draws: settings.draws,
+        fit_draws: settings.fit_draws.min(settings.draws),
+        seed: settings.seed,
+        damping: settings.damping_ratio,
+        noise_db: settings.noise_db,
+        accuracy_percent: 100.0 * settings.accuracy,
+        sample_rate: layout.sample_rate,
+        modes: modes.collect(),
+        omitted: layout.omitted.clone(),
+        stiffnesses: estimators.described(),
+        blocks: plans.iter().map(block_lines).collect(),
+        frequency_errors: Vec::new(),
+        stiffness_errors: Vec::new(),
+        answers: Vec::new(),
+        sentence: String::new(),
+    };
     for (number, plan) in plans.iter().enumerate() {
         // Collected in order: sums are then the same whatever the number of threads.
-        let outcomes: Vec<virtual_test::Outcome> = (0..settings.draws)
+        let draws: Vec<Draw> = (0..settings.draws)
             .into_par_iter()
             .map(|index| {
-                let outcome = drawn(
-                    plan,
-                    (number, index),
-                    settings,
-                    (test, &truths, &estimators),
-                );
-                let count = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                progress(count, total);
-                outcome
+                // A stream for each draw: the thread that computes it does not matter.
+                let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
+                random.set_stream(((number as u64) << 32) + index as u64 + 1);
+                // Fits are made of the first draws only.
+                let mut wanted = settings.readings.clone();
+                wanted.retain(|&reading| reading != ReadBy::Fit || index < settings.fit_draws);
+                let draw = Draw::new(plan, settings, &truths, &estimators, &wanted, &mut random);
+                progress(1 + done.fetch_add(1, Ordering::Relaxed), total);
+                draw
             })
             .collect();
-        statistics::gather(
-            &mut study,
-            plan,
-            &outcomes,
-            (settings, &layout, &estimators),
-        );
+        add_errors(&mut study, plan, &draws, settings, &estimators);
     }
-    statistics::conclude(&mut study, settings);
+    study.conclude(&settings.windows, &settings.readings);
     Ok(study)
+}
+
+fn block_lines(plan: &BlockPlan) -> BlockLines {
+    let lines = plan.bands.first().map_or(0, |band| band.lines.displayed());
+    let bands = plan.bands.iter().map(|band| BandLines {
+        low: band.lines.low,
+        high: band.lines.high,
+        spacing: band.lines.spacing,
+        half_line: band.lines.half_line(),
+        seconds: band.lines.duration,
+        windows: band.windows.iter().map(|window| window.name()).collect(),
+    });
+    BlockLines {
+        block: plan.block,
+        lines,
+        half_line_percent_of_band: formula_percent(lines),
+        bands: bands.collect(),
+    }
+}
+
+/// One virtual test: its truth, its readings and the errors of its estimates.
+#[derive(Debug)]
+struct Draw {
+    truth: Truth,
+    /// For each window and band.
+    readings: Vec<Vec<BandReadings>>,
+    /// For each window, each of the study's readings and each estimator; `None` where the draw was not read
+    /// that way.
+    estimates: Vec<Vec<Option<[ParameterErrors; 2]>>>,
+}
+
+impl Draw {
+    fn new(
+        plan: &BlockPlan,
+        settings: &ResolutionSettings,
+        truths: &Truths,
+        estimators: &Estimators,
+        wanted: &[ReadBy],
+        random: &mut ChaCha8Rng,
+    ) -> Self {
+        let layout = estimators.layout;
+        let truth = truths.draw(plan.variation, random);
+        let (rate, samples) = (layout.sample_rate, plan.samples);
+        let record = VirtualRecord::new(truths, &truth, rate, samples, settings, random);
+        let (mut readings, mut estimates) = (Vec::new(), Vec::new());
+        for window in 0..settings.windows.len() {
+            let bands = plan.bands.iter();
+            let bands: Vec<BandReadings> = bands
+                .map(|band| {
+                    let window = band.windows[window];
+                    read_band(band, window, &record, layout, &truth, wanted)
+                })
+                .collect();
+            let own = settings.readings.iter().map(|reading| {
+                let is_wanted = wanted.contains(reading);
+                is_wanted.then(|| estimators.errors(&truth, &bands, *reading))
+            });
+            estimates.push(own.collect());
+            readings.push(bands);
+        }
+        Draw {
+            truth,
+            readings,
+            estimates,
+        }
+    }
+}
+
+/// rms, mean, 95 % point and largest of some errors.
+#[derive(Debug, Clone, Copy)]
+struct Summary {
+    rms: f64,
+    mean: f64,
+    p95: f64,
+    largest: f64,
+}
+
+impl Summary {
+    fn of(errors: &[f64]) -> Option<Self> {
+        let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let largest = *sizes.last()?;
+        let place = (0.95 * (sizes.len() - 1) as f64).ceil() as usize;
+        Some(Summary {
+            rms: root_mean_square(errors),
+            mean: errors.iter().sum::<f64>() / errors.len() as f64,
+            p95: sizes[place],
+            largest,
+        })
+    }
+}
+
+/// Adds the errors of one block size to the study.
+fn add_errors(
+    study: &mut ResolutionStudy,
+    plan: &BlockPlan,
+    draws: &[Draw],
+    settings: &ResolutionSettings,
+    estimators: &Estimators,
+) {
+    let lines = EstimateMethod::ALL.map(|method| estimators.line_errors(plan, method));
+    for (window, &name) in settings.windows.iter().enumerate() {
+        for (place, &reading) in settings.readings.iter().enumerate() {
+            let draws = match reading {
+                ReadBy::Fit => &draws[..settings.fit_draws.min(draws.len())],
+                ReadBy::Line | ReadBy::Interpolated => draws,
+            };
+            for (band, planned) in plan.bands.iter().enumerate() {
+                for &mode in &planned.modes {
+                    let reads = draws.iter().map(|draw| {
+                        let read = draw.readings[window][band][mode][index_of(reading)];
+                        (read, &draw.truth)
+                    });
+                    let reads: Vec<_> = reads.collect();
+                    let mode = &estimators.layout.modes[mode];
+                    let error = frequency_error(plan, band, mode, name, reading, &reads);
+                    study.frequency_errors.push(error);
+                }
+            }
+            for method in EstimateMethod::ALL {
+                let lines = lines[method as usize].as_ref();
+                for (index, &parameter) in estimators.parameters.iter().enumerate() {
+                    let estimates = draws.iter().filter_map(|draw| {
+                        let both = draw.estimates[window][place].as_ref()?;
+                        both[method as usize][index].map(|error| 100.0 * error)
+                    });
+                    let errors: Vec<f64> = estimates.collect();
+                    let summary = Summary::of(&errors);
+                    study.stiffness_errors.push(StiffnessError {
+                        block: plan.block,
+                        window: name,
+                        reading,
+                        method,
+                        parameter: name_of(parameter),
+                        found: errors.len(),
+                        draws: draws.len(),
+                        rms_percent: summary.map(|summary| summary.rms),
+                        mean_percent: summary.map(|summary| summary.mean),
+                        p95_percent: summary.map(|summary| summary.p95),
+                        largest_percent: summary.map(|summary| summary.largest),
+                        line_rms_percent: lines.map(|lines| 100.0 * lines[index].rms),
+                        half_line_bound_percent: lines.map(|lines| 100.0 * lines[index].bound),
+                    });
+                }
+            }
+        }
+    }
+}
+
+fn frequency_error(
+    plan: &BlockPlan,
+    band: usize,
+    mode: &ModePlan,
+    window: WindowName,
+    reading: ReadBy,
+    reads: &[(Option<Read>, &Truth)],
+) -> FrequencyError {
+    let lines = &plan.bands[band].lines;
+    let (mut truths, mut errors, mut own) = (Vec::new(), Vec::new(), 0);
+    for (read, truth) in reads {
+        let truth = truth.frequencies[mode.number - 1];
+        truths.push(truth);
+        if let Some(read) = read {
+            errors.push(read.frequency - truth);
+            own += usize::from(read.source == reading);
+        }
+    }
+    let summary = Summary::of(&errors);
+    FrequencyError {
+        block: plan.block,
+        window,
+        reading,
+        mode: mode.number,
+        band: [lines.low, lines.high],
+        used: mode.used && mode.band == band,
+        spacing: lines.spacing,
+        half_line: lines.half_line(),
+        spread_lines: standard_deviation(&truths).map(|spread| spread / lines.spacing),
+        found: errors.len(),
+        own,
+        draws: reads.len(),
+        rms: summary.map(|summary| summary.rms),
+        mean: summary.map(|summary| summary.mean),
+        p95: summary.map(|summary| summary.p95),
+        largest: summary.map(|summary| summary.largest),
+    }
+}
+
+/// Standard deviation; `None` of fewer than two.
+fn standard_deviation(values: &[f64]) -> Option<f64> {
+    let count = values.len();
+    let mean = values.iter().sum::<f64>() / count as f64;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (count > 1).then(|| (squares / (count - 1) as f64).sqrt())
 }

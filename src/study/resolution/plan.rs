@@ -1,14 +1,10 @@
-//! Which mode is read in which band, and what each block size needs.
-//!
-//! What a test description gives the study.
+//! The bands, the band of each mode, and the lines, windows and record of each block size.
 
 use super::result::Omitted;
-use super::virtual_test::{Truths, sample_draw, window_of};
+use super::virtual_test::{Truths, VirtualRecord};
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
-use tapjoint_analysis::{TestedStructure, structure_details};
-use tapjoint_beam::{Assembly, JointStiffness};
-use tapjoint_description::ReadBy;
-use tapjoint_description::TestDescription;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use tapjoint_signal::spectral::{DISPLAY_RATIO, Lines, Transformer, Window};
 
 /// Room between a mode and the upper end of its band, as a share of the band's end: truths vary by some
@@ -19,7 +15,7 @@ const MOST_SAMPLES: usize = 1 << 24;
 /// Widest variation of the natural frequencies (1): beyond it the drawn beam is another one.
 const WIDEST: f64 = 0.2;
 
-/// What is the same for all block sizes.
+/// Bands and modes, which all block sizes share.
 #[derive(Debug)]
 pub(super) struct Layout {
     /// Sample rate of the recordings (Hz): 2.56 times the highest band's end, as an analyser takes it.
@@ -41,17 +37,18 @@ pub(super) struct ModePlan {
     pub frequency: f64,
     /// Band from which estimates take it.
     pub band: usize,
-    /// Whether they take it.
+    /// True where they take it.
     pub used: bool,
 }
 
 impl Layout {
     pub fn new(test: &StudiedTest, truths: &Truths) -> Result<Self, ResolutionError> {
-        let bands = bands_of(test, &truths.frequencies);
+        let frequencies = &truths.nominal.frequencies;
+        let bands = bands_of(test, frequencies);
         let highest = bands.iter().map(|band| band.1).fold(0.0, f64::max);
         let mut modes: Vec<ModePlan> = Vec::new();
         let mut omitted = Vec::new();
-        for (index, &frequency) in truths.frequencies.iter().enumerate() {
+        for (index, &frequency) in frequencies.iter().enumerate() {
             if frequency >= highest {
                 break;
             }
@@ -74,12 +71,8 @@ impl Layout {
             }
         }
         if modes.is_empty() {
-            let lowest: Vec<String> = truths
-                .frequencies
-                .iter()
-                .take(3)
-                .map(|f| format!("{f:.1}"))
-                .collect();
+            let lowest = frequencies.iter().take(3);
+            let lowest: Vec<String> = lowest.map(|f| format!("{f:.1}")).collect();
             return Err(ResolutionError::NoModes {
                 lowest: lowest.join(", "),
                 room: 100.0 * ROOM,
@@ -91,12 +84,6 @@ impl Layout {
             modes,
             omitted,
         })
-    }
-
-    pub fn band(&self, index: usize) -> [f64; 2] {
-        self.bands
-            .get(index)
-            .map_or([0.0; 2], |band| [band.0, band.1])
     }
 
     /// The modes that enter an estimate.
@@ -129,7 +116,7 @@ fn holds(band: &(f64, f64), frequency: f64) -> bool {
     frequency > band.0 * low_room && frequency < band.1 * (1.0 - ROOM)
 }
 
-/// What one block size needs.
+/// Bands and record of one block size.
 #[derive(Debug)]
 pub(super) struct BlockPlan {
     /// Block (samples).
@@ -162,7 +149,7 @@ impl BlockPlan {
         block: usize,
         layout: &Layout,
         settings: &ResolutionSettings,
-        (test, truths): (&StudiedTest, &Truths),
+        truths: &Truths,
     ) -> Result<Self, ResolutionError> {
         let bands = layout
             .bands
@@ -177,12 +164,14 @@ impl BlockPlan {
         };
         plan.variation = plan.variation(layout, truths);
         // The decay hardly differs between draws; the window is chosen on the nominal test.
-        let record = sample_draw(&plan, layout.sample_rate, settings, (test, truths));
+        let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
+        let (rate, samples) = (layout.sample_rate, plan.samples);
+        let truth = &truths.nominal;
+        let record = VirtualRecord::new(truths, truth, rate, samples, settings, &mut random);
         for band in &mut plan.bands {
-            let windows = settings.windows.iter();
-            band.windows = windows
-                .map(|&name| window_of(name, &band.lines, &record))
-                .collect();
+            for &name in &settings.windows {
+                band.windows.push(record.window(name, &band.lines));
+            }
         }
         Ok(plan)
     }
@@ -229,7 +218,6 @@ impl BandPlan {
                 most: MOST_SAMPLES,
             });
         }
-        let inside = |frequency: f64| holds(&band, frequency);
         let modes = layout.modes.iter().enumerate();
         Ok(BandPlan {
             transformer: Transformer::new(rate, lines, gate),
@@ -237,67 +225,9 @@ impl BandPlan {
             windows: Vec::new(),
             gate,
             modes: modes
-                .filter(|(_, mode)| inside(mode.frequency))
+                .filter(|(_, mode)| holds(&band, mode.frequency))
                 .map(|(index, _)| index)
                 .collect(),
         })
-    }
-}
-
-/// What a draw reads: fits are made of the first draws only.
-pub(super) fn readings_of(settings: &ResolutionSettings, draw: usize) -> Vec<ReadBy> {
-    let fitted = |reading: &ReadBy| *reading != ReadBy::Fit || draw < settings.fit_draws;
-    settings.readings.iter().copied().filter(fitted).collect()
-}
-
-/// Modes studied where the description says nothing: those of Ingole & Chatterjee.
-const USUAL_MODES: usize = 5;
-
-impl StudiedTest {
-    /// The described test about this joint (1), in `bands` (Hz) or, where there are none, in those of its
-    /// recordings. Tap and sensors are those of the first recording; where nobody said, both are at the
-    /// free right end, where no mode has a node.
-    pub fn of_description(
-        test: &TestDescription,
-        structure: &TestedStructure,
-        joint: JointStiffness,
-        bands: &[(f64, f64)],
-    ) -> Self {
-        let first = test.recordings.first();
-        let end = structure.beam.length;
-        let sensors: Vec<f64> = test
-            .sensors
-            .iter()
-            .filter_map(|sensor| test.place_of(sensor))
-            .collect();
-        let described = test
-            .recordings
-            .iter()
-            .filter_map(|recording| recording.band);
-        let measured = test.measured.as_ref();
-        StudiedTest {
-            structure: *structure,
-            details: structure_details(test, &structure.beam),
-            joint: match structure.assembly {
-                Assembly::Free => JointStiffness::FREE,
-                Assembly::Cantilever | Assembly::Lap => joint,
-            },
-            tap: first.and_then(|recording| recording.tap).unwrap_or(end),
-            sensors: if sensors.is_empty() {
-                vec![end]
-            } else {
-                sensors
-            },
-            bands: if bands.is_empty() {
-                described.collect()
-            } else {
-                bands.to_vec()
-            },
-            modes: measured
-                .and_then(|measured| measured.modes.iter().copied().max())
-                .or(test.analysis.fit_modes)
-                .unwrap_or(USUAL_MODES),
-            fit_modes: test.analysis.fit_modes,
-        }
     }
 }

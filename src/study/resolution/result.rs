@@ -1,11 +1,6 @@
-//! What the study found, as data.
+//! Results of the study as data, with the answers and doubts that follow from them.
 
 use serde::Serialize;
-
-use super::estimate::Estimators;
-use super::plan::{BlockPlan, Layout};
-use super::statistics::formula_percent;
-use super::{ResolutionSettings, StudiedTest};
 use tapjoint_analysis::EstimateMethod;
 use tapjoint_description::{ReadBy, WindowKind};
 
@@ -89,7 +84,7 @@ pub struct StudiedMode {
     pub frequency: f64,
     /// Band in which it is read (Hz).
     pub band: [f64; 2],
-    /// Whether it enters the estimate.
+    /// True where the mode enters the estimate.
     pub used: bool,
 }
 
@@ -111,8 +106,8 @@ pub struct StudiedStiffness {
     pub parameter: &'static str,
     /// Nominal true value.
     pub value: f64,
-    /// What the pair regression makes of exact frequencies, error in percent: it takes an Euler beam
-    /// without sensors. Errors of its estimates count from there. `None` where it has no estimate.
+    /// Error of the pair regression from exact frequencies (%): it assumes an Euler beam without sensors. The
+    /// errors of its estimates count from there. `None` where it has no estimate.
     pub pairs_bias_percent: Option<f64>,
 }
 
@@ -159,7 +154,7 @@ pub struct FrequencyError {
     pub mode: usize,
     /// Band (Hz).
     pub band: [f64; 2],
-    /// Whether the estimates take the mode from this band.
+    /// True where the estimates take the mode from this band.
     pub used: bool,
     /// Line spacing (Hz).
     pub spacing: f64,
@@ -209,9 +204,9 @@ pub struct StiffnessError {
     pub p95_percent: Option<f64>,
     /// Largest error (%).
     pub largest_percent: Option<f64>,
-    /// What errors uniform over a line give to first order, rms (%).
+    /// rms error that frequency errors uniform over a line cause, to first order (%).
     pub line_rms_percent: Option<f64>,
-    /// What half-line errors give at most, to first order (%).
+    /// Largest error that frequency errors of half a line cause, to first order (%).
     pub half_line_bound_percent: Option<f64>,
 }
 
@@ -230,52 +225,194 @@ pub struct Answer {
     pub seconds: Option<f64>,
 }
 
-/// The study before its draws.
-pub(super) fn empty(
-    test: &StudiedTest,
-    settings: &ResolutionSettings,
-    (layout, plans): (&Layout, &[BlockPlan]),
-    estimators: &Estimators,
-) -> ResolutionStudy {
-    let mode = |mode: &super::plan::ModePlan| StudiedMode {
-        mode: mode.number,
-        frequency: mode.frequency,
-        band: layout.band(mode.band),
-        used: mode.used,
-    };
-    ResolutionStudy {
-        draws: settings.draws,
-        fit_draws: settings.fit_draws.min(settings.draws),
-        seed: settings.seed,
-        damping: settings.damping_ratio,
-        noise_db: settings.noise_db,
-        accuracy_percent: 100.0 * settings.accuracy,
-        sample_rate: layout.sample_rate,
-        modes: layout.modes.iter().map(mode).collect(),
-        omitted: layout.omitted.clone(),
-        stiffnesses: estimators.described(&test.joint),
-        blocks: plans.iter().map(block_lines).collect(),
-        frequency_errors: Vec::new(),
-        stiffness_errors: Vec::new(),
-        answers: Vec::new(),
-        sentence: String::new(),
+/// Least share of the draws that must have an estimate.
+const LEAST_SHARE: f64 = 0.95;
+/// Least spread of the truths (lines) that is as good as uniform over a line.
+const LEAST_SPREAD: f64 = 0.35;
+
+/// Half a line in percent of the band, 100/(2 lines): Ingole & Chatterjee, section 3.3.
+pub fn formula_percent(lines: usize) -> f64 {
+    100.0 / (2.0 * lines as f64)
+}
+
+impl FrequencyError {
+    fn is_missed(&self) -> bool {
+        (self.found as f64) < LEAST_SHARE * self.draws as f64
     }
 }
 
-fn block_lines(plan: &BlockPlan) -> BlockLines {
-    let band = |band: &super::plan::BandPlan| BandLines {
-        low: band.lines.low,
-        high: band.lines.high,
-        spacing: band.lines.spacing,
-        half_line: band.lines.half_line(),
-        seconds: band.lines.duration,
-        windows: band.windows.iter().map(|window| window.name()).collect(),
-    };
-    let lines = plan.bands.first().map_or(0, |band| band.lines.displayed());
-    BlockLines {
-        block: plan.block,
-        lines,
-        half_line_percent_of_band: formula_percent(lines),
-        bands: plan.bands.iter().map(band).collect(),
+impl ResolutionStudy {
+    /// Adds the smallest sufficient block for each window, reading and estimator, and the sentence.
+    pub(super) fn conclude(&mut self, windows: &[WindowName], readings: &[ReadBy]) {
+        for &window in windows {
+            for &reading in readings {
+                for method in EstimateMethod::ALL {
+                    let answer = self.answer(window, reading, method);
+                    self.answers.push(answer);
+                }
+            }
+        }
+        let subject = match self.stiffnesses.len() {
+            1 => "the stiffness",
+            _ => "every stiffness",
+        };
+        self.sentence = format!(
+            "For {} % (rms) in {subject} the consistent estimate needs {}; the pair regression needs {}.",
+            self.accuracy_percent,
+            self.needs(EstimateMethod::Consistent),
+            self.needs(EstimateMethod::Pairs)
+        );
     }
+
+    fn answer(&self, window: WindowName, reading: ReadBy, method: EstimateMethod) -> Answer {
+        let mut sufficient: Vec<usize> = self.blocks.iter().map(|lines| lines.block).collect();
+        for row in &self.stiffness_errors {
+            let is_accurate = row
+                .rms_percent
+                .is_some_and(|rms| rms <= self.accuracy_percent)
+                && row.found as f64 >= LEAST_SHARE * row.draws as f64;
+            if (row.window, row.reading, row.method) == (window, reading, method) && !is_accurate {
+                sufficient.retain(|&block| block != row.block);
+            }
+        }
+        let block = sufficient.into_iter().min();
+        Answer {
+            window,
+            reading,
+            method,
+            block,
+            seconds: block.map(|block| self.seconds(block)),
+        }
+    }
+
+    /// Returns the longest record (s) that a block takes in the bands of the modes used.
+    fn seconds(&self, block: usize) -> f64 {
+        let lines = self.blocks.iter().filter(|lines| lines.block == block);
+        lines
+            .flat_map(|lines| &lines.bands)
+            .filter(|band| {
+                let mut modes = self.modes.iter();
+                modes.any(|mode| mode.used && mode.band == [band.low, band.high])
+            })
+            .map(|band| band.seconds)
+            .fold(0.0, f64::max)
+    }
+
+    /// "a block of 512 or less (1 s a tap) read on the line, ...": the smallest block of each reading.
+    fn needs(&self, method: EstimateMethod) -> String {
+        let blocks: Vec<usize> = self.blocks.iter().map(|lines| lines.block).collect();
+        let least = blocks.iter().copied().min().unwrap_or(0);
+        let most = blocks.iter().copied().max().unwrap_or(0);
+        let several_windows = self
+            .answers
+            .iter()
+            .any(|answer| answer.window != self.answers[0].window);
+        let mut parts = Vec::new();
+        for answer in self.answers.iter().filter(|one| one.method == method) {
+            let mut how = match answer.reading {
+                ReadBy::Line => "read on the line",
+                ReadBy::Interpolated => "read between the lines",
+                ReadBy::Fit => "fitted",
+            }
+            .to_owned();
+            if several_windows {
+                how = format!("{how} (window {})", answer.window.name());
+            }
+            parts.push(match (answer.block, answer.seconds) {
+                (Some(block), Some(seconds)) => {
+                    let less = if block == least { " or less" } else { "" };
+                    let time = in_seconds(seconds);
+                    format!("a block of {block}{less} ({time} a tap) {how}")
+                }
+                _ if least == most => format!("more than a block of {most} {how}"),
+                _ => format!("another block than {least} to {most} {how}"),
+            });
+        }
+        parts.join(", ")
+    }
+
+    /// Returns the doubts about the numbers of the study, each a code and a text.
+    pub fn doubts(&self) -> Vec<(&'static str, String)> {
+        let mut doubts = Vec::new();
+        for mode in &self.omitted {
+            doubts.push((
+                "mode-not-studied",
+                format!("mode {} is not studied: {}", mode.mode, mode.reason),
+            ));
+        }
+        for mode in &self.modes {
+            let own = self.frequency_errors.iter();
+            let own = own.filter(|row| row.used && row.mode == mode.mode);
+            let missed = own.clone().filter(|row| row.is_missed());
+            if let Some(largest) = missed.map(|row| row.block).max() {
+                doubts.push((
+                    "mode-missed",
+                    format!(
+                        "mode {} is missed in more than 5 % of the tests at blocks up to {largest}: those \
+                         tests have no estimate",
+                        mode.mode
+                    ),
+                ));
+            }
+            let narrow = own.filter(|row| row.spread_lines.is_some_and(|s| s < LEAST_SPREAD));
+            if let Some(largest) = narrow.map(|row| row.block).max() {
+                doubts.push((
+                    "narrow-spread",
+                    format!(
+                        "mode {} varies by less than a line at blocks up to {largest}: its errors there \
+                         depend on where it lies; a narrower band has finer lines",
+                        mode.mode
+                    ),
+                ));
+            }
+        }
+        doubts.extend(self.modes.iter().filter_map(|mode| self.wide_peak(mode)));
+        for stiffness in &self.stiffnesses {
+            if stiffness.pairs_bias_percent.is_none() {
+                doubts.push((
+                    "no-pairs",
+                    format!(
+                        "the pair regression has no estimate of {} even from exact frequencies",
+                        stiffness.parameter
+                    ),
+                ));
+            }
+        }
+        doubts
+    }
+
+    /// Doubt about a mode whose peak is so wide that from some block on finer lines read it no better.
+    fn wide_peak(&self, mode: &StudiedMode) -> Option<(&'static str, String)> {
+        let width = 2.0 * self.damping * mode.frequency;
+        let rows = self.frequency_errors.iter().filter(|row| {
+            let of_line = (row.mode, row.reading) == (mode.mode, ReadBy::Line);
+            of_line && row.band == mode.band && row.spacing < width
+        });
+        // Errors uniform over a line have this rms; a tenth more is beyond the draws' chance.
+        let worse = rows.filter(|row| {
+            row.rms
+                .is_some_and(|r| r > 1.1 * row.spacing / 12f64.sqrt())
+        });
+        let block = worse.map(|row| row.block).min()?;
+        Some((
+            "wide-peak",
+            format!(
+                "mode {} is {width:.2} Hz wide at half power: from a block of {block} on noise moves the \
+                 reading of its line, and finer lines help less than they promise",
+                mode.mode
+            ),
+        ))
+    }
+}
+
+/// A length of time in three digits (s).
+fn in_seconds(seconds: f64) -> String {
+    let decimals = (2.0 - seconds.max(1e-3).log10().floor()).clamp(0.0, 3.0) as usize;
+    let text = format!("{seconds:.decimals$}");
+    let short = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
+    format!("{short} s")
 }

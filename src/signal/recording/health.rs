@@ -161,11 +161,11 @@ pub struct ChannelHealth {
     /// Runs of at least 3 equal samples at the channel's highest or lowest level, the first 32 of
     /// each side.
     pub flat_tops: Vec<FlatTop>,
-    /// How many there are.
+    /// Number of them, beyond the list too.
     pub flat_top_count: u64,
     /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
     pub dropped: Vec<Dropout>,
-    /// How many there are.
+    /// Number of them, beyond the list too.
     pub dropout_count: u64,
     /// Samples in all of them together.
     pub dropped_samples: u64,

@@ -8,7 +8,7 @@ pub(super) fn short(value: f64) -> f64 {
     format!("{value:.8e}").parse().unwrap_or(value)
 }
 
-/// Why a recording cannot be opened, read or written: the file, and the line where there is one;
+/// Error of opening, reading or writing a recording: the file, and the line where there is one;
 /// what was found, what is allowed, what to do. Poor data are [`super::RecordingWarning`]s instead.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
@@ -50,7 +50,7 @@ pub enum RecordingError {
     UnsupportedFormat {
         /// The file.
         file: String,
-        /// What the first bytes say it is.
+        /// Format by the first bytes.
         format: &'static str,
     },
     /// Text of two bytes a character.
@@ -103,7 +103,7 @@ pub enum RecordingError {
         file: String,
         /// The line, 1-based, that came nearest.
         line: u64,
-        /// What stands there.
+        /// Value found.
         value: String,
     },
     /// A cell that is no usable number.
@@ -225,7 +225,7 @@ pub enum RecordingError {
         /// ` (about N rows are missing)` where the gap is a whole number of steps, empty otherwise.
         lost: String,
     },
-    /// Nothing says how fast the file was sampled.
+    /// A file without a sample rate.
     #[error(
         "{file}:{line}: no time column and no sample rate{hint}; name the time column t or time (unit in brackets allowed), or give sample_rate in Hz"
     )]
@@ -282,7 +282,7 @@ pub enum RecordingError {
         file: String,
         /// The number asked for, 1-based.
         number: usize,
-        /// What exists.
+        /// Channels that exist.
         existing: String,
     },
     /// A channel name that does not exist.
@@ -296,7 +296,7 @@ pub enum RecordingError {
         name: String,
         /// `; did you mean "..."?` where one is near, empty otherwise.
         nearest: String,
-        /// What exists.
+        /// Channels that exist.
         existing: String,
     },
     /// A name that several channels share.
@@ -306,9 +306,9 @@ pub enum RecordingError {
         file: String,
         /// The name asked for.
         name: String,
-        /// How many have it.
+        /// Number of channels that have it.
         count: usize,
-        /// What exists.
+        /// Channels that exist.
         existing: String,
     },
     /// Channels of different lengths.
@@ -349,7 +349,7 @@ pub enum RecordingError {
     },
 }
 
-/// Why the header of a WAV file cannot be used.
+/// Error in the header of a WAV file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WavError {
     /// A chunk without which the samples have no meaning.
@@ -361,7 +361,7 @@ pub enum WavError {
         file: String,
         /// Its four-letter name.
         chunk: &'static str,
-        /// Where it was expected, empty for "anywhere".
+        /// Expected place; empty for "anywhere".
         place: &'static str,
     },
     /// A header field that cannot be true.
@@ -373,7 +373,7 @@ pub enum WavError {
         field: &'static str,
         /// Its value.
         value: u64,
-        /// What is allowed.
+        /// Allowed values.
         allowed: &'static str,
     },
     /// Samples coded in a way that is not read.
@@ -392,7 +392,7 @@ pub enum WavError {
     },
 }
 
-/// Why a universal file cannot be read or written.
+/// Error of reading or writing a universal file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum UffError {
     /// A header record that makes no sense.
@@ -408,11 +408,11 @@ pub enum UffError {
         dataset: usize,
         /// The record, 1-based as in the format's description; 0 for the line with the type.
         record: usize,
-        /// What the field means.
+        /// Meaning of the field.
         field: &'static str,
-        /// What stands there.
+        /// Value found.
         value: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: &'static str,
     },
     /// Numbers in a format of computers of the past.
@@ -440,7 +440,7 @@ pub enum UffError {
         line: u64,
         /// The dataset, 1-based.
         dataset: usize,
-        /// What stands there.
+        /// Value found.
         value: String,
     },
     /// A line too long to be a row of numbers.
@@ -464,7 +464,7 @@ pub enum UffError {
     NoFunctions {
         /// The file.
         file: String,
-        /// What there is.
+        /// Contents of the file.
         found: String,
     },
     /// Functions, but no time series.
@@ -472,9 +472,9 @@ pub enum UffError {
     NoTimeSeries {
         /// The file.
         file: String,
-        /// What there is.
+        /// Contents of the file.
         found: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// A time series whose header cannot be used as one.
@@ -486,9 +486,9 @@ pub enum UffError {
         dataset: usize,
         /// Its name.
         name: String,
-        /// What is wrong.
+        /// Problem.
         problem: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// Times or frequencies that are not evenly spaced.
@@ -550,7 +550,7 @@ pub enum UffError {
     },
 }
 
-/// Why a file gives no frequency response functions.
+/// Error of reading frequency response functions.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ResponseError {
     /// A recording where a response was expected.
@@ -560,7 +560,7 @@ pub enum ResponseError {
     TimeSeries {
         /// The file.
         file: String,
-        /// What it is.
+        /// Kind of file.
         what: String,
     },
     /// Frequency response functions where a recording was expected.
@@ -582,7 +582,7 @@ pub enum ResponseError {
     None {
         /// The file.
         file: String,
-        /// What there is.
+        /// Contents of the file.
         found: String,
     },
     /// Frequency response functions that cannot be used.
@@ -596,7 +596,7 @@ pub enum ResponseError {
         dataset: usize,
         /// Its place and description.
         name: String,
-        /// What is wrong.
+        /// Problem.
         problem: String,
     },
     /// Columns that are not frequency, real part and imaginary part.
@@ -608,7 +608,7 @@ pub enum ResponseError {
         file: String,
         /// Line of the first row, 1-based.
         line: u64,
-        /// What is there instead.
+        /// Problem.
         problem: String,
     },
     /// Frequencies that are not evenly spaced.

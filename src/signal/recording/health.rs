@@ -167,13 +167,13 @@ pub struct ChannelHealth {
     /// each side.
     #[serde(skip)]
     pub flat_tops: Vec<FlatTop>,
-    /// Number of flat tops.
+    /// Number of flat tops, beyond the list too.
     #[serde(rename = "flat_tops")]
     pub flat_top_count: u64,
     /// Runs of at least 32 repeated samples inside the moving signal, the first 32.
     #[serde(skip)]
     pub dropped: Vec<Dropout>,
-    /// How many there are.
+    /// Number of dropouts, beyond the list too.
     #[serde(skip)]
     pub dropout_count: u64,
     /// Samples in all of them together.

@@ -61,7 +61,7 @@ const SAME_RATE: f64 = 1e-3;
 /// Relative difference to a header's factor below which a scale states the same unit: a rounded 9.81 is another.
 const SAME_SCALE: f64 = 1e-6;
 
-/// What the caller knows about a file that the file may not say.
+/// Facts about a file that the file itself may not contain.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ReadSettings {
     /// Sample rate (Hz) of a CSV file without a time column. A file's own rate wins, with a
@@ -93,11 +93,11 @@ pub enum Format {
     },
     /// Text.
     Csv {
-        /// What separates the columns.
+        /// Separator of the columns.
         separator: Separator,
         /// Decimal mark, `.` where no number shows one.
         decimal: char,
-        /// Whether the sample rate comes from a time column.
+        /// Source of the sample rate.
         timed: Timing,
     },
     /// Universal file, datasets 58 or 58b.
@@ -111,7 +111,7 @@ pub enum Format {
     Memory,
 }
 
-/// Where a text file's sample rate comes from.
+/// Source of a text file's sample rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Timing {
     /// From its time column.
@@ -120,7 +120,7 @@ pub enum Timing {
     Given,
 }
 
-/// What is known about one channel.
+/// Name, unit, scale and quality of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ChannelInfo {
     /// Name without the unit, where the file gives one.
@@ -131,7 +131,7 @@ pub struct ChannelInfo {
     /// The unit as the header has it.
     #[serde(skip)]
     pub header_unit: Option<String>,
-    /// What file units are multiplied by: the scale set, else the header unit's factor to SI, else 1.
+    /// Factor on file units: the scale set, else the header unit's factor to SI, else 1.
     pub scale: f64,
     /// Quality of the samples, in the unit that values have.
     #[serde(flatten)]
@@ -239,7 +239,7 @@ impl Recording {
         self.path.as_deref()
     }
 
-    /// What kind of file it is.
+    /// Format of the file.
     pub fn format(&self) -> Format {
         self.format
     }
@@ -264,7 +264,7 @@ impl Recording {
         &self.channels
     }
 
-    /// The same recording under another name, the one its description uses.
+    /// Returns the recording under another name, such as that in a test description.
     pub fn renamed(mut self, name: impl Into<String>) -> Self {
         self.name = name.into();
         self
@@ -570,7 +570,7 @@ impl Iterator for Blocks<'_> {
     }
 }
 
-/// Where the samples of a recording are.
+/// Place of the samples of a recording.
 #[derive(Debug, Clone)]
 enum Source {
     Wav(Box<WavSource>),
@@ -678,7 +678,7 @@ const UNREAD: &[(usize, &[u8], &str)] = &[
     (0, b"BW64", "a RIFF file without WAVE data"),
 ];
 
-/// How many bytes decide.
+/// Number of bytes that decide.
 const DECIDING_BYTES: usize = 4096;
 
 /// Recognises the format of the file at `path`.

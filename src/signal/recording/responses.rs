@@ -58,9 +58,9 @@ impl FrequencyResponses {
 pub struct FrequencyResponse {
     /// Response and reference point such as "3:+Z / 1:-Z", or what else the file calls it.
     pub name: String,
-    /// Where the response was measured.
+    /// Point of the response.
     pub response: Point,
-    /// Where the force acted.
+    /// Point of the force.
     pub reference: Point,
     /// The unit as written; `None` where the file has none.
     pub unit: Option<String>,

@@ -139,7 +139,7 @@ impl TimeCheck {
     }
 }
 
-/// How many digits the times have, over all cells looked at: fixed decimals or fixed significant
+/// Number of digits of the times, over all cells looked at: fixed decimals or fixed significant
 /// digits, zeros at the end possibly left out, or the 24 binary digits of single precision.
 #[derive(Debug, Clone, Copy)]
 struct Digits {
@@ -147,7 +147,7 @@ struct Digits {
     significant: i32,
     /// Power of ten of the finest last digit.
     finest: i32,
-    /// Whether every cell may be a single-precision number.
+    /// `true` where every cell may be a single-precision number.
     single: bool,
 }
 

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-/// What stands between the numbers of a CSV file.
+/// Separator of the numbers of a CSV file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Separator {
     /// `\t`.
@@ -33,7 +33,7 @@ impl Separator {
     }
 }
 
-/// Where a cell stands in its line (bytes).
+/// Place of a cell in its line (bytes).
 pub(super) type Cell = Range<usize>;
 
 /// Splits a line into cells, quotes and surrounding blanks removed. `cells` is reused.
@@ -107,7 +107,14 @@ pub(super) fn parse_number(cell: &[u8], decimal: &mut Option<u8>) -> Result<f64,
     }
     let text = str::from_utf8(cell).map_err(|_| CellProblem::Text)?;
     let value = match mark {
-        Some(b',') => parse_with_comma(text),
+        // A decimal comma has digits on both sides, unlike a comma that separates.
+        Some(b',') => text
+            .split_once(',')
+            .filter(|(before, after)| {
+                before.ends_with(|c: char| c.is_ascii_digit())
+                    && after.starts_with(|c: char| c.is_ascii_digit())
+            })
+            .and_then(|(before, after)| parse_plain(&format!("{before}.{after}"))),
         _ => parse_plain(text),
     };
     let value = value.ok_or(CellProblem::Text)?;
@@ -130,14 +137,6 @@ pub(super) fn parse_plain(text: &str) -> Option<f64> {
         let (mantissa, exponent) = text.split_once(['d', 'D'])?;
         format!("{mantissa}e{exponent}").parse().ok()
     })
-}
-
-/// A decimal comma has digits on both sides, unlike a comma that separates.
-fn parse_with_comma(text: &str) -> Option<f64> {
-    let (before, after) = text.split_once(',')?;
-    let is_decimal = before.ends_with(|c: char| c.is_ascii_digit())
-        && after.starts_with(|c: char| c.is_ascii_digit());
-    is_decimal.then(|| parse_plain(&format!("{before}.{after}")))?
 }
 
 /// Bytes of a text file as characters: UTF-8 where it is valid, else latin-1.

@@ -70,13 +70,6 @@ const UNITS: &[(&str, f64, &str)] = &[
 /// assert_eq!(channel_unit("furlong"), None);
 /// ```
 pub fn channel_unit(text: &str) -> Option<(f64, &'static str)> {
-    let plain = plain_spelling(text);
-    let unit = UNITS.iter().find(|(spelling, ..)| *spelling == plain);
-    unit.map(|(_, factor, si)| (*factor, *si))
-}
-
-/// One spelling for the many ways to type a power, a micro sign or a product.
-fn plain_spelling(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for character in text.trim().chars() {
         match character {
@@ -88,7 +81,8 @@ fn plain_spelling(text: &str) -> String {
             other => plain.push(other),
         }
     }
-    plain
+    let unit = UNITS.iter().find(|(spelling, ..)| *spelling == plain);
+    unit.map(|(_, factor, si)| (*factor, *si))
 }
 
 /// Returns factor to SI and SI unit of a label, which may stand in brackets.
@@ -116,7 +110,7 @@ pub(super) fn split_unit(cell: &str) -> (&str, Option<&str>) {
     (cell, None)
 }
 
-/// Where the bracket opens that a closing one after `inner` would close.
+/// Place of the bracket that a closing one after `inner` would close.
 fn matching_bracket(inner: &str, open: char, close: char) -> Option<usize> {
     let mut depth = 0_usize;
     for (at, character) in inner.char_indices().rev() {
@@ -178,7 +172,7 @@ impl ResponseForm {
         }
     }
 
-    /// How often displacement was differentiated in time.
+    /// Number of times that displacement was differentiated in time.
     fn derivatives(self) -> i32 {
         match self {
             ResponseForm::Receptance => 0,
@@ -247,7 +241,16 @@ pub(super) fn quotient(motion: &str, force: &str) -> Option<(f64, ResponseForm)>
 
 /// Numerator and denominator of a quotient.
 fn split_quotient(text: &str) -> Option<(&str, &str)> {
-    let outside = outside_brackets(text);
+    let mut outside = Vec::new();
+    let mut depth = 0_i32;
+    for (place, character) in text.char_indices() {
+        match character {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ if depth == 0 => outside.push((place, character)),
+            _ => {}
+        }
+    }
     // "(1/N)*(m/s2)": a product with a reciprocal, in either order.
     if let Some((place, mark)) = outside.iter().rfind(|(_, c)| ['*', '\u{b7}'].contains(c)) {
         let (first, second) = (text.get(..*place)?, text.get(place + mark.len_utf8()..)?);
@@ -265,25 +268,10 @@ fn split_quotient(text: &str) -> Option<(&str, &str)> {
     Some((text.get(..=place)?, text.get(place + 1..)?))
 }
 
-/// What "1/N" or "(1/N)" is the reciprocal of.
+/// Returns the "N" of "1/N" or "(1/N)".
 fn reciprocal(text: &str) -> Option<&str> {
     let inner = text.strip_prefix('(').and_then(|t| t.strip_suffix(')'));
     inner.unwrap_or(text).strip_prefix("1/")
-}
-
-/// Characters outside all brackets, with their places.
-fn outside_brackets(text: &str) -> Vec<(usize, char)> {
-    let mut depth = 0_i32;
-    let mut outside = Vec::new();
-    for (place, character) in text.char_indices() {
-        match character {
-            '(' | '[' => depth += 1,
-            ')' | ']' => depth -= 1,
-            _ if depth == 0 => outside.push((place, character)),
-            _ => {}
-        }
-    }
-    outside
 }
 
 #[cfg(test)]

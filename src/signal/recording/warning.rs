@@ -40,7 +40,7 @@ pub enum RecordingWarning {
         "the header gives no valid length (data size {size}); the recorder probably stopped without closing the file; read to the end of the file, {present} samples per channel"
     )]
     UnknownLength {
-        /// What the header says (bytes).
+        /// Size by the header (bytes).
         size: u64,
         /// Samples per channel in the file.
         present: u64,
@@ -62,7 +62,7 @@ pub enum RecordingWarning {
     FullScale {
         /// The channel.
         channel: ChannelLabel,
-        /// How many samples.
+        /// Number of samples.
         count: u64,
         /// The first one (s).
         time: f64,
@@ -74,7 +74,7 @@ pub enum RecordingWarning {
     FlatTops {
         /// The channel.
         channel: ChannelLabel,
-        /// How many runs.
+        /// Number of runs.
         count: u64,
         /// Start of the first one (s).
         time: f64,
@@ -90,7 +90,7 @@ pub enum RecordingWarning {
     Dropped {
         /// The channel.
         channel: ChannelLabel,
-        /// How many runs.
+        /// Number of runs.
         count: u64,
         /// Samples in all of them.
         samples: u64,
@@ -172,7 +172,7 @@ pub enum RecordingWarning {
         dataset: usize,
         /// Its place and description.
         name: String,
-        /// What differs.
+        /// Difference to the others.
         reason: String,
     },
     /// Two channels at one place.
@@ -249,7 +249,7 @@ pub enum ResponseWarning {
         dataset: usize,
         /// Its place and description.
         name: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// The file ends before the header says.

@@ -225,7 +225,7 @@ struct WavHeader {
     coding: Coding,
     /// Bytes of one sample of all channels.
     frame_bytes: u64,
-    /// Where the samples begin in the file.
+    /// First byte of the samples in the file.
     data_start: u64,
     /// Complete samples per channel that are in the file.
     frames: u64,
@@ -286,7 +286,7 @@ impl ChunkWalker<'_> {
         Ok((got == 8).then(|| ([a, b, c, d], u32::from_le_bytes(size))))
     }
 
-    /// Where the next chunk begins. Chunks are padded to even length; where a writer forgot the
+    /// Returns the place of the next chunk. Chunks are padded to even length; where a writer forgot the
     /// pad byte, a known name stands right behind the chunk.
     fn after_chunk(&mut self, content: u64, size: u64) -> Result<u64, RecordingError> {
         let end = content.saturating_add(size);

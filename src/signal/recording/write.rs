@@ -304,7 +304,7 @@ fn unwritable(name: &str, error: impl Into<hound::Error>) -> RecordingError {
     }
 }
 
-/// How datasets are written.
+/// Coding of the datasets that are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UffFormat {
     /// Dataset 58: text with thirteen digits.

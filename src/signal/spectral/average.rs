@@ -46,7 +46,7 @@ pub struct AveragedSpectra {
 }
 
 impl SpectralAverager {
-    /// Nothing averaged yet, for so many responses.
+    /// Begins averages for so many responses.
     pub fn new(lines: Lines, responses: usize) -> Self {
         let points = lines.points();
         SpectralAverager {

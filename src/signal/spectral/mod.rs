@@ -19,7 +19,7 @@ pub use window::{
     line_amplitude, measure_decay, noise_beside, noise_power,
 };
 
-/// What makes a spectrum impossible.
+/// Reason why a spectrum is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpectralError {
     /// The band does not fit the sample rate.
@@ -183,7 +183,7 @@ impl Lines {
             .collect()
     }
 
-    /// What the signal can resolve, 1/T (Hz).
+    /// Resolution of the signal, 1/T (Hz).
     pub fn resolution(&self) -> f64 {
         1.0 / self.duration
     }

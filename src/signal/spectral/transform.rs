@@ -318,7 +318,7 @@ fn filtered(mixed: &[Complex64], filter: &[f64], index: i64) -> Complex64 {
     sums.iter().sum::<Complex64>() + rest.map(|(x, weight)| x * weight).sum::<Complex64>()
 }
 
-/// What a chirp z-transform needs and every record shares.
+/// Tables of a chirp z-transform that all records share.
 pub(super) struct Chirp {
     /// e^{-j 2 pi start n} times half the chirp, for each sample.
     before: Vec<Complex64>,

@@ -87,12 +87,12 @@ pub struct DecayCheck {
     /// rms over the last twentieth of the record over the largest rms of any twentieth, the
     /// noise power taken out of both.
     pub remaining: f64,
-    /// The noise alone, on the same scale: below it nothing can be said.
+    /// Noise alone, on the same scale: a smaller `remaining` is not known.
     pub noise: f64,
 }
 
 impl DecayCheck {
-    /// Of a record that never rises above its noise.
+    /// Result for a record that never rises above its noise.
     pub const NOTHING: Self = Self {
         remaining: 0.0,
         noise: 1.0,

@@ -357,7 +357,7 @@ const STEPS: i32 = 4;
 /// A weaker copy of a pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PulseCopy {
-    /// Where its crest is (samples from the start, with a fraction).
+    /// Place of its crest (samples from the start, with a fraction).
     place: f64,
     /// Its height over the pulse's; negative where it points downwards.
     ratio: f64,
@@ -366,12 +366,20 @@ struct PulseCopy {
 }
 
 impl Pulse<'_> {
-    /// The pulse at `offset` samples from its crest; 0 beyond its reach.
+    /// The pulse at `offset` samples from its crest, by the cubic through the four samples about it (Catmull and
+    /// Rom); 0 beyond its reach.
     fn at(&self, offset: f64) -> f64 {
         if offset.abs() > self.reach as f64 {
             return 0.0;
         }
-        interpolate(self.samples, self.crest as f64 + offset)
+        let place = self.crest as f64 + offset;
+        let index = place.floor();
+        let u = place - index;
+        let [a, b, c, d] = [-1, 0, 1, 2].map(|step| clamped(self.samples, index as i64 + step));
+        let slope = c - a;
+        let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
+        let third = 3.0 * (b - c) + d - a;
+        b + 0.5 * u * (slope + u * (second + u * third))
     }
 
     /// The copy near `place`; `None` where the force there has another shape or width.
@@ -447,7 +455,7 @@ impl Pulse<'_> {
 /// One comparison of the template with the force.
 #[derive(Debug, Clone, Copy)]
 struct Fit {
-    /// Where the crest is, from the place looked at (samples).
+    /// Place of the crest, from the place looked at (samples).
     offset: f64,
     ratio: f64,
     /// The constant a.
@@ -463,17 +471,6 @@ fn clamped(samples: &[f64], index: i64) -> f64 {
         .get(index.clamp(0, last.max(0)) as usize)
         .copied()
         .unwrap_or(0.0)
-}
-
-/// Value between samples, by the cubic through the four about it (Catmull and Rom).
-fn interpolate(samples: &[f64], place: f64) -> f64 {
-    let index = place.floor();
-    let u = place - index;
-    let [a, b, c, d] = [-1, 0, 1, 2].map(|step| clamped(samples, index as i64 + step));
-    let slope = c - a;
-    let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
-    let third = 3.0 * (b - c) + d - a;
-    b + 0.5 * u * (slope + u * (second + u * third))
 }
 
 /// Noise variance from the median magnitude of first differences, sqrt(2) times the noise: pulses and

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use crate::recording::{Recording, RecordingError};
 
-/// Where taps are looked for.
+/// Channels on which taps are looked for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TapSource {
     /// The force on this channel (0-based); its responses follow, for the overload check.
@@ -43,7 +43,7 @@ impl TapSource {
     }
 }
 
-/// How taps are found and judged.
+/// Limits by which taps are found and judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TapSettings {
     /// Signal kept before the trigger (s). 10 ms, enough for a filter's ringing ahead of the pulse;
@@ -62,7 +62,7 @@ pub struct TapSettings {
     /// A second hit above this share of the peak rejects the tap. 10 % (no false alarm in 5,000 clean
     /// pulses, every second hit of 12 % found: `examples/double_hits.rs`).
     pub double_hit: f64,
-    /// A second hit above this share of the peak is told and its tap kept. 4 %, so that one of 5 % is
+    /// A second hit above this share of the peak is reported and its tap kept. 4 %, so that one of 5 % is
     /// found whatever its noise and width: it leaves a ripple of 0.9 dB in the force spectrum.
     pub double_hit_warning: f64,
     /// The force must have fallen below this share of the peak before a second excursion counts. 5 %.
@@ -101,7 +101,7 @@ pub struct Tap {
     /// A second hit within the record, from [`TapSettings::double_hit_warning`] of the peak up; `None`
     /// without one, and without a hammer, where it cannot be told from two modes that beat.
     pub second_hit: Option<SecondHit>,
-    /// Why it does not enter the averages; `None` = accepted.
+    /// Reason why it does not enter the averages; `None` = accepted.
     pub rejection: Option<Rejection>,
 }
 
@@ -117,7 +117,7 @@ impl Tap {
     }
 }
 
-/// Why a tap is rejected.
+/// Reason why a tap is rejected.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rejection {
     /// The hammer hit twice.
@@ -147,16 +147,16 @@ pub enum Rejection {
     },
     /// The file ends before the record is long enough.
     CutOff {
-        /// What there is (s).
+        /// Length recorded (s).
         available: f64,
-        /// What the others have (s).
+        /// Length of the others (s).
         needed: f64,
     },
     /// The next tap comes before the record is long enough.
     NextTooSoon {
-        /// What there is (s).
+        /// Length recorded (s).
         available: f64,
-        /// What the others have (s).
+        /// Length of the others (s).
         needed: f64,
     },
 }
@@ -213,7 +213,7 @@ pub enum TapRemark {
     StartsWithinTap,
     /// The force stayed up for longer than any hammer pulse.
     LongExcursion {
-        /// How often.
+        /// Number of times.
         count: usize,
     },
 }
@@ -281,7 +281,7 @@ struct Event {
 /// Finds the taps of a recording.
 ///
 /// # Errors
-/// What reading the recording meets.
+/// Those of reading the recording.
 pub fn find_taps(
     recording: &Recording,
     source: &TapSource,

@@ -134,10 +134,11 @@ impl<'a> Head<'a> {
     pub(super) fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
         let candidates = Separator::ALL.map(|separator| Candidate::new(self, separator));
         // Most rows first, then a header that fits, then most columns, then the order of preference.
-        let best = candidates
-            .iter()
-            .rev()
-            .max_by_key(|candidate| (candidate.rows, candidate.header_fits(), candidate.cells));
+        let best = candidates.iter().rev().max_by_key(|one| {
+            let above = one.line_above(one.first).map(|at| one.kind(at));
+            let header_fits = above == Some(LineKind::Text(one.cells));
+            (one.rows, header_fits, one.cells)
+        });
         if let Some(best) = best.filter(|best| best.rows > 0) {
             return best.layout(file);
         }
@@ -346,12 +347,6 @@ impl<'a> Candidate<'a> {
         self.lines.get(at).map_or(LineKind::Blank, |line| line.kind)
     }
 
-    /// Returns `true` where text with as many cells as the row stands above the first row.
-    fn header_fits(&self) -> bool {
-        self.line_above(self.first)
-            .is_some_and(|at| self.kind(at) == LineKind::Text(self.cells))
-    }
-
     fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
         let first = self.first_row();
         let mut columns = self.header_above(first, file)?.unwrap_or_default();
@@ -483,24 +478,22 @@ impl<'a> Candidate<'a> {
     /// Finds the time column: one that is named as time and rises in at least half of the steps of the head. (That
     /// it rises in all of them is checked when the rows are read, and is an error there.)
     fn time_column(&self, columns: &[Column], first: usize) -> Option<usize> {
+        let mut cells = Vec::new();
         named_as_time(columns).into_iter().find(|column| {
-            let values = self.column_values(*column, first);
+            // The readable numbers in the rows of the commonest kind.
+            let mut values = Vec::new();
+            for line in self.lines.iter().skip(first) {
+                if line.kind == LineKind::Row(self.cells) {
+                    split_cells(line.text, self.separator, &mut cells);
+                    let cell = cells
+                        .get(*column)
+                        .and_then(|cell| line.text.get(cell.clone()));
+                    values.extend(cell.and_then(|cell| parse_number(cell, &mut None).ok()));
+                }
+            }
             let rising = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
             2 * rising >= values.len().saturating_sub(1)
         })
-    }
-
-    /// The readable numbers of one column in the rows of the commonest kind.
-    fn column_values(&self, column: usize, first: usize) -> Vec<f64> {
-        let mut cells = Vec::new();
-        let rows = self.lines.iter().skip(first);
-        rows.filter(|line| line.kind == LineKind::Row(self.cells))
-            .filter_map(|line| {
-                split_cells(line.text, self.separator, &mut cells);
-                let cell = line.text.get(cells.get(column)?.clone())?;
-                parse_number(cell, &mut None).ok()
-            })
-            .collect()
     }
 }
 

@@ -25,7 +25,7 @@ const INDEX_ROWS: u64 = 4096;
 /// A longer line is not a row of numbers; the limit keeps a file without line ends out of memory.
 const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// A mean rate and the whole number used instead differ worth mentioning from here on, relatively.
+/// Least relative difference of a mean rate and the whole number used instead that is mentioned.
 const MENTIONED_ROUNDING: f64 = 1e-6;
 
 /// Opens a text file as a recording.
@@ -105,7 +105,7 @@ pub(super) struct CsvSource {
     pub file: String,
     pub layout: CsvLayout,
     pub frames: u64,
-    /// Where every 4096th row begins.
+    /// Place of every 4096th row.
     index: Arc<Vec<RowPlace>>,
 }
 
@@ -405,7 +405,7 @@ fn uneven_error(
     }
 }
 
-/// Where a row begins.
+/// Place of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct RowPlace {
     offset: u64,
@@ -419,9 +419,9 @@ struct RowReader<'a> {
     reader: BufReader<File>,
     /// The line read last, with its end.
     line: Vec<u8>,
-    /// Where the next line begins.
+    /// Place of the next line.
     next: RowPlace,
-    /// Where the row read last begins.
+    /// Place of the row read last.
     place: RowPlace,
     decimal: Option<u8>,
     cells: Vec<Cell>,

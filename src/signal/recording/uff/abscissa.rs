@@ -20,7 +20,7 @@ pub(in crate::recording) struct EvenPoints {
     pub start: f64,
     /// Distance (s or Hz).
     pub step: f64,
-    /// How many the header promises.
+    /// Number that the header promises.
     pub points: u64,
 }
 
@@ -36,9 +36,9 @@ impl EvenPoints {
 /// Unit that an abscissa has inside this program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::recording) enum AbscissaUnit {
-    /// Of time series.
+    /// Unit of time series.
     Seconds,
-    /// Of frequency responses.
+    /// Unit of frequency responses.
     Hertz,
 }
 
@@ -96,7 +96,7 @@ impl AbscissaUnit {
 /// Functions on the same points, and the others with the reason why they are left out.
 pub(in crate::recording) struct FunctionGroup<'a> {
     pub functions: Vec<Entry<'a>>,
-    /// Where they lie; `None` where no function can be used.
+    /// Their points; `None` where no function can be used.
     pub points: Option<EvenPoints>,
     /// First those that cannot be used, then those on other points.
     pub left_out: Vec<(Entry<'a>, String)>,

@@ -17,7 +17,7 @@ use crate::recording::{read_fully, unreadable};
 
 /// More datasets than any file has; the limit keeps a file of nothing but marks out of memory.
 const MAX_DATASETS: usize = 1_000_000;
-/// What stands in columns 1 to 6 of the line that opens and the line that closes a dataset.
+/// Columns 1 to 6 of the line that opens and of the line that closes a dataset.
 pub(super) const MARK: &[u8] = b"    -1";
 
 /// A longer line is none; the limit keeps a file without line ends out of memory.
@@ -40,11 +40,11 @@ pub struct Dataset {
     pub function: Option<Function>,
     /// Bytes of the values, or of everything behind the type's line.
     pub bytes: u64,
-    /// Where the values are.
+    /// Place of the values.
     pub(super) place: DataPlace,
 }
 
-/// Where the values of a dataset are and how they are laid out.
+/// Place and layout of the values of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct DataPlace {
     /// First byte.
@@ -53,11 +53,11 @@ pub(super) struct DataPlace {
     pub end: u64,
     /// Bytes of a stored abscissa in binary data.
     pub abscissa_bytes: u64,
-    /// Whether no mark follows: the file was cut here.
+    /// `true` where no mark follows: the file was cut here.
     pub cut: bool,
 }
 
-/// What is in a universal file.
+/// Contents of a universal file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UniversalFile {
     /// The file as the caller named it.
@@ -80,7 +80,7 @@ impl UniversalFile {
         datasets.filter_map(|dataset| Some((dataset, dataset.function.as_ref()?)))
     }
 
-    /// What the file holds, in words: "2 coherence, 1 units (164)".
+    /// Contents in words: "2 coherence, 1 units (164)".
     pub fn contents(&self) -> String {
         let mut kinds: Vec<(String, usize)> = Vec::new();
         for dataset in &self.datasets {
@@ -101,7 +101,7 @@ impl UniversalFile {
 }
 
 impl Dataset {
-    /// What it is, in words: the function's type, or what datasets of this type hold.
+    /// Kind in words: the function's type, or what datasets of this type hold.
     pub fn kind_name(&self) -> String {
         if let Some(function) = &self.function {
             return function.function_type.name().to_owned();
@@ -331,7 +331,7 @@ pub(super) struct Scanner {
     file: File,
     pub length: u64,
     buffer: Vec<u8>,
-    /// Where the buffer begins in the file.
+    /// Place of the buffer in the file.
     base: u64,
     /// Place in the buffer.
     at: usize,
@@ -348,7 +348,7 @@ impl Scanner {
         })
     }
 
-    /// Where the next line begins (bytes).
+    /// Place of the next line (bytes).
     pub(super) fn position(&self) -> u64 {
         self.base + self.at as u64
     }

@@ -38,7 +38,7 @@ pub(super) use values::read_values;
 
 // ---- Header of a dataset 58 or 58b: eleven records of fields in fixed columns.
 
-/// What a function is (record 6, field 1).
+/// Type of a function (record 6, field 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FunctionType(pub u32);
 
@@ -92,7 +92,7 @@ impl FunctionType {
     }
 }
 
-/// How a dataset's values are stored.
+/// Coding of a dataset's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UffCoding {
     /// Dataset 58: text.
@@ -106,7 +106,7 @@ pub enum UffCoding {
     },
 }
 
-/// Whether values are real or complex.
+/// Kind of values: real or complex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ordinate {
     /// One number a point.
@@ -124,7 +124,7 @@ pub enum Precision {
     Double,
 }
 
-/// Where the points lie along the abscissa.
+/// Spacing of the points along the abscissa.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Abscissa {
     /// Evenly spaced; nothing stored.
@@ -237,7 +237,7 @@ pub(super) const PRESSURE: u32 = 15;
 pub(super) const TIME: u32 = 17;
 
 impl Axis {
-    /// What the axis measures, in words; `None` where the file does not say.
+    /// Quantity of the axis in words; `None` where the file does not say.
     pub fn quantity_name(&self) -> Option<&'static str> {
         let known = QUANTITIES
             .iter()
@@ -283,13 +283,13 @@ impl UnitSystem {
 /// A function, as its header describes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Function {
-    /// What it is.
+    /// Type of the function.
     pub function_type: FunctionType,
     /// The five lines of free text, `None` for "NONE": description, run, date and time, two more.
     pub id_lines: [Option<String>; 5],
-    /// Where the response was measured.
+    /// Point of the response.
     pub response: Point,
-    /// Where the excitation acted.
+    /// Point of the excitation.
     pub reference: Point,
     /// Text or binary.
     pub coding: UffCoding,
@@ -299,7 +299,7 @@ pub struct Function {
     pub precision: Precision,
     /// Points that the header promises.
     pub points: u64,
-    /// Where they lie.
+    /// Their spacing.
     pub abscissa: Abscissa,
     /// The abscissa's axis: time or frequency.
     pub abscissa_axis: Axis,

@@ -84,7 +84,7 @@ fn parse_words<'a>(line: &'a [u8], room: usize, into: &mut Vec<f64>) -> Result<(
     Ok(())
 }
 
-/// Where a sign begins another number: not at the start and not behind an exponent's letter.
+/// Returns the place of a sign that begins another number: not at the start and not behind an exponent's letter.
 fn next_sign(word: &[u8]) -> Option<usize> {
     let pairs = word.iter().zip(word.iter().skip(1));
     let at = pairs.enumerate().find(|(_, (before, sign))| {

@@ -88,7 +88,7 @@ pub(in crate::recording) fn read_values(
 /// A place in text values that reading can start from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Checkpoint {
-    /// Where a line begins (bytes).
+    /// First byte of a line.
     pub offset: u64,
     /// Numbers before it.
     pub numbers: u64,
@@ -123,7 +123,7 @@ pub(super) struct Values {
     promised: u64,
     /// Bytes of a point in binary data.
     point_bytes: u64,
-    /// Where reading can start in text; one at least.
+    /// Places in text from which reading can start; one at least.
     pub checkpoints: Arc<Vec<Checkpoint>>,
     /// Samples of a text channel that is kept in memory, all of them.
     pub kept: Option<Arc<Vec<f64>>>,
@@ -249,7 +249,7 @@ pub(super) struct ValueReader<'a> {
     decoded: u64,
     /// Points handed out since the first of the dataset.
     pub at: u64,
-    /// Where the block decoded last began.
+    /// Beginning of the block decoded last.
     pub block: Checkpoint,
 }
 

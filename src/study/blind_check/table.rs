@@ -61,7 +61,13 @@ const NO_ANSWER: &str = "no_answer";
 pub fn rows(scores: &Scores, extent: Option<Extent>) -> Vec<Row> {
     let mut rows = all_rows(scores);
     for row in &mut rows {
-        row.ideal = extent.and_then(|extent| ideal_observer(row.key, extent));
+        let ideal = IDEAL.iter().find(|ideal| ideal.0 == row.key);
+        row.ideal = ideal
+            .zip(extent)
+            .map(|((_, one, five), extent)| match extent {
+                Extent::OneRecording => *one,
+                Extent::FiveRecordings => *five,
+            });
         if extent == Some(Extent::OneRecording) && row.key != NO_ANSWER {
             row.target = Target::None;
         }
@@ -69,184 +75,89 @@ pub fn rows(scores: &Scores, extent: Option<Extent>) -> Vec<Row> {
     rows
 }
 
-fn all_rows(scores: &Scores) -> Vec<Row> {
-    use Target::{AtLeast, AtMost};
-    let s = scores;
-    let mut rows = vec![
-        rate(
-            "top_1",
-            "one effect: first group is right",
-            s.top_1,
-            AtLeast(0.80),
-        ),
-        rate(
-            "top_1_detectable",
-            "the same where it can be noticed",
-            s.top_1_detectable,
-            AtLeast(0.88),
-        ),
-        rate(
-            "top_3",
-            "one effect: among the first three",
-            s.top_3,
-            AtLeast(0.94),
-        ),
-        rate(
-            "where",
-            "one effect: place is right",
-            s.place,
-            AtLeast(0.83),
-        ),
-        rate(
-            "top_1_of_all",
-            "one effect: first of all classes",
-            s.top_1_of_all,
-            Target::None,
-        ),
-        rate(
-            "named_right",
-            "one effect, named: name is right",
-            s.named_right,
-            AtLeast(0.96),
-        ),
-        rate(
-            "coverage",
-            "one effect: something is named",
-            s.named,
-            AtLeast(0.62),
-        ),
-        rate(
-            "named_right_of_all",
-            "any case, named: name is right",
-            s.named_right_of_all,
-            Target::None,
-        ),
-        rate(
-            "null_called_effect",
-            "nothing: called an effect",
-            s.null_called_effect,
-            AtMost(0.02),
-        ),
-        rate(
-            "null_false_alarm",
-            "nothing: an effect comes first",
-            s.null_false_alarm,
-            Target::None,
-        ),
-        rate(
-            "outside_named",
-            "outside: named",
-            s.outside_named,
-            AtMost(0.18),
-        ),
-        rate(
-            "outside_refused",
-            "outside, refutable: refused",
-            s.outside_refused,
-            AtLeast(0.80),
-        ),
-        rate(
-            "outside_unknown",
-            "outside: called unknown",
-            s.outside_unknown,
-            Target::None,
-        ),
+fn all_rows(s: &Scores) -> Vec<Row> {
+    use Target::{AtLeast, AtMost, None};
+    let tests: usize = s.counts.iter().sum();
+    let failed = (tests > 0).then_some(s.failed as f64);
+    let (median, tenth) = s.closure.unzip();
+    let error = s.calibration.expected_calibration_error;
+    vec![
+        rate("top_1", s.top_1, AtLeast(0.80)),
+        rate("top_1_detectable", s.top_1_detectable, AtLeast(0.88)),
+        rate("top_3", s.top_3, AtLeast(0.94)),
+        rate("where", s.place, AtLeast(0.83)),
+        rate("top_1_of_all", s.top_1_of_all, None),
+        rate("named_right", s.named_right, AtLeast(0.96)),
+        rate("coverage", s.named, AtLeast(0.62)),
+        rate("named_right_of_all", s.named_right_of_all, None),
+        rate("null_called_effect", s.null_called_effect, AtMost(0.02)),
+        rate("null_false_alarm", s.null_false_alarm, None),
+        rate("outside_named", s.outside_named, AtMost(0.18)),
+        rate("outside_refused", s.outside_refused, AtLeast(0.80)),
+        rate("outside_unknown", s.outside_unknown, None),
         rate(
             "several_found_or_refused",
-            "two: both found, or refused",
             s.several_found_or_refused,
             AtLeast(0.80),
         ),
-        rate(
-            "several_detectable",
-            "the same where both can be noticed",
-            s.several_detectable,
-            Target::None,
-        ),
-        rate(
-            "several_found",
-            "two: both found",
-            s.several_found,
-            Target::None,
-        ),
-        rate(
-            "set_coverage",
-            "90 % set holds the truth",
-            s.set_coverage,
-            AtLeast(0.88),
-        ),
-    ];
-    rows.extend(figures(scores));
-    rows
-}
-
-fn figures(scores: &Scores) -> [Row; 8] {
-    use Target::{AtLeast, AtMost};
-    let calibration = &scores.calibration;
-    let (median, tenth) = (scores.closure.map(|c| c.0), scores.closure.map(|c| c.1));
-    [
-        figure(
-            NO_ANSWER,
-            "tests that could not be diagnosed",
-            (scores.counts.iter().sum::<usize>() > 0).then_some(scores.failed as f64),
-            AtMost(0.0),
-        ),
-        figure(
-            "set_size",
-            "mean size of the 90 % set",
-            scores.set_size,
-            AtMost(2.0),
-        ),
-        figure(
-            "truth_probability",
-            "mean probability of the truth",
-            scores.truth_probability,
-            Target::None,
-        ),
-        figure("brier", "Brier score", calibration.brier, Target::None),
-        figure(
-            "calibration_error",
-            "expected calibration error",
-            calibration.expected_calibration_error,
-            AtMost(0.08),
-        ),
-        figure(
-            "closure_median",
-            "withheld closure, named: median",
-            median,
-            AtLeast(0.97),
-        ),
-        figure(
-            "closure_10th",
-            "withheld closure, named: 10th pct",
-            tenth,
-            AtLeast(0.75),
-        ),
-        figure(
-            "size_error",
-            "size error, median |ln ratio|",
-            scores.size_error,
-            AtMost(0.15),
-        ),
+        rate("several_detectable", s.several_detectable, None),
+        rate("several_found", s.several_found, None),
+        rate("set_coverage", s.set_coverage, AtLeast(0.88)),
+        figure(NO_ANSWER, failed, AtMost(0.0)),
+        figure("set_size", s.set_size, AtMost(2.0)),
+        figure("truth_probability", s.truth_probability, None),
+        figure("brier", s.calibration.brier, None),
+        figure("calibration_error", error, AtMost(0.08)),
+        figure("closure_median", median, AtLeast(0.97)),
+        figure("closure_10th", tenth, AtLeast(0.75)),
+        figure("size_error", s.size_error, AtMost(0.15)),
     ]
 }
 
-fn rate(key: &'static str, meaning: &'static str, rate: Rate, target: Target) -> Row {
-    Row {
-        key,
-        meaning,
-        value: rate.value(),
-        interval: rate.interval(),
-        counts: Some((rate.hits, rate.of)),
-        target,
-        ideal: None,
+/// The meaning of a figure.
+fn meaning(key: &str) -> &'static str {
+    match key {
+        "top_1" => "one effect: first group is right",
+        "top_1_detectable" => "the same where it can be noticed",
+        "top_3" => "one effect: among the first three",
+        "where" => "one effect: place is right",
+        "top_1_of_all" => "one effect: first of all classes",
+        "named_right" => "one effect, named: name is right",
+        "coverage" => "one effect: something is named",
+        "named_right_of_all" => "any case, named: name is right",
+        "null_called_effect" => "nothing: called an effect",
+        "null_false_alarm" => "nothing: an effect comes first",
+        "outside_named" => "outside: named",
+        "outside_refused" => "outside, refutable: refused",
+        "outside_unknown" => "outside: called unknown",
+        "several_found_or_refused" => "two: both found, or refused",
+        "several_detectable" => "the same where both can be noticed",
+        "several_found" => "two: both found",
+        "set_coverage" => "90 % set holds the truth",
+        NO_ANSWER => "tests that could not be diagnosed",
+        "set_size" => "mean size of the 90 % set",
+        "truth_probability" => "mean probability of the truth",
+        "brier" => "Brier score",
+        "calibration_error" => "expected calibration error",
+        "closure_median" => "withheld closure, named: median",
+        "closure_10th" => "withheld closure, named: 10th pct",
+        "size_error" => "size error, median |ln ratio|",
+        _ => "",
     }
 }
 
-fn figure(key: &'static str, meaning: &'static str, value: Option<f64>, target: Target) -> Row {
+fn rate(key: &'static str, rate: Rate, target: Target) -> Row {
+    Row {
+        interval: rate.interval(),
+        counts: Some((rate.hits, rate.of)),
+        ..figure(key, rate.value(), target)
+    }
+}
+
+fn figure(key: &'static str, value: Option<f64>, target: Target) -> Row {
     Row {
         key,
-        meaning,
+        meaning: meaning(key),
         value,
         interval: None,
         counts: None,
@@ -337,12 +248,3 @@ const IDEAL: [(&str, f64, f64); 14] = [
     ("brier", 0.44, 0.21),
     ("calibration_error", 0.04, 0.03),
 ];
-
-/// An ideal observer's figure with tests of this extent, where it is known.
-fn ideal_observer(key: &str, extent: Extent) -> Option<f64> {
-    let (_, one, five) = IDEAL.iter().find(|figure| figure.0 == key)?;
-    Some(match extent {
-        Extent::OneRecording => *one,
-        Extent::FiveRecordings => *five,
-    })
-}

@@ -429,6 +429,12 @@ impl RecordingResult {
         spectra.map_or(&[], |spectra| &spectra.readings)
     }
 
+    /// Peaks of the accepted taps (`tap_unit`).
+    pub(super) fn tap_peaks(&self) -> Vec<f64> {
+        let taps = self.measurement.taps.accepted();
+        taps.map(|tap| tap.peak).collect()
+    }
+
     /// Frequencies (Hz) between which it was searched for resonances; `None` without spectra.
     pub(super) fn looked_at(&self) -> Option<(f64, f64)> {
         let lines = self.measurement.spectra.as_ref()?.averages.lines;

@@ -400,34 +400,30 @@ fn of_masses(
         grams(mass),
         100.0 * mass / structure.beam.mass()
     );
-    let lowers = "it lowers the measured frequencies and thereby what is estimated from them";
     let included = method == EstimateMethod::Consistent && test.analysis.sensor_mass;
     let mut loading = loading.iter();
     let unplaced = loading.any(|sensor| sensor.mass.is_some() && test.place_of(sensor).is_none());
-    match (included, unplaced, structure.regression) {
-        (true, true, _) => Some(Warning::neglected(
-            format!(
-                "{size} is in the consistent estimate and the prediction only as far as the sensors' positions are known; state them"
-            ),
+    let (effect, of_pairs) = match (included, unplaced, structure.regression) {
+        (true, true, _) => (
+            "is in the consistent estimate and the prediction only as far as the sensors' positions are known; \
+             state them",
             false,
-        )),
-        (true, false, None) => Some(Warning::neglected(
-            format!(
-                "{size} is in the prediction and the consistent estimate; the closed form beside it neglects it"
-            ),
+        ),
+        (true, false, None) => (
+            "is in the prediction and the consistent estimate; the closed form beside it neglects it",
             false,
-        )),
-        (true, false, Some(_)) => Some(Warning::neglected(
-            format!(
-                "{size} is in the prediction and the consistent estimate; the pair regression neglects it"
-            ),
+        ),
+        (true, false, Some(_)) => (
+            "is in the prediction and the consistent estimate; the pair regression neglects it",
             true,
-        )),
-        (false, ..) => Some(Warning::neglected(
-            format!("{size} is in neither the estimate nor the prediction; {lowers}"),
+        ),
+        (false, ..) => (
+            "is in neither the estimate nor the prediction; it lowers the measured frequencies and thereby what is \
+             estimated from them",
             false,
-        )),
-    }
+        ),
+    };
+    Some(Warning::neglected(format!("{size} {effect}"), of_pairs))
 }
 
 /// The warning about masses fastened in the reference configuration.
@@ -447,23 +443,22 @@ fn of_fastened(
         grams(mass),
         100.0 * mass / structure.beam.mass()
     );
-    let included = "is in the prediction and the consistent estimate;";
-    Some(match (method, structure.regression) {
-        (EstimateMethod::Consistent, None) => Warning::neglected(
-            format!("{size} {included} the closed form beside it neglects it"),
+    let (effect, of_pairs) = match (method, structure.regression) {
+        (EstimateMethod::Consistent, None) => (
+            "is in the prediction and the consistent estimate; the closed form beside it neglects it",
             false,
         ),
-        (EstimateMethod::Consistent, Some(_)) => Warning::neglected(
-            format!("{size} {included} the pair regression beside it neglects it"),
+        (EstimateMethod::Consistent, Some(_)) => (
+            "is in the prediction and the consistent estimate; the pair regression beside it neglects it",
             true,
         ),
-        (EstimateMethod::Pairs | EstimateMethod::FreeBeam, _) => Warning::neglected(
-            format!(
-                "{size} is in neither the estimate nor the prediction; begin the description with a recording of the beam without it"
-            ),
+        (EstimateMethod::Pairs | EstimateMethod::FreeBeam, _) => (
+            "is in neither the estimate nor the prediction; begin the description with a recording of the beam \
+             without it",
             false,
         ),
-    })
+    };
+    Some(Warning::neglected(format!("{size} {effect}"), of_pairs))
 }
 
 /// Returns a mass (kg) in grams with four significant digits, without trailing zeros.

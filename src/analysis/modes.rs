@@ -19,7 +19,7 @@ use tapjoint_identify::pairing::{
     ShapeAt, is_plain,
 };
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
-use tapjoint_numerics::stats::times;
+use tapjoint_numerics::stats::{median, times};
 use tapjoint_signal::modal::{BandReadings, ModeReading, merge_modes};
 
 /// Recordings count as tapped at the same level when their median peak forces differ by less than
@@ -76,17 +76,8 @@ pub(super) fn set_aside(
 
 /// Median peak force of the accepted taps; `None` without a hammer or tap.
 fn median_force(recording: &RecordingResult) -> Option<f64> {
-    if !recording.has_hammer {
-        return None;
-    }
-    let mut peaks: Vec<f64> = recording
-        .measurement
-        .taps
-        .accepted()
-        .map(|tap| tap.peak)
-        .collect();
-    peaks.sort_by(f64::total_cmp);
-    peaks.get(peaks.len() / 2).copied()
+    let mut peaks = recording.tap_peaks();
+    (recording.has_hammer && !peaks.is_empty()).then(|| median(&mut peaks))
 }
 
 /// Merges and numbers the readings of the recordings that are not set `aside`, and numbers the readings of all others.

@@ -86,12 +86,7 @@ fn of_recording(index: usize, recording: &RecordingResult) -> Vec<Configuration>
     let Some(spectra) = &recording.measurement.spectra else {
         return Vec::new();
     };
-    let peaks: Vec<f64> = recording
-        .measurement
-        .taps
-        .accepted()
-        .map(|tap| tap.peak)
-        .collect();
+    let peaks = recording.tap_peaks();
     let levels = levels(&peaks, recording.has_hammer);
     let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
     let mut numbered: Vec<(usize, &ModeReading)> = numbered

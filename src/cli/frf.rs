@@ -15,7 +15,7 @@ use tapjoint::description::{ChannelRef, TestDescription, WindowKind};
 use tapjoint::pipeline::{Analysis, Frf, FrfSettings, IdentifySettings, frfs_of, run_wired};
 use tapjoint::recording::UffFormat;
 use tapjoint::report::{
-    frf_document, frf_figure, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
+    frf_document, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
 };
 
 /// Frequency response functions (H1, H2, Hv) with coherence and random error.
@@ -301,7 +301,7 @@ fn write_pictures(
     terminal: &Terminal,
 ) -> anyhow::Result<()> {
     for (file, (recording, frfs)) in files.into_iter().zip(analysis.recordings.iter().zip(frfs)) {
-        match render_frf_picture(&frf_figure(recording, frfs), file.picture_format())? {
+        match render_frf_picture(recording, frfs, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
                 "{}: no tap was accepted, so there is no function to draw",

@@ -16,7 +16,7 @@ use tapjoint::description::TestDescription;
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{Analysis, IdentifySettings, diagnose_test};
 use tapjoint::report::{
-    MODEL_FILE, document_of, earlier_files, figures_of, gap_section, render_run, render_text,
+    MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
 };
 
 /// The main job: recordings to taps, spectra, modes, joint stiffness, perturbation, report.
@@ -189,7 +189,7 @@ pub(super) fn run(
     if let Some(model) = model {
         request.output.add(MODEL_FILE, model.as_bytes())?;
     }
-    for file in render_run(&document, &figures_of(&analysis))? {
+    for file in render_run(&document, &analysis.recordings)? {
         request.output.add(&file.name, &file.bytes)?;
     }
     // Where the folder holds an earlier run's report, what this run does not make again would belong to

@@ -106,61 +106,64 @@ fn curves(panels: &[&Panel], lines: usize) -> Option<Vec<Panel>> {
         });
     }
     let stride = stretches.iter().map(|one| one.stride).max().unwrap_or(1);
-    let mut note = String::new();
-    if envelope {
+    let note = if envelope {
+        let click = match first.events.iter().any(|event| !event.close_up.is_empty()) {
+            true => " Click a tap for its samples.",
+            false => "",
+        };
         let step = significant(whole.step, 2);
-        note = format!("Each point is the smallest and largest value of {step} s.");
-        if first.events.iter().any(|event| !event.close_up.is_empty()) {
-            note.push_str(" Click a tap for its samples.");
-        }
+        format!("Each point is the smallest and largest value of {step} s.{click}")
     } else if stride > 1 && modes.is_empty() {
-        note = format!("Of {lines} lines the smallest and largest of every {stride} are drawn.");
+        format!("Of {lines} lines the smallest and largest of every {stride} are drawn.")
     } else if stride > 1 {
-        note = format!(
+        format!(
             "All lines about the modes are drawn; of the other lines the smallest and largest of every {stride}."
-        );
+        )
+    } else {
+        String::new()
+    };
+    let shown = panels.iter().map(|panel| Panel {
+        note: note.clone(),
+        ..curve_panel(panel, lines, &stretches, &runs)
+    });
+    Some(shown.collect())
+}
+
+/// Returns a panel of curves of so many lines, thinned to stretches, which begin and end at these places.
+fn curve_panel(panel: &Panel, lines: usize, stretches: &[Stretch], runs: &[Run]) -> Panel {
+    let mut shown = panel_like(panel, panel.height, panel.x.clone());
+    for rule in &panel.rules {
+        let places = [rule.at, rule.line, rule.half];
+        if places.iter().all(|place| place.is_finite()) {
+            shown.rules.push(rule.clone());
+        }
     }
-    let mut shown = Vec::new();
-    for panel in panels {
-        let mut curves = panel_like(panel, panel.height, panel.x.clone());
-        curves.note = note.clone();
-        for rule in &panel.rules {
-            if [rule.at, rule.line, rule.half]
-                .iter()
-                .all(|x| x.is_finite())
-            {
-                curves.rules.push(rule.clone());
+    for event in &panel.events {
+        shown.events.push(Event {
+            peak: rounded(event.peak, CURVE_DIGITS),
+            close_up: close_up(&event.close_up).unwrap_or_default(),
+            ..event.clone()
+        });
+    }
+    for one in &panel.series {
+        let [y, low, high] = [&one.y, &one.low, &one.high].map(|values| {
+            let mut values = each(values, CURVE_DIGITS);
+            if !values.is_empty() {
+                values.resize(lines, f64::NAN);
             }
-        }
-        for event in &panel.events {
-            curves.events.push(Event {
-                peak: rounded(event.peak, CURVE_DIGITS),
-                close_up: close_up(&event.close_up).unwrap_or_default(),
-                ..event.clone()
-            });
-        }
-        for one in &panel.series {
-            let [y, low, high] = [&one.y, &one.low, &one.high].map(|values| {
-                let mut values = each(values, CURVE_DIGITS);
-                if !values.is_empty() {
-                    values.resize(lines, f64::NAN);
-                }
-                let parts = stretches.iter().flat_map(|part| part.thinned(&values));
-                parts.collect::<Vec<f64>>()
-            });
-            let x = Places::Even(runs.clone());
-            curves.series.push(Series {
-                x,
-                y,
-                low,
-                high,
-                opacity: one.opacity,
-                ..Series::new(&one.name, one.color, one.mark)
-            });
-        }
-        shown.push(curves);
+            let parts = stretches.iter().flat_map(|part| part.thinned(&values));
+            parts.collect::<Vec<f64>>()
+        });
+        shown.series.push(Series {
+            x: Places::Even(runs.to_vec()),
+            y,
+            low,
+            high,
+            opacity: one.opacity,
+            ..Series::new(&one.name, one.color, one.mark)
+        });
     }
-    Some(shown)
+    shown
 }
 
 /// Returns an empty panel with the title, the vertical axis and the further facts of another one.

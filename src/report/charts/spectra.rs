@@ -80,37 +80,13 @@ pub fn frf(
     others: &[FrfEstimator],
 ) -> Option<Chart> {
     let spectra = recording.measurement.spectra.as_ref()?;
-    let lines = &spectra.averages.lines;
-    let x = frequency_axis(spectra);
-    let mut panels: Vec<Panel> = Vec::new();
+    let mut panels = magnitude_panels(spectra, frfs, others);
+    if panels.is_empty() {
+        return None;
+    }
     let (mut phases, mut coherences) = (Vec::new(), Vec::new());
-    let mut faint: Vec<&str> = Vec::new();
     for (index, frf) in frfs.iter().enumerate() {
-        let color = Color::curve(index);
-        // An analyser does not say by which estimator it has made a function.
-        let estimator = match frf.averages {
-            0 => "of the file",
-            _ => frf.estimator.name(),
-        };
-        let named = format!("{}, {estimator}", frf.response);
-        let curve = over_lines(lines, &named, color, magnitudes(frf.values()));
-        let unit = unit_words(&frf.unit);
-        let series = panel_of(&mut panels, &x, frf.form_words, &unit);
-        series.push(curve);
-        // Of one average all estimators are the same.
-        for other in others.iter().filter(|_| frf.averages > 1) {
-            if *other != frf.estimator {
-                let named = format!("{}, {}", frf.response, other.name());
-                series.push(Series {
-                    mark: Mark::Line(1.0),
-                    opacity: FAINT,
-                    ..over_lines(lines, &named, color, magnitudes(frf.of(*other)))
-                });
-                if index == 0 {
-                    faint.push(other.name());
-                }
-            }
-        }
+        let (lines, color) = (&spectra.averages.lines, Color::curve(index));
         let values = frf.values().iter();
         let phase = values.map(|value| value.map_or(f64::NAN, |value| value.arg().to_degrees()));
         phases.push(over_lines(lines, &frf.response, color, phase.collect()));
@@ -120,14 +96,7 @@ pub fn frf(
             coherences.push(series);
         }
     }
-    if panels.is_empty() {
-        return None;
-    }
-    for panel in &mut panels {
-        // The estimator that is meant gives the colour its name.
-        panel.series.sort_by(|a, b| b.opacity.total_cmp(&a.opacity));
-    }
-    scale_to_magnitudes(&mut panels);
+    let x = frequency_axis(spectra);
     let mut phase = Axis::linear(-190.0, 190.0).of("phase", "\u{b0}");
     phase.period = Some(360.0);
     let degrees = ["\u{2212}180", "\u{2212}90", "0", "90", "180"];
@@ -146,6 +115,8 @@ pub fn frf(
         let axis = Axis::linear(0.0, 1.05).of("coherence", "");
         panels.push(Panel::new(120.0, x, axis).with(coherences));
     }
+    let faint = frfs.first().into_iter().flat_map(|frf| beside(frf, others));
+    let faint: Vec<&str> = faint.map(FrfEstimator::name).collect();
     if !faint.is_empty() {
         below.push_str(&format!(" \u{b7} faint: {}", faint.join(", ")));
     }
@@ -161,6 +132,50 @@ pub fn frf(
         blocks: vec![Block::new(1, panels)],
         ..Chart::default()
     })
+}
+
+/// Returns the panels of the magnitudes, one for each form and unit.
+fn magnitude_panels(
+    spectra: &MeasuredSpectra,
+    frfs: &[Frf],
+    others: &[FrfEstimator],
+) -> Vec<Panel> {
+    let lines = &spectra.averages.lines;
+    let x = frequency_axis(spectra);
+    let mut panels: Vec<Panel> = Vec::new();
+    for (index, frf) in frfs.iter().enumerate() {
+        let color = Color::curve(index);
+        // An analyser does not say by which estimator it has made a function.
+        let estimator = match frf.averages {
+            0 => "of the file",
+            _ => frf.estimator.name(),
+        };
+        let named = format!("{}, {estimator}", frf.response);
+        let curve = over_lines(lines, &named, color, magnitudes(frf.values()));
+        let unit = unit_words(&frf.unit);
+        let series = panel_of(&mut panels, &x, frf.form_words, &unit);
+        series.push(curve);
+        for other in beside(frf, others) {
+            let named = format!("{}, {}", frf.response, other.name());
+            series.push(Series {
+                mark: Mark::Line(1.0),
+                opacity: FAINT,
+                ..over_lines(lines, &named, color, magnitudes(frf.of(other)))
+            });
+        }
+    }
+    for panel in &mut panels {
+        // The estimator that is meant gives the colour its name.
+        panel.series.sort_by(|a, b| b.opacity.total_cmp(&a.opacity));
+    }
+    scale_to_magnitudes(&mut panels);
+    panels
+}
+
+/// Returns the estimators shown beside the one that a function is given by; none of one average, where all are the same.
+fn beside(frf: &Frf, others: &[FrfEstimator]) -> impl Iterator<Item = FrfEstimator> {
+    let shown = others.iter().filter(|_| frf.averages > 1);
+    shown.copied().filter(|other| *other != frf.estimator)
 }
 
 /// Returns the magnitude on each line; what does not exist is no number.

@@ -14,7 +14,7 @@ use rustfft::{FftPlanner, num_complex::Complex64};
 use tapjoint::description::TestDescription;
 use tapjoint::pipeline::{IdentifySettings, MeasureSettings, measure, run_test};
 use tapjoint::recording::{ReadSettings, Recording, WavFormat, write_wav};
-use tapjoint::report::{document_of, figures_of, render_run};
+use tapjoint::report::{document_of, render_run};
 use tapjoint::simulate::{SimulatedMode, TapTestSettings, simulate_tap_test};
 use tapjoint::spectral::{Lines, transform_block};
 use tapjoint::taps::TapSource;
@@ -191,7 +191,7 @@ fn whole(criterion: &mut Criterion, path: &Path) {
     group.bench_function("run: description to JSON, CSV, HTML and PNG", |b| {
         b.iter(|| {
             let analysis = run_test(&test, place, &IdentifySettings::default()).unwrap();
-            render_run(&document_of(&analysis), &figures_of(&analysis)).unwrap()
+            render_run(&document_of(&analysis), &analysis.recordings).unwrap()
         });
     });
     group.finish();

@@ -10,7 +10,7 @@ use std::time::Instant;
 use tapjoint::description::TestDescription;
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{IdentifySettings, diagnose_test, run_test};
-use tapjoint::report::{document_of, figures_of, gap_section, render_run};
+use tapjoint::report::{document_of, gap_section, render_run};
 
 /// As `tapjoint run` draws.
 const DRAWS: (usize, u64) = (1000, 1);
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let begin = Instant::now();
         let mut document = document_of(&analysis);
         document.gap = Some(gap_section(diagnosis.as_ref()));
-        files = render_run(&document, &figures_of(&analysis))?;
+        files = render_run(&document, &analysis.recordings)?;
         seconds.push(begin.elapsed().as_secs_f64());
     }
     seconds.sort_by(f64::total_cmp);

@@ -136,7 +136,8 @@ fn deck_of_model(
     let effects: Vec<&str> = test.effects.iter().map(|one| one.id.as_str()).collect();
     let origin = format!("described, with {}", effects.join(", "));
     Ok(deck_with_effects(
-        (&test.name, &origin),
+        &test.name,
+        &origin,
         &seen.specimen,
         &frequencies,
     ))

@@ -17,7 +17,7 @@ use tapjoint::pipeline::{
 };
 use tapjoint::recording::{Recording, RecordingError, UffFormat};
 use tapjoint::report::{
-    frf_document, frf_figure, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
+    frf_document, render_frf_csv, render_frf_picture, render_frf_uff, render_text,
 };
 use tapjoint::spectral::FrfEstimator;
 
@@ -239,7 +239,7 @@ fn write_pictures(
     terminal: &Terminal,
 ) -> anyhow::Result<()> {
     for ((file, recording), frfs) in files.into_iter().zip(&analysis.recordings).zip(frfs) {
-        match render_frf_picture(&frf_figure(recording, frfs), file.picture_format())? {
+        match render_frf_picture(recording, frfs, file.picture_format())? {
             Some(bytes) => file.write(&bytes)?,
             None => terminal.warn(&format!(
                 "{}: no tap was accepted, so there is no function to draw",

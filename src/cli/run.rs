@@ -16,7 +16,7 @@ use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
 use tapjoint::pipeline::{Analysis, EstimateMethod, IdentifySettings, diagnose_test};
 use tapjoint::report::{
-    MODEL_FILE, document_of, earlier_files, figures_of, gap_section, render_run, render_text,
+    MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
 };
 
 /// Analyse a test from its recordings to the joint, and write a report.
@@ -162,7 +162,7 @@ pub(super) fn run(
     if let Some(model) = model {
         output.add(MODEL_FILE, model.as_bytes())?;
     }
-    for file in render_run(&document, &figures_of(&analysis))? {
+    for file in render_run(&document, &analysis.recordings)? {
         output.add(&file.name, &file.bytes)?;
     }
     // Only a folder with a page holds an earlier report: other commands write a report.json alone.

@@ -11,7 +11,7 @@ use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;
 use tapjoint::description::ReadBy;
-use tapjoint::report::{document_of, figures_of, render_spectrum_picture, render_text};
+use tapjoint::report::{document_of, render_spectrum_picture, render_text};
 
 /// Show the averaged spectrum of a recording and its peaks with their resolution bounds.
 ///
@@ -48,9 +48,9 @@ pub(super) fn run(arguments: &SpectrumArguments, terminal: Terminal) -> anyhow::
     )?;
     let document = document_of(&analysis);
     if let Some(file) = png {
-        let picture = figures_of(&analysis)
-            .first()
-            .map(|figure| render_spectrum_picture(figure, file.picture_format()))
+        let recording = analysis.recordings.first();
+        let picture = recording
+            .map(|recording| render_spectrum_picture(recording, file.picture_format()))
             .transpose()?
             .flatten();
         match picture {

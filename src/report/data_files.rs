@@ -2,17 +2,14 @@
 //! universal file.
 
 use super::ReportError;
-use super::document::{
-    Document, EstimateSection, FreeBeamSection, Method, ModeSection, MonteCarloSection,
-    PairsSection, ResolutionSpanSection, ValueSection, method_name,
-};
+use super::document::{Document, Method, ValueSection, method_name};
+use super::tables::estimated;
 use num_complex::Complex64;
 use tapjoint_analysis::Frf;
 use tapjoint_signal::recording::{
     FrequencyResponse, FrequencyResponses, Point, UffError, UffFormat,
     encode_frequency_responses_uff,
 };
-use tapjoint_signal::spectral::FrfEstimator;
 
 /// Columns of `parameters.csv`.
 const PARAMETER_COLUMNS: [&str; 10] = [
@@ -47,87 +44,59 @@ const MODE_COLUMNS: [&str; 15] = [
     "random_error",
 ];
 
-/// `parameters.csv`: one row for each parameter and method; only its header without an estimate.
+/// Returns `parameters.csv`: one row for each parameter and method; only its header without an estimate.
+///
+/// The estimate's own values come first, then those of the pair regression and of the free beam's closed form where
+/// the estimate is by another method.
 ///
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.
 pub fn render_parameters_csv(document: &Document) -> Result<String, ReportError> {
-    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
-    let rows = estimate.map(parameter_rows).unwrap_or_default();
-    write(&PARAMETER_COLUMNS, rows)
-}
-
-/// `modes.csv`: one row for each resonance and each peak that is none.
-///
-/// # Errors
-/// [`ReportError::Csv`] if a row cannot be written.
-pub fn render_modes_csv(document: &Document) -> Result<String, ReportError> {
-    let modes = document.modes.as_deref().unwrap_or_default();
-    write(&MODE_COLUMNS, modes.iter().map(mode_row).collect())
-}
-
-/// The estimate's own values, then those of the pair regression where it is another method.
-fn parameter_rows(estimate: &EstimateSection) -> Vec<Vec<String>> {
-    let values = [
-        ("kx", "1", &estimate.kx),
-        ("ky", "1", &estimate.ky),
-        ("kz", "1", &estimate.kz),
-        ("coupling", "1", &estimate.coupling),
-        ("kt", "N/m", &estimate.kt),
-        ("kr", "N m/rad", &estimate.kr),
-        ("ktr", "N/rad", &estimate.ktr),
-        ("modulus", "Pa", &estimate.modulus),
-        ("density", "kg/m3", &estimate.density),
-    ];
-    let own = values.into_iter().filter_map(|(name, unit, value)| {
-        let value = value.as_ref()?;
-        Some(parameter_row(name, estimate.method, unit, value))
-    });
-    let pairs = estimate
-        .pairs
-        .iter()
-        .flat_map(|pairs| pairs_rows(pairs, estimate.method));
-    let free = estimate
-        .free_beam
-        .iter()
-        .flat_map(|free| free_beam_rows(free, estimate.method));
-    own.chain(pairs).chain(free).collect()
-}
-
-fn pairs_rows(pairs: &PairsSection, method: Method) -> Vec<Vec<String>> {
-    let repeated = method == Method::Pairs;
-    [
-        ("kx", "1", pairs.kx),
-        ("ky", "1", pairs.ky),
-        ("kz", "1", pairs.kz),
-        ("kt", "N/m", pairs.kt),
-        ("kr", "N m/rad", pairs.kr),
-        ("ktr", "N/rad", pairs.ktr),
-        ("closure", "1", pairs.closure),
-    ]
-    .into_iter()
-    .filter(|(name, _, _)| !repeated || *name == "closure")
-    .filter_map(|(name, unit, value)| Some(closed_row(name, Method::Pairs, unit, value?)))
-    .collect()
-}
-
-fn free_beam_rows(free: &FreeBeamSection, method: Method) -> Vec<Vec<String>> {
-    if method == Method::FreeBeam {
-        return Vec::new();
+    let mut rows = Vec::new();
+    if let Some(estimate) = document.estimate.as_ref().and_then(Option::as_ref) {
+        let own = estimate.method;
+        // Numbers without unit come first.
+        let (numbers, physical): (Vec<_>, Vec<_>) = estimated(estimate)
+            .into_iter()
+            .partition(|one| one.unit == "1");
+        for one in numbers.into_iter().chain(physical) {
+            rows.push(parameter_row(one.name, own, one.unit, one.value));
+        }
+        let mut closed = Vec::new();
+        if let Some(pairs) = &estimate.pairs {
+            if own != Method::Pairs {
+                closed.extend([
+                    ("kx", Method::Pairs, "1", pairs.kx),
+                    ("ky", Method::Pairs, "1", pairs.ky),
+                    ("kz", Method::Pairs, "1", pairs.kz),
+                    ("kt", Method::Pairs, "N/m", pairs.kt),
+                    ("kr", Method::Pairs, "N m/rad", pairs.kr),
+                    ("ktr", Method::Pairs, "N/rad", pairs.ktr),
+                ]);
+            }
+            closed.push(("closure", Method::Pairs, "1", pairs.closure));
+        }
+        if let Some(free) = estimate
+            .free_beam
+            .as_ref()
+            .filter(|_| own != Method::FreeBeam)
+        {
+            closed.extend([
+                ("modulus", Method::FreeBeam, "Pa", Some(free.modulus)),
+                ("density", Method::FreeBeam, "kg/m3", Some(free.density)),
+            ]);
+        }
+        for (name, method, unit, value) in closed {
+            if let Some(value) = value {
+                let value = ValueSection {
+                    value,
+                    ..ValueSection::default()
+                };
+                rows.push(parameter_row(name, method, unit, &value));
+            }
+        }
     }
-    vec![
-        closed_row("modulus", Method::FreeBeam, "Pa", free.modulus),
-        closed_row("density", Method::FreeBeam, "kg/m3", free.density),
-    ]
-}
-
-/// A value in closed form beside the main estimate, without its uncertainty.
-fn closed_row(name: &str, method: Method, unit: &str, value: f64) -> Vec<String> {
-    let value = ValueSection {
-        value,
-        ..ValueSection::default()
-    };
-    parameter_row(name, method, unit, &value)
+    write(&PARAMETER_COLUMNS, rows)
 }
 
 fn parameter_row(name: &str, method: Method, unit: &str, value: &ValueSection) -> Vec<String> {
@@ -145,24 +114,32 @@ fn parameter_row(name: &str, method: Method, unit: &str, value: &ValueSection) -
     ]
 }
 
-fn mode_row(mode: &ModeSection) -> Vec<String> {
-    vec![
-        mode.mode.map(|n| n.to_string()).unwrap_or_default(),
-        mode.label.clone().unwrap_or_default(),
-        mode.recording.clone().unwrap_or_default(),
-        method_name(mode.method).to_owned(),
-        number(Some(mode.frequency)),
-        number(mode.std),
-        number(mode.line_frequency),
-        number(mode.half_line),
-        number(mode.interpolated_frequency),
-        number(mode.interpolated_bound),
-        number(mode.damping),
-        number(mode.damping_std),
-        number(mode.lambda),
-        number(mode.coherence),
-        number(mode.random_error),
-    ]
+/// Returns `modes.csv`: one row for each resonance and each peak that is none.
+///
+/// # Errors
+/// [`ReportError::Csv`] if a row cannot be written.
+pub fn render_modes_csv(document: &Document) -> Result<String, ReportError> {
+    let mut rows = Vec::new();
+    for mode in document.modes.iter().flatten() {
+        rows.push(vec![
+            mode.mode.map(|n| n.to_string()).unwrap_or_default(),
+            mode.label.clone().unwrap_or_default(),
+            mode.recording.clone().unwrap_or_default(),
+            method_name(mode.method).to_owned(),
+            number(Some(mode.frequency)),
+            number(mode.std),
+            number(mode.line_frequency),
+            number(mode.half_line),
+            number(mode.interpolated_frequency),
+            number(mode.interpolated_bound),
+            number(mode.damping),
+            number(mode.damping_std),
+            number(mode.lambda),
+            number(mode.coherence),
+            number(mode.random_error),
+        ]);
+    }
+    write(&MODE_COLUMNS, rows)
 }
 
 /// Columns of `perturbation.csv`: `kind` is what was done to the frequencies, `percent` by how much
@@ -179,26 +156,96 @@ const PERTURBATION_COLUMNS: [&str; 8] = [
     "kz",
 ];
 
-/// `perturbation.csv`; only its header where nothing was perturbed.
+/// Returns `perturbation.csv`; only its header where nothing was perturbed.
 ///
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.
 pub fn render_perturbation_csv(document: &Document) -> Result<String, ReportError> {
-    let spans = document.resolution_span.iter().flatten();
-    let random = document.monte_carlo.iter().flatten();
-    let rows = uniform(document)
-        .into_iter()
-        .chain(averages(document))
-        .chain(spans.flat_map(bounds))
-        .chain(random.flat_map(monte_carlo));
-    write(&PERTURBATION_COLUMNS, rows.collect())
+    let mut rows = Vec::new();
+    for found in document.perturbation.iter().flatten() {
+        let values = [found.kx, found.ky, found.kz];
+        let percent = Some(found.percent);
+        rows.push(changed_row(
+            found.method,
+            "uniform",
+            percent,
+            None,
+            "value",
+            values,
+        ));
+    }
+    for found in document.perturbation_averages.iter().flatten() {
+        let errors = [found.kx_percent, found.ky_percent, found.kz_percent];
+        let of_mean = [
+            found.kx_of_mean_percent,
+            found.ky_of_mean_percent,
+            found.kz_of_mean_percent,
+        ];
+        let percent = Some(found.percent);
+        for (name, values) in [("mean error (%)", errors), ("error of mean (%)", of_mean)] {
+            rows.push(changed_row(
+                found.method,
+                "uniform",
+                percent,
+                None,
+                name,
+                values,
+            ));
+        }
+    }
+    for found in document.resolution_span.iter().flatten() {
+        let method = found.method;
+        for (name, index) in [("smallest", 0), ("largest", 1)] {
+            let values = [found.kx, found.ky, found.kz].map(|range| Some(range?[index]));
+            rows.push(changed_row(
+                method,
+                "sign patterns",
+                None,
+                None,
+                name,
+                values,
+            ));
+        }
+        for mode in &found.sensitivity {
+            let change = [mode.kx_percent, mode.ky_percent, mode.kz_percent];
+            let slope = [
+                mode.kx_percent_per_percent,
+                mode.ky_percent_per_percent,
+                mode.kz_percent_per_percent,
+            ];
+            let one = Some(mode.mode);
+            let name = "change by its bound (%)";
+            rows.push(changed_row(method, "one mode", None, one, name, change));
+            let name = "change per percent (%)";
+            rows.push(changed_row(method, "one mode", None, one, name, slope));
+        }
+    }
+    for found in document.monte_carlo.iter().flatten() {
+        let values = [found.kx, found.ky, found.kz];
+        for (name, values) in [
+            ("median", values.map(|value| Some(value?.value))),
+            ("low", values.map(|value| value?.low)),
+            ("high", values.map(|value| value?.high)),
+        ] {
+            rows.push(changed_row(
+                found.method,
+                "monte carlo",
+                None,
+                None,
+                name,
+                values,
+            ));
+        }
+    }
+    write(&PERTURBATION_COLUMNS, rows)
 }
 
-/// What a row is about: method, kind, percent, mode, statistic.
-type About<'a> = (Method, &'a str, Option<f64>, Option<usize>, &'a str);
-
 fn changed_row(
-    (method, kind, percent, mode, statistic): About<'_>,
+    method: Method,
+    kind: &str,
+    percent: Option<f64>,
+    mode: Option<usize>,
+    statistic: &str,
     values: [Option<f64>; 3],
 ) -> Vec<String> {
     let mut cells = vec![
@@ -210,78 +257,6 @@ fn changed_row(
     ];
     cells.extend(values.map(number));
     cells
-}
-
-fn uniform(document: &Document) -> Vec<Vec<String>> {
-    let rows = document.perturbation.iter().flatten();
-    rows.map(|found| {
-        let about = (found.method, "uniform", Some(found.percent), None, "value");
-        changed_row(about, [found.kx, found.ky, found.kz])
-    })
-    .collect()
-}
-
-fn averages(document: &Document) -> Vec<Vec<String>> {
-    let list = document.perturbation_averages.iter().flatten();
-    list.flat_map(|found| {
-        let about = |statistic| {
-            (
-                found.method,
-                "uniform",
-                Some(found.percent),
-                None,
-                statistic,
-            )
-        };
-        let errors = [found.kx_percent, found.ky_percent, found.kz_percent];
-        let of_mean = [
-            found.kx_of_mean_percent,
-            found.ky_of_mean_percent,
-            found.kz_of_mean_percent,
-        ];
-        [
-            changed_row(about("mean error (%)"), errors),
-            changed_row(about("error of mean (%)"), of_mean),
-        ]
-    })
-    .collect()
-}
-
-fn bounds(found: &ResolutionSpanSection) -> Vec<Vec<String>> {
-    let ranges = [found.kx, found.ky, found.kz];
-    let end = |statistic, index: usize| {
-        let values = ranges.map(|range| range.and_then(|range| range.get(index).copied()));
-        changed_row(
-            (found.method, "sign patterns", None, None, statistic),
-            values,
-        )
-    };
-    let mut rows = vec![end("smallest", 0), end("largest", 1)];
-    for mode in &found.sensitivity {
-        let about = |statistic| (found.method, "one mode", None, Some(mode.mode), statistic);
-        let change = [mode.kx_percent, mode.ky_percent, mode.kz_percent];
-        let slope = [
-            mode.kx_percent_per_percent,
-            mode.ky_percent_per_percent,
-            mode.kz_percent_per_percent,
-        ];
-        rows.push(changed_row(about("change by its bound (%)"), change));
-        rows.push(changed_row(about("change per percent (%)"), slope));
-    }
-    rows
-}
-
-fn monte_carlo(found: &MonteCarloSection) -> Vec<Vec<String>> {
-    let values = [found.kx, found.ky, found.kz];
-    let of = |statistic, pick: fn(ValueSection) -> Option<f64>| {
-        let about = (found.method, "monte carlo", None, None, statistic);
-        changed_row(about, values.map(|value| value.and_then(pick)))
-    };
-    vec![
-        of("median", |value| Some(value.value)),
-        of("low", |value| value.low),
-        of("high", |value| value.high),
-    ]
 }
 
 /// Columns of the table of frequency response functions.
@@ -301,38 +276,38 @@ const FRF_COLUMNS: [&str; 13] = [
     "random_error",
 ];
 
-/// One row for each line of each function: all estimators, coherence and random error, in full
+/// Returns one row for each line of each function: all estimators, coherence and random error, in full
 /// precision; a cell is empty where a value does not exist.
 ///
 /// # Errors
 /// [`ReportError::Csv`] if a row cannot be written.
 pub fn render_frf_csv(frfs: &[Frf]) -> Result<String, ReportError> {
-    write(&FRF_COLUMNS, frfs.iter().flat_map(frf_rows).collect())
-}
-
-fn frf_rows(frf: &Frf) -> impl Iterator<Item = Vec<String>> {
-    (0..frf.lines.points()).map(move |line| {
-        let on_line = |values: &Option<Vec<Option<f64>>>| {
-            number(values.as_ref().and_then(|values| *values.get(line)?))
-        };
-        let mut row = vec![
-            frf.recording.clone(),
-            frf.response.clone(),
-            frf.form_words.to_string(),
-            frf.unit.clone(),
-            frf.lines.frequency(line).to_string(),
-        ];
-        for values in [&frf.h1, &frf.h2, &frf.hv] {
-            let value: Option<Complex64> = values.get(line).copied().flatten();
-            row.extend([number(value.map(|v| v.re)), number(value.map(|v| v.im))]);
+    let mut rows = Vec::new();
+    for frf in frfs {
+        for line in 0..frf.lines.points() {
+            let mut row = vec![
+                frf.recording.clone(),
+                frf.response.clone(),
+                frf.form_words.to_string(),
+                frf.unit.clone(),
+                frf.lines.frequency(line).to_string(),
+            ];
+            for values in [&frf.h1, &frf.h2, &frf.hv] {
+                let value: Option<Complex64> = values.get(line).copied().flatten();
+                row.extend([number(value.map(|v| v.re)), number(value.map(|v| v.im))]);
+            }
+            for values in [&frf.coherence, &frf.random_error] {
+                let value = values.as_ref().and_then(|values| *values.get(line)?);
+                row.push(number(value));
+            }
+            rows.push(row);
         }
-        row.extend([on_line(&frf.coherence), on_line(&frf.random_error)]);
-        row
-    })
+    }
+    write(&FRF_COLUMNS, rows)
 }
 
-/// The shortest digits that give the same number back; empty where there is none.
-fn number(value: Option<f64>) -> String {
+/// Returns the shortest digits that give the same number back; empty where there is none.
+pub(super) fn number(value: Option<f64>) -> String {
     value
         .filter(|value| value.is_finite())
         .map(|value| value.to_string())
@@ -351,7 +326,7 @@ pub(super) fn write(header: &[&str], rows: Vec<Vec<String>>) -> Result<String, R
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// The functions, by the estimator that each is shown by, with their coherences: datasets 58 or 58b, of
+/// Returns the functions, by the estimator that each is shown by, with their coherences: datasets 58 or 58b, of
 /// several recordings one after the other. Sensors are nodes 1, 2, ... of a recording, the tap of the
 /// n-th recording is node 1000 + n; directions are not known and given as scalar. A line on which a
 /// function does not exist (receptance at 0 Hz) is written as 0.
@@ -362,14 +337,22 @@ pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, UffErr
     let mut bytes = Vec::new();
     for (number, group) in (1..).zip(frfs.chunk_by(|a, b| a.recording == b.recording)) {
         let Some(first) = group.first() else { continue };
+        let numbered = (1..).zip(group);
         let responses = FrequencyResponses {
             file: first.recording.clone(),
             first_frequency: first.lines.low,
             spacing: first.lines.spacing,
             lines: first.lines.points(),
-            responses: (1..)
-                .zip(group)
-                .map(|(node, frf)| response(frf, node, 1000 + number))
+            responses: numbered
+                .map(|(node, frf)| FrequencyResponse {
+                    name: frf.response.clone(),
+                    response: point(&frf.response, node),
+                    reference: point("hammer", 1000 + number),
+                    unit: Some(frf.unit.clone()),
+                    form: frf.form,
+                    values: existing(frf.values()),
+                    coherence: frf.coherence.as_deref().map(existing),
+                })
                 .collect(),
             warnings: Vec::new(),
         };
@@ -378,30 +361,16 @@ pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, UffErr
     Ok(bytes)
 }
 
-fn response(frf: &Frf, node: i64, tap: i64) -> FrequencyResponse {
-    let values = match frf.estimator {
-        FrfEstimator::H1 => &frf.h1,
-        FrfEstimator::H2 => &frf.h2,
-        FrfEstimator::Hv => &frf.hv,
-    };
-    let place = |name: &str, node: i64| Point {
-        name: Some(name.to_string()),
+/// Returns values with 0 for what does not exist.
+fn existing<T: Copy + Default>(values: &[Option<T>]) -> Vec<T> {
+    let values = values.iter().copied();
+    values.map(Option::unwrap_or_default).collect()
+}
+
+fn point(name: &str, node: i64) -> Point {
+    Point {
+        name: Some(name.to_owned()),
         node,
         direction: 0,
-    };
-    FrequencyResponse {
-        name: frf.response.clone(),
-        response: place(&frf.response, node),
-        reference: place("hammer", tap),
-        unit: Some(frf.unit.clone()),
-        form: frf.form,
-        values: values
-            .iter()
-            .map(|value| value.unwrap_or(Complex64::ZERO))
-            .collect(),
-        coherence: frf.coherence.as_ref().map(|values| {
-            let of = |value: &Option<f64>| value.unwrap_or(0.0);
-            values.iter().map(of).collect()
-        }),
     }
 }

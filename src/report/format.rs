@@ -95,7 +95,7 @@ pub fn bound_percent(percent: f64) -> String {
     written.map_or_else(|| MISSING.to_owned(), |bound| format!("\u{b1}{bound}"))
 }
 
-/// A probability in percent to a tenth; what would read as certain or impossible is said as a bound.
+/// A probability in percent to a tenth; one that would read as certain or impossible is written as a bound.
 pub fn probability(value: f64) -> String {
     if value >= 0.9995 {
         ">99.9 %".to_owned()
@@ -136,7 +136,7 @@ pub fn trimmed(value: f64, digits: i32) -> String {
     }
 }
 
-/// The same for a value that may not exist.
+/// Returns [`significant`] digits of a value that may not exist.
 pub fn optional(value: Option<f64>, digits: i32) -> String {
     value.map_or_else(|| MISSING.to_owned(), |value| significant(value, digits))
 }
@@ -162,7 +162,7 @@ pub fn signed_percent(percent: Option<f64>) -> String {
     }
 }
 
-/// The same where one number stands in a sentence: what would read as nothing is said to be below the last digit.
+/// Returns [`signed_percent`] for a sentence: a value that would read as zero is "below 0.001".
 pub fn signed_or_below(percent: f64) -> String {
     if percent.abs() < 0.0005 {
         "below 0.001".to_owned()
@@ -221,7 +221,7 @@ pub fn unit_words(unit: &str) -> String {
 /// A value in the unit with the decimal prefix that leaves one to three digits before the point.
 ///
 /// Returns the factor to multiply by and the prefix: 1.4e6 gives (1e-6, "M"). Small values keep
-/// their unit: "mN/m" helps nobody.
+/// their unit: "mN/m" is not in use.
 pub fn prefix(value: f64) -> (f64, &'static str) {
     match value.abs() {
         v if !v.is_finite() => (1.0, ""),
@@ -255,24 +255,21 @@ fn at_place(value: f64, place: i32) -> String {
 fn at_place_together(value: f64, other: f64, place: i32) -> (String, String) {
     let largest = value.abs().max(other.abs());
     let step = 10f64.powi(place);
-    if largest >= PLAIN_LARGEST || step < PLAIN_SMALLEST {
+    let written = if largest >= PLAIN_LARGEST || step < PLAIN_SMALLEST {
         // Of the rounded number, so that 9.9999e9 becomes 1.000e10 and 9.7e9 stays.
         let exponent = last_place((largest / step).round() * step, 12) + 11;
         let decimals = (exponent - place).max(0) as usize;
-        let write = |number: f64| {
+        [value, other].map(|number| {
             let mantissa = format!("{:.decimals$}", number / 10f64.powi(exponent));
             format!("{}e{exponent}", typographic(&mantissa))
-        };
-        return (write(value), write(other));
-    }
-    let write = |number: f64| {
-        if place >= 0 {
-            typographic(&format!("{:.0}", (number / step).round() * step))
-        } else {
-            typographic(&format!("{:.*}", (-place) as usize, number))
-        }
+        })
+    } else {
+        [value, other].map(|number| match place >= 0 {
+            true => typographic(&format!("{:.0}", (number / step).round() * step)),
+            false => typographic(&format!("{number:.*}", (-place) as usize)),
+        })
     };
-    (write(value), write(other))
+    written.into()
 }
 
 /// The hyphen of a negative number becomes a minus sign, and minus zero becomes zero.
@@ -306,7 +303,7 @@ pub fn capital(text: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
-/// What there is, or the sign of what is missing.
+/// Returns a value, or the sign for a missing one.
 pub fn or_missing(value: Option<impl ToString>) -> String {
     value.map_or_else(|| MISSING.to_owned(), |value| value.to_string())
 }

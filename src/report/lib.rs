@@ -8,15 +8,19 @@ pub mod charts;
 mod data_files;
 pub mod deck;
 pub mod document;
-pub mod figures;
 pub mod format;
 pub mod html;
 pub mod tables;
 pub mod text;
-pub mod words;
 
 mod publication;
-mod report_json;
+
+/// Every sentence about a result, once.
+pub mod words {
+    pub mod findings;
+    pub mod gap;
+}
+
 mod resolution;
 mod run;
 mod short_names;
@@ -29,12 +33,13 @@ pub use data_files::{
 pub use document::{
     datasets_of, document_of, frf_document, gap_section, inspection_of, lambdas_of, prediction_of,
 };
-pub use figures::{figures as figures_of, frf_figure};
 pub use html::render_html;
 pub use publication::render_reproduction;
-pub use report_json::{MODEL_FILE, earlier_files, render_json, render_schema};
 pub use resolution::{render_resolution, render_resolution_csv, render_resolution_picture};
-pub use run::{render_cloud_picture, render_frf_picture, render_run, render_spectrum_picture};
+pub use run::{
+    MODEL_FILE, earlier_files, render_cloud_picture, render_frf_picture, render_json, render_run,
+    render_schema, render_spectrum_picture,
+};
 pub use text::{render_gap_text, render_readings, render_stages, render_text};
 
 /// A finished file.
@@ -46,7 +51,7 @@ pub struct ReportFile {
     pub bytes: Vec<u8>,
 }
 
-/// What keeps a report from being written.
+/// Reasons for which a report cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The embedded font is damaged.
@@ -57,9 +62,9 @@ pub enum ReportError {
     /// A picture cannot be drawn.
     #[error("the picture \"{picture}\" cannot be drawn: {problem}")]
     Picture {
-        /// What it shows.
+        /// Its title.
         picture: String,
-        /// Why not.
+        /// The reason.
         problem: String,
     },
     /// The document cannot be serialised.

@@ -1,6 +1,11 @@
-//! All files of one run.
+//! All files of one run: `report.json` with its schema, the page, tables and pictures; and the files that an earlier
+//! run has left.
 
 use rayon::prelude::*;
+use schemars::generate::SchemaSettings;
+use serde_json::Value;
+use tapjoint_analysis::{Frf, FrfSettings, RecordingResult, frfs_of};
+use tapjoint_signal::spectral::FrfEstimator;
 
 use super::chart::{Chart, PictureFormat, packed, render_picture, render_svg};
 use super::charts::amplitude::amplitude;
@@ -11,20 +16,11 @@ use super::charts::spectra::{frf, spectrum};
 use super::charts::stabilisation::stabilisation;
 use super::charts::taps::taps;
 use super::document::Document;
-use super::figures::RecordingFigure;
-use super::html::{InlineFigure, PageFigures, render_html};
-use super::short_names::stems;
+use super::html::{InlineFigure, render_html};
+use super::short_names::{ends_of_paths, stems};
 use super::{
-    ReportError, ReportFile, render_json, render_modes_csv, render_parameters_csv,
-    render_perturbation_csv,
+    ReportError, ReportFile, render_modes_csv, render_parameters_csv, render_perturbation_csv,
 };
-
-/// A picture on its way to a file and to the page.
-struct Picture {
-    /// Name of its files, without ending.
-    name: String,
-    chart: Chart,
-}
 
 /// All files of a report: `report.html`, `report.json`, `parameters.csv`, `modes.csv`,
 /// `perturbation.csv` where something was perturbed, and the pictures that apply, each as PNG and as SVG:
@@ -35,35 +31,28 @@ struct Picture {
 /// The first [`ReportError`] of any file.
 pub fn render_run(
     document: &Document,
-    figures: &[RecordingFigure],
+    recordings: &[RecordingResult],
 ) -> Result<Vec<ReportFile>, ReportError> {
-    let pictures = pictures(document, figures);
+    let pictures = pictures(document, recordings);
     type Rendered = Vec<([ReportFile; 2], InlineFigure)>;
     let (rendered, json) = rayon::join(
         || {
-            pictures
-                .par_iter()
-                .map(rendered)
-                .collect::<Result<Rendered, _>>()
+            let rendered = pictures.par_iter();
+            let rendered = rendered.map(|(name, chart)| render_chart(name, chart));
+            rendered.collect::<Result<Rendered, _>>()
         },
         || render_json(document),
     );
-    let mut page = PageFigures::default();
     let mut files = Vec::new();
-    for (picture, (of_picture, inline)) in pictures.iter().zip(rendered?) {
+    let mut figures = Vec::new();
+    for (of_picture, figure) in rendered? {
         files.extend(of_picture);
-        match picture.chart.kind {
-            "taps" => page.taps.push(inline),
-            "frequencies" | "mode-shapes" => page.comparison.push(inline),
-            "gap" | "gap-place" => page.gap.push(inline),
-            "cloud" => page.cloud.push(inline),
-            _ => page.spectra.push(inline),
-        }
+        figures.push(figure);
     }
     // Before a figure that takes a page of its own, half of a page would stay empty.
-    page.spectra.sort_by_key(|figure| figure.tall);
+    figures.sort_by_key(|figure| figure.tall);
     let mut words = vec![
-        ("report.html", render_html(document, &page)?),
+        ("report.html", render_html(document, &figures)?),
         ("report.json", json?),
         ("parameters.csv", render_parameters_csv(document)?),
         ("modes.csv", render_modes_csv(document)?),
@@ -78,28 +67,33 @@ pub fn render_run(
     Ok(files)
 }
 
-/// The averaged spectra of a recording as a picture, its functions where the file holds nothing else; `None` when no
-/// tap was accepted.
+/// Returns the averaged spectra of a recording as a picture, its functions where the file holds nothing else; `None`
+/// when no tap was accepted.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
 pub fn render_spectrum_picture(
-    figure: &RecordingFigure,
+    recording: &RecordingResult,
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
-    optional(spectrum(figure).or_else(|| frf(figure)), format)
+    let name = ends_of_paths(&[&recording.file]).concat();
+    let chart = spectrum(recording, &name);
+    let chart = chart.or_else(|| frf(recording, &name, &given_frfs(recording), &[]));
+    optional(chart, format)
 }
 
-/// The frequency response functions of a recording as a picture; `None` without a hammer or an accepted
-/// tap.
+/// Returns frequency response functions of a recording as a picture, all estimators shown; `None` without a hammer or
+/// an accepted tap.
 ///
 /// # Errors
 /// [`ReportError::Picture`] if it cannot be drawn.
 pub fn render_frf_picture(
-    figure: &RecordingFigure,
+    recording: &RecordingResult,
+    frfs: &[Frf],
     format: PictureFormat,
 ) -> Result<Option<Vec<u8>>, ReportError> {
-    optional(frf(figure), format)
+    let name = ends_of_paths(&[&recording.file]).concat();
+    optional(frf(recording, &name, frfs, &FrfEstimator::ALL), format)
 }
 
 /// The estimates under changed frequencies as a picture; `None` where there are none.
@@ -118,46 +112,56 @@ fn optional(chart: Option<Chart>, format: PictureFormat) -> Result<Option<Vec<u8
     picture.transpose()
 }
 
-/// A picture as files for screens and for papers, and for the page.
-fn rendered(picture: &Picture) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
-    let drawing = picture.chart.draw();
-    let file = |ending: &str, format: PictureFormat| {
-        Ok::<_, ReportError>(ReportFile {
-            name: format!("{}.{ending}", picture.name),
-            bytes: render_picture(&drawing, format)?,
-        })
-    };
-    let inline = InlineFigure {
-        caption: picture.chart.caption.clone(),
-        svg: render_svg(&drawing),
-        tall: drawing.height > drawing.width,
-        live: picture.chart.page().as_ref().map(packed).transpose()?,
-    };
-    let files = [
-        file("png", PictureFormat::Png)?,
-        file("svg", PictureFormat::Svg)?,
-    ];
-    Ok((files, inline))
+/// Returns a recording's frequency response functions; none without a hammer.
+fn given_frfs(recording: &RecordingResult) -> Vec<Frf> {
+    frfs_of(recording, &FrfSettings::default()).unwrap_or_default()
 }
 
-/// All pictures that there are data for.
-fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
-    let stems = stems(figures.iter().map(|figure| figure.file.as_str()));
-    let of_recordings = figures.par_iter().zip(&stems);
-    let of_recordings = of_recordings.flat_map_iter(|(figure, stem)| {
+/// Returns a picture as files for screens and for papers, and for the page.
+fn render_chart(name: &str, chart: &Chart) -> Result<([ReportFile; 2], InlineFigure), ReportError> {
+    let drawing = chart.draw();
+    let png = ReportFile {
+        name: format!("{name}.png"),
+        bytes: render_picture(&drawing, PictureFormat::Png)?,
+    };
+    let svg = ReportFile {
+        name: format!("{name}.svg"),
+        bytes: render_picture(&drawing, PictureFormat::Svg)?,
+    };
+    let figure = InlineFigure {
+        section: match chart.kind {
+            "taps" => "recordings",
+            "frequencies" | "mode-shapes" => "joint",
+            "gap" | "gap-place" => "gap",
+            "cloud" => "uncertainty",
+            _ => "modes",
+        },
+        caption: chart.caption.clone(),
+        svg: render_svg(&drawing),
+        tall: drawing.height > drawing.width,
+        live: chart.page().as_ref().map(packed).transpose()?,
+    };
+    Ok(([png, svg], figure))
+}
+
+/// Returns all pictures that there are data for, with the names of their files without ending.
+fn pictures(document: &Document, recordings: &[RecordingResult]) -> Vec<(String, Chart)> {
+    let files: Vec<&str> = recordings.iter().map(|one| one.file.as_str()).collect();
+    let of_recordings = recordings.par_iter().zip(ends_of_paths(&files));
+    let of_recordings = of_recordings.zip(stems(files.iter().copied()));
+    let of_recordings = of_recordings.flat_map_iter(|((recording, name), stem)| {
+        let frfs = given_frfs(recording);
         let charts = [
-            spectrum(figure),
-            frf(figure),
-            stabilisation(figure),
-            figure.amplitude.as_ref().and_then(amplitude),
-            taps(figure),
+            spectrum(recording, &name),
+            frf(recording, &name, &frfs, &[]),
+            stabilisation(recording, &name, &frfs),
+            amplitude(recording, &name),
+            taps(recording, &name),
         ];
-        charts.into_iter().flatten().map(move |chart| Picture {
-            name: format!("{}-{stem}", chart.kind),
-            chart,
-        })
+        let charts = charts.into_iter().flatten();
+        charts.map(move |chart| (format!("{}-{stem}", chart.kind), chart))
     });
-    let mut pictures: Vec<Picture> = of_recordings.collect();
+    let mut pictures: Vec<(String, Chart)> = of_recordings.collect();
     let of_model = [
         frequencies(document),
         shapes(document),
@@ -165,9 +169,79 @@ fn pictures(document: &Document, figures: &[RecordingFigure]) -> Vec<Picture> {
         place_map(document),
         cloud(document),
     ];
-    pictures.extend(of_model.into_iter().flatten().map(|chart| Picture {
-        name: chart.kind.to_owned(),
-        chart,
-    }));
+    let of_model = of_model.into_iter().flatten();
+    pictures.extend(of_model.map(|chart| (chart.kind.to_owned(), chart)));
     pictures
+}
+
+/// The document as indented JSON with a newline at its end.
+///
+/// Values that are not finite are written as `null`.
+///
+/// # Errors
+/// [`ReportError::Json`] if the document cannot be serialised.
+pub fn render_json(document: &Document) -> Result<String, ReportError> {
+    let mut text = serde_json::to_string_pretty(document).map_err(ReportError::Json)?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// The JSON Schema (draft 2020-12) of `report.json` and of every `--json` answer that is a document.
+pub fn render_schema() -> String {
+    let generator = SchemaSettings::draft2020_12()
+        .for_serialize()
+        .into_generator();
+    let schema = generator.into_root_schema_for::<Document>();
+    // Indented as report.json is; a value without infinities or maps of odd keys always serialises.
+    let text = serde_json::to_string_pretty(schema.as_value()).unwrap_or_default();
+    text + "\n"
+}
+
+/// The model that a diagnosis leads to, beside the report.
+pub const MODEL_FILE: &str = "updated-model.toml";
+/// Files of words, the model apart.
+const WORDS: [&str; 5] = [
+    "report.html",
+    "report.json",
+    "parameters.csv",
+    "modes.csv",
+    "perturbation.csv",
+];
+/// Pictures of the whole test.
+const OF_TEST: [&str; 5] = ["frequencies", "mode-shapes", "cloud", "gap", "gap-place"];
+/// Pictures of each recording, followed by its name.
+const OF_RECORDING: [&str; 5] = ["spectrum", "frf", "stabilisation", "amplitude", "taps"];
+
+/// Names of all files that a run may have written beside this `report.json`; empty where the text is none
+/// of ours. Pictures of recordings that it does not name are somebody else's.
+pub fn earlier_files(report_json: &str) -> Vec<String> {
+    let Ok(report) = serde_json::from_str::<Value>(report_json) else {
+        return Vec::new();
+    };
+    let ours = report["version"].is_u64() && report["warnings"].is_array();
+    if !ours {
+        return Vec::new();
+    }
+    let recordings = report["recordings"].as_array();
+    let files = recordings
+        .into_iter()
+        .flatten()
+        .filter_map(|recording| recording["file"].as_str());
+    let of_recordings = stems(files)
+        .into_iter()
+        .flat_map(|stem| OF_RECORDING.map(|kind| format!("{kind}-{stem}")));
+    let pictures = OF_TEST
+        .map(str::to_owned)
+        .into_iter()
+        .chain(of_recordings)
+        .flat_map(|name| [format!("{name}.png"), format!("{name}.svg")]);
+    // Where the earlier run wrote no model, one of that name is somebody else's.
+    let model = report["gap"]["updated_model"]["file"].as_str();
+    let model = model.filter(|file| *file == MODEL_FILE).map(str::to_owned);
+    WORDS
+        .map(str::to_owned)
+        .into_iter()
+        .chain(model)
+        .chain(pictures)
+        .collect()
 }

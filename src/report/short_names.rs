@@ -7,7 +7,7 @@ const LEFT_OUT: char = '\u{2026}';
 /// Shortest a name becomes (characters).
 const SHORTEST: usize = 4;
 
-/// The same names in ways that take less and less room: as they are, without the folder and the ending
+/// Returns names in ways that take less and less room: as they are, without the folder and the ending
 /// that all share, without the words that all begin and end with, and at last without their middles. A way
 /// in which two names would be the same is left out.
 pub fn ways(names: &[String]) -> Vec<Vec<String>> {
@@ -18,86 +18,77 @@ pub fn ways(names: &[String]) -> Vec<Vec<String>> {
     let middles = shorter.map(|width| cores.iter().map(|core| middle_out(core, width)).collect());
     let mut ways = vec![names.to_vec(), plain.clone(), cores.clone()];
     ways.extend(middles);
-    let apart = |way: &Vec<String>| way.iter().collect::<BTreeSet<_>>().len() == names.len();
-    ways.retain(apart);
+    ways.retain(|way| way.iter().collect::<BTreeSet<_>>().len() == names.len());
     ways
 }
 
-/// Files by the ends of their paths, each as long as it takes to tell it from the others: names for titles.
+/// Returns files by the ends of their paths, each as long as it takes to tell it from the others: names for titles.
 pub fn ends_of_paths(files: &[&str]) -> Vec<String> {
-    files.iter().map(|file| end_of_path(file, files)).collect()
+    let mut ends = Vec::new();
+    for file in files {
+        let separators = file.rmatch_indices(['/', '\\']);
+        let own = separators.map(|(place, _)| &file[place + 1..]);
+        let mut own = own.filter(|end| !end.is_empty());
+        let apart = own.find(|end| {
+            files.iter().all(|other| {
+                // No other path is this, or ends in a folder's separator and this.
+                let before = other.strip_suffix(end).filter(|_| other != file);
+                before.is_none_or(|before| !before.is_empty() && !before.ends_with(['/', '\\']))
+            })
+        });
+        ends.push(apart.unwrap_or(*file).to_owned());
+    }
+    ends
 }
 
-fn end_of_path(file: &str, files: &[&str]) -> String {
-    let others = || files.iter().filter(|other| **other != file);
-    let folders = file.char_indices().rev();
-    let ends = folders
-        .filter(|(_, letter)| matches!(letter, '/' | '\\'))
-        .map(|(place, _)| &file[place + 1..]);
-    let apart = |end: &&str| others().all(|other| !is_end(end, other));
-    let mut ends = ends.filter(|end| !end.is_empty());
-    ends.find(apart).unwrap_or(file).to_owned()
-}
-
-/// Whether a path is this or ends in a folder's separator and this.
-fn is_end(end: &str, path: &str) -> bool {
-    let before = path.strip_suffix(end);
-    before.is_some_and(|before| before.is_empty() || before.ends_with(['/', '\\']))
-}
-
+/// Returns the names without the folder that all share.
 fn without_folder(names: &[String]) -> Vec<String> {
-    let folder = |name: &str| name.rfind(['/', '\\']).map_or(0, |place| place + 1);
-    let first = names.first().map_or("", |name| &name[..folder(name)]);
-    if names.iter().any(|name| &name[..folder(name)] != first) {
-        return names.to_vec();
+    let places = names.iter().map(|name| name.rfind(['/', '\\']));
+    let folders = names.iter().zip(places);
+    let mut folders = folders.map(|(name, place)| &name[..place.map_or(0, |at| at + 1)]);
+    let first = folders.next().unwrap_or_default();
+    match folders.all(|folder| folder == first) {
+        true => names
+            .iter()
+            .map(|name| name[first.len()..].to_owned())
+            .collect(),
+        false => names.to_vec(),
     }
-    let without = |name: &String| name[first.len()..].to_owned();
-    names.iter().map(without).collect()
 }
 
+/// Returns the names without the ending that all share.
 fn without_ending(names: &[String]) -> Vec<String> {
-    let ending = |name: &String| name.rfind('.').filter(|place| *place > 0);
-    let first = names.first();
-    let Some(shared) = first.and_then(|name| Some(name[ending(name)?..].to_owned())) else {
-        return names.to_vec();
-    };
-    if names
-        .iter()
-        .any(|name| ending(name).map(|place| &name[place..]) != Some(&shared))
-    {
-        return names.to_vec();
+    let mut endings = names.iter().map(|name| {
+        let place = name.rfind('.').filter(|place| *place > 0);
+        place.map_or("", |place| &name[place..])
+    });
+    let first = endings.next().unwrap_or_default();
+    match endings.all(|ending| ending == first) {
+        true => {
+            let plain = names.iter().map(|name| &name[..name.len() - first.len()]);
+            plain.map(str::to_owned).collect()
+        }
+        false => names.to_vec(),
     }
-    let without = |name: &String| name[..name.len() - shared.len()].to_owned();
-    names.iter().map(without).collect()
 }
 
-/// The names without the words that all of them begin and end with.
+/// Returns the names without the words that all of them begin and end with.
 fn cores(names: &[String]) -> Vec<String> {
     let letters: Vec<Vec<char>> = names.iter().map(|name| name.chars().collect()).collect();
-    let Some((first, others)) = letters
-        .split_first()
-        .filter(|(_, others)| !others.is_empty())
-    else {
+    if letters.len() < 2 {
         return names.to_vec();
-    };
+    }
     let least = letters.iter().map(Vec::len).min().unwrap_or(0);
-    let same = |at: usize| others.iter().all(|other| other[at] == first[at]);
-    let mut begin = (0..least).find(|at| !same(*at)).unwrap_or(least);
+    let mut begin = shared(&letters, least);
     while begin > 0 && letters.iter().any(|name| inside_word(name, begin)) {
         begin -= 1;
     }
-    let from_end = |name: &[char], back: usize| name[name.len() - 1 - back];
-    let same = |back: usize| {
-        let last = from_end(first, back);
-        others.iter().all(|other| from_end(other, back) == last)
-    };
-    let most = least - begin;
-    let mut end = (0..most).find(|back| !same(*back)).unwrap_or(most);
-    while end > 0
-        && letters
-            .iter()
-            .any(|name| inside_word(name, name.len() - end))
-    {
+    let mut backwards = letters.clone();
+    for name in &mut backwards {
+        name.reverse();
+    }
+    let mut end = shared(&backwards, least - begin);
+    while end > 0 && backwards.iter().any(|name| inside_word(name, end)) {
         end -= 1;
     }
     // A letter or two at either side is no more than what would stand for it.
@@ -108,25 +99,33 @@ fn cores(names: &[String]) -> Vec<String> {
     if letters.iter().any(|name| name.len() == begin + end) {
         return names.to_vec();
     }
-    let core = |name: &Vec<char>| {
+    let mut cores = Vec::new();
+    for name in &letters {
         let mut core = String::new();
         core.extend((begin > 0).then_some(LEFT_OUT));
         core.extend(&name[begin..name.len() - end]);
         core.extend((end > 0).then_some(LEFT_OUT));
-        core
-    };
-    letters.iter().map(core).collect()
+        cores.push(core);
+    }
+    cores
 }
 
-/// Whether a name would be cut inside a word or a number there.
+/// Returns how many letters all names begin with, `most` of them looked at.
+fn shared(names: &[Vec<char>], most: usize) -> usize {
+    let mut places = 0..most;
+    let differs = places.find(|at| names.iter().any(|name| name[*at] != names[0][*at]));
+    differs.unwrap_or(most)
+}
+
+/// True where a name would be cut inside a word or a number there.
 fn inside_word(name: &[char], at: usize) -> bool {
-    let sides = at
-        .checked_sub(1)
-        .and_then(|before| Some((name.get(before)?, name.get(at)?)));
-    sides.is_some_and(|(before, after)| {
-        let both = |kind: fn(&char) -> bool| kind(before) && kind(after);
-        both(|c| c.is_alphabetic()) || both(|c| c.is_numeric())
-    })
+    match name.get(at.wrapping_sub(1)).zip(name.get(at)) {
+        Some((before, after)) => {
+            before.is_alphabetic() && after.is_alphabetic()
+                || before.is_numeric() && after.is_numeric()
+        }
+        None => false,
+    }
 }
 
 /// A name of at most `width` characters: its middle gives way.
@@ -147,11 +146,19 @@ fn middle_out(name: &str, width: usize) -> String {
     first.chain(&[LEFT_OUT]).chain(last).collect()
 }
 
-/// File names without folder and ending, safe as part of a name, each different.
+/// Returns file names without folder and ending, safe as part of a name, each different.
 pub(super) fn stems<'a>(files: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut stems: Vec<String> = Vec::new();
     for file in files {
-        let stem = stem(file);
+        let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+        let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+        let stem = match stem {
+            "" => "recording".to_owned(),
+            _ => stem.replace(
+                |c: char| !c.is_alphanumeric() && !matches!(c, '-' | '_'),
+                "-",
+            ),
+        };
         let mut unique = stem.clone();
         let mut number = 2;
         while stems.contains(&unique) {
@@ -161,23 +168,6 @@ pub(super) fn stems<'a>(files: impl Iterator<Item = &'a str>) -> Vec<String> {
         stems.push(unique);
     }
     stems
-}
-
-fn stem(file: &str) -> String {
-    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    let safe: String = stem
-        .chars()
-        .map(|c| {
-            let plain = c.is_alphanumeric() || matches!(c, '-' | '_');
-            if plain { c } else { '-' }
-        })
-        .collect();
-    if safe.is_empty() {
-        "recording".to_owned()
-    } else {
-        safe
-    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,10 @@
 //! Tables and findings for a terminal of 80 columns, without colours.
 
-use super::document::{
-    Document, EstimateSection, ModeSection, ReadBy, RecordingSection, TapSection, method_name,
-};
-use super::format::{signed_percent, significant, trimmed};
+use super::document::{Document, ReadBy, RecordingSection, method_name};
+use super::format::{capital, signed_percent, significant, trimmed};
 use super::tables::{self, Table};
 pub use super::text_table::{render_table, wrapped};
-use super::words::findings::brief;
+use super::words::findings::{brief, no_estimate};
 use super::words::gap::gap_story;
 
 /// Most taps listed one by one.
@@ -15,7 +13,7 @@ const MOST_TAPS: usize = 10;
 /// Everything the document holds.
 pub fn render_text(document: &Document) -> String {
     let sections = [
-        table_or_nothing(tables::datasets(document)),
+        joined(&[tables::datasets(document)]),
         recordings(document),
         taps(document),
         modes(document),
@@ -55,7 +53,7 @@ pub fn taps(document: &Document) -> String {
     if count > MOST_TAPS {
         joined(&[tables::taps_used(document), tables::rejected_taps(document)])
     } else {
-        table_or_nothing(tables::taps(document))
+        joined(&[tables::taps(document)])
     }
 }
 
@@ -68,11 +66,19 @@ pub fn modes(document: &Document) -> String {
     let modes = document.modes.as_deref().unwrap_or_default();
     let fitted = modes.iter().any(|mode| mode.method == Some(ReadBy::Fit));
     let note = if fitted {
+        // The numbered modes without a fit: " (mode 3: interpolated; mode 4: line)".
+        let others = modes.iter().filter(|mode| mode.method != Some(ReadBy::Fit));
+        let others =
+            others.filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, method_name(mode.method))));
+        let others: Vec<String> = others.collect();
+        let others = match others.is_empty() {
+            true => String::new(),
+            false => format!(" ({})", others.join("; ")),
+        };
         let note = format!(
-            "Frequency: fit of {}, \u{b1} half the 95 % interval{}; line: the highest spectral line \
+            "Frequency: fit of {}, \u{b1} half the 95 % interval{others}; line: the highest spectral line \
              \u{b1} half line; damping \u{b1} one standard deviation.",
             tables::fitted_to(document),
-            not_fitted(modes)
         );
         wrapped(&note, 0)
     } else {
@@ -80,19 +86,6 @@ pub fn modes(document: &Document) -> String {
     };
     let from = tables::modes_from(document).map_or(String::new(), |from| wrapped(&from, 0));
     render_table(&table) + &note + &from
-}
-
-/// " (mode 3: interpolated; mode 4: line)": the numbered modes without a fit; empty where all have one.
-fn not_fitted(modes: &[ModeSection]) -> String {
-    let others: Vec<String> = modes
-        .iter()
-        .filter(|mode| mode.method != Some(ReadBy::Fit))
-        .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, method_name(mode.method))))
-        .collect();
-    match others.is_empty() {
-        true => String::new(),
-        false => format!(" ({})", others.join("; ")),
-    }
 }
 
 /// The resonances on the frequency response functions; empty where those were not asked for.
@@ -105,9 +98,12 @@ pub fn frfs(document: &Document) -> String {
 pub fn estimate(document: &Document) -> String {
     match &document.estimate {
         None => String::new(),
-        Some(None) => wrapped(&format!("No estimate: {}.", document.no_estimate()), 0),
+        Some(None) => {
+            let words = no_estimate(document).unwrap_or_default();
+            wrapped(&format!("{}.", capital(&words)), 0)
+        }
         Some(Some(found)) => {
-            let mut text = table_or_nothing(tables::parameters(document));
+            let mut text = joined(&[tables::parameters(document)]);
             if let Some(methods) = tables::methods(document) {
                 text.push('\n');
                 text.push_str(&render_table(&methods));
@@ -116,7 +112,7 @@ pub fn estimate(document: &Document) -> String {
             if let Some(closure) = closure {
                 let percent = signed_percent(Some(100.0 * closure));
                 let words = format!(
-                    "From modes {}. The pair regression closes to {percent} % (0: no contradiction).",
+                    "From modes {}. The pair regression contradicts itself by {percent} % (0: not at all).",
                     listed(&found.modes_used)
                 );
                 text.push_str(&wrapped(&words, 0));
@@ -137,14 +133,14 @@ fn listed(modes: &[usize]) -> String {
 
 /// Measured beside predicted frequencies; empty without a prediction.
 pub fn prediction(document: &Document) -> String {
-    table_or_nothing(tables::prediction(document))
+    joined(&[tables::prediction(document)])
 }
 
-/// What changed frequencies do to the estimate; empty where it was not computed.
+/// The estimates under changed frequencies; empty where it was not computed.
 pub fn perturbation(document: &Document) -> String {
     let texts = [
-        table_or_nothing(tables::perturbation(document)),
-        table_or_nothing(tables::averages(document)),
+        joined(&[tables::perturbation(document)]),
+        joined(&[tables::averages(document)]),
         noted(tables::spans(document)),
         noted(tables::sensitivity(document)),
         noted(tables::monte_carlo(document)),
@@ -155,7 +151,7 @@ pub fn perturbation(document: &Document) -> String {
 
 /// The checks of good practice that leave a doubt; empty without any. The ending counts them all.
 pub fn quality(document: &Document) -> String {
-    table_or_nothing(tables::quality_doubts(document))
+    joined(&[tables::quality_doubts(document)])
 }
 
 /// The warnings that concern the result; empty without any. Those of the pair regression stand with it.
@@ -166,7 +162,7 @@ pub fn warnings(document: &Document) -> String {
         .collect()
 }
 
-/// What was found, in five lines at most (longer where a reason has to be told).
+/// The findings, in five lines at most (longer where a reason is given).
 pub fn ending(document: &Document) -> String {
     let lines = brief(document);
     if lines.is_empty() {
@@ -183,10 +179,6 @@ fn noted(table: Option<Table>) -> String {
     table.map_or(String::new(), |table| {
         render_table(&table) + &wrapped(&table.note, 0)
     })
-}
-
-fn table_or_nothing(table: Option<Table>) -> String {
-    table.as_ref().map(render_table).unwrap_or_default()
 }
 
 fn joined(tables: &[Option<Table>]) -> String {
@@ -220,30 +212,28 @@ fn gap(document: &Document) -> String {
     format!("{story}\n{tables}")
 }
 
-/// A line for each recording, the peaks and the estimate; empty where nothing was computed.
+/// Returns a line for each recording, the peaks and the estimate; empty where nothing was computed.
 pub fn render_stages(document: &Document) -> String {
     let recordings = document.recordings.as_deref().unwrap_or_default();
     let mut lines: Vec<String> = recordings.iter().map(recording_stage).collect();
-    lines.extend(document.modes.as_deref().map(modes_stage));
-    lines.extend(document.estimate.iter().flatten().flat_map(estimate_stage));
-    ended(&lines)
-}
-
-/// Every tap and every peak of every recording; empty without recordings.
-pub fn render_readings(document: &Document) -> String {
-    let recordings = document.recordings.as_deref().unwrap_or_default();
-    let lines = recordings.iter().flat_map(|recording| {
-        let file = &recording.file;
-        let taps = recording.taps.iter().map(tap_stage);
-        let peaks = recording.modes.iter().map(peak_stage);
-        taps.chain(peaks)
-            .map(move |words| format!("{file}: {words}"))
-            .collect::<Vec<String>>()
-    });
-    ended(&lines.collect::<Vec<String>>())
-}
-
-fn ended(lines: &[String]) -> String {
+    if let Some(modes) = &document.modes {
+        let numbered = modes.iter().filter(|mode| mode.mode.is_some()).count();
+        let peaks = modes.len();
+        lines.push(format!("modes: {peaks} peaks, {numbered} with a number"));
+    }
+    if let Some(found) = document.estimate.as_ref().and_then(Option::as_ref) {
+        let mut head = format!(
+            "estimate: {} from modes {}",
+            found.method.name(),
+            listed(&found.modes_used)
+        );
+        if let Some(misfit) = &found.misfit {
+            head.push_str(&format!("; {}", misfit.verdict));
+        }
+        lines.push(head);
+        let statements = found.identifiability.iter().flat_map(|can| &can.statements);
+        lines.extend(statements.map(|words| format!("estimate: {words}")));
+    }
     lines.iter().map(|line| format!("{line}\n")).collect()
 }
 
@@ -269,45 +259,30 @@ fn recording_stage(found: &RecordingSection) -> String {
     format!("{}: {}", found.file, parts.join("; "))
 }
 
-fn modes_stage(modes: &[ModeSection]) -> String {
-    let numbered = modes.iter().filter(|mode| mode.mode.is_some()).count();
-    format!("modes: {} peaks, {numbered} with a number", modes.len())
-}
-
-fn estimate_stage(found: &EstimateSection) -> Vec<String> {
-    let modes: Vec<String> = found.modes_used.iter().map(usize::to_string).collect();
-    let misfit = found.misfit.as_ref();
-    let verdict = misfit.map_or(String::new(), |misfit| format!("; {}", misfit.verdict));
-    let head = format!(
-        "{} from modes {}{verdict}",
-        found.method.name(),
-        modes.join(", ")
-    );
-    let more = found.identifiability.iter().flat_map(|can| &can.statements);
-    std::iter::once(&head)
-        .chain(more)
-        .map(|words| format!("estimate: {words}"))
-        .collect()
-}
-
-fn tap_stage(tap: &TapSection) -> String {
-    let fate = match (&tap.reason, tap.accepted) {
-        (Some(reason), _) => reason.as_str(),
-        (None, true) => "accepted",
-        (None, false) => "rejected",
-    };
-    format!("tap at {:.3} s, {fate}", tap.time)
-}
-
-fn peak_stage(mode: &ModeSection) -> String {
-    let what = match (mode.mode, &mode.label) {
-        (Some(number), _) => format!("mode {number}"),
-        (None, Some(label)) => label.clone(),
-        (None, None) => "no number".to_owned(),
-    };
-    let frequency = significant(mode.frequency, 7);
-    format!(
-        "peak at {frequency} Hz ({}), {what}",
-        method_name(mode.method)
-    )
+/// Returns every tap and every peak of every recording; empty without recordings.
+pub fn render_readings(document: &Document) -> String {
+    let mut text = String::new();
+    for recording in document.recordings.iter().flatten() {
+        let file = &recording.file;
+        for tap in &recording.taps {
+            let fate = match (&tap.reason, tap.accepted) {
+                (Some(reason), _) => reason.as_str(),
+                (None, true) => "accepted",
+                (None, false) => "rejected",
+            };
+            text.push_str(&format!("{file}: tap at {:.3} s, {fate}\n", tap.time));
+        }
+        for mode in &recording.modes {
+            let name = match (mode.mode, &mode.label) {
+                (Some(number), _) => format!("mode {number}"),
+                (None, Some(label)) => label.clone(),
+                (None, None) => "no number".to_owned(),
+            };
+            let (frequency, method) = (significant(mode.frequency, 7), method_name(mode.method));
+            text.push_str(&format!(
+                "{file}: peak at {frequency} Hz ({method}), {name}\n"
+            ));
+        }
+    }
+    text
 }

@@ -20,22 +20,40 @@ const GENTLE: usize = 3;
 /// Most rows printed: a terminal is no place for a thousand taps.
 const MOST_ROWS: usize = 40;
 
-/// What of a table is printed.
+/// A table as it is printed.
 struct Layout {
     table: Table,
-    shown: Vec<usize>,
+    /// Lines of each column's head.
     heads: Vec<Vec<String>>,
-    widths: Vec<usize>,
+    shown: Vec<Shown>,
 }
 
-/// A table with its caption, in 80 columns. Heads go to two lines where one has no room, names of files
+/// A column that is printed.
+#[derive(Clone, Copy)]
+struct Shown {
+    index: usize,
+    /// Characters.
+    width: usize,
+}
+
+/// Returns a table with its caption, in 80 columns. Heads go to two lines where one has no room, names of files
 /// are shortened so that they stay apart, columns that can be had elsewhere are left out, then words that do
 /// not fit go on below, and at last columns do. Numbers are never cut.
 pub fn render_table(table: &Table) -> String {
-    let layout = layout(table);
-    let mut text = wrapped(&layout.table.caption, 0);
-    for part in parts(&layout) {
-        text.push_str(&render_part(&part));
+    let Layout {
+        table,
+        heads,
+        shown,
+    } = layout(table);
+    let mut text = wrapped(&table.caption, 0);
+    for part in parts(&shown) {
+        text.push_str(&row(&table, &part, &heads));
+        text.push_str(&"-".repeat(total(&part).min(WIDTH)));
+        text.push('\n');
+        for cells in table.rows.iter().take(MOST_ROWS) {
+            let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
+            text.push_str(&row(&table, &part, &cells));
+        }
     }
     let more = table.rows.len().saturating_sub(MOST_ROWS);
     if more > 0 {
@@ -44,101 +62,74 @@ pub fn render_table(table: &Table) -> String {
     text
 }
 
-fn render_part(layout: &Layout) -> String {
-    let mut text = row(layout, &layout.heads);
-    text.push_str(&"-".repeat(total(&layout.widths).min(WIDTH)));
-    text.push('\n');
-    for cells in layout.table.rows.iter().take(MOST_ROWS) {
-        let cells: Vec<Vec<String>> = cells.iter().map(|cell| vec![cell.clone()]).collect();
-        text.push_str(&row(layout, &cells));
-    }
-    text
+/// Returns the width of columns with the space between them.
+fn total(shown: &[Shown]) -> usize {
+    let widths = shown.iter().map(|column| column.width).sum::<usize>();
+    widths + GAP * shown.len().saturating_sub(1)
 }
 
-/// Width of columns with the space between them.
-fn total(widths: &[usize]) -> usize {
-    widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1)
-}
-
-/// The columns in as many parts as have room side by side, each with the first column, which says what a row is.
-fn parts(layout: &Layout) -> Vec<Layout> {
-    let mut parts: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
-    for (index, width) in layout.shown.iter().zip(&layout.widths) {
+/// Returns the columns in as many parts as have room side by side, each with the first column, which names the rows.
+fn parts(shown: &[Shown]) -> Vec<Vec<Shown>> {
+    let mut parts: Vec<Vec<Shown>> = Vec::new();
+    for &column in shown {
         match parts.last_mut() {
-            Some((shown, widths)) if total(widths) + GAP + width <= WIDTH => {
-                shown.push(*index);
-                widths.push(*width);
-            }
-            None => parts.push((vec![*index], vec![*width])),
-            Some(_) => parts.push((
-                vec![layout.shown[0], *index],
-                vec![layout.widths[0], *width],
-            )),
+            Some(part) if total(part) + GAP + column.width <= WIDTH => part.push(column),
+            None => parts.push(vec![column]),
+            Some(_) => parts.push(vec![shown[0], column]),
         }
     }
-    let part = |(shown, widths)| Layout {
-        table: layout.table.clone(),
-        shown,
-        heads: layout.heads.clone(),
-        widths,
-    };
-    parts.into_iter().map(part).collect()
+    parts
 }
 
-/// The first layout that has room, in the order of what it costs.
+/// Returns the first layout that has room, in the order of what it costs.
 fn layout(table: &Table) -> Layout {
-    let named = with_short_names(table);
-    let last = named.last().cloned().unwrap_or_else(|| table.clone());
-    let spacious = [Place::Everywhere, Place::Spacious];
-    let tries = named
-        .iter()
-        .take(GENTLE)
-        .map(|table| (table, &spacious[..]));
-    let tries = tries.chain(named.iter().map(|table| (table, &spacious[..1])));
-    for (table, places) in tries {
-        let shown = shown(table, places);
-        for heads in heads(table) {
-            let widths = natural_widths(table, &shown, &heads);
-            if has_room(table, &shown, &widths) {
-                let widths = fitted_widths(table, &shown, widths);
+    let mut named = with_short_names(table);
+    let spacious = named.iter().take(GENTLE).map(|table| (table, true));
+    for (table, spacious) in spacious.chain(named.iter().map(|table| (table, false))) {
+        let names = table.columns.iter().map(|column| column.name.as_str());
+        let one_line = names.clone().map(|name| vec![name.to_owned()]);
+        for heads in [one_line.collect(), names.map(two_lines).collect::<Vec<_>>()] {
+            let mut shown = natural_widths(table, &heads, spacious);
+            let least = shown.iter().map(|column| {
+                let head = &table.columns[column.index];
+                let shrinks = head.kind == Kind::Words && !is_name(head);
+                if shrinks {
+                    column.width.min(READABLE)
+                } else {
+                    column.width
+                }
+            });
+            if least.sum::<usize>() <= room(shown.len()) {
+                shrink(table, &mut shown);
                 let table = table.clone();
                 return Layout {
                     table,
-                    shown,
                     heads,
-                    widths,
+                    shown,
                 };
             }
         }
     }
-    let shown = shown(&last, &[Place::Everywhere]);
-    let heads = narrow_heads(&last);
-    let widths = natural_widths(&last, &shown, &heads);
-    let widths = fitted_widths(&last, &shown, widths);
+    let table = named.pop().unwrap_or_else(|| table.clone());
+    let heads = narrow_heads(&table);
+    let mut shown = natural_widths(&table, &heads, false);
+    shrink(&table, &mut shown);
     Layout {
-        table: last,
-        shown,
+        table,
         heads,
-        widths,
+        shown,
     }
 }
 
-/// Heads on one line, and on two.
-fn heads(table: &Table) -> Vec<Vec<Vec<String>>> {
-    let single = table.columns.iter().map(|c| vec![c.name.clone()]);
-    let double = table.columns.iter().map(|c| two_lines(&c.name));
-    vec![single.collect(), double.collect()]
-}
-
-/// Heads no wider than the cells below them, as far as their words allow, all on as many lines.
+/// Returns heads no wider than the cells below them, as far as their words allow, all on as many lines.
 fn narrow_heads(table: &Table) -> Vec<Vec<String>> {
-    let narrow = |(index, column): (usize, &Column)| {
+    let mut heads = Vec::new();
+    for (index, column) in table.columns.iter().enumerate() {
         let cells = table.rows.iter().filter_map(|row| row.get(index));
         let words = column.name.split(' ').map(length);
         let width = cells.map(|cell| length(cell)).chain(words).max();
-        broken(&column.name, width.unwrap_or(0))
-    };
-    let mut heads: Vec<Vec<String>> = table.columns.iter().enumerate().map(narrow).collect();
+        heads.push(broken(&column.name, width.unwrap_or(0)));
+    }
     let lines = heads.iter().map(Vec::len).max().unwrap_or(0);
     for head in &mut heads {
         head.splice(..0, vec![String::new(); lines - head.len()]);
@@ -146,34 +137,16 @@ fn narrow_heads(table: &Table) -> Vec<Vec<String>> {
     heads
 }
 
-fn shown(table: &Table, places: &[Place]) -> Vec<usize> {
-    let columns = table.columns.iter().enumerate();
-    let shown = columns.filter(|(_, column)| places.contains(&column.place));
-    shown.map(|(index, _)| index).collect()
-}
-
-/// Whether all columns fit when those of long words shrink to what still reads well.
-fn has_room(table: &Table, shown: &[usize], widths: &[usize]) -> bool {
-    let least = shown.iter().zip(widths).map(|(index, width)| {
-        let shrinks = is_words(table, *index) && !is_name(table, *index);
-        if shrinks {
-            (*width).min(READABLE)
-        } else {
-            *width
-        }
-    });
-    least.sum::<usize>() <= room(widths.len())
-}
-
-/// The table with its names of files as they are, then shorter and shorter.
+/// Returns the table with its names of files as they are, then shorter and shorter.
 fn with_short_names(table: &Table) -> Vec<Table> {
-    let Some(index) = (0..table.columns.len()).find(|index| is_name(table, *index)) else {
+    let Some(index) = table.columns.iter().position(is_name) else {
         return vec![table.clone()];
     };
     let cells = table.rows.iter().filter_map(|row| row.get(index));
     let names: BTreeSet<&String> = cells.filter(|c| !c.is_empty() && *c != MISSING).collect();
     let names: Vec<String> = names.into_iter().cloned().collect();
-    let shorter = |way: &Vec<String>| {
+    let mut tables = Vec::new();
+    for way in ways(&names) {
         let mut table = table.clone();
         for cell in table.rows.iter_mut().filter_map(|row| row.get_mut(index)) {
             let place = names.iter().position(|name| name == cell);
@@ -181,17 +154,15 @@ fn with_short_names(table: &Table) -> Vec<Table> {
                 cell.clone_from(short);
             }
         }
-        if *way != names
-            && let Some(column) = table.columns.get_mut(index)
-        {
-            column.name = "File".to_owned();
+        if way != names {
+            table.columns[index].name = "File".to_owned();
         }
-        table
-    };
-    ways(&names).iter().map(shorter).collect()
+        tables.push(table);
+    }
+    tables
 }
 
-/// A head on two lines: its unit below its name, or its last word.
+/// Returns a head on two lines: its unit below its name, or its last word.
 fn two_lines(name: &str) -> Vec<String> {
     let place = name.rfind(" (").or_else(|| name.rfind(' '));
     match place.map(|place| name.split_at(place)) {
@@ -200,7 +171,7 @@ fn two_lines(name: &str) -> Vec<String> {
     }
 }
 
-/// Characters that columns share.
+/// Returns the characters that columns share.
 fn room(columns: usize) -> usize {
     WIDTH.saturating_sub(GAP * columns.saturating_sub(1))
 }
@@ -209,91 +180,73 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Widths that hold every head and cell on one line.
-fn natural_widths(table: &Table, shown: &[usize], heads: &[Vec<String>]) -> Vec<usize> {
-    let width = |index: &usize| {
-        let head = heads.get(*index).into_iter().flatten();
-        let rows = table.rows.iter().take(MOST_ROWS);
-        let cells = rows.filter_map(|row| row.get(*index));
-        head.chain(cells)
-            .map(|text| length(text))
-            .max()
-            .unwrap_or(0)
-    };
-    shown.iter().map(width).collect()
+/// Returns the columns with widths that hold every head and cell on one line; with those that are left out where
+/// there is no room, or without.
+fn natural_widths(table: &Table, heads: &[Vec<String>], spacious: bool) -> Vec<Shown> {
+    let mut shown = Vec::new();
+    for (index, column) in table.columns.iter().enumerate() {
+        if column.place == Place::Everywhere || spacious && column.place == Place::Spacious {
+            let head = heads.get(index).into_iter().flatten();
+            let rows = table.rows.iter().take(MOST_ROWS);
+            let cells = rows.filter_map(|row| row.get(index));
+            let width = head.chain(cells).map(|text| length(text)).max();
+            let width = width.unwrap_or(0);
+            shown.push(Shown { index, width });
+        }
+    }
+    shown
 }
 
-/// Widths of the shown columns; where they pass the terminal's, columns of words shrink, and names last.
-fn fitted_widths(table: &Table, shown: &[usize], natural: Vec<usize>) -> Vec<usize> {
-    let mut widths = natural;
-    let room = room(widths.len());
-    while widths.iter().sum::<usize>() > room {
-        let can_shrink = |place: &usize| widths[*place] > NARROWEST;
-        let words = (0..shown.len()).filter(|place| is_words(table, shown[*place]));
-        let widest = words
-            .filter(can_shrink)
-            .max_by_key(|place| (!is_name(table, shown[*place]), widths[*place]));
-        match widest.and_then(|place| widths.get_mut(place)) {
-            Some(width) => *width -= 1,
+/// Shrinks columns of words where they pass the terminal's width, names of files last.
+fn shrink(table: &Table, shown: &mut [Shown]) {
+    let room = room(shown.len());
+    while shown.iter().map(|column| column.width).sum::<usize>() > room {
+        let words = shown.iter_mut().filter(|column| {
+            table.columns[column.index].kind == Kind::Words && column.width > NARROWEST
+        });
+        let widest =
+            words.max_by_key(|column| (!is_name(&table.columns[column.index]), column.width));
+        match widest {
+            Some(column) => column.width -= 1,
             None => break,
         }
     }
-    widths
 }
 
-fn is_words(table: &Table, index: usize) -> bool {
-    let column = table.columns.get(index);
-    column.is_some_and(|column| column.kind == Kind::Words)
+/// True for a column of names of files, which are shortened before they are broken.
+fn is_name(column: &Column) -> bool {
+    matches!(column.name.as_str(), "Recording" | "File")
 }
 
-/// Whether a column holds names of files, which are shortened before they are broken.
-fn is_name(table: &Table, index: usize) -> bool {
-    let column = table.columns.get(index);
-    column.is_some_and(|column| matches!(column.name.as_str(), "Recording" | "File"))
-}
-
-/// One row, on as many lines as its longest cell of words needs.
-fn row(layout: &Layout, cells: &[Vec<String>]) -> String {
-    let Layout {
-        table,
-        shown,
-        widths,
-        ..
-    } = layout;
-    let columns: Vec<Vec<String>> = shown
-        .iter()
-        .zip(widths)
-        .map(|(index, width)| {
-            let cell = cells.get(*index).into_iter().flatten();
-            if is_words(table, *index) {
-                cell.flat_map(|text| broken(text, *width)).collect()
-            } else {
-                cell.cloned().collect()
-            }
-        })
-        .collect();
+/// Returns one row, on as many lines as its longest cell of words needs.
+fn row(table: &Table, shown: &[Shown], cells: &[Vec<String>]) -> String {
+    let mut columns: Vec<Vec<String>> = Vec::new();
+    for column in shown {
+        let cell = cells.get(column.index).into_iter().flatten();
+        columns.push(match table.columns[column.index].kind {
+            Kind::Words => cell.flat_map(|text| broken(text, column.width)).collect(),
+            Kind::Number => cell.cloned().collect(),
+        });
+    }
     let lines = columns.iter().map(Vec::len).max().unwrap_or(0);
-    (0..lines)
-        .map(|line| {
-            let padded: Vec<String> = columns
-                .iter()
-                .zip(shown.iter().zip(widths))
-                .map(|(column, (index, width))| {
-                    let text = column.get(line).map_or("", String::as_str);
-                    let text = text.replace('\u{a0}', " ");
-                    if is_words(table, *index) {
-                        format!("{text:<width$}")
-                    } else {
-                        format!("{text:>width$}")
-                    }
-                })
-                .collect();
-            padded.join("  ").trim_end().to_owned() + "\n"
-        })
-        .collect()
+    let mut text = String::new();
+    for line in 0..lines {
+        let mut padded = Vec::new();
+        for (column, pieces) in shown.iter().zip(&columns) {
+            let piece = pieces.get(line).map_or("", String::as_str);
+            let (piece, width) = (piece.replace('\u{a0}', " "), column.width);
+            padded.push(match table.columns[column.index].kind {
+                Kind::Words => format!("{piece:<width$}"),
+                Kind::Number => format!("{piece:>width$}"),
+            });
+        }
+        text.push_str(padded.join("  ").trim_end());
+        text.push('\n');
+    }
+    text
 }
 
-/// A text in lines of at most `width` characters, broken between words where that is possible.
+/// Returns a text in lines of at most `width` characters, broken between words where that is possible.
 fn broken(text: &str, width: usize) -> Vec<String> {
     // A number stays with its unit: "mains 50 Hz".
     let text = text.replace(" Hz", "\u{a0}Hz");
@@ -319,37 +272,39 @@ fn broken(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// A text of at most `width` characters; "…" stands for what is missing.
-pub(super) fn cut(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
+/// Returns a text of at most `width` characters; "…" stands for what is missing.
+fn cut(text: &str, width: usize) -> String {
+    if length(text) <= width {
         return text.to_owned();
     }
     let kept: String = text.chars().take(width.saturating_sub(1)).collect();
     kept + "\u{2026}"
 }
 
-/// Whether a line may be broken here.
-fn is_gap(c: char) -> bool {
-    c.is_whitespace() && c != '\u{a0}'
+/// Returns a text broken into lines of at most 80 characters; lines after the first are indented.
+pub fn wrapped(text: &str, indent: usize) -> String {
+    let lines = lines_of(text, WIDTH, indent);
+    // No-break spaces have kept words together; a terminal, and who searches it, wants plain ones.
+    lines.join("\n").replace('\u{a0}', " ") + "\n"
 }
 
-/// A text broken into lines of at most 80 characters; lines after the first are indented.
-pub fn wrapped(text: &str, indent: usize) -> String {
+/// Returns a text in lines of at most `width` characters; lines after the first are indented.
+pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
-    for word in text.split(is_gap).filter(|word| !word.is_empty()) {
-        let word = cut(word, WIDTH - indent);
-        let length = |line: &str| line.chars().count();
+    // Lines are not broken at no-break spaces.
+    let words = text.split(|c: char| c.is_whitespace() && c != '\u{a0}');
+    for word in words.filter(|word| !word.is_empty()) {
+        let word = cut(word, width - indent);
         match lines.last_mut() {
             Some(line) if line.is_empty() => line.push_str(&word),
-            Some(line) if length(line) + 1 + length(&word) <= WIDTH => {
+            Some(line) if length(line) + 1 + length(&word) <= width => {
                 line.push(' ');
                 line.push_str(&word);
             }
             _ => lines.push(" ".repeat(indent) + &word),
         }
     }
-    // No-break spaces have kept words together; a terminal, and who searches it, wants plain ones.
-    lines.join("\n").replace('\u{a0}', " ") + "\n"
+    lines
 }
 
 #[cfg(test)]

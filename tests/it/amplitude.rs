@@ -10,8 +10,7 @@ use tapjoint::modal::amplitude::{
 };
 use tapjoint::report::chart::drawing::Shape;
 use tapjoint::report::chart::render_png;
-use tapjoint::report::charts::amplitude::amplitude;
-use tapjoint::report::figures::AmplitudeFigure;
+use tapjoint::report::charts::amplitude::curves;
 
 const RATE: f64 = 2048.0;
 
@@ -459,12 +458,10 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
     let steady = follow(with_noise(&steady, 50.0, 2), &[mode(100.1, 0.003)]);
     let silent = follow(vec![0.0; 4096], &[mode(100.0, 0.003)]);
     let points = slipping.points.len() + steady.points.len();
-    let figure = AmplitudeFigure {
-        file: "low.wav".to_owned(),
-        amplitude: "amplitude (m/s\u{b2})".to_owned(),
-        modes: vec![(1, slipping), (2, silent.clone()), (3, steady)],
-    };
-    let drawing = amplitude(&figure).expect("two modes have curves").draw();
+    let axis = ["amplitude", "m/s\u{b2}"].map(str::to_owned);
+    let modes = [(1, &slipping), (2, &silent), (3, &steady)];
+    let chart = curves("low.wav", &axis, &modes).expect("two modes have curves");
+    let drawing = chart.draw();
     let words = drawing.words().join("\n");
     for wanted in [
         "low.wav",
@@ -498,9 +495,5 @@ fn prop_the_picture_shows_every_curve_and_what_it_says() {
         assert!(inside, "{shape:?}");
     }
     assert!(render_png(&drawing).is_ok());
-    let nothing = AmplitudeFigure {
-        modes: vec![(2, silent)],
-        ..figure
-    };
-    assert!(amplitude(&nothing).is_none());
+    assert!(curves("low.wav", &axis, &[(2, &silent)]).is_none());
 }

@@ -24,7 +24,7 @@ fn deck(joint: &str, effects: &[String]) -> Result<Deck, DeckError> {
     let text = format!("{BEAM}{joint}{}", effects.concat());
     let test = TestDescription::parse(&text, "model.toml").unwrap();
     let (seen, frequencies) = described_structure(&test, 6).unwrap();
-    deck_with_effects(("model", "described"), &seen.specimen, &frequencies)
+    deck_with_effects("model", "described", &seen.specimen, &frequencies)
 }
 
 /// Stiffness and mass matrix of w and theta at every node, by Hermite's elements.

@@ -8,13 +8,13 @@ mod pictures;
 mod vector_files;
 mod words;
 
+use tapjoint::pipeline::{MeasuredSpectra, RecordingResult};
 use tapjoint::report::document::Document;
-use tapjoint::report::figures::RecordingFigure;
 use tapjoint::report::{ReportFile, render_run};
 
 /// Renders a whole report; a report that cannot be rendered fails the test with its error.
-fn rendered(document: &Document, figures: &[RecordingFigure]) -> Vec<ReportFile> {
-    match render_run(document, figures) {
+fn rendered(document: &Document, recordings: &[RecordingResult]) -> Vec<ReportFile> {
+    match render_run(document, recordings) {
         Ok(files) => files,
         Err(error) => panic!("the report was not rendered: {error}"),
     }
@@ -41,28 +41,26 @@ fn names(files: &[ReportFile]) -> Vec<&str> {
     files.iter().map(|file| file.name.as_str()).collect()
 }
 
-/// Documents and figures with parts missing, each with a name.
-fn incomplete() -> Vec<(&'static str, Document, Vec<RecordingFigure>)> {
+/// Spectra of a recording of the fixture.
+fn spectra_of(recording: &mut RecordingResult) -> &mut MeasuredSpectra {
+    let spectra = recording.measurement.spectra.as_mut();
+    spectra.expect("the fixture has spectra")
+}
+
+/// Documents and recordings with parts missing, each with a name.
+fn incomplete() -> Vec<(&'static str, Document, Vec<RecordingResult>)> {
     let whole = fixture::document;
-    let figures = fixture::figures;
-    let without_hammer = figures()
-        .into_iter()
-        .map(|mut figure| {
-            if let Some(spectra) = &mut figure.spectra {
-                spectra.force = None;
-                spectra.frfs.clear();
-            }
-            figure
-        })
-        .collect();
-    let without_taps: Vec<RecordingFigure> = figures()
-        .into_iter()
-        .map(|mut figure| {
-            figure.spectra = None;
-            figure.overview.as_mut().unwrap().taps.clear();
-            figure
-        })
-        .collect();
+    let recordings = fixture::recordings;
+    let mut without_hammer = recordings();
+    for recording in &mut without_hammer {
+        recording.has_hammer = false;
+        spectra_of(recording).averages.force = None;
+    }
+    let mut without_taps = recordings();
+    for recording in &mut without_taps {
+        recording.measurement.spectra = None;
+        recording.measurement.taps.taps.clear();
+    }
     let measured_only = Document {
         recordings: None,
         ..whole()
@@ -80,10 +78,10 @@ fn incomplete() -> Vec<(&'static str, Document, Vec<RecordingFigure>)> {
         ("empty", Document::default(), Vec::new()),
         ("without hammer", whole(), without_hammer),
         ("without taps", no_modes.clone(), without_taps),
-        ("without modes", no_modes, figures()),
+        ("without modes", no_modes, recordings()),
         ("measured frequencies only", measured_only, Vec::new()),
-        ("not finite", broken(), broken_figures()),
-        ("no samples", whole(), empty_figures()),
+        ("not finite", broken(), broken_recordings()),
+        ("no samples", whole(), empty_recordings()),
     ]
 }
 
@@ -117,41 +115,40 @@ fn broken() -> Document {
     document
 }
 
-fn broken_figures() -> Vec<RecordingFigure> {
-    let mut figures = fixture::figures();
-    for figure in &mut figures {
-        figure.overview.as_mut().unwrap().high[7] = f64::NAN;
-        figure.overview.as_mut().unwrap().taps[0].peak = f64::INFINITY;
-        if let Some(spectra) = &mut figure.spectra {
-            spectra.responses[0].values.fill(0.0);
-            spectra.responses[1].values[3] = f64::NAN;
-            spectra.frfs[0].magnitude.fill(f64::NAN);
-            spectra.force = Some(vec![0.0; spectra.lines.points()]);
-            spectra.peaks[0].half_line = f64::NAN;
-            spectra.peaks[1].frequency = f64::NAN;
-        }
+fn broken_recordings() -> Vec<RecordingResult> {
+    let mut recordings = fixture::recordings();
+    for recording in &mut recordings {
+        recording.overview.as_mut().unwrap().high[7] = f64::NAN;
+        recording.measurement.taps.taps[0].peak = f64::INFINITY;
+        let spectra = spectra_of(recording);
+        spectra.averages.responses[0].fill(0.0);
+        spectra.averages.responses[1][3] = f64::NAN;
+        let cross = spectra.averages.cross.as_mut().unwrap();
+        cross[0].fill(num_complex::Complex64::new(f64::NAN, 0.0));
+        spectra.averages.force = Some(vec![0.0; spectra.averages.lines.points()]);
+        spectra.readings[0].half_line = f64::NAN;
+        spectra.readings[1].frequency = f64::NAN;
     }
-    figures
+    recordings
 }
 
-fn empty_figures() -> Vec<RecordingFigure> {
-    let mut figures = fixture::figures();
-    for figure in &mut figures {
-        figure.overview.as_mut().unwrap().low.clear();
-        figure.overview.as_mut().unwrap().high.clear();
-        if let Some(spectra) = &mut figure.spectra {
-            spectra.responses.clear();
-            spectra.frfs.clear();
-            spectra.force = Some(Vec::new());
-        }
+fn empty_recordings() -> Vec<RecordingResult> {
+    let mut recordings = fixture::recordings();
+    for recording in &mut recordings {
+        recording.overview.as_mut().unwrap().low.clear();
+        recording.overview.as_mut().unwrap().high.clear();
+        recording.responses.clear();
+        let averages = &mut spectra_of(recording).averages;
+        averages.responses.clear();
+        averages.force = Some(Vec::new());
     }
-    figures
+    recordings
 }
 
 #[test]
 fn limit_incomplete_analyses_are_reported() {
-    for (case, document, figures) in incomplete() {
-        let files = rendered(&document, &figures);
+    for (case, document, recordings) in incomplete() {
+        let files = rendered(&document, &recordings);
         let names = names(&files);
         for name in ["report.html", "report.json", "parameters.csv", "modes.csv"] {
             assert!(names.contains(&name), "{case}: {name} is missing");
@@ -169,11 +166,11 @@ fn limit_incomplete_analyses_are_reported() {
 fn limit_pictures_apply_only_where_there_are_data() {
     let cases = incomplete();
     let of = |wanted: &str| {
-        let (_, document, figures) = cases
+        let (_, document, recordings) = cases
             .iter()
             .find(|(case, _, _)| *case == wanted)
             .expect("the case exists");
-        let files = rendered(document, figures);
+        let files = rendered(document, recordings);
         files
             .into_iter()
             .map(|file| file.name)
@@ -204,10 +201,10 @@ fn limit_pictures_apply_only_where_there_are_data() {
 
 #[test]
 fn prop_files_of_equal_names_stay_apart() {
-    let mut figures = fixture::figures();
-    figures[0].file = "a/tap one.wav".into();
-    figures[1].file = "b/tap one.csv".into();
-    let files = rendered(&fixture::document(), &figures);
+    let mut recordings = fixture::recordings();
+    recordings[0].file = "a/tap one.wav".into();
+    recordings[1].file = "b/tap one.csv".into();
+    let files = rendered(&fixture::document(), &recordings);
     let names = names(&files);
     for name in ["spectrum-tap-one.png", "spectrum-tap-one-2.png"] {
         assert!(names.contains(&name), "{name} is missing among {names:?}");

@@ -236,9 +236,9 @@ fn with_tiny_spectra(html: &str) -> String {
         .map(|text| (text, unpacked(text)))
         .find(|(_, plot)| plot["kind"] == "spectrum")
         .unwrap();
-    for panel in plot["panels"].as_array_mut().unwrap() {
+    for panel in plot["blocks"][0]["panels"].as_array_mut().unwrap() {
         for series in panel["series"].as_array_mut().unwrap() {
-            for value in series["values"].as_array_mut().unwrap() {
+            for value in series["y"].as_array_mut().unwrap() {
                 if let Some(number) = value.as_f64() {
                     *value = Value::from(1e-4 * number);
                 }

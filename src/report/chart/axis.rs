@@ -1,7 +1,10 @@
 //! An axis: its range, its scale, and the ticks that it has.
 
-/// Tells whether equal distances are equal differences or equal ratios.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+use serde::Serialize;
+
+/// Equal distances are equal differences or equal ratios.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Scale {
     /// Equal differences.
     Linear,
@@ -10,7 +13,7 @@ pub enum Scale {
 }
 
 /// One axis of a panel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
     /// The quantity: "frequency".
     pub label: String,
@@ -23,13 +26,14 @@ pub struct Axis {
     /// Value at the end.
     pub high: f64,
     /// Ticks with names; empty where the axis has numbers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<Tick>,
     /// Length of a turn where values come round again, as 360 degrees do.
     pub period: Option<f64>,
 }
 
 /// A tick and its words; small ticks have none.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tick {
     /// Value at which it stands.
     pub value: f64,
@@ -57,9 +61,12 @@ impl Axis {
 
     /// A logarithmic axis; an end that is not positive is replaced.
     pub fn logarithmic(low: f64, high: f64) -> Axis {
-        let positive = |value: f64| value.is_finite() && value > 0.0;
-        let high = if positive(high) { high } else { 1.0 };
-        let low = if positive(low) && low < high {
+        let high = if high.is_finite() && high > 0.0 {
+            high
+        } else {
+            1.0
+        };
+        let low = if low > 0.0 && low < high {
             low
         } else {
             high * 1e-3
@@ -81,11 +88,10 @@ impl Axis {
 
     /// The axis with names at some values instead of numbers.
     pub fn named(mut self, names: impl IntoIterator<Item = (f64, String)>) -> Axis {
-        let tick = |(value, name)| Tick {
-            value,
-            label: Some(name),
-        };
-        self.names = names.into_iter().map(tick).collect();
+        for (value, name) in names {
+            let label = Some(name);
+            self.names.push(Tick { value, label });
+        }
         self
     }
 

@@ -22,7 +22,7 @@ pub const WHITE: Rgb = Rgb(255, 255, 255);
 /// A finished picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
-    /// What the picture shows, for readers who cannot see it.
+    /// Words for readers who cannot see the picture.
     pub description: String,
     /// Width (pixels).
     pub width: u32,
@@ -52,7 +52,7 @@ pub enum Shape {
     Line {
         /// The points.
         points: Vec<Point>,
-        /// How it is drawn.
+        /// Its look.
         stroke: Stroke,
     },
     /// A filled polygon.
@@ -102,7 +102,7 @@ pub(super) fn ring_hole(radius: f64) -> f64 {
     (radius - 2.0).max(1.0)
 }
 
-/// How a line is drawn.
+/// Look of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
     /// Colour.
@@ -134,9 +134,9 @@ impl Stroke {
 pub struct Text {
     /// The words.
     pub text: String,
-    /// Where.
+    /// Its place.
     pub at: Point,
-    /// Which end of the text lies at `at`.
+    /// The end of the text that lies at `at`.
     pub align: Align,
     /// Size of the letters (pixels per em).
     pub size: f64,
@@ -148,7 +148,7 @@ pub struct Text {
     pub direction: Direction,
 }
 
-/// Which end of a text lies at its position.
+/// The end of a text that lies at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Align {
     /// The text begins there.

@@ -1,7 +1,7 @@
 //! Words on a picture: the legend, and labels that cover nothing.
 
 use super::drawing::{Drawing, Point, Shape, Stroke, Text, Weight, text_width};
-use super::{Block, Color, Mark};
+use super::{Block, Color, Mark, Rule};
 
 /// Left edge of panels whose numbers need no more room (pixels).
 pub(super) const LEFT: f64 = 84.0;
@@ -151,9 +151,9 @@ impl Legend {
             };
             entries.push((mark, series.color, series.name.clone()));
         }
-        let rules = || panels.iter().flat_map(|panel| &panel.rules);
-        if rules().any(|rule| rule.mode) {
-            let shaded = rules().any(|rule| rule.half > 0.0);
+        let rules: Vec<&Rule> = panels.iter().flat_map(|panel| &panel.rules).collect();
+        if rules.iter().any(|rule| rule.mode) {
+            let shaded = rules.iter().any(|rule| rule.half > 0.0);
             let words = if shaded {
                 "mode, shaded: line \u{b1} half line"
             } else {
@@ -161,20 +161,17 @@ impl Legend {
             };
             entries.push((dashes, Color::Blue, words.to_owned()));
         }
-        if rules().any(|rule| !rule.mode && rule.half > 0.0) {
+        if rules.iter().any(|rule| !rule.mode && rule.half > 0.0) {
             let words = "mains or other, no mode".to_owned();
             entries.push((dashes, Color::Orange, words));
         }
-        let events = || panels.iter().flat_map(|panel| &panel.events);
-        if events().any(|event| event.used) {
+        let mut events = panels.iter().flat_map(|panel| &panel.events);
+        if events.clone().any(|event| event.used) {
             entries.push((Mark::Dot(5.0), Color::Blue, "tap used".to_owned()));
         }
-        if events().any(|event| !event.used) {
-            entries.push((
-                Mark::Cross(6.0),
-                Color::Vermilion,
-                "tap rejected".to_owned(),
-            ));
+        if events.any(|event| !event.used) {
+            let words = "tap rejected".to_owned();
+            entries.push((Mark::Cross(6.0), Color::Vermilion, words));
         }
         if unnamed > 0 {
             let words = format!("{} more without a label, see the table", unnamed);
@@ -194,7 +191,8 @@ impl Legend {
     }
 }
 
-fn draw_sample(drawing: &mut Drawing, mark: Mark, color: Color, (x, y): Point) {
+fn draw_sample(drawing: &mut Drawing, mark: Mark, color: Color, at: Point) {
+    let (x, y) = at;
     let middle = (x + 11.0, y);
     let rgb = color.rgb();
     match mark {

@@ -1,7 +1,7 @@
 //! The model of a picture: axes with units, series with words, marks and legend.
 //!
-//! Each kind of picture is built once, in `charts`, and rendered twice: by [`Chart::draw`] as PNG and SVG,
-//! and by [`Chart::page`] for the report's script. Both show the same data with the same labels.
+//! Each kind of picture is built once, in `charts`. [`Chart::draw`] makes a PNG or SVG of it. [`Chart::page`] thins
+//! it for the report's script, which reads this model as JSON. Both show the same data with the same labels.
 
 pub mod axis;
 pub mod drawing;
@@ -14,47 +14,58 @@ pub mod thinning;
 
 use std::path::Path;
 
+use serde::{Serialize, Serializer};
+
 use crate::ReportError;
 pub use axis::Axis;
 pub use drawing::Drawing;
 use drawing::Rgb;
-pub use page::{Curves, PageChart, PointSet, Points, packed};
+pub use page::packed;
 pub use png::render_png;
 pub use svg::{render_svg, render_svg_file};
 
 /// A picture of one kind.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Chart {
     /// Kind, the beginning of its file's name: "spectrum".
     pub kind: &'static str,
     /// Title.
+    #[serde(skip)]
     pub title: String,
     /// Line beneath the title.
+    #[serde(skip)]
     pub subtitle: String,
     /// Caption in the page: contents, and what to look for.
+    #[serde(skip)]
     pub caption: String,
     /// Width of the picture (pixels); 0 for the width of a page.
+    #[serde(skip)]
     pub width: u32,
     /// Parts of the picture below each other. The page shows one at a time where they have names.
     pub blocks: Vec<Block>,
     /// Lines beneath the picture.
+    #[serde(skip)]
     pub footnotes: Vec<String>,
 }
 
 /// Panels that belong together.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Block {
     /// Heading of the block, and its button in the page.
     pub name: String,
     /// Words after the heading.
+    #[serde(skip)]
     pub aside: String,
     /// The panels.
     pub panels: Vec<Panel>,
     /// Panels beside each other.
+    #[serde(skip)]
     pub columns: usize,
     /// Panels that the picture has room for; the page has all.
+    #[serde(skip)]
     pub drawn: usize,
     /// Part that the block has in the page.
+    #[serde(skip)]
     pub in_page: InPage,
 }
 
@@ -71,11 +82,11 @@ pub enum InPage {
 }
 
 /// A rectangle with axes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Panel {
     /// Title above it; empty where the block's says enough.
     pub title: String,
-    /// Height in the picture (pixels).
+    /// Height (pixels).
     pub height: f64,
     /// Horizontal axis.
     pub x: Axis,
@@ -89,10 +100,13 @@ pub struct Panel {
     pub events: Vec<Event>,
     /// Name and unit of the series' `extra`.
     pub extra: Option<[&'static str; 2]>,
+    /// Sentence on the points that the page leaves out; empty where it has all.
+    pub note: String,
 }
 
 /// Look of a series.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "mark", content = "size", rename_all = "lowercase")]
 pub enum Mark {
     /// Filled circles of this radius (pixels).
     Dot(f64),
@@ -104,7 +118,8 @@ pub enum Mark {
     Square(f64),
     /// A line of this width (pixels).
     Line(f64),
-    /// A broken line of this width (pixels).
+    /// A broken line of this width (pixels); the page draws it whole.
+    #[serde(rename = "line")]
     Dashed(f64),
     /// A line of this width (pixels) whose points answer the pointer.
     Curve(f64),
@@ -117,22 +132,35 @@ pub enum Mark {
 }
 
 /// Horizontal places of a series.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Places {
     /// One by one.
     Each(Vec<f64>),
-    /// The first and the distance of equally spaced ones, as spectral lines and samples have.
-    Even(f64, f64),
+    /// Equally spaced piece by piece, as spectral lines and samples are.
+    Even(Vec<Run>),
+}
+
+/// Equally spaced places.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Run {
+    /// The first.
+    pub first: f64,
+    /// Their distance.
+    pub step: f64,
+    /// Their number.
+    pub count: usize,
 }
 
 /// Points that look alike.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Series {
     /// Name in the legend; empty for none.
     pub name: String,
     /// Colour.
     pub color: Color,
     /// Look.
+    #[serde(flatten)]
     pub mark: Mark,
     /// 0 to 1.
     pub opacity: f64,
@@ -141,21 +169,27 @@ pub struct Series {
     /// Heights (unit of the axis); empty for a band.
     pub y: Vec<f64>,
     /// Lower ends of error bars or of a band; may be empty.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub low: Vec<f64>,
     /// Upper ends.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub high: Vec<f64>,
     /// Further facts for the pointer (unit of the panel's `extra`).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub extra: Vec<f64>,
     /// Name of each point.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub words: Vec<String>,
     /// Height of each point with its uncertainty and unit; where empty, the number itself is shown.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub said: Vec<String>,
     /// Words beside each point in the picture, as far as there is room.
+    #[serde(skip)]
     pub labels: Vec<String>,
 }
 
 /// A place on the horizontal axis, such as a resonance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rule {
     /// Best value (unit of the axis).
     pub at: f64,
@@ -170,11 +204,12 @@ pub struct Rule {
     /// True for a mode.
     pub mode: bool,
     /// The most prominent rules get their names first (dB).
+    #[serde(skip)]
     pub prominence: f64,
 }
 
 /// A tap in a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Event {
     /// Time (s).
     pub at: f64,
@@ -249,6 +284,12 @@ impl Color {
     }
 }
 
+impl Serialize for Color {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.css())
+    }
+}
+
 impl Block {
     /// Panels in so many columns.
     pub fn new(columns: usize, panels: Vec<Panel>) -> Block {
@@ -273,6 +314,7 @@ impl Panel {
             rules: Vec::new(),
             events: Vec::new(),
             extra: None,
+            note: String::new(),
         }
     }
 
@@ -297,14 +339,15 @@ impl Panel {
 }
 
 impl Series {
-    fn new(name: &str, color: Color, mark: Mark, x: Places, y: Vec<f64>) -> Series {
+    /// A series without points.
+    pub fn new(name: &str, color: Color, mark: Mark) -> Series {
         Series {
             name: name.to_owned(),
             color,
             mark,
             opacity: 1.0,
-            x,
-            y,
+            x: Places::Each(Vec::new()),
+            y: Vec::new(),
             low: Vec::new(),
             high: Vec::new(),
             extra: Vec::new(),
@@ -322,20 +365,28 @@ impl Series {
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Series {
         let (x, y) = points.into_iter().unzip();
-        Series::new(name, color, mark, Places::Each(x), y)
+        Series {
+            x: Places::Each(x),
+            y,
+            ..Series::new(name, color, mark)
+        }
     }
 
     /// A line through equally spaced values.
-    pub fn even(name: &str, color: Color, start: f64, step: f64, values: Vec<f64>) -> Series {
-        let x = Places::Even(start, step);
-        Series::new(name, color, Mark::Line(1.5), x, values)
+    pub fn even(name: &str, color: Color, first: f64, step: f64, values: Vec<f64>) -> Series {
+        Series {
+            x: Places::even(first, step, values.len()),
+            y: values,
+            ..Series::new(name, color, Mark::Line(1.5))
+        }
     }
 
-    /// The area between two values at each place.
-    pub fn band(name: &str, color: Color, x: Places, low: Vec<f64>, high: Vec<f64>) -> Series {
-        let mut band = Series::new(name, color, Mark::Band, x, Vec::new());
-        (band.low, band.high) = (low, high);
-        band
+    /// Adds a point to those that stand one by one.
+    pub fn push(&mut self, at: f64, height: f64) {
+        if let Places::Each(places) = &mut self.x {
+            places.push(at);
+            self.y.push(height);
+        }
     }
 
     /// Number of points.
@@ -347,7 +398,16 @@ impl Series {
     pub fn at(&self, index: usize) -> f64 {
         match &self.x {
             Places::Each(places) => places.get(index).copied().unwrap_or(f64::NAN),
-            Places::Even(start, step) => start + step * index as f64,
+            Places::Even(runs) => {
+                let mut before = 0;
+                for run in runs {
+                    if index < before + run.count {
+                        return run.first + run.step * (index - before) as f64;
+                    }
+                    before += run.count;
+                }
+                f64::NAN
+            }
         }
     }
 
@@ -355,6 +415,13 @@ impl Series {
     pub fn pairs(&self) -> impl Iterator<Item = (f64, f64)> {
         let heights = self.y.iter().enumerate();
         heights.map(|(index, height)| (self.at(index), *height))
+    }
+}
+
+impl Places {
+    /// One run of equally spaced places.
+    pub fn even(first: f64, step: f64, count: usize) -> Places {
+        Places::Even(vec![Run { first, step, count }])
     }
 }
 

@@ -8,7 +8,7 @@ use super::drawing::{
 };
 use super::labels::{LEFT, LINE, Legend, Patch, WORDS, draw_mark, ink, spread};
 use super::thinning::decimate;
-use super::{Block, Chart, Color, Event, Mark, Panel, Places, Rule, Series};
+use super::{Block, Chart, Color, Mark, Panel, Places, Rule, Series};
 use crate::format::trimmed;
 
 /// Width of a picture that fills a page (pixels).
@@ -215,7 +215,11 @@ fn named<'a>(frame: &Frame<'a>) -> Vec<(&'a Rule, f64)> {
         let place = rules.partition_point(|rule| rule.at <= candidate.at);
         rules.insert(place, candidate);
         let wishes: Vec<f64> = rules.iter().map(|rule| frame.x(rule.at)).collect();
-        let widths: Vec<f64> = rules.iter().map(|rule| name_width(rule)).collect();
+        let widths = rules.iter().map(|rule| {
+            let name = text_width(&rule.name, WORDS, Weight::Bold);
+            name.max(text_width(&rule.words, WORDS, Weight::Regular))
+        });
+        let widths: Vec<f64> = widths.collect();
         let (low, high) = (frame.left - 40.0, frame.right + 14.0);
         let Some(centers) = spread(&wishes, &widths, APART, low, high) else {
             continue;
@@ -226,11 +230,6 @@ fn named<'a>(frame: &Frame<'a>) -> Vec<(&'a Rule, f64)> {
         }
     }
     best
-}
-
-fn name_width(rule: &Rule) -> f64 {
-    let name = text_width(&rule.name, WORDS, Weight::Bold);
-    name.max(text_width(&rule.words, WORDS, Weight::Regular))
 }
 
 fn rule_color(rule: &Rule) -> Color {
@@ -251,11 +250,12 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn of(panel: &'a Panel, (left, right): (f64, f64), top: f64) -> Frame<'a> {
+    /// A panel between the left and the right edge of a column.
+    fn of(panel: &'a Panel, column: (f64, f64), top: f64) -> Frame<'a> {
         Frame {
             panel,
-            left,
-            right,
+            left: column.0,
+            right: column.1,
             top,
             bottom: top + panel.height,
         }
@@ -423,19 +423,18 @@ impl<'a> Frame<'a> {
     }
 
     fn draw_series(&self, drawing: &mut Drawing, series: &Series) {
-        let stroke = |width: f64| Stroke::new(series.color.rgb(), width).faint(series.opacity);
         match series.mark {
             Mark::Band => self.draw_band(drawing, series),
             Mark::Line(width) | Mark::Curve(width) => {
                 self.draw_band(drawing, series);
                 for piece in self.pieces(series) {
-                    drawing.line(piece, stroke(width));
+                    drawing.line(piece, stroke(series, width));
                 }
             }
             Mark::Dashed(width) => {
                 for piece in self.pieces(series) {
                     for pair in piece.windows(2) {
-                        drawing.dashed(pair[0], pair[1], 6.0, 5.0, stroke(width));
+                        drawing.dashed(pair[0], pair[1], 6.0, 5.0, stroke(series, width));
                     }
                 }
             }
@@ -507,7 +506,6 @@ impl<'a> Frame<'a> {
     }
 
     fn draw_points(&self, drawing: &mut Drawing, series: &Series) {
-        let stroke = |width: f64| Stroke::new(series.color.rgb(), width).faint(series.opacity);
         let shown = series.pairs().enumerate();
         let shown: Vec<(usize, f64, f64)> = shown
             .filter(|(_, (x, y))| self.holds(*x, *y))
@@ -517,10 +515,10 @@ impl<'a> Frame<'a> {
         for (index, x, _) in &shown {
             if let (Some(low), Some(high)) = (series.low.get(*index), series.high.get(*index)) {
                 let ends = [self.place(*x, *low), self.place(*x, *high)];
-                drawing.line(ends.to_vec(), stroke(1.4));
+                drawing.line(ends.to_vec(), stroke(series, 1.4));
                 let reach = if shown.len() < MOST_NOTES { 6.0 } else { 0.0 };
                 for (x, y) in ends.into_iter().filter(|_| reach > 0.0) {
-                    drawing.line(vec![(x - reach, y), (x + reach, y)], stroke(1.4));
+                    drawing.line(vec![(x - reach, y), (x + reach, y)], stroke(series, 1.4));
                 }
             }
         }
@@ -539,7 +537,7 @@ impl<'a> Frame<'a> {
                 Mark::Cross(radius) if radius < 4.0 => 1.0,
                 _ => 2.5,
             };
-            draw_mark(drawing, series.mark, at, stroke(width));
+            draw_mark(drawing, series.mark, at, stroke(series, width));
         }
     }
 
@@ -617,7 +615,11 @@ impl<'a> Frame<'a> {
         let mut free = f64::NEG_INFINITY;
         for (index, event) in self.panel.events.iter().enumerate() {
             let at = self.place(event.at, event.peak);
-            let (mark, color) = Event::look(event.used);
+            let (mark, color) = if event.used {
+                (Mark::Dot(5.0), Color::Blue)
+            } else {
+                (Mark::Cross(6.0), Color::Vermilion)
+            };
             draw_mark(drawing, mark, at, Stroke::new(color.rgb(), 2.5));
             let offset = if event.peak < 0.0 { 15.0 } else { -15.0 };
             let number = (index + 1).to_string();
@@ -660,6 +662,11 @@ impl<'a> Frame<'a> {
     }
 }
 
+/// Returns a line of a series.
+fn stroke(series: &Series, width: f64) -> Stroke {
+    Stroke::new(series.color.rgb(), width).faint(series.opacity)
+}
+
 /// Lines of the grid.
 const GRID: Stroke = Stroke {
     color: super::drawing::Rgb(226, 226, 226),
@@ -667,23 +674,9 @@ const GRID: Stroke = Stroke {
     opacity: 1.0,
 };
 
-impl Event {
-    fn look(used: bool) -> (Mark, Color) {
-        if used {
-            (Mark::Dot(5.0), Color::Blue)
-        } else {
-            (Mark::Cross(6.0), Color::Vermilion)
-        }
-    }
-}
-
 /// Words of a point for the pointer, as the page's script has them: "sensor, A · position 338 mm ·
 /// displacement 0.43".
 fn saying(panel: &Panel, series: &Series, index: usize) -> String {
-    let with_unit = |number: String, unit: &str| match unit {
-        "" | "1" => number,
-        unit => format!("{number} {unit}"),
-    };
     let mut parts = Vec::new();
     match series.words.get(index) {
         Some(words) if series.name.is_empty() => parts.push(words.clone()),
@@ -691,17 +684,27 @@ fn saying(panel: &Panel, series: &Series, index: usize) -> String {
         None => parts.push(series.name.clone()),
     }
     if panel.x.names.is_empty() {
-        let place = with_unit(trimmed(series.at(index), 5), &panel.x.unit);
+        let place = number_with_unit(trimmed(series.at(index), 5), &panel.x.unit);
         parts.push(format!("{} {place}", panel.x.label));
     }
     if panel.y.names.is_empty() {
         let height = series.y.get(index).copied().unwrap_or(f64::NAN);
         let said = series.said.get(index).cloned();
-        let said = said.unwrap_or_else(|| with_unit(trimmed(height, 5), &panel.y.unit));
+        let said = said.unwrap_or_else(|| number_with_unit(trimmed(height, 5), &panel.y.unit));
         parts.push(format!("{} {said}", panel.y.label));
     }
     if let (Some([label, unit]), Some(extra)) = (panel.extra, series.extra.get(index)) {
-        parts.push(format!("{label} {}", with_unit(trimmed(*extra, 4), unit)));
+        parts.push(format!(
+            "{label} {}",
+            number_with_unit(trimmed(*extra, 4), unit)
+        ));
     }
     parts.join(" \u{b7} ")
+}
+
+fn number_with_unit(number: String, unit: &str) -> String {
+    match unit {
+        "" | "1" => number,
+        unit => format!("{number} {unit}"),
+    }
 }

@@ -64,8 +64,8 @@ fn ink(color: Rgb, opacity: f64) -> RGBAColor {
     RGBAColor(color.0, color.1, color.2, opacity.min(1.0))
 }
 
-fn pixel((x, y): Point) -> (i32, i32) {
-    (x.round() as i32, y.round() as i32)
+fn pixel(at: Point) -> (i32, i32) {
+    (at.0.round() as i32, at.1.round() as i32)
 }
 
 struct Canvas<'a>(BitMapBackend<'a>);
@@ -134,9 +134,10 @@ impl Canvas<'_> {
 
     fn dot(&mut self, center: Point, radius: f64, color: Rgb) -> Result<(), String> {
         let reach = radius + 1.0;
-        let ends = |middle: f64| (middle - reach).floor() as i32..=(middle + reach).ceil() as i32;
-        for y in ends(center.1) {
-            for x in ends(center.0) {
+        let [columns, rows] = [center.0, center.1]
+            .map(|middle| (middle - reach).floor() as i32..=(middle + reach).ceil() as i32);
+        for y in rows {
+            for x in columns.clone() {
                 let distance = length(f64::from(x) + 0.5 - center.0, f64::from(y) + 0.5 - center.1);
                 self.blend(x, y, color, (radius + 0.5 - distance).clamp(0.0, 1.0))?;
             }

@@ -276,8 +276,8 @@ fn outline_path(curves: &[OutlineCurve]) -> String {
     path
 }
 
-fn place((x, y): Point) -> (i32, i32) {
-    (whole(x), whole(y))
+fn place(at: Point) -> (i32, i32) {
+    (whole(at.0), whole(at.1))
 }
 
 fn whole(pixels: f64) -> i32 {

@@ -106,25 +106,27 @@ impl Stretch {
     }
 
     /// The values of the points.
-    pub(super) fn thinned(&self, values: &[Option<f64>]) -> Vec<Option<f64>> {
-        let own = &values[self.lines.clone()];
+    pub(super) fn thinned(&self, values: &[f64]) -> Vec<f64> {
+        let lines = self.lines.start.min(values.len())..self.lines.end.min(values.len());
         if self.stride == 1 {
-            return own.to_vec();
+            return values[lines].to_vec();
         }
-        own.chunks(self.stride).flat_map(ends).collect()
+        values[lines].chunks(self.stride).flat_map(ends).collect()
     }
 }
 
-/// Smallest and largest of some values, in the order in which they stand.
-fn ends(values: &[Option<f64>]) -> [Option<f64>; 2] {
-    let numbered = values.iter().enumerate();
-    let known = numbered.filter_map(|(at, value)| Some((at, (*value)?)));
-    let low = known.clone().min_by(|a, b| a.1.total_cmp(&b.1));
-    let high = known.max_by(|a, b| a.1.total_cmp(&b.1));
+/// Smallest and largest of some values, in the order in which they stand; none where no value is a number.
+fn ends(values: &[f64]) -> [f64; 2] {
+    let known = values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| !value.is_nan());
+    let low = known.clone().min_by(|a, b| a.1.total_cmp(b.1));
+    let high = known.max_by(|a, b| a.1.total_cmp(b.1));
     match (low, high) {
-        (Some(low), Some(high)) if low.0 <= high.0 => [Some(low.1), Some(high.1)],
-        (Some(low), Some(high)) => [Some(high.1), Some(low.1)],
-        _ => [None, None],
+        (Some(low), Some(high)) if low.0 <= high.0 => [*low.1, *high.1],
+        (Some(low), Some(high)) => [*high.1, *low.1],
+        _ => [f64::NAN; 2],
     }
 }
 
@@ -142,8 +144,8 @@ mod tests {
 
     #[test]
     fn limit_what_is_no_number_leaves_a_hole() {
-        assert_eq!(ends(&[None, None]), [None, None]);
-        assert_eq!(ends(&[Some(2.0), None, Some(1.0)]), [Some(2.0), Some(1.0)]);
+        assert!(ends(&[f64::NAN, f64::NAN]).iter().all(|end| end.is_nan()));
+        assert_eq!(ends(&[2.0, f64::NAN, 1.0]), [2.0, 1.0]);
     }
 
     proptest! {
@@ -159,19 +161,19 @@ mod tests {
             prop_assert_eq!(all[0].lines.start, 0);
             prop_assert_eq!(all[all.len() - 1].lines.end, lines);
             prop_assert!(all.windows(2).all(|two| two[0].lines.end == two[1].lines.start));
-            let values: Vec<Option<f64>> = (0..lines).map(|line| Some(line as f64)).collect();
+            let values: Vec<f64> = (0..lines).map(|line| line as f64).collect();
             for stretch in &all {
                 let (first, step, count) = stretch.points();
                 let found = stretch.thinned(&values);
                 prop_assert_eq!(found.len(), count);
                 if stretch.stride == 1 {
-                    prop_assert_eq!(found[0], Some(first));
+                    prop_assert_eq!(found[0], first);
                     prop_assert_eq!(step, 1.0);
                 }
                 // The smallest and largest of some lines are their ends, half a distance from the points.
                 for (point, value) in found.iter().enumerate() {
                     let at = first + step * point as f64;
-                    prop_assert!((at - value.unwrap()).abs() <= stretch.stride as f64);
+                    prop_assert!((at - value).abs() <= stretch.stride as f64);
                 }
             }
             for mode in modes {

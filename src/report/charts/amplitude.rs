@@ -1,12 +1,12 @@
 //! Natural frequency and damping against amplitude: a pair of panels for every mode.
 
+use tapjoint_analysis::{RecordingResult, Response};
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict, Trend};
 
 use super::super::chart::axis::{Axis, extent, padded};
-use super::super::chart::{Block, Chart, Color, Mark, Panel, Places, Series};
-use super::super::figures::AmplitudeFigure;
+use super::super::chart::{Block, Chart, Color, Mark, Panel, Series};
 use super::super::format::significant;
-use super::taps::split_unit;
+use super::unit_of;
 
 /// Most modes in the picture; the page and the tables have them all.
 const MOST: usize = 8;
@@ -22,42 +22,74 @@ const BAR: f64 = 1.96;
 /// Places at which the curve and its bound are computed.
 const CURVE_POINTS: usize = 80;
 
-/// Frequency and damping against amplitude; `None` where no mode has a curve.
-pub fn amplitude(figure: &AmplitudeFigure) -> Option<Chart> {
-    let with_curve = figure
-        .modes
-        .iter()
-        .filter(|(_, curve)| curve.frequency.is_some());
-    let mut blocks = Vec::new();
-    for (number, curve) in with_curve {
-        let panels = [Quantity::Frequency, Quantity::Damping];
-        let panels = panels
-            .iter()
-            .filter_map(|quantity| quantity.panel(figure, curve));
-        let block = Block::new(2, panels.collect());
-        blocks.push(Block {
-            name: format!("mode {number}"),
-            aside: verdict(curve),
-            drawn: if blocks.len() < MOST { block.drawn } else { 0 },
-            ..block
-        });
-    }
-    if blocks.is_empty() {
-        return None;
-    }
-    let shown = if blocks.len() > MOST {
-        format!(" \u{b7} the first {MOST} of {} modes", blocks.len())
-    } else {
-        String::new()
+/// Returns frequency and damping of a recording's numbered modes against amplitude; `None` where none of them changes
+/// enough to matter.
+pub fn amplitude(recording: &RecordingResult, name: &str) -> Option<Chart> {
+    let spectra = recording.measurement.spectra.as_ref()?;
+    let numbered = spectra.readings.iter().zip(&recording.mode_numbers);
+    let numbered = numbered.filter_map(|(reading, mode)| Some((reading, (*mode)?)));
+    numbered
+        .clone()
+        .find(|(reading, _)| recording.amplitude_change(reading).is_some())?;
+    let modes = numbered.filter_map(|(reading, mode)| {
+        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
+        Some((mode, curve))
+    });
+    let modes: Vec<(usize, &AmplitudeCurve)> = modes.collect();
+    curves(name, &amplitude_axis(recording, &modes), &modes)
+}
+
+/// Returns what the amplitude is: that of one sensor, or of the strongest sensor where the modes differ in it.
+fn amplitude_axis(recording: &RecordingResult, modes: &[(usize, &AmplitudeCurve)]) -> [String; 2] {
+    let mut sensors: Vec<usize> = modes.iter().filter_map(|(_, curve)| curve.sensor).collect();
+    sensors.sort_unstable();
+    sensors.dedup();
+    let responses = sensors.iter();
+    let responses = responses.filter_map(|sensor| recording.responses.get(*sensor));
+    let responses: Vec<&Response> = responses.collect();
+    let unit = responses.first().and_then(|first| first.unit.clone());
+    let unit = match responses.iter().all(|response| response.unit == unit) {
+        true => unit_of(&unit),
+        false => "each sensor's unit".to_owned(),
     };
-    let file = &figure.file;
+    let label = match responses.as_slice() {
+        [one] => format!("peak amplitude of {}", one.name),
+        _ => "peak amplitude of the mode's strongest sensor".to_owned(),
+    };
+    [label, unit]
+}
+
+/// Returns frequency and damping of modes, each with its number, against an amplitude of this name and unit; `None`
+/// where no mode has a curve.
+pub fn curves(
+    name: &str,
+    amplitude: &[String; 2],
+    modes: &[(usize, &AmplitudeCurve)],
+) -> Option<Chart> {
+    let mut blocks: Vec<Block> = Vec::new();
+    for (number, curve) in modes.iter().filter(|(_, curve)| curve.frequency.is_some()) {
+        let quantities = [Quantity::Frequency, Quantity::Damping].iter();
+        let panels = quantities.filter_map(|quantity| quantity.panel(amplitude, curve));
+        let mut block = Block::new(2, panels.collect());
+        block.name = format!("mode {number}");
+        block.aside = verdict(curve);
+        if blocks.len() >= MOST {
+            block.drawn = 0;
+        }
+        blocks.push(block);
+    }
+    let shown = match blocks.len() {
+        0 => return None,
+        count if count > MOST => format!(" \u{b7} the first {MOST} of {count} modes"),
+        _ => String::new(),
+    };
     Some(Chart {
         kind: "amplitude",
-        title: format!("Frequency and damping against amplitude, {file}"),
+        title: format!("Frequency and damping against amplitude, {name}"),
         subtitle: format!(
             "every point a piece of a decay, none used twice \u{b7} bars and band 95 %{shown}"
         ),
-        caption: format!("Frequency and damping of the modes of {file} against amplitude."),
+        caption: format!("Frequency and damping of the modes of {name} against amplitude."),
         blocks,
         ..Chart::default()
     })
@@ -109,35 +141,26 @@ impl Quantity {
         points.collect()
     }
 
-    fn panel(self, figure: &AmplitudeFigure, curve: &AmplitudeCurve) -> Option<Panel> {
+    fn panel(self, amplitude: &[String; 2], curve: &AmplitudeCurve) -> Option<Panel> {
         let trend = self.trend(curve)?;
         let sizes = curve.points.iter().map(|point| point.amplitude);
         let (low, high) = extent(sizes).unwrap_or((1.0, 10.0));
-        let (label, unit) = split_unit(&figure.amplitude);
         // Amplitudes rise to the right as on every axis: a decay runs from right to left.
+        let [label, unit] = amplitude;
         let x = Axis::logarithmic(low / 1.12, high * 1.12).of(label, unit);
-        let mut bound = Series::band(
-            "95 % bound",
-            Color::Blue,
-            Places::Each(Vec::new()),
-            Vec::new(),
-            Vec::new(),
-        );
-        let (mut places, mut values) = (Vec::new(), Vec::new());
+        let mut bound = Series::new("95 % bound", Color::Blue, Mark::Band);
+        let mut line = Series::new("curve through them", Color::Ink, Mark::Line(1.5));
         for index in 0..CURVE_POINTS {
             let share = index as f64 / (CURVE_POINTS - 1) as f64;
             let amplitude = low * (share * (high / low).ln()).exp();
             if let Some((value, half)) = trend.at_amplitude(amplitude) {
                 let (value, half) = (self.factor() * value, self.factor() * half);
-                places.push(amplitude);
-                values.push(value);
+                line.push(amplitude, value);
                 bound.low.push(value - half);
                 bound.high.push(value + half);
             }
         }
-        bound.x = Places::Each(places.clone());
-        let line = places.into_iter().zip(values);
-        let line = Series::points("curve through them", Color::Ink, Mark::Line(1.5), line);
+        bound.x = line.x.clone();
         let mut panel = Panel::new(160.0, x, self.axis(curve)).with([bound, line]);
         panel.extra = Some(["time after the tap", "s"]);
         Some(panel.with(self.dots(curve)))
@@ -156,18 +179,15 @@ impl Quantity {
                 2..=MOST_COLOURS => format!("tap {}", group + 1),
                 _ => format!("pieces of the decays of {taps} taps"),
             };
-            let mut set = Series::points(&name, Color::curve(group), Mark::Dot(3.3), []);
-            let mut places = Vec::new();
+            let mut set = Series::new(&name, Color::curve(group), Mark::Dot(3.3));
             for (point, (value, std)) in curve.points.iter().zip(&values) {
                 if groups == 1 || point.tap == group {
-                    places.push(point.amplitude);
-                    set.y.push(*value);
+                    set.push(point.amplitude, *value);
                     set.low.push(value - BAR * std);
                     set.high.push(value + BAR * std);
                     set.extra.push(point.time);
                 }
             }
-            set.x = Places::Each(places);
             dots.push(set);
         }
         dots
@@ -181,17 +201,16 @@ impl Quantity {
         stds.sort_by(f64::total_cmp);
         let limit = TELLING * stds.get(stds.len() / 2).copied().unwrap_or(0.0);
         let telling = values.iter().filter(|(_, std)| *std <= limit);
-        let (low, high) = extent(telling.flat_map(bar)).unwrap_or((0.0, 1.0));
-        let distant = values
-            .iter()
-            .filter(|(value, std)| value + DISTANT * std < low || value - DISTANT * std > high);
-        let ends = extent(distant.flat_map(bar).chain([low, high]));
-        padded(ends.unwrap_or((low, high)), 0.12).of(self.name(), self.unit())
+        let bars = telling.flat_map(|(value, std)| [value - BAR * std, value + BAR * std]);
+        let (low, high) = extent(bars).unwrap_or((0.0, 1.0));
+        let mut ends = vec![low, high];
+        for (value, std) in &values {
+            if value + DISTANT * std < low || value - DISTANT * std > high {
+                ends.extend([value - BAR * std, value + BAR * std]);
+            }
+        }
+        padded(extent(ends).unwrap_or((low, high)), 0.12).of(self.name(), self.unit())
     }
-}
-
-fn bar((value, std): &(f64, f64)) -> [f64; 2] {
-    [value - BAR * std, value + BAR * std]
 }
 
 /// "change from loud to soft: frequency +0.32 ± 0.01 Hz, damping ratio −0.14 ± 0.01 %".
@@ -204,7 +223,15 @@ fn verdict(curve: &AmplitudeCurve) -> String {
         AmplitudeVerdict::Changes if seen_at_the_ends => {
             format!("change from loud to soft: {}", changes(curve))
         }
-        AmplitudeVerdict::Changes => format!("at half the amplitude: {}", slopes(curve)),
+        // By the slopes of the straight lines, with 95 % bounds (normal distribution: a line leaves many degrees of
+        // freedom).
+        AmplitudeVerdict::Changes => {
+            let half = 0.5f64.ln();
+            let slopes = both(curve, |trend| {
+                (half * trend.slope, 1.96 * half.abs() * trend.slope_std)
+            });
+            format!("at half the amplitude: {slopes}")
+        }
         AmplitudeVerdict::Steady => {
             format!("no change beyond its uncertainty: {}", changes(curve))
         }
@@ -221,15 +248,6 @@ fn verdict(curve: &AmplitudeCurve) -> String {
 /// From the largest to the smallest amplitude, with its 95 % bound.
 fn changes(curve: &AmplitudeCurve) -> String {
     both(curve, |trend| (trend.change, trend.change_bound))
-}
-
-/// By the slopes of the straight lines, for a halved amplitude, with 95 % bounds (normal distribution: a line
-/// leaves many degrees of freedom).
-fn slopes(curve: &AmplitudeCurve) -> String {
-    let half = 0.5f64.ln();
-    both(curve, |trend| {
-        (half * trend.slope, 1.96 * half.abs() * trend.slope_std)
-    })
 }
 
 /// "frequency +0.32 ± 0.01 Hz, damping ratio −0.14 ± 0.01 %".

@@ -26,31 +26,26 @@ pub fn confusion(cases: &[Case]) -> Chart {
             *counts.entry((planted, first)).or_insert(0) += 1;
         }
     }
-    let names = || classes.iter().enumerate();
     let last = classes.len() as f64 - 0.5;
+    let names = classes.iter().enumerate();
+    let names = names.map(|(at, class)| (at as f64, class.name().to_owned()));
     let x = Axis::linear(-0.5, last).of("most probable class", "");
-    let x = x.named(names().map(|(at, class)| (at as f64, class.name().to_owned())));
+    let x = x.named(names.clone());
     let y = Axis::linear(-last, 0.5).of("planted", "");
-    let y = y.named(names().map(|(at, class)| (-(at as f64), class.name().to_owned())));
-    let mut cells = Series::points("", Color::Blue, Mark::Cell, []);
-    let mut places = Vec::new();
+    let y = y.named(names.map(|(at, name)| (-at, name)));
+    let mut cells = Series::new("", Color::Blue, Mark::Cell);
     for (row, planted) in classes.iter().enumerate() {
         let own = counts.iter().filter(|((class, _), _)| class == planted);
         let total: usize = own.map(|(_, count)| *count).sum();
         for (column, class) in classes.iter().enumerate() {
             if let Some(count) = counts.get(&(*planted, *class)) {
-                places.push((column as f64, -(row as f64)));
+                cells.push(column as f64, -(row as f64));
                 cells.low.push(*count as f64 / total as f64);
                 cells.labels.push(count.to_string());
             }
         }
     }
-    let series = Series {
-        low: cells.low,
-        labels: cells.labels,
-        ..Series::points("", Color::Blue, Mark::Cell, places)
-    };
-    let panel = Panel::new(CELL * classes.len() as f64, x, y).with([series]);
+    let panel = Panel::new(CELL * classes.len() as f64, x, y).with([cells]);
     Chart {
         kind: "confusion",
         title: "What was planted, and what came first".to_owned(),
@@ -77,11 +72,8 @@ pub(crate) fn classes() -> Vec<Class> {
 
 /// The reliability diagram: on the diagonal a stated probability is the share of right answers.
 pub fn reliability(calibration: &Calibration) -> Chart {
-    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-    let (ece, brier) = (
-        number(calibration.expected_calibration_error),
-        number(calibration.brier),
-    );
+    let [ece, brier] = [calibration.expected_calibration_error, calibration.brier]
+        .map(|value| value.map_or("-".to_owned(), |value| format!("{value:.3}")));
     let bins = calibration.reliability.iter();
     let known = bins.filter_map(|bin| Some((bin.stated?, bin.right?, bin.cases)));
     let places = known.clone().map(|(stated, right, _)| (stated, right));

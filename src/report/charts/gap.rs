@@ -4,50 +4,14 @@ use super::super::chart::axis::{Axis, extent, padded};
 use super::super::chart::{Block, Chart, Color, Mark, Panel, Series};
 use super::super::document::{Document, GapSection};
 use super::super::format::{probability, rounded, signed_percent};
-use super::super::tables::place_of;
+use super::super::words::gap::{found_best, place_of};
 use super::HIGH;
-use tapjoint_diagnosis::{Hypothesis, LocationMap, Residual, Verdict};
+use tapjoint_diagnosis::{LocationMap, Residual};
 
 /// Hypotheses shown.
 const MOST_BARS: usize = 9;
 /// The axis reaches at least this far to either side of zero (%).
 const LEAST_SPAN: f64 = 0.02;
-
-/// What stands beside the errors of the described model.
-enum Explanation {
-    /// The errors that this effect leaves: the most probable one of those that the verdict names.
-    Effect(String),
-    /// Nothing, for this reason: an effect that is probably not the cause explains nothing.
-    Nothing(&'static str),
-}
-
-impl Explanation {
-    fn of(gap: &GapSection) -> Explanation {
-        match gap.verdict {
-            Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => {
-                // The diagnosis gives the errors of the most probable hypothesis that predicts anything.
-                let mut hypotheses = gap.hypotheses.iter().map(|found| &found.hypothesis);
-                match hypotheses.find(|one| **one != Hypothesis::Unknown) {
-                    Some(effects @ Hypothesis::Effects(_)) => Explanation::Effect(effects.name()),
-                    _ => Explanation::Nothing("no effect is more probable than none"),
-                }
-            }
-            Verdict::NoGap => Explanation::Nothing("nothing is missing"),
-            Verdict::Unknown => Explanation::Nothing("nothing in the catalogue explains the rest"),
-            Verdict::NotEnoughData(_) => {
-                Explanation::Nothing("these data do not decide what is missing")
-            }
-        }
-    }
-
-    /// "with the described model, and with sensor-mass", or why there is nothing to compare it with.
-    fn words(&self) -> String {
-        match self {
-            Explanation::Effect(name) => format!("with the described model, and with {name}"),
-            Explanation::Nothing(why) => format!("with the described model ({why})"),
-        }
-    }
-}
 
 /// Errors with the described model and with the effect that is probably the cause, and how probable each
 /// hypothesis is; `None` without a diagnosis.
@@ -57,7 +21,11 @@ pub fn gap(document: &Document) -> Option<Chart> {
     if pulls.is_empty() {
         return None;
     }
-    let shown = Explanation::of(gap).words();
+    // Errors are shown beside those of the described model where an effect is probably the cause.
+    let shown = match found_best(gap) {
+        Ok(effect) => format!("with the described model, and with {effect}"),
+        Err(why) => format!("with the described model ({why})"),
+    };
     let panels = vec![errors_panel(gap, pulls), odds_panel(gap)];
     Some(Chart {
         kind: "gap",
@@ -83,24 +51,21 @@ fn errors_panel(gap: &GapSection, pulls: &[Residual]) -> Panel {
     let withheld = withheld.map_or_else(String::new, |fitted| {
         format!("; modes above {fitted} took no part")
     });
-    let places = pulls.iter().map(|pull| abscissa(pulls, pull));
-    let places: Vec<f64> = places.collect();
     let before = pulls.iter().map(|pull| (pull.error_percent, pull.z));
-    let (color, ring) = (Color::Vermilion, Mark::Ring(4.5));
     let mut described = "described model, joint fitted".to_owned();
     let mut series = Vec::new();
-    if let Explanation::Effect(effect) = Explanation::of(gap) {
+    if let Ok(effect) = found_best(gap) {
+        let name = format!("with {effect}{withheld}");
         let after = pulls
             .iter()
             .map(|pull| (pull.error_percent_after, pull.z_after));
-        let mut set = Series::points("", Color::Blue, Mark::Dot(4.0), []);
-        set.name = format!("with {effect}{withheld}");
-        series.push(with_errors(set, pulls, &places, after));
+        let set = Series::new(&name, Color::Blue, Mark::Dot(4.0));
+        series.push(with_errors(set, pulls, after));
     } else {
         described.push_str(&withheld);
     }
-    let set = Series::points(&described, color, ring, []);
-    series.insert(0, with_errors(set, pulls, &places, before));
+    let set = Series::new(&described, Color::Vermilion, Mark::Ring(4.5));
+    series.insert(0, with_errors(set, pulls, before));
     let heights = series.iter().flat_map(|set| set.y.iter().copied());
     let (low, high) = extent(heights).unwrap_or((-1.0, 1.0));
     let y = padded((low.min(-LEAST_SPAN), high.max(LEAST_SPAN)), 0.1);
@@ -112,26 +77,23 @@ fn errors_panel(gap: &GapSection, pulls: &[Residual]) -> Panel {
     }
 }
 
-/// The series with the errors of all frequencies with one model, each in percent and in standard deviations.
+/// Returns the series with the errors of all frequencies with one model, each in percent and in standard deviations.
 fn with_errors(
     mut series: Series,
     pulls: &[Residual],
-    places: &[f64],
     errors: impl Iterator<Item = (f64, f64)>,
 ) -> Series {
-    series.x = super::super::chart::Places::Each(places.to_vec());
     for (pull, (percent, deviations)) in pulls.iter().zip(errors) {
-        series.y.push(percent);
+        series.push(abscissa(pulls, pull), percent);
         series.extra.push(deviations);
-        series
-            .words
-            .push(format!("mode {} in {}", pull.mode, place_of(pull)));
+        let words = format!("mode {} in {}", pull.mode, place_of(pull));
+        series.words.push(words);
         series.said.push(signed_percent(Some(percent)) + " %");
     }
     series
 }
 
-/// Where an error stands: the tap levels of all recordings that saw a mode stand beside each other over half
+/// Returns the place of an error: the tap levels of all recordings that saw a mode stand beside each other over half
 /// its width.
 fn abscissa(pulls: &[Residual], pull: &Residual) -> f64 {
     // One recording can hold taps of two levels, which saw the mode apart.
@@ -157,30 +119,20 @@ fn odds_panel(gap: &GapSection) -> Panel {
     let lowest = 0.4 - gap.hypotheses.len().min(MOST_BARS) as f64;
     let y = Axis::linear(lowest, 0.6).named(names);
     let x = Axis::linear(0.0, 100.0).of("probability", "%");
-    let mut series = Vec::new();
-    for (name, color, held) in [
-        ("found", Color::Blue, true),
-        ("other explanations", Color::Sky, false),
-    ] {
-        let own = rows
-            .clone()
-            .filter(|(_, found)| gap.verdict.hypotheses().contains(&found.hypothesis) == held);
-        let bars = own
-            .clone()
-            .map(|(row, found)| (100.0 * found.probability, row));
-        let mut set = Series::points(name, color, Mark::Bar(9.0), bars);
-        set.words = own
-            .clone()
-            .map(|(_, found)| found.hypothesis.name())
-            .collect();
-        set.labels = own
-            .map(|(_, found)| probability(found.probability))
-            .collect();
-        series.push(set);
+    let mut found = Series::new("found", Color::Blue, Mark::Bar(9.0));
+    let mut others = Series::new("other explanations", Color::Sky, Mark::Bar(9.0));
+    for (row, one) in rows {
+        let series = match gap.verdict.hypotheses().contains(&one.hypothesis) {
+            true => &mut found,
+            false => &mut others,
+        };
+        series.push(100.0 * one.probability, row);
+        series.words.push(one.hypothesis.name());
+        series.labels.push(probability(one.probability));
     }
     Panel::new(HIGH, x, y)
         .titled("what may be missing")
-        .with(series)
+        .with([found, others])
 }
 
 /// Effect of a change at one place alone, and below it the changes of all places together; `None` without
@@ -192,7 +144,7 @@ pub fn place_map(document: &Document) -> Option<Chart> {
         [first, second, ..] => second - first,
         _ => *last,
     };
-    let x = || Axis::linear(0.0, 1e3 * (last + 0.5 * step)).of("position from the joint", "mm");
+    let x = Axis::linear(0.0, 1e3 * (last + 0.5 * step)).of("position from the joint", "mm");
     let curves = [
         (&map.stiffness_explains, &map.stiffness, &map.stiffness_std),
         (&map.mass_explains, &map.mass, &map.mass_std),
@@ -222,8 +174,8 @@ pub fn place_map(document: &Document) -> Option<Chart> {
     let y = padded(range, 0.08).of("local change", "%");
     let explained = Axis::linear(0.0, 105.0).of("misfit explained", "%");
     let panels = vec![
-        Panel::new(220.0, x(), explained).with(alone),
-        Panel::new(240.0, x(), y).with_zero().with(together),
+        Panel::new(220.0, x.clone(), explained).with(alone),
+        Panel::new(240.0, x, y).with_zero().with(together),
     ];
     Some(Chart {
         kind: "gap-place",

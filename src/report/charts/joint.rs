@@ -107,37 +107,26 @@ fn error_series(errors: &[FrequencyError<'_>], used: bool, bounded: bool) -> Ser
             Mark::Ring(5.0),
         )
     };
-    let own = errors
-        .iter()
-        .enumerate()
-        .filter(|(_, error)| error.prediction.used == used && error.bound.is_some() == bounded);
-    let mut series = Series::points(name, color, mark, []);
-    let mut places = Vec::new();
-    for (at, error) in own {
-        places.push((at as f64, error.percent));
+    let mut series = Series::new(name, color, mark);
+    for (at, error) in errors.iter().enumerate() {
+        if error.prediction.used != used || error.bound.is_some() != bounded {
+            continue;
+        }
+        series.push(at as f64, error.percent);
         if let Some(bound) = error.bound {
             series.low.push(error.percent - bound);
             series.high.push(error.percent + bound);
         }
         series.words.push(frequency_words(error.prediction));
         // Thousandths of a percent.
-        series
-            .said
-            .push(rounded_to(error.percent, error.bound, -3).joined() + " %");
+        let said = rounded_to(error.percent, error.bound, -3).joined();
+        series.said.push(said + " %");
         if errors.len() <= MOST_LABELS {
-            series
-                .labels
-                .push(format!("{} %", signed_percent(Some(error.percent))));
+            let label = format!("{} %", signed_percent(Some(error.percent)));
+            series.labels.push(label);
         }
     }
-    Series {
-        low: series.low,
-        high: series.high,
-        words: series.words,
-        said: series.said,
-        labels: series.labels,
-        ..Series::points(name, color, mark, places)
-    }
+    series
 }
 
 /// "mode 1, measured 16.5524 Hz, predicted 16.7220 Hz".
@@ -246,7 +235,7 @@ impl Cloud {
             cloud.estimate = estimate_by(estimate, method);
             if estimate.method.name() == method {
                 let covariance = cloud.estimate.zip(estimate.log_covariance);
-                let region = covariance.map(|(place, covariance)| ellipse(place, covariance));
+                let region = covariance.map(|((kx, ky), covariance)| ellipse(kx, ky, covariance));
                 cloud.ellipse = region.unwrap_or_default();
             }
         }
@@ -254,24 +243,25 @@ impl Cloud {
     }
 
     fn panel(self) -> Panel {
-        let shifted = || self.shifted.iter().map(|(_, place)| *place);
+        let shifted = self.shifted.iter().map(|(_, place)| place);
         let shown = self
             .patterns
             .iter()
             .chain(&self.estimate)
-            .chain(&self.ellipse);
-        let shown: Vec<(f64, f64)> = shown.copied().chain(shifted()).collect();
+            .chain(&self.ellipse)
+            .chain(shifted);
+        let shown: Vec<(f64, f64)> = shown.copied().collect();
         let random_x = inner(self.random.iter().map(|place| place.0));
         let random_y = inner(self.random.iter().map(|place| place.1));
         let x = stiffness_axis(shown.iter().map(|place| place.0).chain(random_x));
         let y = stiffness_axis(shown.iter().map(|place| place.1).chain(random_y));
-        let mut alike = Series::points(
+        let mut alike = Series::new(
             "all frequencies changed alike",
             Color::Orange,
             Mark::Cross(6.0),
-            shifted(),
         );
-        for (percent, _) in &self.shifted {
+        for (percent, (kx, ky)) in &self.shifted {
+            alike.push(*kx, *ky);
             let words = format!("{} %", signed(*percent));
             alike.words.push(words.clone());
             alike.labels.push(words);
@@ -315,7 +305,8 @@ fn estimate_by(estimate: &EstimateSection, method: &str) -> Option<(f64, f64)> {
 
 /// All places (ln Kx, ln Ky) with d^T C^-1 d = 5.99 about the estimate: with L L^T = C they are
 /// L (cos t, sin t) times the root of that. Empty where they do not exist.
-fn ellipse((x, y): (f64, f64), [[xx, xy], [_, yy]]: [[f64; 2]; 2]) -> Vec<(f64, f64)> {
+fn ellipse(kx: f64, ky: f64, covariance: [[f64; 2]; 2]) -> Vec<(f64, f64)> {
+    let [[xx, xy], [_, yy]] = covariance;
     let first = xx.sqrt();
     let (cross, rest) = (xy / first, (yy - xy * xy / xx).max(0.0).sqrt());
     let mut corners = Vec::new();
@@ -326,10 +317,10 @@ fn ellipse((x, y): (f64, f64), [[xx, xy], [_, yy]]: [[f64; 2]; 2]) -> Vec<(f64, 
             ELLIPSE_95.sqrt() * angle.cos(),
         );
         let corner = (
-            x * (first * cos).exp(),
-            y * (cross * cos + rest * sin).exp(),
+            kx * (first * cos).exp(),
+            ky * (cross * cos + rest * sin).exp(),
         );
-        if !(x > 0.0 && y > 0.0 && is_finite(&corner)) {
+        if !(kx > 0.0 && ky > 0.0 && is_finite(&corner)) {
             return Vec::new();
         }
         corners.push(corner);

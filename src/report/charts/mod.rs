@@ -1,4 +1,4 @@
-//! The pictures of a report, each built once from the data that it shows.
+//! The pictures of a report, each built once from the results that it shows.
 
 pub mod amplitude;
 pub mod blind_check;
@@ -10,5 +10,12 @@ pub mod spectra;
 pub mod stabilisation;
 pub mod taps;
 
+use super::format::unit_words;
+
 /// Height of a panel that stands alone (pixels).
 const HIGH: f64 = 340.0;
+
+/// Returns a unit as print has it, also where none was stated.
+fn unit_of(unit: &Option<String>) -> String {
+    unit_words(unit.as_deref().unwrap_or("unit of the file"))
+}

@@ -115,16 +115,18 @@ fn mode_curves(study: &ResolutionStudy, window: WindowName, reading: ReadBy) -> 
             (row.window, row.reading) == (window, reading)
                 && (row.mode, row.band) == (mode.mode, mode.band)
         });
-        let percent = |value: f64| 100.0 * value / mode.frequency;
         let bounds = curve(
             rows.clone()
-                .map(|row| (row.block, Some(percent(row.half_line)))),
+                .map(|row| (row.block, Some(100.0 * row.half_line / mode.frequency))),
         );
         // One entry of the legend explains the broken lines of all colours.
         let name = if index == 0 { "half-line bound" } else { "" };
         curves.push(Series::points(name, color, Mark::Dashed(1.3), bounds));
         let name = format!("mode {}: {} Hz", mode.mode, significant(mode.frequency, 4));
-        let errors = curve(rows.map(|row| (row.block, row.rms.map(percent))));
+        let errors = curve(rows.map(|row| {
+            let percent = row.rms.map(|rms| 100.0 * rms / mode.frequency);
+            (row.block, percent)
+        }));
         curves.extend(marked(&name, color, Mark::Dot(4.0), errors));
     }
     curves

@@ -75,28 +75,20 @@ fn panel(
         Mark::Square(5.0),
         joint,
     ));
-    let taps = taps
-        .iter()
-        .map(|place| (1e3 * place, displacement(shape, *place)));
-    let mut taps = Series::points("tap", Color::Vermilion, Mark::Cross(6.0), taps);
-    taps.words = taps
-        .y
-        .iter()
-        .map(|_| format!("mode {}", shape.mode))
-        .collect();
-    series.push(taps);
+    let mut tapped = Series::new("tap", Color::Vermilion, Mark::Cross(6.0));
+    for place in taps {
+        tapped.push(1e3 * place, displacement(shape, *place));
+        tapped.words.push(format!("mode {}", shape.mode));
+    }
+    series.push(tapped);
     for (name, places) in sensors {
-        let places = places
-            .iter()
-            .map(|place| (1e3 * place, displacement(shape, *place)));
-        let mut set = Series::points("sensor", Color::Orange, Mark::Dot(5.0), places);
-        set.words = set
-            .y
-            .iter()
-            .map(|_| format!("{name}: mode {}", shape.mode))
-            .collect();
-        set.labels = set.y.iter().map(|_| (*name).to_owned()).collect();
-        series.push(set);
+        let mut sensed = Series::new("sensor", Color::Orange, Mark::Dot(5.0));
+        for place in places {
+            sensed.push(1e3 * place, displacement(shape, *place));
+            sensed.words.push(format!("{name}: mode {}", shape.mode));
+            sensed.labels.push((*name).to_owned());
+        }
+        series.push(sensed);
     }
     let title = format!(
         "mode {}, {} Hz",
@@ -110,13 +102,14 @@ fn panel(
 /// Displacement at a place, between the points next to it.
 fn displacement(shape: &SampledShape, place: f64) -> f64 {
     let after = shape.positions.partition_point(|x| *x < place);
-    let point = |index: usize| {
-        let position = shape.positions.get(index)?;
-        Some((*position, *shape.displacements.get(index)?))
-    };
-    match (after.checked_sub(1).and_then(point), point(after)) {
-        (Some((x0, y0)), Some((x1, y1))) if x1 > x0 => y0 + (y1 - y0) * (place - x0) / (x1 - x0),
-        (_, Some((_, y))) | (Some((_, y)), None) => y,
-        (None, None) => 0.0,
+    let points = shape.positions.iter().zip(&shape.displacements);
+    let mut near = points.skip(after.saturating_sub(1));
+    match (near.next(), near.next()) {
+        (Some((x0, y0)), Some((x1, y1))) if after > 0 && x1 > x0 => {
+            y0 + (y1 - y0) * (place - x0) / (x1 - x0)
+        }
+        (Some(_), Some((_, y))) if after > 0 => *y,
+        (Some((_, y)), _) => *y,
+        (None, _) => 0.0,
     }
 }

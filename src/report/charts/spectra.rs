@@ -1,14 +1,19 @@
 //! Averaged spectra and frequency response functions of a recording, with their resonances.
 
+use num_complex::Complex64;
+use tapjoint_analysis::{Frf, MeasuredSpectra, RecordingResult};
+use tapjoint_description::SensorKind;
+use tapjoint_signal::modal::ModeReading;
+use tapjoint_signal::spectral::{FrfEstimator, Lines};
+
 use super::super::chart::axis::{extent, nice_step};
 use super::super::chart::{Axis, Block, Chart, Color, InPage, Mark, Panel, Rule, Series};
-use super::super::figures::{Curve, FrfCurve, PeakMark, RecordingFigure, SpectraFigure};
-use super::super::format::{significant, trimmed};
+use super::super::format::{significant, trimmed, unit_words};
 use super::HIGH;
 
 /// Smallest magnitude shown, relative to the largest: 140 dB.
 const DEEPEST: f64 = 1e-7;
-/// How far beyond the highest peak a shortened axis goes, in shares of the peak's frequency.
+/// Upper end of a shortened axis in shares of the peak's frequency.
 const PAST_HIGHEST: f64 = 1.25;
 /// An axis is shortened when that hides more than the rest of this share of the band.
 const MOST_SHOWN_PART: f64 = 0.6;
@@ -21,148 +26,209 @@ const SIDE: f64 = 6.0;
 /// Depth shown below a close-up's peak (dB).
 const DEPTH: f64 = 30.0;
 
-/// The spectra of a recording; `None` when no tap was accepted, and where only functions are known.
-pub fn spectrum(figure: &RecordingFigure) -> Option<Chart> {
-    let spectra = figure.spectra.as_ref()?;
-    let mut groups: Vec<Vec<(usize, &Curve)>> = Vec::new();
-    for (index, curve) in spectra.responses.iter().enumerate() {
-        match groups
-            .iter_mut()
-            .find(|group| group[0].1.unit == curve.unit)
-        {
-            Some(group) => group.push((index, curve)),
-            None => groups.push(vec![(index, curve)]),
-        }
-    }
+/// Returns the spectra of a recording; `None` when no tap was accepted, and where only functions are known.
+pub fn spectrum(recording: &RecordingResult, name: &str) -> Option<Chart> {
+    let spectra = recording.measurement.spectra.as_ref()?;
+    let lines = &spectra.averages.lines;
+    let x = frequency_axis(spectra);
     let mut panels = Vec::new();
-    for group in &groups {
-        let axis = magnitude_axis(group.iter().map(|(_, curve)| curve.values.as_slice()));
-        let axis = axis.of("magnitude, rms", group[0].1.unit.as_str());
-        let series = group.iter().map(|(index, curve)| {
-            let color = Color::curve(*index);
-            over_lines(spectra, &curve.name, color, curve.values.clone())
-        });
-        panels.push(Panel::new(HIGH, frequency_axis(spectra), axis).with(series));
+    let responses = recording.responses.iter().zip(&spectra.averages.responses);
+    for (index, (response, values)) in responses.enumerate() {
+        let sensed = match response.kind {
+            None => "",
+            Some(SensorKind::Acceleration) => ", acceleration",
+            Some(SensorKind::Velocity) => ", velocity",
+            Some(SensorKind::Displacement) => ", displacement",
+            Some(SensorKind::Sound) => ", sound pressure",
+        };
+        let sensed = format!("{}{sensed}", response.name);
+        let curve = over_lines(lines, &sensed, Color::curve(index), values.clone());
+        let unit = unit_of_transform(&response.unit);
+        panel_of(&mut panels, &x, "magnitude, rms", &unit).push(curve);
     }
     if panels.is_empty() {
         return None;
     }
-    panels.extend(force_panel(spectra));
+    scale_to_magnitudes(&mut panels);
+    panels.extend(force_panel(
+        spectra,
+        &unit_of_transform(&recording.tap_unit),
+    ));
+    let rules = rules(recording, spectra);
     for panel in &mut panels {
-        panel.rules = rules(spectra);
+        panel.rules.clone_from(&rules);
     }
-    let file = &figure.file;
     Some(Chart {
         kind: "spectrum",
-        title: format!("Averaged spectra, {file}"),
+        title: format!("Averaged spectra, {name}"),
         subtitle: subtitle(spectra),
-        caption: format!("Averaged spectra of {file} with the resonances found."),
+        caption: format!("Averaged spectra of {name} with the resonances found."),
         blocks: [Block::new(1, panels)]
             .into_iter()
-            .chain(close_ups(spectra))
+            .chain(close_ups(spectra, &rules))
             .collect(),
         ..Chart::default()
     })
 }
 
-/// The frequency response functions of a recording; `None` without a hammer or without taps.
-pub fn frf(figure: &RecordingFigure) -> Option<Chart> {
-    let spectra = figure.spectra.as_ref()?;
-    let mut groups: Vec<Vec<(usize, &FrfCurve)>> = Vec::new();
-    for (index, frf) in spectra.frfs.iter().enumerate() {
-        let kind = (&frf.form, &frf.unit);
-        let same =
-            |group: &&mut Vec<(usize, &FrfCurve)>| (&group[0].1.form, &group[0].1.unit) == kind;
-        match groups.iter_mut().find(same) {
-            Some(group) => group.push((index, frf)),
-            None => groups.push(vec![(index, frf)]),
-        }
-    }
-    let x = || frequency_axis(spectra);
-    let mut panels = Vec::new();
-    for group in &groups {
-        let axis = magnitude_axis(group.iter().map(|(_, frf)| frf.magnitude.as_slice()));
-        let axis = axis.of(group[0].1.form.as_str(), group[0].1.unit.as_str());
-        let mut series = Vec::new();
-        for (index, frf) in group {
-            let color = Color::curve(*index);
-            for (estimator, magnitude) in &frf.others {
-                let name = format!("{}, {estimator}", frf.name);
-                let mut other = over_lines(spectra, &name, color, magnitude.clone());
-                other.mark = Mark::Line(1.0);
-                other.opacity = FAINT;
-                series.push(other);
-            }
-            let name = format!("{}, {}", frf.name, frf.estimator);
-            series.push(over_lines(spectra, &name, color, frf.magnitude.clone()));
-        }
-        // The estimator that is meant gives the colour its name.
-        series.sort_by(|a, b| b.opacity.total_cmp(&a.opacity));
-        panels.push(Panel::new(HIGH, x(), axis).with(series));
-    }
+/// Returns the frequency response functions of a recording, other estimators faintly beside those that they are
+/// given by; `None` without a hammer or without taps.
+pub fn frf(
+    recording: &RecordingResult,
+    name: &str,
+    frfs: &[Frf],
+    others: &[FrfEstimator],
+) -> Option<Chart> {
+    let spectra = recording.measurement.spectra.as_ref()?;
+    let mut panels = magnitude_panels(spectra, frfs, others);
     if panels.is_empty() {
         return None;
     }
-    let mut axis = Axis::linear(-190.0, 190.0).of("phase", "\u{b0}");
-    axis.period = Some(360.0);
-    let phases = [-180.0, -90.0, 0.0, 90.0, 180.0];
-    axis = axis.named(
-        phases.map(|degrees: f64| (degrees, format!("{degrees:.0}").replace('-', "\u{2212}"))),
-    );
-    let frfs = || spectra.frfs.iter().enumerate();
-    let series = frfs()
-        .map(|(index, frf)| over_lines(spectra, &frf.name, Color::curve(index), frf.phase.clone()));
-    panels.push(Panel::new(150.0, x(), axis).with(series));
-    let coherent = spectra.frfs.iter().any(|frf| frf.coherence.is_some());
-    if coherent {
-        let series = frfs().filter_map(|(index, frf)| {
-            let values = frf.coherence.clone()?;
-            Some(over_lines(spectra, &frf.name, Color::curve(index), values))
-        });
-        let axis = Axis::linear(0.0, 1.05).of("coherence", "");
-        panels.push(Panel::new(120.0, x(), axis).with(series));
+    let (mut phases, mut coherences) = (Vec::new(), Vec::new());
+    for (index, frf) in frfs.iter().enumerate() {
+        let (lines, color) = (&spectra.averages.lines, Color::curve(index));
+        let values = frf.values().iter();
+        let phase = values.map(|value| value.map_or(f64::NAN, |value| value.arg().to_degrees()));
+        phases.push(over_lines(lines, &frf.response, color, phase.collect()));
+        if let Some(coherence) = &frf.coherence {
+            let values = coherence.iter().map(|value| value.unwrap_or(f64::NAN));
+            let series = over_lines(lines, &frf.response, color, values.collect());
+            coherences.push(series);
+        }
     }
-    for panel in &mut panels {
-        panel.rules = rules(spectra);
-    }
+    let x = frequency_axis(spectra);
+    let mut phase = Axis::linear(-190.0, 190.0).of("phase", "\u{b0}");
+    phase.period = Some(360.0);
+    let degrees = ["\u{2212}180", "\u{2212}90", "0", "90", "180"];
+    let degrees = degrees.iter().zip([-180.0, -90.0, 0.0, 90.0, 180.0]);
+    let phase = phase.named(degrees.map(|(words, value)| (value, (*words).to_owned())));
+    panels.push(Panel::new(150.0, x.clone(), phase).with(phases));
     let mut below = subtitle(spectra);
-    if !coherent {
-        let why = if spectra.averages == 1 {
+    if coherences.is_empty() {
+        let why = if spectra.averages.taps == 1 {
             "one average: "
         } else {
             ""
         };
         below.push_str(&format!(" \u{b7} {why}no coherence"));
+    } else {
+        let axis = Axis::linear(0.0, 1.05).of("coherence", "");
+        panels.push(Panel::new(120.0, x, axis).with(coherences));
     }
-    if let Some(frf) = spectra.frfs.iter().find(|frf| !frf.others.is_empty()) {
-        let names: Vec<&str> = frf.others.iter().map(|(name, _)| name.as_str()).collect();
-        below.push_str(&format!(" \u{b7} faint: {}", names.join(", ")));
+    let faint = frfs.first().into_iter().flat_map(|frf| beside(frf, others));
+    let faint: Vec<&str> = faint.map(FrfEstimator::name).collect();
+    if !faint.is_empty() {
+        below.push_str(&format!(" \u{b7} faint: {}", faint.join(", ")));
     }
-    let file = &figure.file;
+    let rules = rules(recording, spectra);
+    for panel in &mut panels {
+        panel.rules.clone_from(&rules);
+    }
     Some(Chart {
         kind: "frf",
-        title: format!("Frequency response functions, {file}"),
+        title: format!("Frequency response functions, {name}"),
         subtitle: below,
-        caption: format!("Response per force (H1) of {file}, magnitude, phase and coherence."),
+        caption: format!("Response per force (H1) of {name}, magnitude, phase and coherence."),
         blocks: vec![Block::new(1, panels)],
         ..Chart::default()
     })
 }
 
-/// A curve over the spectral lines.
-pub(super) fn over_lines(
-    spectra: &SpectraFigure,
-    name: &str,
-    color: Color,
-    values: Vec<f64>,
-) -> Series {
-    let lines = &spectra.lines;
+/// Returns the panels of the magnitudes, one for each form and unit.
+fn magnitude_panels(
+    spectra: &MeasuredSpectra,
+    frfs: &[Frf],
+    others: &[FrfEstimator],
+) -> Vec<Panel> {
+    let lines = &spectra.averages.lines;
+    let x = frequency_axis(spectra);
+    let mut panels: Vec<Panel> = Vec::new();
+    for (index, frf) in frfs.iter().enumerate() {
+        let color = Color::curve(index);
+        // An analyser does not say by which estimator it has made a function.
+        let estimator = match frf.averages {
+            0 => "of the file",
+            _ => frf.estimator.name(),
+        };
+        let named = format!("{}, {estimator}", frf.response);
+        let curve = over_lines(lines, &named, color, magnitudes(frf.values()));
+        let unit = unit_words(&frf.unit);
+        let series = panel_of(&mut panels, &x, frf.form_words, &unit);
+        series.push(curve);
+        for other in beside(frf, others) {
+            let named = format!("{}, {}", frf.response, other.name());
+            series.push(Series {
+                mark: Mark::Line(1.0),
+                opacity: FAINT,
+                ..over_lines(lines, &named, color, magnitudes(frf.of(other)))
+            });
+        }
+    }
+    for panel in &mut panels {
+        // The estimator that is meant gives the colour its name.
+        panel.series.sort_by(|a, b| b.opacity.total_cmp(&a.opacity));
+    }
+    scale_to_magnitudes(&mut panels);
+    panels
+}
+
+/// Returns the estimators shown beside the one that a function is given by; none of one average, where all are the same.
+fn beside(frf: &Frf, others: &[FrfEstimator]) -> impl Iterator<Item = FrfEstimator> {
+    let shown = others.iter().filter(|_| frf.averages > 1);
+    shown.copied().filter(|other| *other != frf.estimator)
+}
+
+/// Returns the magnitude on each line; what does not exist is no number.
+pub(super) fn magnitudes(values: &[Option<Complex64>]) -> Vec<f64> {
+    let magnitudes = values
+        .iter()
+        .map(|value| value.map_or(f64::NAN, |h| h.norm()));
+    magnitudes.collect()
+}
+
+/// Returns the series of the panel of this quantity and unit, which is added where there is none yet.
+fn panel_of<'a>(
+    panels: &'a mut Vec<Panel>,
+    x: &Axis,
+    label: &str,
+    unit: &str,
+) -> &'a mut Vec<Series> {
+    let known = panels.iter();
+    let known = known.map(|panel| (panel.y.label.as_str(), panel.y.unit.as_str()));
+    let index = known.take_while(|own| *own != (label, unit)).count();
+    if index == panels.len() {
+        let y = Axis::linear(0.0, 1.0).of(label, unit);
+        panels.push(Panel::new(HIGH, x.clone(), y));
+    }
+    &mut panels[index].series
+}
+
+/// Gives panels logarithmic axes over their curves, faint ones apart.
+fn scale_to_magnitudes(panels: &mut [Panel]) {
+    for panel in panels {
+        panel.series.retain(|series| series.count() > 0);
+        let main = panel.series.iter().filter(|series| series.opacity == 1.0);
+        let y = magnitude_axis(main.flat_map(|series| series.y.iter().copied()));
+        panel.y = y.of(&panel.y.label, &panel.y.unit);
+    }
+}
+
+/// Returns the unit of a transform: that of the signal times seconds.
+fn unit_of_transform(unit: &Option<String>) -> String {
+    match unit {
+        Some(unit) => format!("{} s", unit_words(unit)),
+        None => "unit of the file \u{d7} s".to_owned(),
+    }
+}
+
+/// Returns a curve over the spectral lines.
+pub(super) fn over_lines(lines: &Lines, name: &str, color: Color, values: Vec<f64>) -> Series {
     Series::even(name, color, lines.frequency(0), lines.spacing, values)
 }
 
 /// Averages, block, lines, spacing and resolution in words.
-fn subtitle(spectra: &SpectraFigure) -> String {
-    let lines = &spectra.lines;
+fn subtitle(spectra: &MeasuredSpectra) -> String {
+    let lines = &spectra.averages.lines;
     let end = shown_to(spectra);
     let shown = if end < lines.high {
         let (end, all) = (trimmed(end, 6), trimmed(lines.high, 6));
@@ -171,33 +237,35 @@ fn subtitle(spectra: &SpectraFigure) -> String {
         String::new()
     };
     let spacing = trimmed(lines.spacing, 4);
-    if spectra.averages == 0 {
-        return format!(
-            "as the file holds them \u{b7} {} lines \u{b7} line spacing {spacing} Hz{shown}",
-            lines.points()
-        );
-    }
-    let taps = if spectra.averages == 1 { "tap" } else { "taps" };
+    let taps = match spectra.averages.taps {
+        0 => {
+            return format!(
+                "as the file holds them \u{b7} {} lines \u{b7} line spacing {spacing} Hz{shown}",
+                lines.points()
+            );
+        }
+        1 => "1 tap".to_owned(),
+        count => format!("{count} taps"),
+    };
     format!(
-        "{} {taps} averaged \u{b7} block {} samples, {} lines \u{b7} line spacing {spacing} Hz \u{b7} resolution 1/T = {} Hz{shown}",
-        spectra.averages,
+        "{taps} averaged \u{b7} block {} samples, {} lines \u{b7} line spacing {spacing} Hz \u{b7} resolution 1/T = {} Hz{shown}",
         lines.block,
         lines.displayed(),
         trimmed(lines.resolution(), 4),
     )
 }
 
-/// The horizontal axis of a recording's spectra.
-pub(super) fn frequency_axis(spectra: &SpectraFigure) -> Axis {
-    Axis::linear(spectra.lines.low, shown_to(spectra)).of("frequency", "Hz")
+/// Returns the horizontal axis of a recording's spectra.
+pub(super) fn frequency_axis(spectra: &MeasuredSpectra) -> Axis {
+    Axis::linear(spectra.averages.lines.low, shown_to(spectra)).of("frequency", "Hz")
 }
 
 /// Upper end of the frequencies shown (Hz): the band's, or where nothing was found in its upper
 /// part, a round frequency above the highest peak. A kilohertz of modes under twenty kilohertz of
 /// noise cannot be read.
-fn shown_to(spectra: &SpectraFigure) -> f64 {
-    let (low, high) = (spectra.lines.low, spectra.lines.high);
-    let peaks = spectra.peaks.iter().map(|peak| peak.frequency);
+fn shown_to(spectra: &MeasuredSpectra) -> f64 {
+    let (low, high) = (spectra.averages.lines.low, spectra.averages.lines.high);
+    let peaks = spectra.readings.iter().map(|reading| reading.frequency);
     let Some((_, highest)) = extent(peaks) else {
         return high;
     };
@@ -211,19 +279,18 @@ fn shown_to(spectra: &SpectraFigure) -> f64 {
     }
 }
 
-/// A logarithmic axis that shows all positive values down to 140 dB below the largest.
-pub(super) fn magnitude_axis<'a>(curves: impl Iterator<Item = &'a [f64]>) -> Axis {
-    let all = curves.flatten().copied().filter(|value| *value > 0.0);
-    let all: Vec<f64> = all.collect();
+/// Returns a logarithmic axis that shows all positive values down to 140 dB below the largest.
+pub(super) fn magnitude_axis(values: impl Iterator<Item = f64>) -> Axis {
+    let all: Vec<f64> = values.filter(|value| *value > 0.0).collect();
     let high = extent(all.iter().copied()).map_or(1.0, |range| range.1);
     let shown = all.into_iter().filter(|value| *value >= DEEPEST * high);
     let low = extent(shown).map_or(1e-3, |range| range.0);
     Axis::logarithmic(low / 1.4, high * 1.6)
 }
 
-/// The force's spectrum in dB below its largest value: how far the hammer reaches; `None` without a force.
-fn force_panel(spectra: &SpectraFigure) -> Option<Panel> {
-    let force = spectra.force.as_deref()?;
+/// Returns the force's spectrum in dB below its largest value: how far the hammer reaches; `None` without a force.
+fn force_panel(spectra: &MeasuredSpectra, unit: &str) -> Option<Panel> {
+    let force = spectra.averages.force.as_deref()?;
     let largest = extent(force.iter().copied())?.1;
     if largest <= 0.0 {
         return None;
@@ -233,74 +300,60 @@ fn force_panel(spectra: &SpectraFigure) -> Option<Panel> {
     let lowest = extent(decibels.iter().copied()).map_or(-20.0, |range| range.0);
     let floor = (lowest / 10.0).floor().clamp(-8.0, -1.0) * 10.0;
     let axis = Axis::linear(floor - 2.0, 4.0).of("force", "dB");
-    let unit = &spectra.force_unit;
-    let name = format!(
-        "force, dB below its largest of {} {unit}",
-        significant(largest, 3)
-    );
-    let series = over_lines(spectra, &name, Color::Soft, decibels);
+    let largest = significant(largest, 3);
+    let name = format!("force, dB below its largest of {largest} {unit}");
+    let series = over_lines(&spectra.averages.lines, &name, Color::Soft, decibels);
     Some(Panel::new(114.0, frequency_axis(spectra), axis).with([series]))
 }
 
-/// Level of a ratio of amplitudes (dB), at least -120.
+/// Returns the level of a ratio of amplitudes (dB), at least -120.
 fn decibels(ratio: f64) -> f64 {
     20.0 * ratio.max(1e-6).log10()
 }
 
-/// The resonances as marks on the frequency axis.
-pub(super) fn rules(spectra: &SpectraFigure) -> Vec<Rule> {
-    let known = spectra
-        .peaks
-        .iter()
-        .filter(|peak| peak.frequency.is_finite());
-    known.map(rule).collect()
+/// Returns the resonances as marks on the frequency axis.
+pub(super) fn rules(recording: &RecordingResult, spectra: &MeasuredSpectra) -> Vec<Rule> {
+    let read = spectra.readings.iter().zip(&recording.mode_numbers);
+    let known = read.filter(|(reading, _)| reading.frequency.is_finite());
+    known.map(|(reading, mode)| rule(reading, *mode)).collect()
 }
 
-fn rule(peak: &PeakMark) -> Rule {
-    Rule {
-        at: peak.frequency,
-        line: peak.line_frequency,
-        half: peak.half_line,
-        name: match (peak.mode, &peak.label) {
-            (Some(mode), _) => format!("mode {mode}"),
-            (None, Some(label)) => label.clone(),
-            (None, None) => "no mode".to_owned(),
-        },
-        words: frequency_words(peak),
-        mode: peak.mode.is_some(),
-        prominence: peak.prominence_db,
-    }
-}
-
-/// The frequency with one digit more than its half-line bound.
-fn frequency_words(peak: &PeakMark) -> String {
-    let bound = peak.half_line / 5.0;
+fn rule(reading: &ModeReading, mode: Option<usize>) -> Rule {
+    // One digit more than the half-line bound.
+    let bound = reading.half_line / 5.0;
     let decimals = if bound > 0.0 {
         (-bound.log10().floor()).clamp(0.0, 5.0) as usize
     } else {
         2
     };
-    format!("{:.decimals$} Hz", peak.frequency)
+    Rule {
+        at: reading.frequency,
+        line: reading.line_frequency,
+        half: reading.half_line,
+        name: match (mode, reading.label) {
+            (Some(mode), _) => format!("mode {mode}"),
+            (None, Some(label)) => label.to_string(),
+            (None, None) => "no mode".to_owned(),
+        },
+        words: format!("{:.decimals$} Hz", reading.frequency),
+        mode: mode.is_some(),
+        prominence: reading.prominence_db.unwrap_or(0.0),
+    }
 }
 
-/// Close-ups of the modes: the single lines, the bound of the reading, and the frequency between the lines. The
-/// page needs none: it zooms.
-fn close_ups(spectra: &SpectraFigure) -> Option<Block> {
-    let modes = spectra.peaks.iter().filter(|peak| peak.mode.is_some());
-    let modes: Vec<&PeakMark> = modes.filter(|peak| peak.frequency.is_finite()).collect();
-    if modes.is_empty() {
-        return None;
-    }
-    let shown = modes.iter().take(MOST_CLOSE_UPS);
-    let panels: Vec<Panel> = shown.map(|peak| close_up(spectra, peak)).collect();
-    let name = if modes.len() > MOST_CLOSE_UPS {
-        format!(
-            "Close-ups, the first {MOST_CLOSE_UPS} of {} modes",
-            modes.len()
-        )
-    } else {
-        "Close-ups".to_owned()
+/// Returns close-ups of the modes: the single lines, the bound of the reading, and the frequency between the lines.
+/// The page needs none: it zooms.
+fn close_ups(spectra: &MeasuredSpectra, rules: &[Rule]) -> Option<Block> {
+    let modes: Vec<&Rule> = rules.iter().filter(|rule| rule.mode).collect();
+    let name = match modes.len() {
+        0 => return None,
+        count if count > MOST_CLOSE_UPS => {
+            format!("Close-ups, the first {MOST_CLOSE_UPS} of {count} modes")
+        }
+        _ => "Close-ups".to_owned(),
     };
+    let shown = modes.into_iter().take(MOST_CLOSE_UPS);
+    let panels: Vec<Panel> = shown.map(|rule| close_up(spectra, rule)).collect();
     Some(Block {
         name,
         in_page: InPage::Absent,
@@ -308,10 +361,11 @@ fn close_ups(spectra: &SpectraFigure) -> Option<Block> {
     })
 }
 
-fn close_up(spectra: &SpectraFigure, peak: &PeakMark) -> Panel {
-    let center = peak.line_frequency;
-    let reach = (SIDE * spectra.lines.spacing).max(2.0 * peak.half_line);
-    let decimals = if peak.half_line < 0.05 { 3 } else { 2 };
+fn close_up(spectra: &MeasuredSpectra, rule: &Rule) -> Panel {
+    let center = rule.line;
+    let lines = &spectra.averages.lines;
+    let reach = (SIDE * lines.spacing).max(2.0 * rule.half);
+    let decimals = if rule.half < 0.05 { 3 } else { 2 };
     let side = significant(reach, 2);
     let x = Axis::linear(center - reach, center + reach);
     let names = [
@@ -320,23 +374,21 @@ fn close_up(spectra: &SpectraFigure, peak: &PeakMark) -> Panel {
         (x.high, format!("+{side}")),
     ];
     let y = Axis::linear(-DEPTH, 4.0).of("level", "dB");
-    let mut panel = Panel::new(118.0, x.named(names), y);
-    panel.title = peak
-        .mode
-        .map_or(String::new(), |mode| format!("mode {mode}"));
-    panel.rules = vec![rule(peak)];
-    for (index, response) in spectra.responses.iter().enumerate() {
-        let color = Color::curve(index);
-        let curve = over_lines(spectra, "", color, response.values.clone());
-        let near = curve
-            .pairs()
-            .filter(|(at, value)| panel.x.holds(*at) && value.is_finite());
+    let mut panel = Panel::new(118.0, x.named(names), y).titled(&rule.name);
+    panel.rules = vec![rule.clone()];
+    for (index, values) in spectra.averages.responses.iter().enumerate() {
+        let numbered = values.iter().enumerate();
+        let near = numbered.map(|(line, value)| {
+            let at = lines.frequency(0) + lines.spacing * line as f64;
+            (at, *value)
+        });
+        let near = near.filter(|(at, value)| panel.x.holds(*at) && value.is_finite());
         let near: Vec<(f64, f64)> = near.collect();
         let largest = extent(near.iter().map(|point| point.1)).map_or(1.0, |range| range.1);
-        let levels: Vec<(f64, f64)> = near
-            .into_iter()
-            .map(|(at, value)| (at, decibels(value / largest)))
-            .collect();
+        let levels = near.into_iter();
+        let levels = levels.map(|(at, value)| (at, decibels(value / largest)));
+        let levels: Vec<(f64, f64)> = levels.collect();
+        let color = Color::curve(index);
         // In one colour the legend explains the lines.
         let name = if index == 0 { "spectral line" } else { "" };
         panel = panel.with([

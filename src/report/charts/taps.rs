@@ -1,95 +1,99 @@
 //! A recording over time with its taps.
 
+use tapjoint_analysis::{CloseUp, RecordingResult};
+use tapjoint_signal::taps::Tap;
+
 use super::super::chart::axis::{Axis, extent, padded};
-use super::super::chart::{Block, Chart, Color, Event, Panel, Places, Series};
-use super::super::figures::{RecordingFigure, TapMark, TimeOverview};
+use super::super::chart::{Block, Chart, Color, Event, Mark, Panel, Places, Series};
 use super::super::format::significant;
+use super::unit_of;
 
 /// Most reasons written under the picture; the table of taps has them all.
 const MOST_REASONS: usize = 6;
 
-/// The recording over time; `None` for a recording without samples.
-pub fn taps(figure: &RecordingFigure) -> Option<Chart> {
-    let overview = figure.overview.as_ref()?;
+/// Returns the recording over time; `None` for a recording without samples.
+pub fn taps(recording: &RecordingResult, name: &str) -> Option<Chart> {
+    let overview = recording.overview.as_ref()?;
     let count = overview.low.len().min(overview.high.len());
     if count == 0 {
         return None;
     }
     let (low, high) = (&overview.low[..count], &overview.high[..count]);
-    let peaks = overview.taps.iter().map(|tap| tap.peak);
+    let taps = &recording.measurement.taps.taps;
+    let peaks = taps.iter().map(|tap| tap.peak);
     let range = extent(low.iter().chain(high).copied().chain(peaks)).unwrap_or((-1.0, 1.0));
-    let (label, unit) = split_unit(&overview.label);
+    let (label, unit) = match recording.responses.first() {
+        _ if recording.has_hammer => ("force".to_owned(), unit_of(&recording.tap_unit)),
+        Some(first) => (format!("response {}", first.name), unit_of(&first.unit)),
+        None => ("response".to_owned(), String::new()),
+    };
     let seconds = overview.step * count as f64;
     // Room at the start: a recording may begin with a tap, whose mark would lie on the frame.
     let x = Axis::linear(-0.015 * seconds, seconds).of("time", "s");
     // Room above the tallest tap for its number.
-    let y = padded(range, 0.14).of(label, unit);
-    let places = Places::Even(0.5 * overview.step, overview.step);
-    let signal = Series::band(
-        &overview.label,
-        Color::Data,
-        places,
-        low.to_vec(),
-        high.to_vec(),
-    );
+    let y = padded(range, 0.14).of(label, &unit);
+    let signal = Series {
+        x: Places::even(0.5 * overview.step, overview.step, count),
+        low: low.to_vec(),
+        high: high.to_vec(),
+        ..Series::new(&y.title(), Color::Data, Mark::Band)
+    };
     let mut panel = Panel::new(262.0, x, y).with([signal]);
-    let marks = overview.taps.iter();
-    panel.events = marks.map(|tap| event(tap, unit)).collect();
+    for (index, tap) in taps.iter().enumerate() {
+        let close_up = overview.close_ups.get(index);
+        panel.events.push(event(tap, &unit, recording, close_up));
+    }
+    let found = match taps.len() {
+        1 => "1 tap".to_owned(),
+        count => format!("{count} taps"),
+    };
+    let used = taps.iter().filter(|tap| tap.accepted()).count();
+    let rejected = taps.len() - used;
     Some(Chart {
         kind: "taps",
-        title: format!("Taps, {}", figure.file),
-        subtitle: counts(overview),
-        caption: format!("{} over time; numbers count the taps.", figure.file),
+        title: format!("Taps, {name}"),
+        subtitle: format!("{found} found \u{b7} {used} used \u{b7} {rejected} rejected"),
+        caption: format!("{name} over time; numbers count the taps."),
         blocks: vec![Block::new(1, vec![panel])],
-        footnotes: reasons(&overview.taps),
+        footnotes: reasons(taps),
         ..Chart::default()
     })
 }
 
-/// "force (N)" as "force" and "N".
-pub(super) fn split_unit(label: &str) -> (&str, &str) {
-    let inner = label.strip_suffix(')');
-    let parts = inner.and_then(|label| label.rsplit_once(" ("));
-    parts.unwrap_or((label, ""))
-}
-
-fn event(tap: &TapMark, unit: &str) -> Event {
-    let place = format!("{:.3} s, {} {unit}", tap.time, significant(tap.peak, 3));
-    let close_up = tap.close_up.iter().flat_map(|close_up| {
-        close_up.curves.iter().map(|curve| {
-            let (start, step) = (1e3 * close_up.start, 1e3 * close_up.step);
-            let series = Series::even(&curve.label, Color::Soft, start, step, curve.values.clone());
-            let y = Axis::linear(0.0, 1.0).of(curve.label.as_str(), curve.unit.as_str());
+fn event(tap: &Tap, unit: &str, recording: &RecordingResult, found: Option<&CloseUp>) -> Event {
+    let mut close_up = Vec::new();
+    if let Some(found) = found {
+        let force = found.force.as_ref();
+        let force = force.map(|values| ("force".to_owned(), &recording.tap_unit, values));
+        let response = recording.responses.first().zip(found.response.as_ref());
+        let response =
+            response.map(|(one, values)| (format!("response {}", one.name), &one.unit, values));
+        for (label, unit, values) in force.into_iter().chain(response) {
+            let (start, step) = (1e3 * found.start, 1e3 * found.step);
+            let series = Series::even(&label, Color::Soft, start, step, values.clone());
             let x = Axis::linear(0.0, 1.0).of("time from the trigger", "ms");
-            Panel::new(190.0, x, y).with([series])
-        })
-    });
+            let y = Axis::linear(0.0, 1.0).of(label, unit_of(unit));
+            close_up.push(Panel::new(190.0, x, y).with([series]));
+        }
+    }
+    let place = format!("{:.3} s, {} {unit}", tap.time, significant(tap.peak, 3));
     Event {
         at: tap.time,
         peak: tap.peak,
-        words: match &tap.rejected {
+        words: match &tap.rejection {
             None => format!("used, {place}"),
             Some(reason) => format!("rejected, {place}: {reason}"),
         },
-        used: tap.rejected.is_none(),
-        close_up: close_up.collect(),
+        used: tap.accepted(),
+        close_up,
     }
 }
 
-fn counts(overview: &TimeOverview) -> String {
-    let found = overview.taps.len();
-    let rejected = overview.taps.iter().filter(|tap| tap.rejected.is_some());
-    let rejected = rejected.count();
-    let used = found - rejected;
-    let taps = if found == 1 { "tap" } else { "taps" };
-    format!("{found} {taps} found \u{b7} {used} used \u{b7} {rejected} rejected")
-}
-
-/// "tap 3 at 6.21 s: double hit", and how many more there are.
-fn reasons(taps: &[TapMark]) -> Vec<String> {
+/// Returns "tap 3 at 6.21 s: double hit" of every rejected tap, and how many more there are.
+fn reasons(taps: &[Tap]) -> Vec<String> {
     let mut reasons = Vec::new();
     for (index, tap) in taps.iter().enumerate() {
-        if let Some(reason) = &tap.rejected {
+        if let Some(reason) = &tap.rejection {
             reasons.push(format!("tap {} at {:.2} s: {reason}", index + 1, tap.time));
         }
     }

@@ -37,7 +37,7 @@ pub fn render_abaqus(deck: &Deck) -> String {
         section(&mut text, deck, index, &set);
     }
     for (index, own) in deck.masses.iter().enumerate() {
-        element = mass(&mut text, (element, index + 1), own);
+        mass(&mut text, &mut element, index + 1, own);
     }
     // A plane beam still stretches: it is held along x.
     text.push_str("*BOUNDARY\nALL, 1, 1\n");
@@ -45,7 +45,7 @@ pub fn render_abaqus(deck: &Deck) -> String {
         let is_joint = index == 0 && deck.joint.is_some();
         let hinge = format!("HINGE{}", index + 1);
         let set = if is_joint { "SPRING" } else { &hinge };
-        springs(&mut text, joint, (element, set));
+        springs(&mut text, joint, element, set);
         element += SPRINGS;
     }
     for (index, (node, stiffness)) in deck.springs.iter().enumerate() {
@@ -58,12 +58,7 @@ pub fn render_abaqus(deck: &Deck) -> String {
         let _ = writeln!(text, "*SPRING, ELSET={set}\n{W}\n{stiffness:.10e}");
     }
     let modes = deck.frequencies.len().max(5);
-    // Rigid-body motions of a structure that is not held lie below 1 Hz.
-    let from = if deck.joint.is_some_and(|joint| joint.other.is_none()) {
-        ""
-    } else {
-        "1."
-    };
+    let from = deck.least_frequency();
     let _ = writeln!(text, "*STEP\n*FREQUENCY\n{modes}, {from}\n*END STEP");
     text
 }
@@ -95,18 +90,17 @@ fn section(text: &mut String, deck: &Deck, index: usize, set: &str) {
     );
 }
 
-/// A mass and its moment of inertia, after so many elements; how many there are with it.
-fn mass(text: &mut String, (elements, number): (usize, usize), own: &DeckMass) -> usize {
+/// Writes a mass and its moment of inertia, and counts their elements.
+fn mass(text: &mut String, element: &mut usize, number: usize, own: &DeckMass) {
     let node = own.node + 1;
-    let mut element = elements;
     if own.mass != 0.0 {
-        element += 1;
+        *element += 1;
         let set = format!("MASS{number}");
         let _ = writeln!(text, "*ELEMENT, TYPE=MASS, ELSET={set}\n{element}, {node}");
         let _ = writeln!(text, "*MASS, ELSET={set}\n{:.10e}", own.mass);
     }
     if own.inertia != 0.0 {
-        element += 1;
+        *element += 1;
         let set = format!("INERTIA{number}");
         let _ = writeln!(
             text,
@@ -119,10 +113,9 @@ fn mass(text: &mut String, (elements, number): (usize, usize), own: &DeckMass) -
             own.inertia
         );
     }
-    element
 }
 
-fn springs(text: &mut String, joint: &DeckJoint, (elements, name): (usize, &str)) {
+fn springs(text: &mut String, joint: &DeckJoint, elements: usize, name: &str) {
     let node = joint.node + 1;
     let mut id = elements;
     for (stiffness, direction) in [(joint.translation, W), (joint.rotation, THETA)] {

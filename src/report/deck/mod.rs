@@ -7,6 +7,7 @@
 mod abaqus;
 mod nastran;
 
+use super::text_table::lines_of;
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Hinge, Specimen, SpecimenJoint};
@@ -19,6 +20,8 @@ pub use nastran::render_nastran;
 
 /// Elements along the beam: with cubic elements and consistent mass ten modes are then right to 1e-5.
 const ELEMENTS: usize = 120;
+/// Longest remark that old input formats take (characters).
+const LONGEST: usize = 72;
 /// Nodes nearer than this share of the length are one node.
 const SAME: f64 = 1e-9;
 
@@ -27,9 +30,9 @@ const SAME: f64 = 1e-9;
 pub struct Deck {
     /// Name of the test.
     pub name: String,
-    /// Where the numbers of the joint come from.
+    /// Source of the joint's numbers.
     pub origin: String,
-    /// What has to be known of the joint's numbers: how far the model misses, and their limits.
+    /// Doubts about the joint's numbers: the model's misfit, and their limits.
     pub doubts: Vec<String>,
     /// Theory of bending.
     pub theory: BeamTheory,
@@ -86,21 +89,13 @@ pub struct DeckJoint {
     pub cross: f64,
 }
 
-impl DeckJoint {
-    /// Whether the ground holds a direction without give.
-    fn is_held(&self) -> bool {
-        let rigid = self.translation.is_infinite() || self.rotation.is_infinite();
-        self.other.is_none() && rigid
-    }
-}
-
-/// Why there is no deck.
+/// Reasons for which there is no deck.
 #[derive(Debug, thiserror::Error)]
 pub enum DeckError {
     /// Nothing was estimated and nothing is known.
     #[error("there is no joint to write: {reason}")]
     NoJoint {
-        /// Why.
+        /// The reason.
         reason: String,
     },
     /// A coupled joint that is rigid in one direction.
@@ -113,7 +108,7 @@ pub enum DeckError {
         "a deck has no elements for {what}; take that [[effect]] out, or predict with the description itself"
     )]
     NoElement {
-        /// What it changes.
+        /// The property that it changes.
         what: &'static str,
     },
     /// A beam or a lap joint that cannot exist.
@@ -121,16 +116,16 @@ pub enum DeckError {
     Structure(#[from] StructureError),
 }
 
-/// What a deck is made of.
+/// Input of a deck.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeckSource {
     /// The structure without its joint, of the beam that belongs to the joint.
     pub structure: JointedStructure,
     /// The joint, non-dimensional by that beam.
     pub joint: JointStiffness,
-    /// Where it is from.
+    /// Its source.
     pub origin: String,
-    /// What has to be known of its numbers.
+    /// Doubts about its numbers.
     pub doubts: Vec<String>,
     /// Frequencies (Hz) that both together predict.
     pub frequencies: Vec<f64>,
@@ -143,13 +138,12 @@ pub struct DeckSource {
 pub fn source_of(test: &TestDescription, analysis: &Analysis) -> Result<DeckSource, DeckError> {
     let structure = tested_structure(test);
     let found = analysis.identification.as_ref();
-    let missing = || DeckError::NoJoint {
-        reason: found
-            .and_then(|found| found.reason.clone())
-            .unwrap_or_else(|| "nothing was estimated".to_owned()),
+    let known = found.and_then(|found| Some((found, found.beam_and_joint(&structure)?)));
+    let Some((found, (beam, joint))) = known else {
+        let reason = found.and_then(|found| found.reason.clone());
+        let reason = reason.unwrap_or_else(|| "nothing was estimated".to_owned());
+        return Err(DeckError::NoJoint { reason });
     };
-    let found = found.ok_or_else(missing)?;
-    let (beam, joint) = found.beam_and_joint(&structure).ok_or_else(missing)?;
     let origin = match (&found.consistent, &found.estimate) {
         (Some(_), _) => "least squares on the frequencies",
         (None, _) if structure.known.over(None).is_some() => "stated in the description",
@@ -175,19 +169,8 @@ pub fn source_of(test: &TestDescription, analysis: &Analysis) -> Result<DeckSour
 /// [`DeckError`] where structure or joint cannot be written.
 pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
     let structure = &source.structure;
-    let mut deck = Deck {
-        name: name.to_owned(),
-        origin: source.origin.clone(),
-        doubts: source.doubts.clone(),
-        theory: structure.theory,
-        pieces: Vec::new(),
-        nodes: Vec::new(),
-        masses: Vec::new(),
-        joint: None,
-        hinges: Vec::new(),
-        springs: Vec::new(),
-        frequencies: source.frequencies.clone(),
-    };
+    let mut deck = Deck::new(name, &source.origin, structure.theory, &source.frequencies);
+    deck.doubts.clone_from(&source.doubts);
     let body = structure.body()?;
     let specimen = structure.specimen(SpecimenJoint::Free);
     let mut masses = specimen.masses.clone();
@@ -198,44 +181,27 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
     for mass in masses {
         deck.add_mass(mass.position, mass.mass, 0.0);
     }
-    let (beam, joint) = (&structure.beam, &source.joint);
-    deck.joint = match structure.assembly {
-        Assembly::Free => None,
-        Assembly::Cantilever => Some(springs(beam, joint, (0, None))?),
-        Assembly::Lap => {
-            let first = deck.pieces.last().map_or(0, |piece| piece.first);
-            Some(springs(beam, joint, (first, first.checked_sub(1)))?)
-        }
+    let node = match structure.assembly {
+        Assembly::Free => return Ok(deck),
+        Assembly::Cantilever => 0,
+        Assembly::Lap => deck.pieces.last().map_or(0, |piece| piece.first),
     };
+    let units = StiffnessUnits::of(&structure.beam);
+    let joint = &source.joint;
+    let (kt, kr) = (joint.kx * units.kt, joint.ky * units.kr);
+    let cross = joint.cross_compliance / units.ktr;
+    deck.joint = Some(scalar_springs(kt, kr, cross, node)?);
     Ok(deck)
 }
 
-/// The joint's scalar springs: with the stiffness matrix K, the inverse of the compliance
-/// `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`, they are w to ground K11 + K12, theta to ground K22 + K12, and
-/// between w and theta -K12.
-fn springs(
-    beam: &Beam,
-    joint: &JointStiffness,
-    (node, other): (usize, Option<usize>),
-) -> Result<DeckJoint, DeckError> {
-    let units = StiffnessUnits::of(beam);
-    let stiffnesses = (joint.kx * units.kt, joint.ky * units.kr);
-    scalar_springs(
-        stiffnesses,
-        joint.cross_compliance / units.ktr,
-        (node, other),
-    )
-}
-
-/// The same from Kt (N/m), Kr (N m/rad) and 1/Ktr (rad/N).
-fn scalar_springs(
-    (kt, kr): (f64, f64),
-    cross: f64,
-    (node, other): (usize, Option<usize>),
-) -> Result<DeckJoint, DeckError> {
+/// Returns the scalar springs of a joint of Kt (N/m), Kr (N m/rad) and 1/Ktr (rad/N): with the stiffness matrix K,
+/// the inverse of the compliance `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`, they are w to ground K11 + K12, theta to ground
+/// K22 + K12, and between w and theta -K12.
+fn scalar_springs(kt: f64, kr: f64, cross: f64, node: usize) -> Result<DeckJoint, DeckError> {
     let plain = DeckJoint {
         node,
-        other,
+        // The first node stands on the ground, any other beside the end of the piece before it.
+        other: node.checked_sub(1),
         translation: kt,
         rotation: kr,
         cross: 0.0,
@@ -257,6 +223,23 @@ fn scalar_springs(
 }
 
 impl Deck {
+    /// A deck without nodes.
+    fn new(name: &str, origin: &str, theory: BeamTheory, frequencies: &[f64]) -> Deck {
+        Deck {
+            name: name.to_owned(),
+            origin: origin.to_owned(),
+            doubts: Vec::new(),
+            theory,
+            pieces: Vec::new(),
+            nodes: Vec::new(),
+            masses: Vec::new(),
+            joint: None,
+            hinges: Vec::new(),
+            springs: Vec::new(),
+            frequencies: frequencies.to_vec(),
+        }
+    }
+
     /// Nodes at these places and at equal distances between them: a short element beside a node of a regular mesh
     /// would cost digits. Elements of each beam between its own nodes.
     fn mesh(&mut self, beams: &[Beam], at: &[f64]) {
@@ -272,17 +255,15 @@ impl Deck {
             let mut ends: Vec<f64> = inside.chain([from, to]).collect();
             ends.sort_by(f64::total_cmp);
             ends.dedup_by(|a, b| (*a - *b).abs() < SAME * length);
-            let between = |pair: &[f64]| {
+            let first = self.nodes.len();
+            for pair in ends.windows(2) {
                 // A little more than whole, by rounding, is whole.
                 let count = ((pair[1] - pair[0]) / longest - 1e-6).ceil().max(1.0) as usize;
                 let step = (pair[1] - pair[0]) / count as f64;
-                let start = pair[0];
-                (0..count).map(move |index| start + step * index as f64)
-            };
-            let places = ends.windows(2).flat_map(between);
-            let places: Vec<f64> = places.chain(ends.last().copied()).collect();
-            let first = self.nodes.len();
-            self.nodes.extend(places);
+                let places = (0..count).map(|index| pair[0] + step * index as f64);
+                self.nodes.extend(places);
+            }
+            self.nodes.extend(ends.last());
             self.pieces.push(DeckPiece {
                 first,
                 last: self.nodes.len() - 1,
@@ -292,34 +273,42 @@ impl Deck {
         }
     }
 
-    /// The node at a place (m).
+    /// Returns the node nearest to a place (m).
     fn node_at(&self, place: f64) -> Option<usize> {
-        let distance = |node: &(usize, &f64)| (node.1 - place).abs();
-        let nodes = self.nodes.iter().enumerate();
-        let nearest = nodes.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.map(|(node, _)| node)
+        nearest(place, self.nodes.iter().copied())
     }
 
     fn add_mass(&mut self, place: f64, mass: f64, inertia: f64) {
-        let node = self.node_at(place);
-        let mass = |node| DeckMass {
-            node,
-            mass,
-            inertia,
-        };
-        self.masses.extend(node.map(mass));
+        if let Some(node) = self.node_at(place) {
+            self.masses.push(DeckMass {
+                node,
+                mass,
+                inertia,
+            });
+        }
     }
 
-    /// What both formats say at their head.
+    /// Lower end (Hz) of the frequencies to compute, in both formats: a structure that is not held has rigid-body
+    /// motions, which lie below 1 Hz.
+    fn least_frequency(&self) -> &'static str {
+        match self.joint {
+            Some(DeckJoint { other: None, .. }) => "",
+            _ => "1.",
+        }
+    }
+
+    /// Returns the remarks at the head of both formats.
     fn remarks(&self) -> Vec<String> {
         let mut lines = vec![
             format!(
                 "{}: beam with its joint, written by tapjoint",
-                plain(&self.name)
+                ascii(&self.name).chars().take(40).collect::<String>()
             ),
             format!("joint: {}", self.origin),
         ];
-        lines.extend(self.doubts.iter().flat_map(|doubt| short_lines(doubt)));
+        let doubts = self.doubts.iter();
+        let doubts = doubts.flat_map(|doubt| lines_of(doubt, LONGEST, 0));
+        lines.extend(doubts.map(|line| ascii(&line)));
         lines.push(
             "units: m, kg, s, N, rad; the beam lies along x, w is along y, theta about z"
                 .to_owned(),
@@ -345,35 +334,19 @@ impl Deck {
     }
 }
 
-/// A remark in lines that old input formats take.
-fn short_lines(text: &str) -> Vec<String> {
-    const LONGEST: usize = 72;
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.is_empty() => line.push_str(word),
-            Some(line) if line.len() + 1 + word.len() <= LONGEST => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines.iter().map(|line| ascii(line)).collect()
-}
-
-/// A name as old input formats want it.
-fn plain(text: &str) -> String {
-    ascii(text).chars().take(40).collect()
-}
-
-/// Printable ASCII.
+/// Returns a text in printable ASCII.
 fn ascii(text: &str) -> String {
-    let printable = |letter: char| match letter == ' ' || letter.is_ascii_graphic() {
-        true => letter,
-        false => '?',
-    };
-    text.chars().map(printable).collect()
+    text.replace(
+        |letter: char| letter != ' ' && !letter.is_ascii_graphic(),
+        "?",
+    )
+}
+
+/// Returns the index of the value nearest to a place.
+fn nearest(place: f64, values: impl Iterator<Item = f64>) -> Option<usize> {
+    let distances = values.map(|value| (value - place).abs()).enumerate();
+    let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.map(|(index, _)| index)
 }
 
 /// The deck of a structure, and the frequencies (Hz) that it is predicted to have.
@@ -382,23 +355,12 @@ fn ascii(text: &str) -> String {
 /// [`DeckError::NoElement`] of what no element of a plane beam shows: an axial force, a fixture that rocks, a beam
 /// with part of its shear and rotary inertia; [`DeckError::RigidAndCoupled`] as for any joint.
 pub fn deck_with_effects(
-    (name, origin): (&str, &str),
+    name: &str,
+    origin: &str,
     specimen: &Specimen,
     frequencies: &[f64],
 ) -> Result<Deck, DeckError> {
-    let mut deck = Deck {
-        name: name.to_owned(),
-        origin: origin.to_owned(),
-        doubts: Vec::new(),
-        theory: theory_of(specimen)?,
-        pieces: Vec::new(),
-        nodes: Vec::new(),
-        masses: Vec::new(),
-        joint: None,
-        hinges: Vec::new(),
-        springs: Vec::new(),
-        frequencies: frequencies.to_vec(),
-    };
+    let mut deck = Deck::new(name, origin, theory_of(specimen)?, frequencies);
     let cracks = cracks_of(specimen);
     let masses = specimen.masses.iter().map(|mass| mass.position);
     let springs = specimen.springs.iter().map(|spring| spring.position);
@@ -406,7 +368,16 @@ pub fn deck_with_effects(
     deck.mesh(&cut(specimen.body.beams(), &cracks), &places);
     let joint = joint_of(&deck, specimen)?;
     deck.joint = joint;
-    deck.hinges = deck.hinges_at(&cracks);
+    for crack in &cracks {
+        let node = deck.first_beyond(crack.position);
+        deck.hinges.push(DeckJoint {
+            node,
+            other: node.checked_sub(1),
+            translation: f64::INFINITY,
+            rotation: crack.compliance.recip(),
+            cross: 0.0,
+        });
+    }
     for mass in &specimen.masses {
         deck.add_mass(mass.position, mass.mass, mass.inertia);
     }
@@ -435,29 +406,28 @@ pub fn deck_with_effects(
 
 /// By which theory the specimen bends, where nothing is in it that has no element.
 fn theory_of(specimen: &Specimen) -> Result<BeamTheory, DeckError> {
-    let refuse = |what| Err(DeckError::NoElement { what });
-    if specimen.axial_force != 0.0 {
-        return refuse("an axial load");
-    }
-    if specimen.base.is_some() {
-        return refuse("a fixture that rocks");
-    }
-    if specimen.overlap.is_some_and(|overlap| overlap.mass != 0.0) {
-        return refuse("the spread mass of an overlap beside effects");
-    }
-    match specimen.shear_rotary {
-        0.0 => Ok(BeamTheory::Euler),
-        1.0 => Ok(BeamTheory::Timoshenko),
-        _ => refuse("a part of the shear and of the rotary inertia"),
-    }
+    let what = if specimen.axial_force != 0.0 {
+        "an axial load"
+    } else if specimen.base.is_some() {
+        "a fixture that rocks"
+    } else if specimen.overlap.is_some_and(|overlap| overlap.mass != 0.0) {
+        "the spread mass of an overlap beside effects"
+    } else if specimen.shear_rotary == 0.0 {
+        return Ok(BeamTheory::Euler);
+    } else if specimen.shear_rotary == 1.0 {
+        return Ok(BeamTheory::Timoshenko);
+    } else {
+        "a part of the shear and of the rotary inertia"
+    };
+    Err(DeckError::NoElement { what })
 }
 
 /// Cracks that lie within a beam, from left to right.
 fn cracks_of(specimen: &Specimen) -> Vec<Hinge> {
     let length: f64 = specimen.body.beams().iter().map(|beam| beam.length).sum();
-    let inside = |hinge: &&Hinge| hinge.position > 0.0 && hinge.position < length;
-    let mut cracks: Vec<Hinge> = specimen.hinges.iter().filter(inside).copied().collect();
-    cracks.retain(|hinge| hinge.compliance > 0.0);
+    let mut cracks = specimen.hinges.clone();
+    cracks
+        .retain(|hinge| hinge.position > 0.0 && hinge.position < length && hinge.compliance > 0.0);
     cracks.sort_by(|a, b| a.position.total_cmp(&b.position));
     cracks
 }
@@ -487,41 +457,21 @@ fn joint_of(deck: &Deck, specimen: &Specimen) -> Result<Option<DeckJoint>, DeckE
     let SpecimenJoint::Springs { kt, kr, coupling } = specimen.joint else {
         return Ok(None);
     };
-    let sides = match &specimen.body {
-        Body::One(_) => (0, None),
-        Body::Joined([left, _]) => {
-            let first = deck.first_beyond(left.length);
-            (first, first.checked_sub(1))
-        }
+    let node = match &specimen.body {
+        Body::One(_) => 0,
+        Body::Joined([left, _]) => deck.first_beyond(left.length),
     };
     let cross = match coupling {
         0.0 => 0.0,
         coupling => coupling / (kt * kr).sqrt(),
     };
-    scalar_springs((kt, kr), cross, sides).map(Some)
+    scalar_springs(kt, kr, cross, node).map(Some)
 }
 
 impl Deck {
-    /// The first node of the piece that begins at a place (m).
+    /// Returns the first node of the piece that begins at a place (m).
     fn first_beyond(&self, place: f64) -> usize {
-        let distance = |piece: &&DeckPiece| (self.nodes[piece.first] - place).abs();
-        let pieces = self.pieces.iter();
-        let nearest = pieces.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nearest.map_or(0, |piece| piece.first)
-    }
-
-    /// A hinge between the two nodes at every crack.
-    fn hinges_at(&self, cracks: &[Hinge]) -> Vec<DeckJoint> {
-        let hinge = |crack: &Hinge| {
-            let node = self.first_beyond(crack.position);
-            DeckJoint {
-                node,
-                other: node.checked_sub(1),
-                translation: f64::INFINITY,
-                rotation: crack.compliance.recip(),
-                cross: 0.0,
-            }
-        };
-        cracks.iter().map(hinge).collect()
+        let begins = self.pieces.iter().map(|piece| self.nodes[piece.first]);
+        nearest(place, begins).map_or(0, |index| self.pieces[index].first)
     }
 }

@@ -22,16 +22,15 @@ pub fn render_nastran(deck: &Deck) -> String {
     }
     let modes = deck.frequencies.len().max(5);
     text.push_str("SOL 103\nCEND\nTITLE = BEAM ON ITS JOINT\nECHO = NONE\n");
-    if deck.joint.is_some_and(|joint| joint.is_held()) {
+    let rigid = deck.joint.is_some_and(|joint| {
+        let rigid = joint.translation.is_infinite() || joint.rotation.is_infinite();
+        joint.other.is_none() && rigid
+    });
+    if rigid {
         text.push_str("SPC = 1\n");
     }
     text.push_str("METHOD = 1\nDISPLACEMENT = ALL\nBEGIN BULK\nPARAM,COUPMASS,1\nPARAM,POST,-1\n");
-    // Rigid-body motions of a structure that is not held lie below 1 Hz.
-    let from = if deck.joint.is_some_and(|joint| joint.other.is_none()) {
-        ""
-    } else {
-        "1."
-    };
+    let from = deck.least_frequency();
     let _ = writeln!(text, "EIGRL,1,{from},,{modes}");
     for (index, place) in deck.nodes.iter().enumerate() {
         let _ = writeln!(

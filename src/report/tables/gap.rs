@@ -1,5 +1,7 @@
 //! Tables of the diagnosis: what may be missing in the model, and what to do next.
 
+use std::collections::BTreeSet;
+
 use super::super::document::{Baseline, Document, GapSection};
 use super::super::format::{MISSING, or_missing, probability, significant};
 use super::super::words::gap::{
@@ -8,7 +10,7 @@ use super::super::words::gap::{
 };
 use super::{Table, number, words};
 use tapjoint_beam::effects::EffectId;
-use tapjoint_diagnosis::{Hypothesis, HypothesisResult, NextTest, ParameterValue, Verdict};
+use tapjoint_diagnosis::{Hypothesis, HypothesisResult, Verdict};
 
 /// At least so many hypotheses are listed.
 const LEAST_LISTED: usize = 4;
@@ -19,16 +21,21 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
     if gap.hypotheses.is_empty() {
         return None;
     }
-    let listed = gap
-        .hypotheses
-        .iter()
-        .enumerate()
-        .filter(|(index, found)| {
-            *index < LEAST_LISTED
-                || found.probability >= LEAST_PROBABILITY
-                || !matches!(found.hypothesis, Hypothesis::Effects(_))
-        })
-        .map(|(_, found)| row(found, gap.noise_floor));
+    let mut rows = Vec::new();
+    for (index, found) in gap.hypotheses.iter().enumerate() {
+        let is_effect = matches!(found.hypothesis, Hypothesis::Effects(_));
+        if index < LEAST_LISTED || found.probability >= LEAST_PROBABILITY || !is_effect {
+            rows.push(vec![
+                together(&found.hypothesis),
+                probability(found.probability),
+                left(found.gap_after, gap.noise_floor),
+                left(found.holdout_after, gap.noise_floor),
+                sizes(found),
+                told_apart(found),
+                looks_like(&found.confounded_with),
+            ]);
+        }
+    }
     Some(Table {
         caption: "What may be missing".to_owned(),
         columns: vec![
@@ -40,12 +47,12 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
             words("Told apart from").on_page(),
             words("Looks like").on_page(),
         ],
-        rows: listed.collect(),
+        rows,
         note: note(document, gap),
     })
 }
 
-/// What the columns are, why even the hypothesis that nothing is missing mostly leaves less than the described model,
+/// Explains the columns, why even the hypothesis that nothing is missing mostly leaves less than the described model,
 /// and why the errors are not those of the estimate.
 fn note(document: &Document, gap: &GapSection) -> String {
     let described = percent(Some(gap.hypotheses[0].gap_before));
@@ -53,76 +60,54 @@ fn note(document: &Document, gap: &GapSection) -> String {
     let withheld = withheld.map_or_else(String::new, |before| {
         format!(" and {} %", significant(before, 2))
     });
-    let (one_joint, drift) = match !document.has_joint() || recordings(gap) < 2 {
+    let residuals = gap.place.iter().flat_map(|place| &place.modes);
+    let recordings: BTreeSet<&str> = residuals.map(|one| one.recording.as_str()).collect();
+    let (one_joint, drift) = match !document.has_joint() || recordings.len() < 2 {
         true => ("", ""),
         false => (
-            "one joint for all recordings and ",
-            "lets the joint and the warmth differ a little from recording to recording (so does the described model \
-             on withheld ones), and ",
+            "there is one joint for all recordings, and ",
+            "lets the joint and the temperature differ a little between recordings (so does the described model on \
+             withheld ones), and ",
         ),
     };
     let part = gap
         .fitted_modes
         .map_or_else(String::new, |last| format!(" (modes up to {last})"));
-    format!(
-        "Fitted, withheld: errors of the frequencies left (rms); of the described model {described} %{withheld}. \
-         The described model has {one_joint}geometry, shear and masses exactly as described; every hypothesis, none \
-         too, {drift}lets these and sensors' inertias move within their uncertainty, and so usually leaves less; the fit \
-         weighs each reading by its uncertainty, so that a plain rms may also be larger. All are errors of fits to the \
-         readings that take part in the diagnosis{part}; those of the estimate, which weighs all modes, may differ. Size \u{b1} one standard deviation.{}",
-        one_factor(gap)
-    )
-}
-
-/// What the baseline leaves that needs no cause, only a factor.
-fn one_factor(gap: &GapSection) -> String {
-    let scale = gap.baselines.iter().find(|one| one.name == Baseline::Scale);
-    let floor = gap.noise_floor;
-    scale.map_or_else(String::new, |scale| {
+    let mut note = format!(
+        "Fitted, withheld: rms errors of the frequencies that are left; the described model leaves {described} \
+         %{withheld}. In the described model {one_joint}geometry, shear and masses are exactly as described. Every \
+         hypothesis, none included, {drift}lets these and sensors' inertias move within their uncertainty, and so \
+         usually leaves less. The fit weighs each reading by its uncertainty, so a plain rms may also be larger. All are \
+         errors of fits to the readings that take part in the diagnosis{part}; the estimate weighs all modes and may \
+         leave others. Size \u{b1} one standard deviation."
+    );
+    if let Some(scale) = gap.baselines.iter().find(|one| one.name == Baseline::Scale) {
         let withheld = scale.holdout_after.map_or_else(String::new, |after| {
-            format!(", of the withheld ones {} %", left(Some(after), floor))
+            let after = left(Some(after), gap.noise_floor);
+            format!(", of the withheld ones {after} %")
         });
-        format!(
+        note.push_str(&format!(
             " For comparison: one unnamed factor on all frequencies leaves an error of {} % (rms){withheld}.",
-            left(scale.gap_after, floor)
-        )
-    })
-}
-
-/// How many recordings the diagnosis compares.
-fn recordings(gap: &GapSection) -> usize {
-    let pulls = gap.place.iter().flat_map(|place| &place.modes);
-    let files: std::collections::BTreeSet<&str> =
-        pulls.map(|pull| pull.recording.as_str()).collect();
-    files.len()
-}
-
-fn row(found: &HypothesisResult, floor: Option<f64>) -> Vec<String> {
-    vec![
-        together(&found.hypothesis),
-        probability(found.probability),
-        left(found.gap_after, floor),
-        left(found.holdout_after, floor),
-        sizes(found),
-        told_apart(found),
-        looks_like(&found.confounded_with),
-    ]
+            left(scale.gap_after, gap.noise_floor)
+        ));
+    }
+    note
 }
 
 /// The size of a single effect from which these readings would tell it from every other.
 fn told_apart(found: &HypothesisResult) -> String {
-    let least = |parameter: &ParameterValue| {
+    if matches!(&found.hypothesis, Hypothesis::Effects(effects) if effects.len() > 1) {
+        return MISSING.to_owned();
+    }
+    let least = found.parameters.iter().find_map(|parameter| {
         let (unit, factor) = unit_of(parameter.name);
         let least = factor * parameter.smallest_separable?;
         Some(format!("{}{unit}", significant(least, 2)))
-    };
-    let is_pair = matches!(&found.hypothesis, Hypothesis::Effects(effects) if effects.len() > 1);
-    let mut parameters = found.parameters.iter().filter(|_| !is_pair);
-    let least = parameters.find_map(least);
+    });
     or_missing(least)
 }
 
-/// How many hypotheses that cannot be told from one are named; report.json has them all.
+/// Hypotheses named among those that cannot be told from one; report.json has them all.
 const NAMED: usize = 4;
 
 /// "timebase, modulus", "timebase, modulus, length, fixture and 9 more".
@@ -146,8 +131,9 @@ pub fn next_tests(document: &Document) -> Option<Table> {
         Verdict::Unknown => EQUALLY_LIKELY,
         _ => "by the hypotheses above",
     };
-    let row = |test: &NextTest| {
-        vec![
+    let mut rows = Vec::new();
+    for test in tests {
+        rows.push(vec![
             test.action.clone() + &not_predicted(test, "; could not be predicted for "),
             match confirms(test) {
                 true => MISSING.to_owned(),
@@ -155,8 +141,8 @@ pub fn next_tests(document: &Document) -> Option<Table> {
             },
             format!("{:.0}", test.effort),
             test.separates.join(", "),
-        ]
-    };
+        ]);
+    }
     Some(Table {
         caption: "What to do next".to_owned(),
         columns: vec![
@@ -165,7 +151,7 @@ pub fn next_tests(document: &Document) -> Option<Table> {
             number("Effort"),
             words("Tells apart").on_page(),
         ],
-        rows: tests.iter().map(row).collect(),
+        rows,
         note: format!(
             "Information about the cause that the test is expected to bring at least, {premise}; effort in \
              multiples of reading again what is recorded. Ranked by one over the other."

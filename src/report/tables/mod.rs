@@ -5,10 +5,8 @@ mod joint;
 mod modes;
 mod quality;
 mod recordings;
-mod resolution;
 mod uncertainty;
 
-pub use super::words::gap::{gap_in_short, gap_story, place_of};
 pub use gap::{hypotheses, next_tests};
 pub use joint::{Parameter, correlations, estimated, methods, pairs, parameters};
 pub use modes::{
@@ -18,7 +16,6 @@ pub use quality::{quality, quality_all, quality_count, quality_doubts};
 pub use recordings::{
     channels, conditions, datasets, peak_unit, recordings, rejected_taps, taps, taps_used,
 };
-pub use resolution::{resolution_frequencies, resolution_lines, resolution_stiffnesses};
 pub use uncertainty::{averages, monte_carlo, perturbation, sensitivity, spans};
 
 use super::document::{Document, ModeSection, ReadBy};
@@ -28,7 +25,7 @@ use tapjoint_identify::observation::UNPAIRED;
 /// A table of words.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
-    /// What it shows.
+    /// Its heading.
     pub caption: String,
     /// Its columns.
     pub columns: Vec<Column>,
@@ -45,11 +42,11 @@ pub struct Column {
     pub name: String,
     /// Numbers are aligned right, words left.
     pub kind: Kind,
-    /// Whether a narrow terminal shows it.
+    /// Outputs that show it.
     pub place: Place,
 }
 
-/// What a column holds.
+/// Kind of cells of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Numbers.
@@ -59,13 +56,13 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Whether the column holds numbers.
+    /// True for a column of numbers.
     pub fn is_number(self) -> bool {
         self == Kind::Number
     }
 }
 
-/// Where a column is shown.
+/// Outputs that show a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// Everywhere.
@@ -77,7 +74,7 @@ pub enum Place {
 }
 
 /// A column of numbers shown everywhere.
-fn number(name: &str) -> Column {
+pub(crate) fn number(name: &str) -> Column {
     Column {
         name: name.to_owned(),
         kind: Kind::Number,
@@ -95,46 +92,39 @@ fn words(name: &str) -> Column {
 }
 
 impl Table {
-    /// The same table without the column of this name.
-    fn without_column(mut self, name: &str) -> Table {
-        if let Some(index) = self.columns.iter().position(|column| column.name == name) {
-            self.columns.remove(index);
-            for row in self.rows.iter_mut().filter(|row| index < row.len()) {
-                row.remove(index);
+    /// Returns the table without the columns of these names.
+    fn without_columns(self, unwanted: &[&str]) -> Table {
+        let names = self.columns.iter();
+        let kept = names.map(|column| !unwanted.contains(&column.name.as_str()));
+        let kept = kept.collect();
+        self.with_columns(kept)
+    }
+
+    /// Returns the table without the columns that are empty in every row.
+    fn without_empty_columns(self) -> Table {
+        let mut kept = vec![false; self.columns.len()];
+        for row in &self.rows {
+            for (kept, cell) in kept.iter_mut().zip(row) {
+                *kept |= !cell.is_empty() && cell != MISSING;
             }
         }
-        self
+        self.with_columns(kept)
     }
 
-    /// The same table without the columns whose names are unwanted.
-    fn without_columns(self, unwanted: impl Fn(&str) -> bool) -> Table {
-        let names: Vec<String> = self
-            .columns
-            .iter()
-            .map(|column| column.name.clone())
-            .collect();
-        let names = names.iter().filter(|name| unwanted(name));
-        names.fold(self, |table, name| table.without_column(name))
-    }
-
-    /// The same table without the columns in which nothing stands.
-    fn without_empty_columns(mut self) -> Table {
-        let says = |cell: Option<&String>| cell.is_some_and(|c| !c.is_empty() && c != MISSING);
-        let kept: Vec<bool> = (0..self.columns.len())
-            .map(|index| self.rows.iter().any(|row| says(row.get(index))))
-            .collect();
-        let mut flags = kept.iter();
-        self.columns.retain(|_| flags.next() == Some(&true));
+    /// Returns the table with the columns that are marked.
+    fn with_columns(mut self, kept: Vec<bool>) -> Table {
+        let mut marks = kept.iter();
+        self.columns.retain(|_| marks.next() == Some(&true));
         for row in &mut self.rows {
-            let mut flags = kept.iter();
-            row.retain(|_| flags.next() == Some(&true));
+            let mut marks = kept.iter();
+            row.retain(|_| marks.next() == Some(&true));
         }
         self
     }
 }
 
 impl Column {
-    /// Whether its cells hold sentences or lists, which need several lines.
+    /// True where its cells hold sentences or lists, which need several lines.
     pub fn is_long(&self) -> bool {
         const LONG: [&str; 8] = [
             "Reason",
@@ -149,19 +139,15 @@ impl Column {
         LONG.contains(&self.name.as_str())
     }
 
-    /// The same column, on the page only.
-    fn on_page(mut self) -> Column {
-        self.place = Place::Page;
-        self
+    /// Returns the column, on the page only.
+    fn on_page(self) -> Column {
+        Column {
+            place: Place::Page,
+            ..self
+        }
     }
 
-    /// The same column, in a terminal only where there is room.
-    fn where_room(mut self) -> Column {
-        self.place = Place::Spacious;
-        self
-    }
-
-    /// The same column, on the page only where a condition holds.
+    /// Returns the column, on the page only where a condition holds.
     fn on_page_if(self, crowded: bool) -> Column {
         if crowded { self.on_page() } else { self }
     }
@@ -202,7 +188,7 @@ fn mode_name(number: Option<usize>, label: Option<&str>) -> String {
     }
 }
 
-/// A coherence in four digits; one that only rounding would make 1 is said to be above 0.9999.
+/// A coherence in four digits; one that only rounding would make 1 is written ">0.9999".
 fn coherence(value: Option<f64>) -> String {
     match value {
         None => MISSING.to_owned(),

@@ -1,15 +1,12 @@
 //! Tables of resonances: as read, on frequency response functions, and beside their predictions.
 
-use super::super::document::{
-    Document, FrfResonanceSection, FrfSection, ModeSection, PredictionSection, ReadBy,
-    RecordingSection, method_name,
-};
+use super::super::document::{Document, FrfSection, ModeSection, PredictionSection, ReadBy, method_name};
 use super::super::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
     or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,
     with_decimals_of,
 };
-use super::{Column, Table, bound_of, coherence, mode_name, mode_of, number, words};
+use super::{Column, Place, Table, bound_of, coherence, mode_name, mode_of, number, words};
 use tapjoint_signal::modal::fit::UncertaintySource;
 
 /// Most significant digits of lambda.
@@ -27,56 +24,61 @@ pub fn modes(document: &Document) -> Option<Table> {
         (false, true) => "Modes",
         (false, false) => "Resonances",
     };
-    let note = match given {
+    let mut note = match given {
         true => "Frequency: as it was given, with its bound.".to_owned(),
         false => note(document, modes, described),
     };
-    let note = match modes_from(document) {
-        Some(from) => format!("{from} {note}"),
-        None => note,
-    };
+    if let Some(from) = modes_from(document) {
+        note = format!("{from} {note}");
+    }
     let table = table(caption, modes.iter().map(row).collect(), &note);
-    Some(without(table, &DETAILS))
+    Some(table.without_columns(&DETAILS))
 }
 
 /// "From soft.wav; hard.wav (8.8 times its tap level) enters the diagnosis alone."; `None` where every recording
 /// gives the list.
 pub fn modes_from(document: &Document) -> Option<String> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let named = |aside: bool| {
-        let mut names: Vec<String> = recordings
-            .iter()
-            .filter(|recording| recording.aside.is_some() == aside)
-            .map(|recording| match &recording.aside {
-                Some(how) => format!("{} ({how})", recording.file),
-                None => recording.file.clone(),
-            })
-            .collect();
-        // A file may be read in several bands.
-        names.dedup();
-        names
+    let (mut from, mut aside) = (Vec::new(), Vec::new());
+    for recording in recordings {
+        match &recording.aside {
+            Some(how) => aside.push(format!("{} ({how})", recording.file)),
+            None => from.push(recording.file.clone()),
+        }
+    }
+    // A file may be read in several bands.
+    from.dedup();
+    aside.dedup();
+    let enter = match aside.len() {
+        0 => return None,
+        1 => "enters",
+        _ => "enter",
     };
-    let (from, aside) = (named(false), named(true));
-    let enter = if aside.len() == 1 { "enters" } else { "enter" };
-    (!aside.is_empty()).then(|| {
-        format!(
-            "From {}; {} {enter} the diagnosis alone.",
-            from.join(", "),
-            aside.join(", ")
-        )
-    })
+    let (from, aside) = (from.join(", "), aside.join(", "));
+    Some(format!("From {from}; {aside} {enter} the diagnosis alone."))
 }
 
-/// How each resonance of the merged list was read, for who doubts it; `None` where nothing is known
-/// but the reading itself.
+/// Details of the reading of each resonance of the merged list; `None` where nothing is known but the reading
+/// itself.
 pub fn mode_details(document: &Document) -> Option<Table> {
     let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
-    let note = details_note(modes);
-    let table = table("How each was read", modes.iter().map(row).collect(), &note);
-    details(table)
+    let mut notes = Vec::new();
+    if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit) {
+        notes.push(INTERVAL_NOTE);
+    }
+    if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
+        notes.push(TAPS_NOTE);
+    }
+    if modes.iter().any(|mode| mode.random_error.is_some()) {
+        notes.push(
+            "Coherence and random error: of the sensor that knows the mode best, on its line.",
+        );
+    }
+    let rows = modes.iter().map(row).collect();
+    details(table("How each was read", rows, &notes.join(" ")))
 }
 
-/// The same of each recording's own readings.
+/// Details of the reading of each resonance in each recording; `None` where there is at most one recording.
 pub fn reading_details(document: &Document) -> Option<Table> {
     let caption = "How each was read in each recording";
     let table = table(caption, reading_rows(document)?, "");
@@ -95,40 +97,17 @@ const DETAILS: [&str; 7] = [
     "Random error (%)",
 ];
 
-fn without(table: Table, names: &[&str]) -> Table {
-    table.without_columns(|name| names.contains(&name))
-}
-
 fn details(table: Table) -> Option<Table> {
-    let table = without(
-        table,
-        &["Method", "Line (Hz)", "Damping (%)", "\u{3bb} (1)"],
-    );
-    let known = |column: &Column| DETAILS.contains(&column.name.as_str());
-    table.columns.iter().any(known).then_some(table)
+    let table = table.without_columns(&["Method", "Line (Hz)", "Damping (%)", "\u{3bb} (1)"]);
+    let mut names = table.columns.iter().map(|column| column.name.as_str());
+    names.any(|name| DETAILS.contains(&name)).then_some(table)
 }
 
-fn details_note(modes: &[ModeSection]) -> String {
-    let mut parts = Vec::new();
-    if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit)) {
-        parts.push(INTERVAL_NOTE);
-    }
-    if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
-        parts.push(TAPS_NOTE);
-    }
-    if modes.iter().any(|mode| mode.random_error.is_some()) {
-        parts.push(
-            "Coherence and random error: of the sensor that knows the mode best, on its line.",
-        );
-    }
-    parts.join(" ")
-}
-
-/// What fitted frequencies were fitted to.
+/// Returns the data that frequencies were fitted to.
 pub fn fitted_to(document: &Document) -> &'static str {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let functions = |recording: &&RecordingSection| recording.sample_rate.is_none();
-    match recordings.iter().filter(functions).count() {
+    let functions = recordings.iter().filter(|one| one.sample_rate.is_none());
+    match functions.count() {
         0 => "the free decays of all taps and sensors",
         count if count == recordings.len() => "the frequency response functions of all sensors",
         _ => {
@@ -137,18 +116,22 @@ pub fn fitted_to(document: &Document) -> &'static str {
     }
 }
 
-/// What the columns mean, of the methods that occur.
+/// Explains the columns and the methods that occur.
 fn note(document: &Document, modes: &[ModeSection], described: bool) -> String {
-    let by = |method: ReadBy| modes.iter().any(|mode| mode.method == Some(method));
+    let (mut fitted, mut interpolated) = (false, false);
+    for mode in modes {
+        fitted |= mode.method == Some(ReadBy::Fit);
+        interpolated |= mode.method == Some(ReadBy::Interpolated);
+    }
     let fit = format!(
         "Fit: maximum likelihood of {}; its bound is half the 95 % interval.",
         fitted_to(document)
     );
     let mut parts = vec!["Frequency: the best reading with its bound (about 95 %)."];
-    if by(ReadBy::Fit) {
+    if fitted {
         parts.push(&fit);
     }
-    if by(ReadBy::Interpolated) {
+    if interpolated {
         parts.push("Interpolated: from the shape of the peak between the lines.");
     }
     parts.push(LINE_NOTE);
@@ -172,63 +155,66 @@ const TAPS_NOTE: &str = "Tap deviation: of the tap farthest from their mean, eac
 pub fn readings(document: &Document) -> Option<Table> {
     let note = "The list of modes takes each from the recording that resolves it best.";
     let table = table("Readings of each recording", reading_rows(document)?, note);
-    Some(without(table, &DETAILS))
+    Some(table.without_columns(&DETAILS))
 }
 
 fn reading_rows(document: &Document) -> Option<Vec<Vec<String>>> {
     let recordings = document.recordings.as_deref().filter(|r| r.len() > 1)?;
-    let rows: Vec<Vec<String>> = recordings
-        .iter()
-        .flat_map(|recording| {
-            recording.modes.iter().map(|mode| {
-                let mut mode = mode.clone();
-                mode.recording.get_or_insert_with(|| recording.file.clone());
-                row(&mode)
-            })
-        })
-        .collect();
+    let mut rows = Vec::new();
+    for recording in recordings {
+        for mode in &recording.modes {
+            let mut mode = mode.clone();
+            mode.recording.get_or_insert_with(|| recording.file.clone());
+            rows.push(row(&mode));
+        }
+    }
     (!rows.is_empty()).then_some(rows)
 }
 
 /// The table; the recordings' column only where there are several.
 fn table(caption: &str, mut rows: Vec<Vec<String>>, note: &str) -> Table {
-    let name = |row: &Vec<String>| row.last().cloned();
-    let first = rows.first().and_then(name);
-    if rows.iter().all(|row| name(row) == first) {
+    let first = rows.first().and_then(|row| row.last().cloned());
+    if rows.iter().all(|row| row.last() == first.as_ref()) {
         for cell in rows.iter_mut().filter_map(|row| row.last_mut()) {
             cell.clear();
         }
     }
     let table = Table {
         caption: caption.to_owned(),
-        columns: columns(),
+        columns: vec![
+            words("Mode"),
+            number("Frequency (Hz)"),
+            words("Method").on_page(),
+            words("Interval from").on_page(),
+            number("Line (Hz)"),
+            number("Damping (%)"),
+            number("Tap deviation (Hz)").on_page(),
+            number("p").on_page(),
+            Column {
+                place: Place::Spacious,
+                ..number("\u{3bb} (1)")
+            },
+            number("Prominence (dB)").on_page(),
+            number("Above noise (dB)").on_page(),
+            number("Coherence").on_page(),
+            number("Random error (%)").on_page(),
+            words("Recording"),
+        ],
         rows,
         note: note.to_owned(),
     };
     table.without_empty_columns()
 }
 
-fn columns() -> Vec<Column> {
-    vec![
-        words("Mode"),
-        number("Frequency (Hz)"),
-        words("Method").on_page(),
-        words("Interval from").on_page(),
-        number("Line (Hz)"),
-        number("Damping (%)"),
-        number("Tap deviation (Hz)").on_page(),
-        number("p").on_page(),
-        number("\u{3bb} (1)").where_room(),
-        number("Prominence (dB)").on_page(),
-        number("Above noise (dB)").on_page(),
-        number("Coherence").on_page(),
-        number("Random error (%)").on_page(),
-        words("Recording"),
-    ]
-}
-
 fn row(mode: &ModeSection) -> Vec<String> {
-    let line = mode.line_frequency.filter(|line| is_of(mode, *line));
+    // The highest line near a pole may be of another peak, and its bound says nothing of the pole then. A fit is taken
+    // as off by three times its interval.
+    let bounds = mode.half_line.zip(bound_of(mode));
+    let reach = bounds.map_or(f64::INFINITY, |(half, bound)| half + 3.0 * bound);
+    let line = mode.line_frequency;
+    let line = line.filter(|line| {
+        mode.method != Some(ReadBy::Fit) || (line - mode.frequency).abs() <= reach || reach.is_nan()
+    });
     let line = line.map(|line| match mode.half_line {
         Some(half) => line_reading(line, half).joined(),
         None => significant(line, 6),
@@ -255,14 +241,6 @@ fn row(mode: &ModeSection) -> Vec<String> {
         optional(mode.random_error.map(|error| 100.0 * error), 2),
         or_missing(mode.recording.clone()),
     ]
-}
-
-/// Whether the reading on a line is of this mode: the highest line near a pole may be of another peak, and its bound
-/// says nothing of the pole then. A fit is taken as off by three times its interval.
-fn is_of(mode: &ModeSection, line: f64) -> bool {
-    let bounds = mode.half_line.zip(bound_of(mode));
-    let far = |(half, bound): (f64, f64)| (line - mode.frequency).abs() > half + 3.0 * bound;
-    mode.method != Some(ReadBy::Fit) || !bounds.is_some_and(far)
 }
 
 /// Distance (Hz) of the tap farthest from the mean of all taps; `None` with fewer than two.
@@ -322,27 +300,43 @@ pub fn frfs(document: &Document) -> Option<Table> {
     } else {
         format!("|{}|", first.estimator)
     };
-    let rows = frfs
-        .iter()
-        .flat_map(|frf| {
-            let unit = if one_unit {
-                String::new()
-            } else {
-                unit_words(&frf.unit)
-            };
-            let named = (recording_name(document, frf), unit);
-            frf.resonances
-                .iter()
-                .map(move |found| function_row(frf, found, named.clone()))
-        })
-        .collect();
+    let several = document.recordings.as_ref().is_some_and(|r| r.len() > 1);
+    let mut rows = Vec::new();
+    for frf in frfs {
+        for found in &frf.resonances {
+            let phase = found.phase;
+            let phase = phase.map(|value| format!("{value:.1}").replace('-', "\u{2212}"));
+            rows.push(vec![
+                match several {
+                    true => frf.recording.clone(),
+                    false => String::new(),
+                },
+                frf.response.clone(),
+                mode_name(found.mode, found.label.as_deref()),
+                trimmed(found.frequency, 6),
+                optional(found.magnitude, 4),
+                match one_unit {
+                    true => String::new(),
+                    false => unit_words(&frf.unit),
+                },
+                or_missing(phase),
+                coherence(found.coherence),
+                optional(found.random_error.map(|error| 100.0 * error), 2),
+            ]);
+        }
+    }
     let taps = frfs.iter().map(|frf| frf.averages);
     let (least, most) = (taps.clone().min().unwrap_or(0), taps.max().unwrap_or(0));
+    let estimator = &first.estimator;
+    // An analyser tells neither estimator nor taps.
+    let made_by = match (least, most) {
+        (0, 0) => "as the file holds them".to_owned(),
+        (1, 1) => format!("{estimator}, 1 tap"),
+        _ if least == most => format!("{estimator}, {least} taps averaged"),
+        _ => format!("{estimator}, {least} to {most} taps averaged"),
+    };
     let table = Table {
-        caption: format!(
-            "Frequency response functions at the resonances, {}",
-            made_by(&first.estimator, least, most)
-        ),
+        caption: format!("Frequency response functions at the resonances, {made_by}"),
         columns: vec![
             words("Recording"),
             words("Response"),
@@ -358,16 +352,6 @@ pub fn frfs(document: &Document) -> Option<Table> {
         note: function_note(frfs, least),
     };
     Some(table.without_empty_columns())
-}
-
-/// Estimator and taps; of what an analyser has made nobody says either.
-fn made_by(estimator: &str, least: usize, most: usize) -> String {
-    match (least, most) {
-        (0, 0) => "as the file holds them".to_owned(),
-        (1, 1) => format!("{estimator}, 1 tap"),
-        _ if least == most => format!("{estimator}, {least} taps averaged"),
-        _ => format!("{estimator}, {least} to {most} taps averaged"),
-    }
 }
 
 fn function_note(frfs: &[FrfSection], least: usize) -> String {
@@ -394,60 +378,28 @@ fn function_note(frfs: &[FrfSection], least: usize) -> String {
     text
 }
 
-/// The recording's name where there are several.
-fn recording_name(document: &Document, frf: &FrfSection) -> String {
-    let several = document.recordings.as_ref().is_some_and(|r| r.len() > 1);
-    if several {
-        frf.recording.clone()
-    } else {
-        String::new()
-    }
-}
-
-fn function_row(
-    frf: &FrfSection,
-    found: &FrfResonanceSection,
-    (recording, unit): (String, String),
-) -> Vec<String> {
-    let name = mode_name(found.mode, found.label.as_deref());
-    let phase = |value: f64| format!("{value:.1}").replace('-', "\u{2212}");
-    vec![
-        recording,
-        frf.response.clone(),
-        name,
-        trimmed(found.frequency, 6),
-        optional(found.magnitude, 4),
-        unit,
-        or_missing(found.phase.map(phase)),
-        coherence(found.quality.coherence),
-        optional(found.quality.random_error.map(|error| 100.0 * error), 2),
-    ]
-}
-
 /// Measured beside predicted frequencies; `None` where nothing was predicted.
 pub fn prediction(document: &Document) -> Option<Table> {
     let rows = document.prediction.as_deref().filter(|p| !p.is_empty())?;
     let compared = rows.iter().any(|row| row.measured.is_some());
-    let used = |used: bool| if used { "yes" } else { "no" }.to_owned();
-    let cells = rows
-        .iter()
-        .map(|row| {
-            let [measured, predicted, reading] = compared_frequencies(document, row);
-            vec![
-                row.mode.to_string(),
-                measured,
-                predicted,
-                signed_percent(row.error_percent),
-                reading,
-                optional(row.lambda, 6),
-                if compared {
-                    used(row.used)
-                } else {
-                    String::new()
-                },
-            ]
-        })
-        .collect();
+    let mut cells = Vec::new();
+    for row in rows {
+        let [measured, predicted, reading] = compared_frequencies(document, row);
+        let used = match (compared, row.used) {
+            (false, _) => "",
+            (true, true) => "yes",
+            (true, false) => "no",
+        };
+        cells.push(vec![
+            row.mode.to_string(),
+            measured,
+            predicted,
+            signed_percent(row.error_percent),
+            reading,
+            optional(row.lambda, 6),
+            used.to_owned(),
+        ]);
+    }
     let (caption, note) = if compared {
         (
             "Measured and predicted frequencies",
@@ -486,16 +438,12 @@ fn compared_frequencies(document: &Document, row: &PredictionSection) -> [String
     let listed = mode
         .filter(|_| bound.is_some())
         .map(|mode| reading(mode).value);
-    let hertz = |value: Option<f64>| match (value, &listed) {
+    let [measured, predicted] = [row.measured, row.predicted].map(|value| match (value, &listed) {
         (Some(value), Some(listed)) => with_decimals_of(value, listed),
         _ => optional(value, 6),
-    };
+    });
     let percent = bound
         .zip(row.measured)
         .map(|(bound, hz)| 100.0 * bound / hz);
-    [
-        hertz(row.measured),
-        hertz(row.predicted),
-        or_missing(percent.map(bound_percent)),
-    ]
+    [measured, predicted, or_missing(percent.map(bound_percent))]
 }

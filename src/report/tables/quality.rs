@@ -33,10 +33,33 @@ pub fn quality(document: &Document) -> Option<Table> {
             checks.push(verdict.check);
         }
     }
-    let rows: Vec<Vec<String>> = checks
-        .into_iter()
-        .filter_map(|check| summary_row(verdicts, check))
-        .collect();
+    let mut rows = Vec::new();
+    for check in checks {
+        let of_check = verdicts.iter().filter(|verdict| verdict.check == check);
+        let worst = of_check.clone().min_by(|a, b| {
+            let by_size = b.severity().total_cmp(&a.severity());
+            b.outcome.cmp(&a.outcome).then(by_size)
+        });
+        let Some(worst) = worst else { continue };
+        let (mut good, mut apply) = (0, 0);
+        for verdict in of_check {
+            good += usize::from(verdict.outcome == Outcome::Good);
+            apply += usize::from(verdict.outcome != Outcome::NotApplicable);
+        }
+        rows.push(vec![
+            check.code().to_owned(),
+            worst.outcome.name().to_owned(),
+            match apply {
+                0 => MISSING.to_owned(),
+                _ => format!("{good} of {apply}"),
+            },
+            value(worst),
+            limit(worst),
+            unit(worst),
+            worst.subject.to_string(),
+            with_minus_signs(&worst.happened),
+        ]);
+    }
     (!rows.is_empty()).then(|| Table {
         caption: "Good practice".to_owned(),
         columns: vec![
@@ -55,31 +78,6 @@ pub fn quality(document: &Document) -> Option<Table> {
     })
 }
 
-fn summary_row(verdicts: &[Verdict], check: Check) -> Option<Vec<String>> {
-    let of_check = || verdicts.iter().filter(move |v| v.check == check);
-    let worse = |a: &&Verdict, b: &&Verdict| {
-        let by_size = b.severity().total_cmp(&a.severity());
-        b.outcome.cmp(&a.outcome).then(by_size)
-    };
-    let worst = of_check().min_by(worse)?;
-    let good = of_check().filter(|v| v.outcome == Outcome::Good).count();
-    let apply = of_check().filter(|v| v.outcome != Outcome::NotApplicable);
-    let count = match apply.count() {
-        0 => MISSING.to_owned(),
-        all => format!("{good} of {all}"),
-    };
-    Some(vec![
-        check.code().to_owned(),
-        worst.outcome.name().to_owned(),
-        count,
-        value(worst),
-        limit(worst),
-        unit(worst),
-        worst.subject.to_string(),
-        with_minus_signs(&worst.happened),
-    ])
-}
-
 /// One row for each doubt, the worst first: what happened, why it might be, what helps; `None` without
 /// any.
 pub fn quality_doubts(document: &Document) -> Option<Table> {
@@ -88,19 +86,20 @@ pub fn quality_doubts(document: &Document) -> Option<Table> {
         .filter(|verdict| verdict.is_doubt())
         .collect();
     doubts.sort_by_key(|verdict| Reverse(verdict.outcome));
-    let row = |verdict: &&Verdict| {
+    let mut rows = Vec::new();
+    for verdict in &doubts {
         let mut row = row(verdict);
         row.push(verdict.cause.unwrap_or_default().to_owned());
         row.push(verdict.remedy.unwrap_or_default().to_owned());
-        row
-    };
-    (!doubts.is_empty()).then(|| Table {
+        rows.push(row);
+    }
+    (!rows.is_empty()).then(|| Table {
         caption: "Doubts about the measurement".to_owned(),
         columns: columns()
             .into_iter()
             .chain(["Why it might be", "What helps"].map(|title| words(title).on_page()))
             .collect(),
-        rows: doubts.iter().map(row).collect(),
+        rows,
         note: String::new(),
     })
 }
@@ -152,10 +151,10 @@ fn row(verdict: &Verdict) -> Vec<String> {
     ]
 }
 
-/// How a ratio is said: the factor to what is written, and its unit.
+/// Returns the factor from a value to its written number, and the unit of that.
 ///
-/// A share is said in percent and a multiple with a times sign, as the sentences say them. What agrees best at 1
-/// is known to everyone as it is.
+/// A share is written in percent and a multiple with a times sign, as in the sentences. Coherence and reciprocity,
+/// which are best at 1, are known as they are.
 fn scale(verdict: &Verdict) -> (f64, &str) {
     match (verdict.unit, verdict.check) {
         ("1", Check::TapLevels | Check::WeakTap) => (1.0, "\u{d7}"),
@@ -178,7 +177,7 @@ fn value(verdict: &Verdict) -> String {
     }
 }
 
-/// Percentages below this (%) are said to be so: no limit is near them.
+/// Percentages below this (%) are written as "<0.001": no limit is near them.
 const LEAST_PERCENT: f64 = 0.001;
 
 /// Limits are round numbers, whose zeros say nothing; a computed one has three digits.

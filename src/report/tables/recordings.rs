@@ -1,8 +1,6 @@
 //! Tables of what was recorded: recordings, their channels and taps; datasets of universal files.
 
-use super::super::document::{
-    ChannelSection, DatasetSection, Document, RecordingSection, TapSection,
-};
+use super::super::document::{Document, RecordingSection, TapSection};
 use super::super::format::{MISSING, optional, or_missing, significant, trimmed, unit_words};
 use super::{Table, number, words};
 
@@ -19,9 +17,10 @@ pub fn recordings(document: &Document) -> Option<Table> {
         ),
         false => ("Recordings", ""),
     };
-    let row = |recording: &RecordingSection| {
+    let mut rows = Vec::new();
+    for recording in recordings {
         let used = recording.taps.iter().filter(|tap| tap.accepted).count();
-        vec![
+        rows.push(vec![
             recording.file.clone(),
             recording.format.clone(),
             or_missing(recording.sample_rate.map(|rate| trimmed(rate, 8))),
@@ -45,8 +44,8 @@ pub fn recordings(document: &Document) -> Option<Table> {
             or_missing(recording.window.clone()),
             optional(recording.window_decay, 3),
             optional(recording.remaining_at_end.map(|level| 100.0 * level), 2),
-        ]
-    };
+        ]);
+    }
     let table = Table {
         caption: caption.to_owned(),
         columns: vec![
@@ -66,17 +65,18 @@ pub fn recordings(document: &Document) -> Option<Table> {
             number("Window's decay (1/s)").on_page(),
             number("Left at end (%)").on_page(),
         ],
-        rows: recordings.iter().map(row).collect(),
+        rows,
         note: note.to_owned(),
     };
     Some(table.without_empty_columns())
 }
 
-/// Where taps and sensors were in each recording, and under what conditions: beside the spectra's columns these would
+/// Places of taps and sensors in each recording, and its conditions: beside the spectra's columns these would
 /// need a page wider than a screen. `None` where nothing of it is stated.
 pub fn conditions(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
-    let row = |recording: &RecordingSection| {
+    let mut rows = Vec::new();
+    for recording in recordings {
         let sensors = recording.conditions.sensor_positions.iter();
         let sensors = sensors.map(|(name, position)| format!("{name} {}", trimmed(*position, 4)));
         let masses = recording.conditions.masses.iter();
@@ -84,7 +84,7 @@ pub fn conditions(document: &Document) -> Option<Table> {
             let grams = significant(1e3 * one.mass, 4);
             format!("{grams} g at {} m", trimmed(one.position, 4))
         });
-        vec![
+        rows.push(vec![
             recording.file.clone(),
             exact(recording.conditions.tap),
             listed(sensors.collect()),
@@ -92,8 +92,8 @@ pub fn conditions(document: &Document) -> Option<Table> {
             exact(recording.conditions.torque),
             exact(recording.conditions.temperature),
             or_missing(recording.conditions.date.clone()),
-        ]
-    };
+        ]);
+    }
     let table = Table {
         caption: "Where and how each was recorded".to_owned(),
         columns: vec![
@@ -105,7 +105,7 @@ pub fn conditions(document: &Document) -> Option<Table> {
             number("Temperature (°C)").on_page(),
             words("Date").on_page(),
         ],
-        rows: recordings.iter().map(row).collect(),
+        rows,
         note: String::new(),
     };
     Some(table.without_empty_columns()).filter(|table| table.columns.len() > 1)
@@ -124,15 +124,27 @@ fn exact(value: Option<f64>) -> String {
 /// One row for each channel; `None` without recordings.
 pub fn channels(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let several = recordings.len() > 1;
-    let rows: Vec<Vec<String>> = recordings
-        .iter()
-        .flat_map(|recording| {
-            let name = if several { recording.file.as_str() } else { "" };
-            let details = recording.channel_details.iter();
-            details.map(|channel| channel_row(name, channel))
-        })
-        .collect();
+    let mut rows = Vec::new();
+    for recording in recordings {
+        for channel in &recording.channel_details {
+            let unit = channel.info.unit.as_deref().unwrap_or("not given");
+            rows.push(vec![
+                match recordings.len() {
+                    1 => String::new(),
+                    _ => recording.file.clone(),
+                },
+                channel.channel.to_string(),
+                channel.info.name.clone().unwrap_or_default(),
+                unit_words(unit),
+                significant(channel.info.health.mean, 3),
+                significant(channel.info.health.rms, 3),
+                significant(channel.info.health.peak, 3),
+                channel.info.health.full_scale_samples.to_string(),
+                channel.info.health.flat_top_count.to_string(),
+                channel.info.health.dropped_samples.to_string(),
+            ]);
+        }
+    }
     if rows.is_empty() {
         return None;
     }
@@ -159,24 +171,7 @@ pub fn channels(document: &Document) -> Option<Table> {
     Some(table.without_empty_columns())
 }
 
-fn channel_row(file: &str, channel: &ChannelSection) -> Vec<String> {
-    let health = &channel.info.health;
-    let unit = channel.info.unit.as_deref().unwrap_or("not given");
-    vec![
-        file.to_owned(),
-        channel.channel.to_string(),
-        channel.info.name.clone().unwrap_or_default(),
-        unit_words(unit),
-        significant(health.mean, 3),
-        significant(health.rms, 3),
-        significant(health.peak, 3),
-        health.full_scale_samples.to_string(),
-        health.flat_top_count.to_string(),
-        health.dropped_samples.to_string(),
-    ]
-}
-
-/// Unit of the taps' peaks, in words where nobody said.
+/// Returns the unit of the taps' peaks, also where none was stated.
 pub fn peak_unit(recording: &RecordingSection) -> String {
     unit_words(recording.tap_unit.as_deref().unwrap_or("unit of the file"))
 }
@@ -197,14 +192,23 @@ fn taps_of(
     wanted: impl Fn(&TapSection) -> bool,
 ) -> Option<Table> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let rows: Vec<Vec<String>> = recordings
-        .iter()
-        .flat_map(|recording| {
-            let taps = recording.taps.iter().enumerate();
-            taps.filter(|(_, tap)| wanted(tap))
-                .map(|(index, tap)| tap_row(recording, index + 1, tap))
-        })
-        .collect();
+    let mut rows = Vec::new();
+    for recording in recordings {
+        for (index, tap) in recording.taps.iter().enumerate() {
+            if !wanted(tap) {
+                continue;
+            }
+            rows.push(vec![
+                recording.file.clone(),
+                (index + 1).to_string(),
+                format!("{:.3}", tap.time),
+                or_missing(peak(tap).map(|peak| significant(peak, 3))),
+                peak_unit(recording),
+                if tap.accepted { "yes" } else { "no" }.to_owned(),
+                tap.reason.clone().unwrap_or_default(),
+            ]);
+        }
+    }
     if rows.is_empty() {
         return None;
     }
@@ -239,18 +243,6 @@ fn without_single_name(
     rows
 }
 
-fn tap_row(recording: &RecordingSection, number: usize, tap: &TapSection) -> Vec<String> {
-    vec![
-        recording.file.clone(),
-        number.to_string(),
-        format!("{:.3}", tap.time),
-        or_missing(peak(tap).map(|peak| significant(peak, 3))),
-        peak_unit(recording),
-        if tap.accepted { "yes" } else { "no" }.to_owned(),
-        tap.reason.clone().unwrap_or_default(),
-    ]
-}
-
 fn peak(tap: &TapSection) -> Option<f64> {
     tap.peak_force.or(tap.peak_response)
 }
@@ -270,11 +262,25 @@ fn peaks_note(recordings: &[RecordingSection]) -> String {
 /// without any tap.
 pub fn taps_used(document: &Document) -> Option<Table> {
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let rows: Vec<Vec<String>> = recordings
-        .iter()
-        .filter(|recording| !recording.taps.is_empty())
-        .map(used_row)
-        .collect();
+    let mut rows = Vec::new();
+    for recording in recordings.iter().filter(|one| !one.taps.is_empty()) {
+        let used: Vec<&TapSection> = recording.taps.iter().filter(|tap| tap.accepted).collect();
+        let peaks = used.iter().filter_map(|tap| peak(tap));
+        let softest = peaks.clone().min_by(f64::total_cmp);
+        let hardest = peaks.max_by(f64::total_cmp);
+        let mut row = vec![
+            recording.file.clone(),
+            format!("{} of {}", used.len(), recording.taps.len()),
+        ];
+        for tap in [used.first(), used.last()] {
+            row.push(or_missing(tap.map(|tap| format!("{:.3}", tap.time))));
+        }
+        for peak in [softest, hardest] {
+            row.push(or_missing(peak.map(|peak| significant(peak, 3))));
+        }
+        row.push(peak_unit(recording));
+        rows.push(row);
+    }
     if rows.is_empty() {
         return None;
     }
@@ -296,28 +302,40 @@ pub fn taps_used(document: &Document) -> Option<Table> {
     Some(table.without_empty_columns())
 }
 
-fn used_row(recording: &RecordingSection) -> Vec<String> {
-    let used: Vec<&TapSection> = recording.taps.iter().filter(|tap| tap.accepted).collect();
-    let time = |tap: Option<&&TapSection>| or_missing(tap.map(|tap| format!("{:.3}", tap.time)));
-    let peaks = || used.iter().filter_map(|tap| peak(tap));
-    let written = |peak: Option<f64>| or_missing(peak.map(|peak| significant(peak, 3)));
-    vec![
-        recording.file.clone(),
-        format!("{} of {}", used.len(), recording.taps.len()),
-        time(used.first()),
-        time(used.last()),
-        written(peaks().min_by(f64::total_cmp)),
-        written(peaks().max_by(f64::total_cmp)),
-        peak_unit(recording),
-    ]
-}
-
 /// One row for each dataset; `None` without any.
 pub fn datasets(document: &Document) -> Option<Table> {
     let datasets = document.datasets.as_deref().filter(|d| !d.is_empty())?;
     let first = datasets.first().map(|dataset| &dataset.file);
     let several = datasets.iter().any(|dataset| Some(&dataset.file) != first);
-    let rows = datasets.iter().map(|dataset| dataset_row(dataset, several));
+    let mut rows = Vec::new();
+    for dataset in datasets {
+        let step = match (dataset.spacing, &dataset.spacing_unit) {
+            (Some(step), Some(unit)) => format!("{} {unit}", trimmed(step, 6)),
+            (Some(step), None) => trimmed(step, 6),
+            (None, _) if dataset.points.is_some() => "uneven".to_owned(),
+            (None, _) => MISSING.to_owned(),
+        };
+        let unit = match (&dataset.unit, &dataset.denominator_unit) {
+            (Some(above), Some(below)) => format!("({above})/({below})"),
+            (above, _) => or_missing(above.clone()),
+        };
+        rows.push(vec![
+            match several {
+                true => dataset.file.clone(),
+                false => String::new(),
+            },
+            dataset.dataset.to_string(),
+            dataset.kind.clone(),
+            or_missing(dataset.points),
+            step,
+            or_missing(dataset.response.clone()),
+            or_missing(dataset.reference.clone()),
+            unit,
+            or_missing(dataset.values.clone()),
+            or_missing(dataset.coding.clone()),
+            or_missing(dataset.description.clone()),
+        ]);
+    }
     let table = Table {
         caption: "Datasets".to_owned(),
         columns: vec![
@@ -333,38 +351,8 @@ pub fn datasets(document: &Document) -> Option<Table> {
             words("Stored as").on_page(),
             words("Description").on_page(),
         ],
-        rows: rows.collect(),
+        rows,
         note: "As the headers say; values were not read.".to_owned(),
     };
     Some(table.without_empty_columns())
-}
-
-fn dataset_row(dataset: &DatasetSection, several: bool) -> Vec<String> {
-    let step = match (dataset.spacing, &dataset.spacing_unit) {
-        (Some(step), Some(unit)) => format!("{} {unit}", trimmed(step, 6)),
-        (Some(step), None) => trimmed(step, 6),
-        (None, _) if dataset.points.is_some() => "uneven".to_owned(),
-        (None, _) => MISSING.to_owned(),
-    };
-    let unit = match (&dataset.unit, &dataset.denominator_unit) {
-        (Some(above), Some(below)) => format!("({above})/({below})"),
-        (above, _) => or_missing(above.clone()),
-    };
-    vec![
-        if several {
-            dataset.file.clone()
-        } else {
-            String::new()
-        },
-        dataset.dataset.to_string(),
-        dataset.kind.clone(),
-        or_missing(dataset.points),
-        step,
-        or_missing(dataset.response.clone()),
-        or_missing(dataset.reference.clone()),
-        unit,
-        or_missing(dataset.values.clone()),
-        or_missing(dataset.coding.clone()),
-        or_missing(dataset.description.clone()),
-    ]
 }

@@ -1,27 +1,20 @@
 //! Tables of how far the estimate moves when the frequencies do.
 
-use super::super::document::{
-    Document, EstimateSection, Method, MonteCarloSection, ResolutionSpanSection, SensitivitySection,
-};
+use super::super::document::{Document, Method, SensitivitySection};
 use super::super::format::{
-    MISSING, RIGID, bound_percent, optional, signed, signed_percent, significant, trimmed,
+    RIGID, bound_percent, optional, or_missing, signed, signed_percent, significant, trimmed,
 };
 use super::{Column, Table, mode_of, number, words};
 
-/// The non-dimensional values that changes are counted from.
+/// Returns the non-dimensional values that changes are counted from.
 fn base(document: &Document, method: Method) -> [Option<f64>; 3] {
-    let estimate = document.estimate.as_ref().and_then(Option::as_ref);
-    let Some(estimate) = estimate else {
+    let Some(estimate) = document.estimate.as_ref().and_then(Option::as_ref) else {
         return [None; 3];
     };
     match &estimate.pairs {
         Some(pairs) if method == Method::Pairs => [pairs.kx, pairs.ky, pairs.kz],
-        _ => own(estimate),
+        _ => [&estimate.kx, &estimate.ky, &estimate.kz].map(|value| Some(value.as_ref()?.value)),
     }
-}
-
-fn own(estimate: &EstimateSection) -> [Option<f64>; 3] {
-    [&estimate.kx, &estimate.ky, &estimate.kz].map(|value| value.as_ref().map(|v| v.value))
 }
 
 /// A column that says by which method, shown where there are several.
@@ -53,8 +46,8 @@ fn side_by_side<T: Copy, K: PartialEq>(
     placed.into_iter().map(|(_, _, row)| row).collect()
 }
 
-/// A stiffness in five digits; "rigid" beyond all bounds.
-fn stiffness(value: Option<f64>) -> String {
+/// Returns a stiffness in five digits; "rigid" beyond all bounds.
+pub(super) fn stiffness(value: Option<f64>) -> String {
     match value {
         Some(value) if value.is_infinite() => RIGID.to_owned(),
         value => optional(value, 5),
@@ -115,19 +108,24 @@ pub fn averages(document: &Document) -> Option<Table> {
     let list = averages.filter(|list| !list.is_empty())?;
     let methods: Vec<Method> = list.iter().map(|row| row.method).collect();
     let ordered = side_by_side(list.iter(), |row| row.percent.to_bits(), |row| row.method);
-    let rows = ordered.into_iter().map(|row| {
-        let cell = |percent: Option<f64>| optional(percent, 3);
-        vec![
+    let mut rows = Vec::new();
+    for row in ordered {
+        let mut cells = vec![
             format!("\u{b1}{}", trimmed(row.percent, 4)),
             row.method.name().to_owned(),
-            cell(row.kx_percent),
-            cell(row.ky_percent),
-            cell(row.kz_percent),
-            cell(row.kx_of_mean_percent),
-            cell(row.ky_of_mean_percent),
-            cell(row.kz_of_mean_percent),
-        ]
-    });
+        ];
+        for percent in [
+            row.kx_percent,
+            row.ky_percent,
+            row.kz_percent,
+            row.kx_of_mean_percent,
+            row.ky_of_mean_percent,
+            row.kz_of_mean_percent,
+        ] {
+            cells.push(optional(percent, 3));
+        }
+        rows.push(cells);
+    }
     let table = Table {
         caption: "Average errors of the stiffnesses".to_owned(),
         columns: vec![
@@ -140,7 +138,7 @@ pub fn averages(document: &Document) -> Option<Table> {
             number("mean of Ky (%)"),
             number("mean of Kz (%)"),
         ],
-        rows: rows.collect(),
+        rows,
         note: "Off by: mean size of the changes of the table above, up and down. Mean of: how far the \
                mean of the two estimates is off, which is less, because opposite changes cancel."
             .to_owned(),
@@ -170,6 +168,17 @@ pub fn monte_carlo(document: &Document) -> Option<Table> {
             signed_percent(change(value.high, base)),
         ]
     });
+    let failed = list.iter().map(|found| (found.method, found.failed));
+    let mut note = format!(
+        "{} draws, each frequency with its own standard deviation.{}",
+        list.first().map_or(0, |found| found.samples),
+        failures(&failed.collect::<Vec<_>>(), " and are left out")
+    );
+    if methods.contains(&Method::Consistent) {
+        note.push_str(
+            " The consistent estimate draws the beam's properties that have a tolerance as well.",
+        );
+    }
     let table = Table {
         caption: "Random errors of the frequencies (Monte Carlo)".to_owned(),
         columns: vec![
@@ -183,34 +192,24 @@ pub fn monte_carlo(document: &Document) -> Option<Table> {
             number("up (%)"),
         ],
         rows: rows.collect(),
-        note: draws(list),
+        note,
     };
     Some(table.without_empty_columns())
 }
 
-/// How often it was repeated, and how often in vain.
-fn draws(list: &[MonteCarloSection]) -> String {
-    let samples = list.first().map_or(0, |found| found.samples);
-    let failed = list.iter().filter(|found| found.failed > 0).map(|found| {
-        let by = if list.len() > 1 {
-            format!(" by the method {}", found.method.name())
-        } else {
-            String::new()
+/// Returns how many repetitions left no estimate, by each method, and what follows from that.
+fn failures(failed: &[(Method, usize)], consequence: &str) -> String {
+    let mut words = String::new();
+    for (method, count) in failed.iter().filter(|(_, count)| *count > 0) {
+        let by = match failed.len() {
+            1 => String::new(),
+            _ => format!(" by the method {}", method.name()),
         };
-        format!(
-            " {} of them leave no estimate{by} and are left out.",
-            found.failed
-        )
-    });
-    let tolerances = if list.iter().any(|found| found.method == Method::Consistent) {
-        " The consistent estimate draws the beam's properties that have a tolerance as well."
-    } else {
-        ""
-    };
-    format!(
-        "{samples} draws, each frequency with its own standard deviation.{}{tolerances}",
-        failed.collect::<String>()
-    )
+        words.push_str(&format!(
+            " {count} of them leave no estimate{by}{consequence}."
+        ));
+    }
+    words
 }
 
 /// Smallest and largest estimate over all sign patterns of the bounds; `None` where not computed.
@@ -234,6 +233,7 @@ pub fn spans(document: &Document) -> Option<Table> {
             signed_percent(change(Some(high), base)),
         ]
     });
+    let failed = list.iter().map(|span| (span.method, span.failed));
     Some(Table {
         caption: "Every mode at one end of its bound or the other".to_owned(),
         columns: vec![
@@ -246,30 +246,15 @@ pub fn spans(document: &Document) -> Option<Table> {
             number("up (%)"),
         ],
         rows: rows.collect(),
-        note: tried(list),
+        note: format!(
+            "{} sign patterns tried.{}",
+            list.first().map_or(0, |span| span.patterns),
+            failures(&failed.collect::<Vec<_>>(), ": the span is open")
+        ),
     })
 }
 
-/// How many sign patterns were tried, and how many in vain.
-fn tried(list: &[ResolutionSpanSection]) -> String {
-    let patterns = list.first().map_or(0, |span| span.patterns);
-    let failed = list.iter().filter(|span| span.failed > 0).map(|span| {
-        let method = span.method.name();
-        let by = if list.len() > 1 {
-            format!(" by the method {method}")
-        } else {
-            String::new()
-        };
-        format!(
-            " {} of them leave no estimate{by}: the span is open.",
-            span.failed
-        )
-    });
-    let failed: String = failed.collect();
-    format!("{patterns} sign patterns tried.{failed}")
-}
-
-/// What each mode's bound does to each parameter; `None` where not computed.
+/// Change of each parameter by each mode's bound; `None` where not computed.
 pub fn sensitivity(document: &Document) -> Option<Table> {
     let list = document.resolution_span.as_deref()?;
     let methods: Vec<Method> = list.iter().map(|span| span.method).collect();
@@ -291,11 +276,13 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
         columns.push(number(&format!("{name} moves (%)")));
     }
     let rows = ordered.into_iter().map(|(span, row)| {
+        let mode = mode_of(document, row.mode).filter(|mode| mode.frequency > 0.0);
+        let percent = mode.map(|mode| 100.0 * row.half_line / mode.frequency);
         let mut cells = vec![
             row.mode.to_string(),
             span.method.name().to_owned(),
             significant(row.half_line, 3),
-            reading_percent(document, row),
+            or_missing(percent.map(bound_percent)),
             signed_percent(row.kx_percent),
             signed_percent(row.ky_percent),
             signed_percent(row.kz_percent),
@@ -303,57 +290,44 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
         cells.truncate(columns.len());
         cells
     });
+    let mut notes = Vec::new();
+    for span in list {
+        let drivers = drivers(&span.sensitivity, with_kz);
+        if !drivers.is_empty() {
+            notes.push(match list.len() {
+                1 => drivers,
+                _ => format!("By the method {}: {drivers}", span.method.name()),
+            });
+        }
+    }
     Some(Table {
         caption: "Which mode drives which parameter".to_owned(),
         rows: rows.collect(),
-        note: all_drivers(list, with_kz),
+        note: notes.join(" "),
         columns,
     })
 }
 
-/// The drivers by each method.
-fn all_drivers(list: &[ResolutionSpanSection], with_kz: bool) -> String {
-    let sentences = list.iter().filter_map(|span| {
-        let drivers = drivers(&span.sensitivity, with_kz);
-        let said = (!drivers.is_empty()).then_some(drivers)?;
-        Some(match list.len() {
-            1 => said,
-            _ => format!("By the method {}: {said}", span.method.name()),
-        })
-    });
-    sentences.collect::<Vec<_>>().join(" ")
-}
-
-/// The bound in percent of the mode's frequency.
-fn reading_percent(document: &Document, row: &SensitivitySection) -> String {
-    let mode = mode_of(document, row.mode).filter(|mode| mode.frequency > 0.0);
-    mode.map_or(MISSING.to_owned(), |mode| {
-        bound_percent(100.0 * row.half_line / mode.frequency)
-    })
-}
-
-/// "Kx depends most on mode 4, Ky on mode 1."
-pub fn drivers(list: &[SensitivitySection], with_kz: bool) -> String {
-    let pick: [fn(&SensitivitySection) -> Option<f64>; 3] = [
-        |row| row.kx_percent,
-        |row| row.ky_percent,
-        |row| row.kz_percent,
-    ];
-    let sentences: Vec<String> = names(with_kz)
-        .iter()
-        .zip(pick)
-        .filter_map(|(name, pick)| {
-            let strength = |row: &SensitivitySection| pick(row).map_or(0.0, f64::abs);
-            let strongest = list
-                .iter()
-                .filter(|row| strength(row) > 0.0)
-                .max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
-            Some(format!("{name} on mode {}", strongest.mode))
-        })
-        .collect();
-    if sentences.is_empty() {
-        return String::new();
+/// Returns "Kx depends most on mode 4, Ky on mode 1."; empty where nothing depends on any.
+fn drivers(list: &[SensitivitySection], with_kz: bool) -> String {
+    let mut drivers: Vec<String> = Vec::new();
+    for (index, name) in names(with_kz).iter().enumerate() {
+        let strengths = list.iter().map(|row| {
+            let percent = [row.kx_percent, row.ky_percent, row.kz_percent][index];
+            (percent.map_or(0.0, f64::abs), row.mode)
+        });
+        let strengths = strengths.filter(|(strength, _)| *strength > 0.0);
+        if let Some((_, mode)) = strengths.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let depends = if drivers.is_empty() {
+                " depends most"
+            } else {
+                ""
+            };
+            drivers.push(format!("{name}{depends} on mode {mode}"));
+        }
     }
-    let list = sentences.join(", ");
-    format!("{}.", list.replacen(" on mode", " depends most on mode", 1))
+    match drivers.is_empty() {
+        true => String::new(),
+        false => drivers.join(", ") + ".",
+    }
 }

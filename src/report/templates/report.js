@@ -45,13 +45,13 @@ function element(name, className, text) {
 function unit(words) { return words && words !== "1" ? " " + words : ""; }
 
 // Half-line bands and lines of the resonances; names above the topmost panel only.
-function drawMarks(plot, top) {
+function drawMarks(marks, top) {
   return function (u) {
     var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, free = -Infinity;
     c.save();
     c.font = 12 * ratio + "px system-ui, sans-serif";
     c.textAlign = "center";
-    plot.marks.forEach(function (mark) {
+    marks.forEach(function (mark) {
       var x = u.valToPos(mark.at, "x", true);
       if (x < box.left || x > box.left + box.width) return;
       c.strokeStyle = c.fillStyle = color(mark.mode ? "--mode" : "--other");
@@ -78,14 +78,14 @@ function drawMarks(plot, top) {
 }
 
 // Taps: dots for used ones, crosses for rejected ones, with their numbers where there is room.
-function drawTaps(plot, state) {
+function drawTaps(taps, state) {
   return function (u) {
     var c = u.ctx, box = u.bbox, ratio = devicePixelRatio || 1, free = -Infinity;
     c.save();
     c.font = 12 * ratio + "px system-ui, sans-serif";
     c.textAlign = "center";
     c.textBaseline = "middle";
-    plot.taps.forEach(function (tap, index) {
+    taps.forEach(function (tap, index) {
       var x = u.valToPos(tap.at, "x", true);
       if (tap.peak == null || x < box.left || x > box.left + box.width) return;
       var y = Math.min(Math.max(u.valToPos(tap.peak, "y", true), box.top + 6 * ratio), box.top + box.height - 6 * ratio);
@@ -110,50 +110,59 @@ function drawTaps(plot, state) {
   };
 }
 
+// Every place of equally spaced points.
+function places(runs) {
+  var all = [];
+  runs.forEach(function (run) { for (var i = 0; i < run.count; i++) all.push(run.first + i * run.step); });
+  return all;
+}
+
 // The samples about a chosen tap, below the recording: one panel for the force, one for the response.
 function closeUp(figure, tap) {
-  var near = tap && tap.close_up;
   (figure.near || []).forEach(function (u) { u.destroy(); });
   figure.near = [];
   figure.nearHost.textContent = "";
-  if (!near) return false;
-  var x = near.curves[0].values.map(function (part, i) { return near.start + i * near.step; });
-  figure.near = near.curves.map(function (curve, index) {
-    var values = curve.values.map(function (part) { return part * curve.part; });
-    var last = index === near.curves.length - 1, panel = { label: curve.label, unit: curve.unit, scale: "linear" };
+  if (!tap || !tap.close_up.length) return false;
+  figure.near = tap.close_up.map(function (panel, index) {
+    var last = index === tap.close_up.length - 1, curve = panel.series[0];
+    panel.x.label = "time from the trigger of " + tap.name;
     return new uPlot({
       width: Math.max(figure.nearHost.clientWidth, 240), height: 190 + (last ? 36 : 0), padding: [8, 30, 0, 0],
-      axes: axes({ x: { label: "time from the trigger of " + tap.name, unit: "ms" } }, panel, last),
-      scales: { x: { time: false }, y: vertical(panel) },
+      axes: axes(panel, last), scales: { x: { time: false }, y: { range: padded } },
       series: [{ label: "time", value: function (u, v) { return v == null ? "–" : digits(v) + " ms"; } },
-        { label: curve.label, stroke: color(index ? "--c0" : "--soft"), width: 1.5, value: function (u, v) { return digits(v) + (v == null ? "" : unit(curve.unit)); } }],
+        { label: panel.y.label, stroke: color(index ? "--c0" : "--soft"), width: 1.5, value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.y.unit)); } }],
       cursor: { sync: { key: figure.key + "near", scales: ["x", null] }, drag: { x: true, y: false } }
-    }, [x, values], figure.nearHost);
+    }, [places(curve.x), curve.y], figure.nearHost);
   });
-  if (near.note) figure.nearHost.appendChild(element("p", "note", near.note));
+  var note = tap.close_up[0].note;
+  if (note) figure.nearHost.appendChild(element("p", "note", note));
   return true;
 }
 
-function axes(plot, panel, last) {
+function axes(panel, last) {
   var ink = color("--ink"), rule = color("--rule");
   var common = { stroke: ink, grid: { stroke: rule, width: 1 }, ticks: { stroke: rule, width: 1 } };
   var narrow = innerWidth < 600;
   return [
-    Object.assign({}, common, { label: last ? plot.x.label + " (" + plot.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
+    Object.assign({}, common, { label: last ? panel.x.label + " (" + panel.x.unit + ")" : "", labelSize: last ? 22 : 0, size: last ? 34 : 8,
       values: function (u, splits) { return last ? tickNames(splits) : []; } }),
     Object.assign({}, common, {
-      label: panel.label + " (" + (panel.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 56 : 62, space: 28,
+      label: panel.y.label + " (" + (panel.y.unit || "unit of the file") + ")", labelSize: 20, size: narrow ? 56 : 62, space: 28,
       values: function (u, splits) { return tickNames(splits); }
-    }, panel.scale !== "logarithmic" ? {} : {
+    }, !logarithmic(panel.y) ? {} : {
       splits: function (u, index, low, high) { return ticks(low, high, true); },
       filter: function (u, splits) { return splits; }
     })
   ];
 }
 
+// Room above and below what is shown.
+var padded = { min: { pad: 0.08 }, max: { pad: 0.14 } };
+
+function isBand(curve) { return curve.mark === "band"; }
+
 function vertical(panel) {
-  if (panel.range) return { range: panel.range };
-  if (panel.scale !== "logarithmic") return { range: { min: { pad: 0.08 }, max: { pad: 0.14 } } };
+  if (!logarithmic(panel.y)) return { range: panel.series.some(isBand) ? padded : [panel.y.low, panel.y.high] };
   return {
     distr: 3,
     // As in the pictures, 140 dB below the largest are shown at most.
@@ -161,22 +170,32 @@ function vertical(panel) {
   };
 }
 
+// The curves of a panel; a band is two.
+function curves(panel) {
+  return [].concat.apply([], panel.series.map(function (curve) {
+    if (!isBand(curve)) return [curve];
+    return [["smallest", curve.low], ["largest", curve.high]].map(function (end) {
+      return Object.assign({}, curve, { name: end[0], y: end[1] });
+    });
+  }));
+}
+
 function options(figure, index) {
-  var plot = figure.plot, panel = plot.panels[index], last = index === plot.panels.length - 1;
-  var taps = plot.kind === "taps";
-  var series = [{ label: plot.x.label, value: function (u, v) { return v == null ? "–" : +v.toPrecision(7) + " " + plot.x.unit; } }];
-  panel.series.forEach(function (curve) {
+  var all = figure.curves, panel = all[index], last = index === all.length - 1;
+  var taps = figure.plot.kind === "taps";
+  var series = [{ label: panel.x.label, value: function (u, v) { return v == null ? "–" : +v.toPrecision(7) + " " + panel.x.unit; } }];
+  curves(panel).forEach(function (curve) {
     series.push({
       label: curve.name, stroke: color("--" + curve.color), alpha: curve.opacity, width: 1.5, spanGaps: false,
       points: { show: taps ? false : undefined },
-      value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.unit)); }
+      value: function (u, v) { return digits(v) + (v == null ? "" : unit(panel.y.unit)); }
     });
   });
-  var draw = [taps ? drawTaps(plot, figure) : drawMarks(plot, index === 0)];
+  var draw = [taps ? drawTaps(figure.taps, figure) : drawMarks(figure.marks, index === 0)];
   return {
     width: Math.max(figure.host.clientWidth, 240),
     height: Math.min(panel.height, 280) + (last ? 36 : 0),
-    series: series, axes: axes(plot, panel, last),
+    series: series, axes: axes(panel, last),
     scales: { x: { time: false }, y: vertical(panel) },
     bands: taps ? [{ series: [2, 1], fill: color("--data") + "55" }] : [],
     padding: [index === 0 ? 22 : 8, 30, 0, 0],
@@ -195,16 +214,17 @@ function zoom(figure, low, high) {
 function whole(figure) { zoom(figure, -Infinity, Infinity); }
 
 function build(figure) {
-  closeUp(figure, figure.tap >= 0 && figure.plot.taps[figure.tap]);
-  if (figure.plot.kind === "points") return buildPoints(figure);
+  closeUp(figure, figure.taps[figure.tap]);
+  if (figure.points) return buildPoints(figure);
   figure.panels.forEach(function (u) { u.destroy(); });
-  figure.panels = figure.plot.panels.map(function (panel, index) {
-    var data = [figure.x].concat(panel.series.map(function (curve) {
-      var values = curve.values;
-      if (panel.scale === "logarithmic") return values.map(function (v) { return v > 0 ? v : null; });
+  figure.panels = figure.curves.map(function (panel, index) {
+    var period = panel.y.period;
+    var data = [figure.x].concat(curves(panel).map(function (curve) {
+      var values = curve.y;
+      if (logarithmic(panel.y)) return values.map(function (v) { return v > 0 ? v : null; });
       // No line where values come round again, as a phase does.
-      return !panel.period ? values : values.map(function (v, i) {
-        return i > 0 && v != null && values[i - 1] != null && Math.abs(v - values[i - 1]) > panel.period / 2 ? null : v;
+      return !period ? values : values.map(function (v, i) {
+        return i > 0 && v != null && values[i - 1] != null && Math.abs(v - values[i - 1]) > period / 2 ? null : v;
       });
     }));
     var u = new uPlot(options(figure, index), data, figure.host);
@@ -214,7 +234,7 @@ function build(figure) {
 }
 
 function chosen(figure, index) {
-  var tap = figure.plot.taps[index], x = figure.x, reach = Math.max(20 * finest(figure), 0.02 * x[x.length - 1]);
+  var tap = figure.taps[index], x = figure.x, reach = Math.max(20 * finest(figure), 0.02 * x[x.length - 1]);
   figure.tap = index;
   figure.said.textContent = tap.name + ": " + tap.words;
   // The recording stays whole where the samples themselves are shown below it.
@@ -230,7 +250,7 @@ function chips(figure) {
     button.addEventListener("click", function () { action(button); });
     bar.appendChild(button);
   }
-  if (figure.plot.kind === "points") pointChips(figure, chip);
+  if (figure.points) pointChips(figure, chip);
   else curveChips(figure, chip);
   chip("picture", "reset", function () { figure.element.classList.toggle("still"); });
   return bar;
@@ -238,18 +258,18 @@ function chips(figure) {
 
 // The least distance of points.
 function finest(figure) {
-  return Math.min.apply(null, figure.plot.x.runs.map(function (run) { return run[1]; }));
+  return Math.min.apply(null, figure.curves[0].series[0].x.map(function (run) { return run.step; }));
 }
 
 function curveChips(figure, chip) {
   chip("whole range", "reset", function () { figure.tap = -1; figure.said.textContent = ""; closeUp(figure, null); whole(figure); });
-  figure.plot.marks.forEach(function (mark) {
+  figure.marks.forEach(function (mark) {
     chip(mark.name + ", " + mark.words, mark.mode ? "mode" : "other", function () {
       var reach = Math.max(40 * mark.half, 10 * finest(figure));
       zoom(figure, mark.at - reach, mark.at + reach);
     });
   });
-  figure.plot.taps.forEach(function (tap, index) {
+  figure.taps.forEach(function (tap, index) {
     chip((tap.used ? "● " : "✕ ") + tap.name, tap.used ? "mode" : "bad", function () { chosen(figure, index); });
   });
 }
@@ -261,7 +281,7 @@ function clicks(figure) {
     var over = event.target.closest(".u-over"), u = figure.panels[0];
     if (!over || !u) return;
     var at = event.clientX - over.getBoundingClientRect().left, best = -1, near = 14;
-    figure.plot.taps.forEach(function (tap, index) {
+    figure.taps.forEach(function (tap, index) {
       var distance = Math.abs(u.valToPos(tap.at, "x") - at);
       if (distance < near) { near = distance; best = index; }
     });
@@ -277,10 +297,18 @@ function unpacked(node) {
   return new Response(stream).text().then(JSON.parse);
 }
 
+// Curves stand over runs of equally spaced places, single points over places of their own.
 function start(node, index, plot) {
-  var figure = { element: node, key: "figure" + index, panels: [], tap: -1, shown: 0, x: [], plot: plot };
-  var points = figure.plot.kind === "points", axis = figure.plot.x;
-  if (!points) axis.runs.forEach(function (run) { for (var i = 0; i < run[2]; i++) figure.x.push(run[0] + i * run[1]); });
+  var panels = plot.blocks[0].panels, first = panels[0].series[0], points = !(first && first.x[0] && first.x[0].count);
+  var figure = { element: node, key: "figure" + index, plot: plot, panels: [], tap: -1, shown: 0, points: points, x: [], marks: [], taps: [] };
+  if (points) plot.blocks.forEach(function (block) { block.panels.forEach(function (panel) { ends(panel.x); ends(panel.y); }); });
+  else {
+    figure.curves = panels;
+    figure.x = places(first.x);
+    figure.marks = panels[0].rules;
+    figure.taps = panels[0].events;
+    figure.taps.forEach(function (tap, number) { tap.name = "tap " + (number + 1); });
+  }
   var live = element("div", "plot");
   figure.host = element("div", "host");
   figure.said = element("p", "said");
@@ -290,7 +318,7 @@ function start(node, index, plot) {
   live.appendChild(figure.said);
   figure.nearHost = element("div", "host near");
   live.appendChild(figure.nearHost);
-  live.appendChild(element("p", "note", "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + (figure.plot.note || "")));
+  live.appendChild(element("p", "note", "Drag over a range to zoom, double click for the whole range; two fingers zoom, one moves. " + panels[0].note));
   node.insertBefore(live, node.firstChild);
   node.classList.add("live");
   build(figure);

@@ -3,6 +3,14 @@
 
 var reach = 24; // pixels within which a point answers the pointer
 
+// The ends of an axis, and its named places apart from their names.
+function ends(axis) {
+  axis.range = [axis.low, axis.high];
+  if (!axis.names) return;
+  axis.at = axis.names.map(function (tick) { return tick.value; });
+  axis.names = axis.names.map(function (tick) { return tick.label; });
+}
+
 function logarithmic(axis) { return axis.scale === "logarithmic"; }
 
 // A title of at most `room` pixels: its words give way at their end, its unit stays.
@@ -118,7 +126,7 @@ function drawPanel(panel) {
     c.save();
     drawRules(u, panel);
     c.beginPath(); c.rect(box.left, box.top, box.width, box.height); c.clip();
-    panel.sets.forEach(function (set) { drawSet(u, panel, set, panel.lit); });
+    panel.series.forEach(function (set) { drawSet(u, panel, set, panel.lit); });
     c.restore();
   };
 }
@@ -126,7 +134,7 @@ function drawPanel(panel) {
 // The point nearest to the pointer, and what it says.
 function nearest(u, panel, left, top) {
   var best = null, near = reach;
-  panel.sets.forEach(function (set) {
+  panel.series.forEach(function (set) {
     if (mute(set)) return;
     set.x.forEach(function (value, i) {
       if (!shown(set, i, panel.view.x, panel.view.y)) return;
@@ -222,7 +230,7 @@ function pointOptions(figure, panel, holder) {
 
 function key(panel) {
   var signs = { dot: "●", ring: "○", cross: "✕", square: "■", line: "―", curve: "―", band: "▮", bar: "▮" }, line = element("p", "key"), listed = {};
-  panel.sets.forEach(function (set) {
+  panel.series.forEach(function (set) {
     if (!set.name || listed[set.name]) return;
     listed[set.name] = true;
     var sign = element("span", "", signs[set.mark] + " ");
@@ -238,8 +246,8 @@ function buildPoints(figure) {
   figure.panels.forEach(function (u) { u.destroy(); });
   figure.host.textContent = figure.said.textContent = "";
   figure.host.classList.add("points");
-  figure.host.classList.toggle("many", figure.plot.views[figure.shown].panels.length > 3);
-  figure.panels = figure.plot.views[figure.shown].panels.map(function (panel) {
+  figure.host.classList.toggle("many", figure.plot.blocks[figure.shown].panels.length > 3);
+  figure.panels = figure.plot.blocks[figure.shown].panels.map(function (panel) {
     var holder = element("div", "");
     if (panel.title) holder.appendChild(element("p", "head", panel.title));
     holder.appendChild(key(panel));
@@ -256,7 +264,7 @@ function buildPoints(figure) {
 }
 
 function pointChips(figure, chip) {
-  var views = figure.plot.views;
+  var views = figure.plot.blocks;
   chip("whole range", "reset", function () { buildPoints(figure); });
   if (views.length > 1) views.forEach(function (view, index) {
     chip(view.name, index === figure.shown ? "mode chosen" : "mode", function (button) {

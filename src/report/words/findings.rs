@@ -1,18 +1,22 @@
-//! What was found: in five lines for a terminal, and in a few plain sentences for the page.
+//! The findings: in five lines for a terminal, and in a few plain sentences for the page.
 
-use super::super::document::{
-    Document, EstimateSection, ModeSection, PredictionSection, ReadBy, RecordingSection,
-};
+use super::super::chart::axis::extent;
+use super::super::document::{Document, EstimateSection, ModeSection, PredictionSection, ReadBy};
 use super::super::format::{bound_percent, capital, signed_or_below, significant, trimmed};
 use super::super::tables::{Parameter, estimated, quality_count, reading_bound};
-use super::gap::{gap_in_short, gap_story, joint_with, missing, shows_gap};
+use super::gap::{gap_in_short, gap_story, joint_with, listed, missing, shows_gap};
 use tapjoint_diagnosis::Verdict;
 use tapjoint_identify::observation::UNPAIRED;
 
 /// At most five lines, each with what it is about; what was not computed has none.
 pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
+    // Without a hammer it matters on which channels taps were looked for.
+    let taps_and_channels = taps(document).map(|taps| match channels(document) {
+        Some(channels) => format!("{taps}. {channels}"),
+        None => taps,
+    });
     let lines = [
-        ("Taps", taps_in_short(document)),
+        ("Taps", taps_and_channels),
         ("Modes", modes_in_short(document)),
         (
             if document.has_joint() {
@@ -32,79 +36,59 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
         .collect()
 }
 
-fn taps_in_short(document: &Document) -> Option<String> {
-    let found = TapCount::of(document)?;
-    if found.of_functions {
+/// Returns "12 of 14 taps used, in 2 recordings".
+fn taps(document: &Document) -> Option<String> {
+    let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
+    let files = match recordings.len() {
+        1 => "1 recording".to_owned(),
+        count => format!("{count} recordings"),
+    };
+    if recordings.iter().all(|one| one.sample_rate.is_none()) {
         return Some(format!(
-            "none: {} of frequency response functions",
-            found.files
+            "no taps to judge: {files} of frequency response functions"
         ));
     }
+    let taps = recordings.iter().flat_map(|recording| &recording.taps);
+    let total = taps.clone().count();
+    let used = taps.filter(|tap| tap.accepted).count();
+    // Recordings that were only looked at have not been used yet.
     let could = match document.modes {
         Some(_) => "used",
         None => "can be used",
     };
-    // Without a hammer it matters on what taps were looked for.
-    let channels = channels(document).map_or(String::new(), |words| format!(". {words}"));
-    Some(format!(
-        "{} of {} taps {could}, in {}{channels}",
-        found.used, found.total, found.files
-    ))
-}
-
-/// Taps of all recordings.
-struct TapCount {
-    /// "2 recordings".
-    files: String,
-    /// Whether the files hold nothing but frequency response functions, which have no taps to judge.
-    of_functions: bool,
-    total: usize,
-    used: usize,
-}
-
-impl TapCount {
-    fn of(document: &Document) -> Option<TapCount> {
-        let recordings = document.recordings.as_deref().filter(|r| !r.is_empty())?;
-        let taps = recordings.iter().flat_map(|recording| &recording.taps);
-        Some(TapCount {
-            files: match recordings.len() {
-                1 => "1 recording".to_owned(),
-                count => format!("{count} recordings"),
-            },
-            of_functions: recordings.iter().all(|one| one.sample_rate.is_none()),
-            total: taps.clone().count(),
-            used: taps.filter(|tap| tap.accepted).count(),
-        })
-    }
-}
-
-fn modes_in_short(document: &Document) -> Option<String> {
-    let (count, range) = numbered(document.modes.as_deref()?);
-    Some(match count {
-        0 => "none".to_owned(),
-        1 => format!("1 mode {range}"),
-        count => format!("{count} modes {range}"),
+    Some(match total {
+        0 => format!("no taps found in {files}"),
+        1 => format!("{used} of 1 tap {could}, in {files}"),
+        _ => format!("{used} of {total} taps {could}, in {files}"),
     })
 }
 
-/// The number of modes, and where they are: "from 17.00 to 994.2 Hz".
-fn numbered(modes: &[ModeSection]) -> (usize, String) {
-    let numbered = modes.iter().filter(|mode| mode.mode.is_some());
-    let frequencies = || numbered.clone().map(|mode| mode.frequency);
-    let low = significant(frequencies().fold(f64::INFINITY, f64::min), 4);
-    let range = match frequencies().count() {
-        1 => format!("at {low} Hz"),
-        _ => {
-            let high = significant(frequencies().fold(0.0, f64::max), 4);
-            format!("from {low} to {high} Hz")
-        }
+/// Returns "5 modes from 17.00 to 994.2 Hz"; of a bare recording resonances.
+fn modes_in_short(document: &Document) -> Option<String> {
+    let modes = document.modes.as_deref()?.iter();
+    let numbered = modes.filter(|mode| mode.mode.is_some());
+    let frequencies: Vec<f64> = numbered.map(|mode| mode.frequency).collect();
+    let described = document.test.iter().any(|test| test.kind.is_some());
+    let word = if described { "mode" } else { "resonance" };
+    let Some((low, high)) = extent(frequencies.iter().copied()) else {
+        return Some(format!("no {word}s found"));
     };
-    (frequencies().count(), range)
+    let (low, high) = (significant(low, 4), significant(high, 4));
+    Some(match frequencies.len() {
+        1 => format!("1 {word} at {low} Hz"),
+        count => format!("{count} {word}s from {low} to {high} Hz"),
+    })
+}
+
+/// Returns "no estimate: 3 modes are needed"; `None` where there is one or none was asked for.
+pub fn no_estimate(document: &Document) -> Option<String> {
+    let missing = matches!(document.estimate, Some(None));
+    missing.then(|| format!("no estimate: {}", document.no_estimate()))
 }
 
 fn joint(document: &Document) -> Option<String> {
     let Some(estimate) = document.estimate.as_ref()? else {
-        return Some(format!("no estimate: {}", document.no_estimate()));
+        return no_estimate(document);
     };
     let physical = physical(estimate, with_bounds);
     (!physical.is_empty()).then(|| physical.join(", "))
@@ -118,7 +102,7 @@ fn physical(estimate: &EstimateSection, words: fn(&Parameter<'_>) -> String) -> 
 }
 
 /// "Kt = 1.3820 ± 0.0090 MN/m"; the larger of the standard deviations where there are two. Where the misfit
-/// gives limits these are said, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
+/// gives limits these are written, which need not lie alike on both sides: "Kt = 1.790 MN/m (95 %: 1.59 to 1.99)".
 fn with_bounds(parameter: &Parameter<'_>) -> String {
     let [value, _, _, _, unit] = parameter.written();
     let rounded = parameter.written_together();
@@ -166,7 +150,8 @@ fn doubts(document: &Document) -> Option<String> {
 
 /// The findings, one sentence or two in each string; what was not computed is not mentioned.
 pub fn sentences(document: &Document) -> Vec<String> {
-    let first = [taps(document), channels(document), modes(document)];
+    let taps = taps(document).map(|taps| capital(&taps) + ".");
+    let first = [taps, channels(document), modes(document)];
     let rest = [
         quality_count(document).map(|count| capital(&count) + "."),
         estimate(document),
@@ -183,7 +168,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
         .collect()
 }
 
-/// What a description would add to a bare recording; `None` where there is one, and of what was not analysed.
+/// Tells what a description would add to a bare recording; `None` where there is one, and without an analysis.
 fn described(document: &Document) -> Option<String> {
     let bare = document
         .test
@@ -201,47 +186,18 @@ fn described(document: &Document) -> Option<String> {
 /// One sentence for each mode that changes with the amplitude.
 fn amplitudes(document: &Document) -> Vec<String> {
     let modes = document.modes.as_deref().unwrap_or_default();
-    let sentence = |mode: &ModeSection| {
-        let change = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
-        let change = change.to_string();
-        // A number stays on the line of its unit.
-        let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
-        Some(format!("Caution: mode {} {change}.", mode.mode?))
-    };
-    modes.iter().filter_map(sentence).collect()
-}
-
-fn taps(document: &Document) -> Option<String> {
-    let TapCount {
-        files,
-        of_functions,
-        total,
-        used,
-    } = TapCount::of(document)?;
-    let found = match total {
-        1 => format!("1 tap was found in {files}"),
-        count => format!("{count} taps were found in {files}"),
-    };
-    // Of recordings that were only looked at, nothing was used yet.
-    let [was_used, were_used] = match document.modes {
-        None => ["can be used"; 2],
-        Some(_) => ["was used", "were used"],
-    };
-    Some(match (total, used) {
-        (0, _) if of_functions => {
-            format!("{files} of frequency response functions: there are no taps to judge.")
+    let mut sentences = Vec::new();
+    for mode in modes {
+        let amplitude = mode.fit.as_ref().and_then(|fit| fit.amplitude.as_ref());
+        let change = amplitude.and_then(|amplitude| amplitude.ends.as_ref());
+        if let Some((number, change)) = mode.mode.zip(change) {
+            let change = change.to_string();
+            // A number stays on the line of its unit.
+            let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
+            sentences.push(format!("Caution: mode {number} {change}."));
         }
-        (0, _) => format!("No taps were found in {files}."),
-        (1, 1) => format!("{found}, and it {was_used}."),
-        (1, _) => format!("{found}, and it was rejected."),
-        (_, 0) => format!("{found}, and all were rejected."),
-        _ if used == total => format!("{found}, and all {were_used}."),
-        _ => {
-            let rejected = total - used;
-            let were = if rejected == 1 { "was" } else { "were" };
-            format!("{used} of {total} taps in {files} {were_used}, {rejected} {were} rejected.")
-        }
-    })
+    }
+    sentences
 }
 
 /// On what taps were looked for where there is no hammer.
@@ -255,31 +211,29 @@ fn channels(document: &Document) -> Option<String> {
             }
         }
     }
-    let names = match names.as_slice() {
-        [] => return None,
-        [one] => (*one).to_owned(),
-        [all @ .., last] => format!("{} and {last}", all.join(", ")),
-    };
+    if names.is_empty() {
+        return None;
+    }
+    let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
+    let names = listed(&names, "and");
     Some(format!(
         "There is no hammer channel: taps were looked for on {names}, and without the force there is \
          no frequency response function."
     ))
 }
 
+/// Returns the number of modes and where they are, how well lines could be read, and the peaks that are not counted.
 fn modes(document: &Document) -> Option<String> {
     let modes = document.modes.as_deref()?;
-    let (count, range) = numbered(modes);
-    let given = !modes.is_empty() && modes.iter().all(|mode| mode.method.is_none());
-    let found = if given { "given" } else { "found" };
-    let described = document.test.iter().any(|test| test.kind.is_some());
-    let word = if described { "mode" } else { "resonance" };
-    let mut sentence = match count {
-        0 => format!("No {word}s were {found}"),
-        1 => format!("1 {word} was {found}, {range}"),
-        count => format!("{count} {word}s were {found}, {range}"),
-    };
-    let finest = finest(document.recordings.as_deref().unwrap_or_default());
-    if let Some(half_line) = finest.filter(|_| count > 0) {
+    let mut sentence = capital(&modes_in_short(document)?);
+    if !modes.is_empty() && modes.iter().all(|mode| mode.method.is_none()) {
+        sentence.push_str(" (given)");
+    }
+    let recordings = document.recordings.iter().flatten();
+    let finest = recordings.filter_map(|recording| recording.half_line);
+    let finest = finest.min_by(f64::total_cmp);
+    let found = modes.iter().any(|mode| mode.mode.is_some());
+    if let Some(half_line) = finest.filter(|_| found) {
         let half_line = trimmed(half_line, 3);
         sentence.push_str(&format!(
             "; a reading on a spectral line is good to \u{b1}{half_line} Hz at best"
@@ -289,7 +243,7 @@ fn modes(document: &Document) -> Option<String> {
     Some(sentence + ".")
 }
 
-/// How many peaks were left out, and as what: "; 3 more peaks are not counted (2 no clear
+/// Returns the number of peaks that are not counted, by kind: "; 3 more peaks are not counted (2 no clear
 /// resonance, 1 mains 50 Hz)".
 fn others(modes: &[ModeSection]) -> String {
     let mut kinds: Vec<(&str, usize)> = Vec::new();
@@ -315,20 +269,9 @@ fn others(modes: &[ModeSection]) -> String {
     }
 }
 
-/// The smallest half-line bound of all recordings (Hz).
-fn finest(recordings: &[RecordingSection]) -> Option<f64> {
-    let bounds = recordings
-        .iter()
-        .filter_map(|recording| recording.half_line);
-    bounds.min_by(f64::total_cmp)
-}
-
 fn estimate(document: &Document) -> Option<String> {
     let Some(estimate) = document.estimate.as_ref()? else {
-        return Some(format!(
-            "No stiffness was estimated: {}.",
-            document.no_estimate()
-        ));
+        return no_estimate(document).map(|words| capital(&words) + ".");
     };
     let physical = physical(estimate, stiffness);
     if physical.is_empty() {
@@ -387,10 +330,11 @@ fn stiffness(parameter: &Parameter<'_>) -> String {
 
 /// The mode that the model misses most.
 fn most_missed(document: &Document) -> Option<&PredictionSection> {
-    let size = |row: &&PredictionSection| row.error_percent.map_or(-1.0, f64::abs);
     let rows = document.prediction.as_deref()?.iter();
-    rows.filter(|row| row.error_percent.is_some_and(f64::is_finite))
-        .max_by(|a, b| size(a).total_cmp(&size(b)))
+    let compared = rows.filter_map(|row| Some((row.error_percent?.abs(), row)));
+    let compared = compared.filter(|(size, _)| size.is_finite());
+    let worst = compared.max_by(|a, b| a.0.total_cmp(&b.0));
+    worst.map(|(_, row)| row)
 }
 
 /// The largest misfit among the modes, with what the reading alone explains.
@@ -413,15 +357,12 @@ fn misfit(document: &Document) -> Option<String> {
     ))
 }
 
-/// What reading on lines alone would leave open; nothing beside a misfit that is larger than what the readings leave
+/// Returns the spans that reading on lines alone would leave open; nothing beside a misfit that is larger than what the readings leave
 /// open, for the spans would look like what is known of the joint.
 fn resolution(document: &Document) -> Option<String> {
     let estimate = document.estimate.as_ref().and_then(Option::as_ref);
-    let misses = |estimate: &EstimateSection| {
-        let all = estimated(estimate);
-        all.iter().any(|one| one.value.std_scaled.is_some())
-    };
-    if estimate.is_some_and(misses) {
+    let parameters = estimate.map(estimated).unwrap_or_default();
+    if parameters.iter().any(|one| one.value.std_scaled.is_some()) {
         return None;
     }
     let main = estimate.map(|estimate| estimate.method);
@@ -454,7 +395,7 @@ fn resolution(document: &Document) -> Option<String> {
     ))
 }
 
-/// What the spans were computed from: beside a frequency read between the lines, "bound" alone would
+/// Returns the bound that the spans were computed from: beside a frequency read between the lines, "bound" alone would
 /// be taken for that one's.
 fn bound_name(document: &Document) -> &'static str {
     let modes = document.modes.as_deref().unwrap_or_default();

@@ -27,7 +27,7 @@ pub fn gap_story(document: &Document) -> Vec<String> {
     story
 }
 
-/// Where, unless there is no gap; the probabilities take for granted that something is missing.
+/// Returns the likely places of a gap and the worst misfit, unless there is none; the probabilities take for granted that something is missing.
 fn place(document: &Document, gap: &GapSection) -> Option<String> {
     if matches!(gap.verdict, Verdict::NoGap | Verdict::NotEnoughData(_)) {
         return None;
@@ -63,24 +63,24 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
 fn sensors_at(document: &Document, gap: &GapSection) -> String {
     const MOST: usize = 3;
     let recordings = document.recordings.as_deref().unwrap_or_default();
-    let by_mass = gap
+    let mut effects = gap
         .hypotheses
         .iter()
-        .find_map(|found| match &found.hypothesis {
-            Hypothesis::Effects(effects) if is_at_sensor(effects) => {
-                Some(effects.as_slice() == [EffectId::SensorMass])
-            }
+        .filter_map(|found| match &found.hypothesis {
+            Hypothesis::Effects(effects) => Some(effects),
             _ => None,
         });
+    // The first of them whose first effect sits at a sensor.
+    let at_sensor = effects.find(|effects| {
+        let first = effects.first();
+        first.is_some_and(|effect| effect.place() == Place::Sensor)
+    });
+    let by_mass = at_sensor.is_some_and(|effects| effects.as_slice() == [EffectId::SensorMass]);
     let mut sensors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for one in recordings {
         for (name, position) in &one.conditions.sensor_positions {
-            let weighed = one
-                .conditions
-                .sensor_masses
-                .get(name)
-                .is_some_and(|mass| *mass > 0.0);
-            if !(by_mass == Some(true) && weighed) {
+            let weighed = one.conditions.sensor_masses.get(name).is_some_and(|mass| *mass > 0.0);
+            if !(by_mass && weighed) {
                 sensors.entry(name).or_default().push(*position);
             }
         }
@@ -88,20 +88,15 @@ fn sensors_at(document: &Document, gap: &GapSection) -> String {
     if sensors.is_empty() || sensors.len() > MOST {
         return String::new();
     }
-    let named = sensors.iter().map(|(name, places)| {
-        let first = places[0];
-        match places.iter().all(|place| *place == first) {
-            true => format!("{name} at {} mm", trimmed(1e3 * first, 4)),
-            false => format!("{name}, which was moved"),
-        }
-    });
-    format!(" ({})", named.collect::<Vec<_>>().join("; "))
-}
-
-/// Whether the first effect sits at a sensor.
-fn is_at_sensor(effects: &[EffectId]) -> bool {
-    let first = effects.first();
-    first.is_some_and(|effect| effect.place() == Place::Sensor)
+    let mut named = Vec::new();
+    for (name, places) in sensors {
+        let moved = places.iter().any(|place| *place != places[0]);
+        named.push(match moved {
+            true => format!("{name}, which was moved"),
+            false => format!("{name} at {} mm", trimmed(1e3 * places[0], 4)),
+        });
+    }
+    format!(" ({})", named.join("; "))
 }
 
 /// "high.wav", or "high.wav (level 0.73)" where its taps were softer than the hardest.
@@ -117,7 +112,7 @@ fn change(value: f64, decimals: usize) -> String {
     format!("{value:+.decimals$}").replace('-', "\u{2212}")
 }
 
-/// How far the errors shrink, where an effect is held for the cause.
+/// Tells how far the errors shrink, where an effect is probably the cause.
 fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     if !matches!(
         gap.verdict,
@@ -169,7 +164,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     })
 }
 
-/// What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of the
+/// Returns the error that is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of the
 /// errors.
 fn by_drift(gap: &GapSection, found: &HypothesisResult, has_joint: bool) -> String {
     let none = gap.result(&Hypothesis::None);
@@ -197,7 +192,7 @@ fn share(closure: &Closure) -> String {
     )
 }
 
-/// What the decays say by themselves, where the verdict does not already say it.
+/// Tells what the decays show by themselves, where the verdict does not already say it.
 fn along_decays(gap: &GapSection) -> Option<String> {
     let found = gap.along_decays.as_ref()?;
     let largest = found.changes.iter().max_by(|a, b| {
@@ -216,9 +211,9 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             true => format!(
                 "{seen}, but not as a joint whose stiffness depends on the amplitude would make them."
             ),
-            false => format!(
-                "{seen}; of one frequency alone nobody can tell whether the joint does that."
-            ),
+            false => {
+                format!("{seen}; one frequency alone cannot tell whether the joint causes that.")
+            }
         });
     };
     let own = Hypothesis::Effects(vec![effect]);
@@ -245,26 +240,23 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             .to_owned()
     };
     Some(format!(
-        "{seen}: the joint {} ({}); {size}. That is said by the decays alone and explains \
+        "{seen}: the joint {} ({}); {size}. This follows from the decays alone and explains \
          no misfit of the frequencies.",
         found.direction(),
         effect.name()
     ))
 }
 
-/// What ignoring the effect costs; `None` where none is named.
+/// Tells how far the joint moves with the effect; `None` where none is named.
 fn price(gap: &GapSection) -> Option<String> {
     let found = cause(gap)?;
-    let part = |name: &str, shift: Option<f64>| {
-        Some(format!("{name} by {} %", signed_percent(Some(shift?))))
-    };
-    let parts: Vec<String> = [
-        part("Kx", found.joint_shift.kx_percent),
-        part("Ky", found.joint_shift.ky_percent),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    let shift = &found.joint_shift;
+    let mut parts = Vec::new();
+    for (name, percent) in [("Kx", shift.kx_percent), ("Ky", shift.ky_percent)] {
+        if percent.is_some() {
+            parts.push(format!("{name} by {} %", signed_percent(percent)));
+        }
+    }
     if parts.is_empty() {
         return None;
     }
@@ -289,16 +281,19 @@ fn cause(gap: &GapSection) -> Option<&HypothesisResult> {
         .filter(|found| found.hypothesis != Hypothesis::None)
 }
 
-/// What a named effect does, in one sentence, and the test to make next; empty where nothing is missing.
+/// Returns the effect of a named cause, in one sentence, and the test to make next; empty where nothing is missing.
 pub fn gap_in_short(document: &Document) -> Vec<String> {
-    let is_there = |gap: &&GapSection| match gap.verdict {
+    let Some(gap) = &document.gap else {
+        return Vec::new();
+    };
+    let is_there = match gap.verdict {
         Verdict::NoGap => false,
         Verdict::NotEnoughData(_) => shows_gap(gap),
         _ => true,
     };
-    let Some(gap) = document.gap.as_ref().filter(is_there) else {
+    if !is_there {
         return Vec::new();
-    };
+    }
     let found = cause(gap).filter(|found| found.gap_after < Some(found.gap_before));
     let shrink = found.map(|found| {
         let joint =
@@ -319,16 +314,14 @@ fn joint(found: &HypothesisResult, intervals: bool) -> Option<String> {
     let [of_kt, of_kr] = found
         .joint_intervals
         .map(|interval| interval.filter(|_| intervals));
-    let kr = stiffness((kr, of_kr), "N\u{a0}m/rad");
+    let kr = stiffness(kr, of_kr, "N\u{a0}m/rad");
+    let kt = stiffness(kt, of_kt, "N/m");
     // A value stays on the line of its name and unit.
-    Some(format!(
-        "Kt\u{a0}=\u{a0}{}, Kr\u{a0}=\u{a0}{kr}",
-        stiffness((kt, of_kt), "N/m")
-    ))
+    Some(format!("Kt\u{a0}=\u{a0}{kt}, Kr\u{a0}=\u{a0}{kr}"))
 }
 
 /// "1.995 MN/m (95 %: 1.991 to 1.999)", the value on one line with its unit.
-fn stiffness((value, interval): (f64, Option<[f64; 2]>), unit: &str) -> String {
+fn stiffness(value: f64, interval: Option<[f64; 2]>, unit: &str) -> String {
     if value.is_infinite() {
         return RIGID.to_owned();
     }
@@ -364,8 +357,8 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
             let effects: Vec<String> = list.iter().map(Hypothesis::name).collect();
             match effects.as_slice() {
                 [effect] => format!(
-                    "{effect} explains the readings best, but does not predict those that were kept from it any \
-                     better: it is not held for the cause."
+                    "{effect} explains the readings best, but does not predict the withheld ones any better: it is \
+                     probably not the cause."
                 ),
                 _ => format!(
                     "The cause is most likely one of {}; these data do not decide.",
@@ -378,20 +371,17 @@ fn verdict(gap: &GapSection, has_joint: bool) -> String {
     }
 }
 
-/// That the cause has no name, and what it looks like where two local changes would explain it.
+/// Tells that the cause has no name, and that it is spread where two local changes would explain it.
 fn unknown(gap: &GapSection, has_joint: bool) -> String {
-    let is_likeness = |found: &&HypothesisResult| {
+    let found = gap.hypotheses.iter().find(|found| {
         use EffectId::{AddedMass, LocalCrack};
-        let Hypothesis::Effects(effects) = &found.hypothesis else {
-            return false;
-        };
-        matches!(
-            effects.as_slice(),
-            [AddedMass, LocalCrack] | [LocalCrack, AddedMass]
-        ) && found.goodness_of_fit.is_some_and(|p| p >= MISFIT)
+        let is_pair = [[AddedMass, LocalCrack], [LocalCrack, AddedMass]]
+            .iter()
+            .any(|pair| found.hypothesis == Hypothesis::Effects(pair.to_vec()));
+        is_pair
+            && found.goodness_of_fit.is_some_and(|p| p >= MISFIT)
             && found.probability >= LEAST_PROBABILITY
-    };
-    let found = gap.hypotheses.iter().find(is_likeness);
+    });
     let likeness = found.map_or_else(String::new, |found| {
         format!(
             " A crack and a mass would explain it ({}), and so would any change that is spread over a part of \
@@ -410,12 +400,12 @@ fn unknown(gap: &GapSection, has_joint: bool) -> String {
     )
 }
 
-/// That nothing is missing, and why so even where an effect leads the table.
+/// Tells that nothing is missing, and why so even where an effect leads the table.
 fn no_gap(gap: &GapSection) -> String {
     let first = gap.hypotheses.first();
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
-            " No effect is established: {:.0} to 1 against none is asked for.",
+            " No effect is established: that takes odds of {:.0} to 1 against none.",
             DETECTED.exp()
         ),
         None => String::new(),
@@ -435,14 +425,14 @@ fn no_gap(gap: &GapSection) -> String {
     }
 }
 
-/// What the described model itself leaves, where that is much more than the readings' uncertainty and than what is
+/// Returns the error that the described model itself leaves, where that is much more than the readings' uncertainty and than what is
 /// left with a joint that may differ between recordings.
 fn by_moving(none: &HypothesisResult, floor: Option<f64>) -> String {
     let left_over = none.gap_after.zip(floor);
     match left_over.filter(|(after, floor)| none.gap_before > 2.0 * after.max(*floor)) {
         Some((after, floor)) => format!(
-            ", once joint, geometry and masses may differ from what is described by their tolerances and from recording \
-             to recording (errors {} %; exactly as described {} %)",
+            ", once joint, geometry and masses may differ from the description within their tolerances, and between \
+             recordings (errors {} %; exactly as described {} %)",
             left(Some(after), Some(floor)),
             percent(Some(none.gap_before))
         ),
@@ -453,29 +443,29 @@ fn by_moving(none: &HypothesisResult, floor: Option<f64>) -> String {
 /// Probability of `none` below which a gap counts as there.
 const GAP: f64 = 0.1;
 
-/// Whether the readings show a gap, be its cause known or not.
+/// True where the readings show a gap, be its cause known or not.
 pub(crate) fn shows_gap(gap: &GapSection) -> bool {
     let none = gap.result(&Hypothesis::None);
     misfit_unplaced(gap).is_some() || none.is_some_and(|none| none.probability < GAP)
 }
 
-/// What the model misses without masses that sat nobody knows where, if it does.
+/// Returns the misfit without sensors of unknown position, where the model misses the frequencies without them.
 fn misfit_unplaced(gap: &GapSection) -> Option<&UnlocatedSensors> {
     let unplaced = gap.unplaced.as_ref();
     unplaced.filter(|one| one.goodness_of_fit < MISFIT)
 }
 
-/// That there is no answer, and what is known all the same.
+/// Tells that there is no answer, and what is known all the same.
 fn undecided(gap: &GapSection, reason: &str, has_joint: bool) -> String {
     let Some(none) = gap.result(&Hypothesis::None) else {
         return format!("No diagnosis: {reason}.");
     };
     let mut text = if let Some(without) = misfit_unplaced(gap) {
         format!(
-            "There is a gap: without the {} g of {}, which sat nobody knows where, the described model misses the \
+            "There is a gap: without {} ({} g), whose position is not given, the described model misses the \
              frequencies by {} % (rms), as chance would in {} of tests. These data cannot say what causes it: {reason}.",
-            trimmed(1e3 * without.mass, 3),
             without.sensors.join(" and "),
+            trimmed(1e3 * without.mass, 3),
             percent(Some(without.gap)),
             probability(without.goodness_of_fit),
         )
@@ -505,34 +495,34 @@ fn undecided(gap: &GapSection, reason: &str, has_joint: bool) -> String {
     text
 }
 
-/// How probable the verdict is: of a group its members together, be they single effects or pairs.
+/// Returns the probability of the verdict: that of a group is the sum over its members, be they single effects or
+/// pairs.
 fn odds(gap: &GapSection) -> Option<f64> {
     let Verdict::Group(group) = &gap.verdict else {
         return gap.named().map(|found| found.probability);
     };
-    let total = |single: bool| {
-        let members = gap
-            .hypotheses
-            .iter()
-            .filter(|found| match &found.hypothesis {
-                Hypothesis::Effects(effects) => {
-                    (!single || effects.len() == 1) && effects.iter().all(|one| group.contains(one))
-                }
-                _ => false,
-            });
-        members.map(|one| one.probability).reduce(|a, b| a + b)
-    };
-    total(true).or_else(|| total(false))
+    let (mut singles, mut all) = (None, None);
+    for found in &gap.hypotheses {
+        let Hypothesis::Effects(effects) = &found.hypothesis else {
+            continue;
+        };
+        if effects.iter().all(|one| group.contains(one)) {
+            *all.get_or_insert(0.0) += found.probability;
+            if effects.len() == 1 {
+                *singles.get_or_insert(0.0) += found.probability;
+            }
+        }
+    }
+    singles.or(all)
 }
 
-/// What the diagnosis answers, in a few words; `there` where the readings show a gap, be its cause known or not.
+/// Returns the answer of the diagnosis in a few words; `there` where the readings show a gap, be its cause known or not.
 pub(crate) fn missing(verdict: &Verdict, there: bool) -> String {
-    let single = |effects: &[EffectId]| {
-        let one = |effect: &EffectId| Hypothesis::Effects(vec![*effect]);
-        effects.iter().map(one).collect()
-    };
     let hypotheses = match verdict {
-        Verdict::Named(effects) => single(effects),
+        Verdict::Named(effects) => {
+            let effects = effects.iter().map(|effect| vec![*effect]);
+            effects.map(Hypothesis::Effects).collect()
+        }
         other => other.hypotheses(),
     };
     let mut names: Vec<String> = Vec::new();
@@ -546,21 +536,46 @@ pub(crate) fn missing(verdict: &Verdict, there: bool) -> String {
             names.push(name);
         }
     }
-    let listed = |last: &str| match names.split_last() {
-        Some((one, others)) if !others.is_empty() => {
-            format!("{} {last} {one}", others.join(", "))
-        }
-        _ => names.join(""),
-    };
     match verdict {
         Verdict::NoGap => "no gap is established".to_owned(),
-        Verdict::Named(_) => format!("missing in it: {}", listed("and")),
-        Verdict::Group(_) => format!("missing in it: one of {}", listed("or")),
+        Verdict::Named(_) => format!("missing in it: {}", listed(&names, "and")),
+        Verdict::Group(_) => format!("missing in it: one of {}", listed(&names, "or")),
         Verdict::Set(_) if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
-        Verdict::Set(_) => format!("not decided is what is missing in it: {}", listed("or")),
+        Verdict::Set(_) => format!(
+            "these data do not decide what is missing in it: {}",
+            listed(&names, "or")
+        ),
         Verdict::Unknown => "missing in it: something unknown".to_owned(),
         _ if there => "something is missing in it, and these data cannot say what".to_owned(),
         _ => "not enough data to tell whether something is missing in it".to_owned(),
+    }
+}
+
+/// Returns "modulus, length or timebase".
+pub(super) fn listed(names: &[String], conjunction: &str) -> String {
+    match names.split_last() {
+        Some((last, others)) if !others.is_empty() => {
+            format!("{} {conjunction} {last}", others.join(", "))
+        }
+        _ => names.concat(),
+    }
+}
+
+/// Returns the effect that is probably the cause: the most probable one of those that the verdict names. `Err` says why
+/// there is none.
+pub(crate) fn found_best(gap: &GapSection) -> Result<String, &'static str> {
+    match gap.verdict {
+        Verdict::Named(_) | Verdict::Group(_) | Verdict::Set(_) => {
+            // The diagnosis gives the errors of the most probable hypothesis that predicts anything.
+            let mut hypotheses = gap.hypotheses.iter().map(|found| &found.hypothesis);
+            match hypotheses.find(|one| **one != Hypothesis::Unknown) {
+                Some(effects @ Hypothesis::Effects(_)) => Ok(effects.name()),
+                _ => Err("no effect is more probable than none"),
+            }
+        }
+        Verdict::NoGap => Err("nothing is missing"),
+        Verdict::Unknown => Err("nothing in the catalogue explains the rest"),
+        Verdict::NotEnoughData(_) => Err("these data do not decide what is missing"),
     }
 }
 
@@ -584,12 +599,12 @@ fn next_test(gap: &GapSection) -> Option<String> {
     ))
 }
 
-/// Whether a test tells nothing new about which hypothesis holds.
+/// True for a test that tells nothing new about which hypothesis holds.
 pub(crate) fn confirms(test: &NextTest) -> bool {
     matches!(test.proposal, Proposal::Confirm { .. })
 }
 
-/// The hypotheses that nothing is said of, after `lead`; nothing where there are none.
+/// The hypotheses for which a test could not be predicted, after `lead`; nothing where there are none.
 pub(crate) fn not_predicted(test: &NextTest, lead: &str) -> String {
     match test.unpredicted.as_slice() {
         [] => String::new(),
@@ -597,13 +612,13 @@ pub(crate) fn not_predicted(test: &NextTest, lead: &str) -> String {
     }
 }
 
-/// What the information of a test rests on where nothing explains the readings: the ranking then says little.
+/// Premise of the information of a test where nothing explains the readings: the ranking then says little.
 pub(crate) const EQUALLY_LIKELY: &str = "taking the catalogue's effects as equally likely";
 
 /// Hypotheses less probable than this are not listed.
 pub(crate) const LEAST_PROBABILITY: f64 = 0.005;
 
-/// What a search leaves of a size at zero, in the unit it is read in: by rounding alone.
+/// A size below this is zero but for rounding, in the unit that it is written in.
 const NOTHING: f64 = 1e-9;
 
 /// "local-crack + joint-nonlinearity": both names of two effects, which a line may be broken between.
@@ -619,15 +634,17 @@ pub(crate) fn names(effects: &[EffectId]) -> String {
 
 /// "mass 24.10 ± 0.30 g"; of two effects "local-crack: compliance ..., position ...; sensor-mass: mass ...".
 pub(crate) fn sizes(found: &HypothesisResult) -> String {
-    // Of what may be anywhere, and of an inertia of no mass, no digit says anything.
-    let is_known = |parameter: &&ParameterValue| match parameter.std {
-        None => !is_place(parameter.name),
-        Some(std) => parameter.name != "inertia" || std != 0.0,
-    };
     let mut sorted: Vec<&ParameterValue> = found.parameters.iter().collect();
     sorted.sort_by_key(|one| (one.effect.name(), one.name));
     let alone = sorted.iter().all(|one| one.effect == sorted[0].effect);
-    sorted.retain(is_known);
+    // A place that may be anywhere, and the inertia of no mass, are left out.
+    sorted.retain(|parameter| match parameter.std {
+        None => !matches!(
+            parameter.name,
+            "position" | "frequency" | "exponent" | "inertia"
+        ),
+        Some(std) => parameter.name != "inertia" || std != 0.0,
+    });
     let of_effects = sorted.chunk_by(|one, next| one.effect == next.effect);
     let parts: Vec<String> = of_effects
         .map(|own| {
@@ -639,11 +656,6 @@ pub(crate) fn sizes(found: &HypothesisResult) -> String {
         })
         .collect();
     parts.join("; ")
-}
-
-/// Whether a parameter says where an effect sits, at which frequency or after which law, and not how large it is.
-fn is_place(name: &str) -> bool {
-    matches!(name, "position" | "frequency" | "exponent" | "inertia")
 }
 
 fn size(parameter: &ParameterValue) -> String {
@@ -754,7 +766,8 @@ mod tests {
             Hypothesis::None,
             Hypothesis::Unknown,
         ]));
-        let said = "not decided is what is missing in it: modulus, nothing or something unknown";
+        let said =
+            "these data do not decide what is missing in it: modulus, nothing or something unknown";
         assert_eq!(set, said);
         let [alone, _] = words(Verdict::Set(vec![modulus]));
         assert_eq!(alone, "perhaps missing in it: modulus");

@@ -1,14 +1,23 @@
 //! A plausible finished analysis: a cantilever with five modes, two recordings, two sensors.
 
+use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use tapjoint::description::JointModel;
-use tapjoint::modal::polyreference::PoleStability;
+use std::collections::BTreeMap;
+use tapjoint::description::{JointModel, SensorKind};
+use tapjoint::modal::polyreference::{
+    BandSearch, PoleStability, PolyreferenceMode, StabilisationPole, SubBand,
+};
+use tapjoint::modal::{self, ModeReading, PeakLabel};
+use tapjoint::pipeline::{
+    CloseUp, Conditions, MeasuredSpectra, Measurement, Overview, RecordingResult, Response,
+};
 use tapjoint::quality::{Check, Outcome, Subject, Verdict};
+use tapjoint::recording::Format;
 use tapjoint::report::document::*;
-use tapjoint::report::figures::*;
-use tapjoint::spectral::Lines;
+use tapjoint::spectral::{AveragedSpectra, Lines, SpectralAverager, Window};
 use tapjoint::structure::{Assembly, BeamTheory};
+use tapjoint::taps::{Rejection, Tap, Taps};
 
 /// Frequencies of the five modes (Hz).
 pub const FREQUENCIES: [f64; 5] = [17.003, 118.04, 335.71, 628.9, 994.2];
@@ -54,11 +63,11 @@ pub fn document() -> Document {
     }
 }
 
-/// Pictures of the two recordings.
-pub fn figures() -> Vec<RecordingFigure> {
+/// The two recordings as measured.
+pub fn recordings() -> Vec<RecordingResult> {
     vec![
-        figure("low.wav", [0.0, 200.0], 0..2),
-        figure("full.wav", [0.0, 2000.0], 0..5),
+        measured("low.wav", [0.0, 200.0], 0..2),
+        measured("full.wav", [0.0, 2000.0], 0..5),
     ]
 }
 
@@ -297,39 +306,82 @@ fn span() -> ResolutionSpanSection {
     }
 }
 
-fn figure(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingFigure {
+fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> RecordingResult {
     let lines = lines(band);
-    let mut peaks: Vec<PeakMark> = modes
-        .map(|index| PeakMark {
-            mode: Some(index + 1),
-            frequency: FREQUENCIES[index],
+    let mut readings: Vec<ModeReading> = modes
+        .clone()
+        .map(|index| ModeReading {
             line_frequency: (FREQUENCIES[index] / lines.spacing).round() * lines.spacing,
-            half_line: lines.half_line(),
-            prominence_db: 38.2,
-            label: None,
+            ..mode_reading(FREQUENCIES[index], lines.half_line(), 38.2)
         })
         .collect();
-    peaks.push(PeakMark {
-        mode: None,
-        frequency: 50.0,
-        line_frequency: 50.0,
-        half_line: lines.half_line(),
-        prominence_db: 12.0,
-        label: Some("mains 50 Hz".into()),
+    readings.push(ModeReading {
+        label: Some(PeakLabel::Mains(50.0)),
+        ..mode_reading(50.0, lines.half_line(), 12.0)
     });
-    RecordingFigure {
+    let mut spectra = MeasuredSpectra {
+        averages: averages(lines),
+        window: Window::Rectangular,
+        decay: None,
+        readings,
+        force_noise: None,
+        stabilisation: Default::default(),
+    };
+    spectra.stabilisation.searches = vec![band_search(band)];
+    let response = |name: &str| Response {
+        name: name.into(),
+        kind: Some(SensorKind::Acceleration),
+        unit: Some("m/s2".into()),
+    };
+    RecordingResult {
         file: file.into(),
+        format: Format::Memory,
+        sample_rate: Some(5120.0),
+        seconds: Some(20.5),
+        channels: Vec::new(),
+        has_hammer: true,
+        tap_unit: Some("N".into()),
+        responses: vec![response("A"), response("B")],
+        band: Some((band[0], band[1])),
+        conditions: Conditions::default(),
+        mode_numbers: modes.map(|index| Some(index + 1)).chain([None]).collect(),
         overview: Some(overview()),
-        spectra: Some(spectra(lines, peaks)),
-        stabilisation: Some(stabilisation(band)),
-        amplitude: None,
+        measurement: Measurement {
+            taps: Taps {
+                taps: measured_taps(),
+                noise: 0.01,
+                remarks: Vec::new(),
+            },
+            spectra: Some(spectra),
+            warnings: Vec::new(),
+        },
     }
 }
 
-/// Each mode from its order on, new first and stable after.
-fn stabilisation(band: [f64; 2]) -> StabilisationFigure {
+/// A resonance that stands on its line.
+pub fn mode_reading(frequency: f64, half_line: f64, prominence_db: f64) -> ModeReading {
+    ModeReading {
+        frequency,
+        source: modal::ReadBy::Interpolated,
+        interval: (frequency, frequency),
+        line_frequency: frequency,
+        half_line,
+        interpolated: Some(frequency),
+        bound: None,
+        std: None,
+        damping_ratio: None,
+        damping_std: None,
+        prominence_db: Some(prominence_db),
+        above_noise_db: None,
+        label: None,
+        fit: None,
+    }
+}
+
+/// Poles of each mode from its order on, new first and stable after.
+fn band_search(band: [f64; 2]) -> BandSearch {
     let within = |frequency: &&f64| (band[0]..band[1]).contains(*frequency);
-    let mut poles = Vec::new();
+    let mut diagram = Vec::new();
     for order in 2..20 {
         for (index, frequency) in FREQUENCIES.iter().filter(within).enumerate() {
             let stability = match order.cmp(&(2 * index + 3)) {
@@ -337,105 +389,97 @@ fn stabilisation(band: [f64; 2]) -> StabilisationFigure {
                 std::cmp::Ordering::Equal => PoleStability::New,
                 std::cmp::Ordering::Greater => PoleStability::All,
             };
-            poles.push(PoleMark {
+            diagram.push(StabilisationPole {
                 order,
+                pole: Complex64::ZERO,
                 frequency: *frequency,
                 damping_ratio: 0.004,
+                participation: Vec::new(),
                 stability,
             });
         }
     }
-    StabilisationFigure {
-        bands: vec![StabilisationBand {
+    let selected = FREQUENCIES.iter().filter(within);
+    BandSearch {
+        band: SubBand {
+            low: band[0],
+            high: band[1],
             core: (band[0], band[1]),
-            order: 20,
-            poles,
-            selected: FREQUENCIES.iter().filter(within).copied().collect(),
-        }],
-    }
-}
-
-fn spectra(lines: Lines, peaks: Vec<PeakMark>) -> SpectraFigure {
-    let mut random = ChaCha8Rng::seed_from_u64(7);
-    let force: Vec<f64> = lines
-        .frequencies()
-        .iter()
-        .map(|f| 0.021 * (-(f / 1300.0).powi(2)).exp() + 1e-6)
-        .collect();
-    let frfs: Vec<FrfCurve> = [
-        ("A", [1.0, 0.7, 0.6, 0.9, 0.8]),
-        ("B", [0.4, -0.8, 0.5, -0.3, 0.6]),
-    ]
-    .iter()
-    .map(|(name, shape)| frf(name, shape, &lines, &mut random))
-    .collect();
-    let responses = frfs
-        .iter()
-        .map(|frf| Curve {
-            name: format!("{}, acceleration", frf.name),
-            unit: "m/s\u{b2} s".into(),
-            values: frf
-                .magnitude
-                .iter()
-                .zip(&force)
-                .map(|(h, f)| h * f + 2e-5)
-                .collect(),
-        })
-        .collect();
-    SpectraFigure {
-        lines,
-        averages: 4,
-        force: Some(force),
-        force_unit: "N s".into(),
-        responses,
-        frfs,
-        peaks,
-    }
-}
-
-fn frf(name: &str, shape: &[f64; 5], lines: &Lines, random: &mut ChaCha8Rng) -> FrfCurve {
-    let values: Vec<(f64, f64)> = lines
-        .frequencies()
-        .iter()
-        .map(|f| {
-            // Accelerance of five modes with 0.3 % damping, and a little noise.
-            let (mut re, mut im) = (0.0, 0.0);
-            for (frequency, amplitude) in FREQUENCIES.iter().zip(shape) {
-                let ratio = f / frequency;
-                let (a, b) = (1.0 - ratio * ratio, 0.006 * ratio);
-                let scale = -amplitude * ratio * ratio / (a * a + b * b);
-                re += scale * a;
-                im -= scale * b;
-            }
-            let mut noise = || 0.02 * (random.random::<f64>() - 0.5);
-            (re + noise(), im + noise())
-        })
-        .collect();
-    FrfCurve {
-        name: name.into(),
-        form: "accelerance".into(),
-        unit: "(m/s\u{b2})/N".into(),
-        magnitude: values.iter().map(|(re, im)| re.hypot(*im)).collect(),
-        phase: values
-            .iter()
-            .map(|(re, im)| im.atan2(*re).to_degrees())
+        },
+        order: 20,
+        diagram,
+        modes: selected
+            .map(|frequency| PolyreferenceMode {
+                pole: Complex64::ZERO,
+                frequency: *frequency,
+                damping_ratio: 0.004,
+                frequency_spread: 0.0,
+                damping_spread: 0.0,
+                count: 10,
+                share: 0.5,
+                participation: Vec::new(),
+                shape: Vec::new(),
+            })
             .collect(),
-        estimator: "H1".into(),
-        others: Vec::new(),
-        coherence: Some(vec![0.98; lines.points()]),
     }
+}
+
+/// Averages of four taps: accelerances of five modes with 0.3 % damping, and a little noise.
+fn averages(lines: Lines) -> AveragedSpectra {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let shapes = [[1.0, 0.7, 0.6, 0.9, 0.8], [0.4, -0.8, 0.5, -0.3, 0.6]];
+    let frequencies = lines.frequencies();
+    let force: Vec<Complex64> = frequencies
+        .iter()
+        .map(|f| Complex64::from(0.021 * (-(f / 1300.0).powi(2)).exp() + 1e-6))
+        .collect();
+    let mut sum = SpectralAverager::new(lines, shapes.len());
+    for _ in 0..4 {
+        let responses = shapes.map(|shape| {
+            let response = frequencies.iter().zip(&force).map(|(f, force)| {
+                let mut accelerance = Complex64::ZERO;
+                for (frequency, amplitude) in FREQUENCIES.iter().zip(shape) {
+                    let ratio = f / frequency;
+                    let below = Complex64::new(1.0 - ratio * ratio, 0.006 * ratio);
+                    accelerance -= amplitude * ratio * ratio / below;
+                }
+                let mut noise = || 0.04 * (random.random::<f64>() - 0.5);
+                (accelerance + Complex64::new(noise(), noise())) * force + 2e-5
+            });
+            response.collect()
+        });
+        sum.add(Some(&force), &responses);
+    }
+    sum.finish().expect("taps were averaged")
+}
+
+fn measured_taps() -> Vec<Tap> {
+    let mut taps: Vec<Tap> = taps()
+        .iter()
+        .map(|tap| Tap {
+            time: tap.time,
+            peak: tap.peak_force.unwrap_or(1.0),
+            pulse_end: None,
+            record: 0..0,
+            second_hit: None,
+            rejection: None,
+        })
+        .collect();
+    taps[1].rejection = Some(Rejection::DoubleHit {
+        delay: 0.014,
+        ratio: 0.31,
+        limit: 0.1,
+    });
+    taps[4].rejection = Some(Rejection::Overload {
+        channel: 1,
+        samples: 12,
+    });
+    taps
 }
 
 /// A half sine of 1 ms and the response that it leaves.
-fn close_up(peak: f64) -> TapCloseUp {
+fn close_up(peak: f64) -> CloseUp {
     let rate = 20_000.0;
-    let curve = |label: &str, unit: &str, value: &dyn Fn(f64) -> f64| TapCurve {
-        label: label.into(),
-        unit: unit.into(),
-        values: (0..640)
-            .map(|k| value(f64::from(k) / rate - 0.002))
-            .collect(),
-    };
     let pulse = |time: f64| {
         let inside = (0.0..0.001).contains(&time);
         if inside {
@@ -448,21 +492,20 @@ fn close_up(peak: f64) -> TapCloseUp {
         let rings = 12.0 * (600.0 * time).sin() * (-40.0 * time).exp();
         if time < 0.0 { 0.0 } else { rings }
     };
-    TapCloseUp {
+    let times = (0..640).map(|k| f64::from(k) / rate - 0.002);
+    CloseUp {
         start: -0.002,
         step: 1.0 / rate,
-        curves: vec![
-            curve("force", "N", &pulse),
-            curve("response A", "m/s\u{b2}", &ringing),
-        ],
+        force: Some(times.clone().map(pulse).collect()),
+        response: Some(times.map(ringing).collect()),
     }
 }
 
-fn overview() -> TimeOverview {
+fn overview() -> Overview {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let pieces = 4096;
     let step = 20.5 / pieces as f64;
-    let taps = taps();
+    let taps = measured_taps();
     let mut low = vec![0.0; pieces];
     let mut high = vec![0.0; pieces];
     for piece in 0..pieces {
@@ -472,23 +515,13 @@ fn overview() -> TimeOverview {
     }
     for tap in &taps {
         let piece = (tap.time / step) as usize;
-        let peak = tap.peak_force.unwrap_or(1.0);
-        high[piece] = peak;
-        low[piece + 1] = -0.04 * peak;
+        high[piece] = tap.peak;
+        low[piece + 1] = -0.04 * tap.peak;
     }
-    TimeOverview {
-        label: "force (N)".into(),
+    Overview {
         step,
         low,
         high,
-        taps: taps
-            .iter()
-            .map(|tap| TapMark {
-                time: tap.time,
-                peak: tap.peak_force.unwrap_or(1.0),
-                rejected: tap.reason.clone(),
-                close_up: Some(close_up(tap.peak_force.unwrap_or(1.0))),
-            })
-            .collect(),
+        close_ups: taps.iter().map(|tap| close_up(tap.peak)).collect(),
     }
 }

@@ -2,17 +2,9 @@
 
 use tapjoint::effects::EffectId;
 use tapjoint::gap::{Hypothesis, HypothesisResult, LocationMap, Residual, Verdict};
-use tapjoint::report::chart::{Chart, PageChart, PointSet, Points, render_svg};
+use tapjoint::report::chart::{Mark, Series, render_svg};
 use tapjoint::report::charts::gap::{gap, place_map};
 use tapjoint::report::document::{Document, GapPlaceSection, GapSection};
-
-/// The chart's points as the page has them.
-fn points(chart: &Chart) -> Points {
-    match chart.page() {
-        Some(PageChart::Points(points)) => points,
-        other => panic!("no points: {other:?}"),
-    }
-}
 
 fn document(gap: GapSection) -> Document {
     Document {
@@ -48,14 +40,15 @@ fn of_three_levels() -> Document {
 fn regress_two_levels_of_one_recording_stand_apart_and_are_told_apart() {
     let document = of_three_levels();
     let chart = gap(&document).unwrap();
-    let live = points(&chart);
-    let errors = &live.views[0].panels[0].sets;
-    let before = errors.iter().find(|set| set.mark == "ring").unwrap();
+    let live = chart.page().unwrap();
+    let errors = &live.blocks[0].panels[0].series;
+    let is_ring = |set: &&Series| matches!(set.mark, Mark::Ring(_));
+    let before = errors.iter().find(is_ring).unwrap();
     // Three seats over half of the mode's width, each in the middle of its third.
     let expected = [1.0 - 0.5 / 3.0, 1.0, 1.0 + 0.5 / 3.0];
-    for (place, expected) in before.x.iter().zip(expected) {
-        // The page has places with four digits.
-        assert!((place - expected).abs() < 1e-3, "{:?}", before.x);
+    for (index, expected) in expected.into_iter().enumerate() {
+        // The page has places with seven digits.
+        assert!((before.at(index) - expected).abs() < 1e-3, "{:?}", before.x);
     }
     let words = [
         "mode 1 in low.wav",
@@ -129,9 +122,9 @@ fn regress_an_effect_that_nobody_holds_for_the_cause_is_not_shown() {
     for (kind, hypotheses, words) in cases {
         let document = with_verdict(&kind, &hypotheses);
         let chart = gap(&document).unwrap();
-        let live = points(&chart);
-        let panel = &live.views[0].panels[0];
-        let shown: Vec<&str> = panel.sets.iter().map(|set| set.name.as_str()).collect();
+        let live = chart.page().unwrap();
+        let panel = &live.blocks[0].panels[0];
+        let shown: Vec<&str> = panel.series.iter().map(|set| set.name.as_str()).collect();
         let svg = render_svg(&chart.draw());
         assert!(svg.contains(words), "{kind:?}");
         assert!(chart.caption.contains(words), "{kind:?}");
@@ -144,7 +137,7 @@ fn regress_an_effect_that_nobody_holds_for_the_cause_is_not_shown() {
                 assert_eq!(shown.len(), 2, "{kind:?}: {shown:?}");
                 assert!(!svg.contains("+99 %"), "{kind:?}");
                 // Nor does it stretch the axis.
-                assert!(panel.y.range[1] < 20.0, "{kind:?}: {:?}", panel.y.range);
+                assert!(panel.y.high < 20.0, "{kind:?}: {:?}", panel.y);
             }
         }
     }
@@ -162,8 +155,9 @@ fn regress_local_changes_have_the_digits_of_their_uncertainty() {
         map: Some(map),
         ..GapSection::default()
     });
-    let live = points(&place_map(&document).unwrap());
-    let is_curve = |set: &&PointSet| set.mark == "curve";
-    let set = live.views[0].panels[1].sets.iter().find(is_curve).unwrap();
+    let live = place_map(&document).unwrap().page().unwrap();
+    let is_curve = |set: &&Series| matches!(set.mark, Mark::Curve(_));
+    let series = &live.blocks[0].panels[1].series;
+    let set = series.iter().find(is_curve).unwrap();
     assert_eq!(set.said, ["3 \u{b1} 12 %", "12.34500 \u{b1} 0.00050 %"]);
 }

@@ -3,30 +3,31 @@
 use std::collections::HashMap;
 
 use proptest::prelude::*;
+use tapjoint::pipeline::{FrfSettings, RecordingResult, frfs_of};
 use tapjoint::report::chart::axis::{Axis, Tick, nice_step};
 use tapjoint::report::chart::drawing::{Point, Rgb, Shape};
 use tapjoint::report::chart::labels::spread;
 use tapjoint::report::chart::thinning::decimate;
-use tapjoint::report::chart::{Color, Drawing, PageChart, render_png, render_svg};
+use tapjoint::report::chart::{Chart, Color, Drawing, render_png, render_svg};
 use tapjoint::report::charts::joint::{cloud, frequencies};
 use tapjoint::report::charts::spectra::{frf, spectrum};
 use tapjoint::report::charts::stabilisation::stabilisation;
 use tapjoint::report::charts::taps::taps;
-use tapjoint::report::figures::PeakMark;
 
-use super::fixture;
+use super::{fixture, spectra_of};
 
 /// All pictures of the fixture.
 pub(super) fn drawings() -> Vec<Drawing> {
     let document = fixture::document();
-    let mut drawings: Vec<Drawing> = fixture::figures()
+    let mut drawings: Vec<Drawing> = fixture::recordings()
         .iter()
-        .flat_map(|figure| {
+        .flat_map(|recording| {
+            let frfs = frfs_of(recording, &FrfSettings::default()).expect("there is a hammer");
             [
-                spectrum(figure),
-                frf(figure),
-                stabilisation(figure),
-                taps(figure),
+                spectrum(recording, &recording.file),
+                frf_of(recording),
+                stabilisation(recording, &recording.file, &frfs),
+                taps(recording, &recording.file),
             ]
         })
         .flatten()
@@ -36,6 +37,17 @@ pub(super) fn drawings() -> Vec<Drawing> {
     drawings.extend(cloud(&document).map(|chart| chart.draw()));
     assert_eq!(drawings.len(), 10, "two recordings have four pictures each");
     drawings
+}
+
+/// The frequency response functions of a recording.
+fn frf_of(recording: &RecordingResult) -> Option<Chart> {
+    let frfs = frfs_of(recording, &FrfSettings::default()).expect("there is a hammer");
+    frf(recording, &recording.file, &frfs, &[])
+}
+
+/// The spectra of a recording of the fixture.
+fn spectrum_of(recording: &RecordingResult) -> Chart {
+    spectrum(recording, &recording.file).expect("there are spectra")
 }
 
 /// Width, height, and how often each colour occurs.
@@ -120,8 +132,7 @@ fn text_inside(text: &tapjoint::report::chart::drawing::Text, drawing: &Drawing)
 
 #[test]
 fn prop_spectrum_says_what_it_shows() {
-    let figure = &fixture::figures()[0];
-    let drawing = spectrum(figure).expect("there are spectra").draw();
+    let drawing = spectrum_of(&fixture::recordings()[0]).draw();
     let words = drawing.words().join("\n");
     for wanted in [
         "low.wav",
@@ -143,7 +154,7 @@ fn prop_spectrum_says_what_it_shows() {
 
 #[test]
 fn prop_frf_names_form_and_unit() {
-    let drawing = frf(&fixture::figures()[1])
+    let drawing = frf_of(&fixture::recordings()[1])
         .expect("there are functions")
         .draw();
     let words = drawing.words();
@@ -154,11 +165,9 @@ fn prop_frf_names_form_and_unit() {
 
 #[test]
 fn prop_responses_of_different_units_have_a_panel_each() {
-    let mut figure = fixture::figures().remove(0);
-    if let Some(spectra) = &mut figure.spectra {
-        spectra.responses[1].unit = "Pa s".into();
-    }
-    let chart = spectrum(&figure).expect("there are spectra");
+    let mut recording = fixture::recordings().remove(0);
+    recording.responses[1].unit = Some("Pa".into());
+    let chart = spectrum_of(&recording);
     let units = chart.blocks[0].panels.iter().map(|panel| panel.y.title());
     let units: Vec<String> = units.collect();
     let wanted = ["magnitude, rms (m/s² s)", "magnitude, rms (Pa s)"];
@@ -168,21 +177,23 @@ fn prop_responses_of_different_units_have_a_panel_each() {
 /// The page's curves are the picture's: same panels, same names, same values but for rounding.
 #[test]
 fn prop_the_page_has_the_curves_of_the_picture() {
-    for figure in fixture::figures() {
-        for chart in [spectrum(&figure), frf(&figure)].into_iter().flatten() {
-            let Some(PageChart::Curves(page)) = chart.page() else {
-                panic!("{} has no curves", chart.title);
-            };
+    for recording in fixture::recordings() {
+        for chart in [Some(spectrum_of(&recording)), frf_of(&recording)]
+            .into_iter()
+            .flatten()
+        {
+            let page = chart.page().expect("there are curves");
             let panels = &chart.blocks[0].panels;
-            assert_eq!(page.panels.len(), panels.len(), "{}", chart.title);
-            for (shown, panel) in page.panels.iter().zip(panels) {
-                assert_eq!(shown.label, panel.y.label);
+            let shown = &page.blocks[0].panels;
+            assert_eq!(page.blocks.len(), 1, "{}", chart.title);
+            assert_eq!(shown.len(), panels.len(), "{}", chart.title);
+            for (shown, panel) in shown.iter().zip(panels) {
+                assert_eq!(shown.y, panel.y);
                 assert_eq!(shown.series.len(), panel.series.len());
                 for (curve, series) in shown.series.iter().zip(&panel.series) {
                     assert_eq!(curve.name, series.name);
-                    assert_eq!(curve.color, series.color.css());
-                    for (rounded, value) in curve.values.iter().zip(&series.y) {
-                        let rounded = rounded.unwrap_or(f64::NAN);
+                    assert_eq!(curve.color, series.color);
+                    for (rounded, value) in curve.y.iter().zip(&series.y) {
                         let close = (rounded - value).abs() <= 5.1e-4 * value.abs();
                         assert!(close || value.is_nan(), "{value} became {rounded}");
                     }
@@ -194,11 +205,12 @@ fn prop_the_page_has_the_curves_of_the_picture() {
 
 #[test]
 fn prop_rejected_taps_carry_their_reason() {
-    let drawing = taps(&fixture::figures()[0])
+    let drawing = taps(&fixture::recordings()[0], "low.wav")
         .expect("there are samples")
         .draw();
     let words = drawing.words();
-    let reason = "tap 2 at 3.71 s: double hit: second excursion of 31 % after 14 ms";
+    let reason =
+        "tap 2 at 3.71 s: double hit: a second excursion of 31 % after 14.0 ms (limit 10 %)";
     assert!(words.contains(&reason), "{words:?}");
     let dots = dots(&drawing, Color::Blue);
     // Four taps used and one in the legend.
@@ -238,20 +250,15 @@ fn prop_cloud_shows_every_pattern() {
 
 #[test]
 fn prop_many_marks_keep_their_labels_apart() {
-    let mut figure = fixture::figures().remove(1);
-    if let Some(spectra) = &mut figure.spectra {
-        spectra.peaks = (1..=40)
-            .map(|mode| PeakMark {
-                mode: Some(mode),
-                frequency: 600.0 + 2.5 * mode as f64,
-                line_frequency: 600.0 + 2.5 * mode as f64,
-                half_line: 1.25,
-                prominence_db: 40.0 - mode as f64,
-                label: None,
-            })
-            .collect();
-    }
-    let drawing = spectrum(&figure).expect("there are spectra").draw();
+    let mut recording = fixture::recordings().remove(1);
+    recording.mode_numbers = (1..=40).map(Some).collect();
+    spectra_of(&mut recording).readings = (1..=40)
+        .map(|mode| {
+            let prominence = 40.0 - f64::from(mode);
+            fixture::mode_reading(600.0 + 2.5 * f64::from(mode), 1.25, prominence)
+        })
+        .collect();
+    let drawing = spectrum_of(&recording).draw();
     let words = drawing.words().join("\n");
     assert!(
         words.contains("more without a label, see the table"),
@@ -266,9 +273,9 @@ fn prop_many_marks_keep_their_labels_apart() {
 
 #[test]
 fn prop_svg_holds_the_picture_and_escapes_names() {
-    let mut figure = fixture::figures().remove(0);
-    figure.file = "<script>&\"x\".wav".into();
-    let drawing = spectrum(&figure).expect("there are spectra").draw();
+    let mut recording = fixture::recordings().remove(0);
+    recording.file = "<script>&\"x\".wav".into();
+    let drawing = spectrum_of(&recording).draw();
     let svg = render_svg(&drawing);
     assert!(
         svg.starts_with("<svg viewBox=\"0 0 4800 "),
@@ -401,20 +408,15 @@ fn limit_decimation_leaves_out_what_is_not_finite() {
 
 #[test]
 fn prop_the_most_prominent_modes_keep_their_labels() {
-    let mut figure = fixture::figures().remove(1);
-    if let Some(spectra) = &mut figure.spectra {
-        spectra.peaks = (1..=30)
-            .map(|mode| PeakMark {
-                mode: Some(mode),
-                frequency: 600.0 + 2.5 * mode as f64,
-                line_frequency: 600.0 + 2.5 * mode as f64,
-                half_line: 1.25,
-                prominence_db: if mode == 17 { 90.0 } else { 10.0 },
-                label: None,
-            })
-            .collect();
-    }
-    let drawing = spectrum(&figure).expect("there are spectra").draw();
+    let mut recording = fixture::recordings().remove(1);
+    recording.mode_numbers = (1..=30).map(Some).collect();
+    spectra_of(&mut recording).readings = (1..=30)
+        .map(|mode| {
+            let prominence = if mode == 17 { 90.0 } else { 10.0 };
+            fixture::mode_reading(600.0 + 2.5 * f64::from(mode), 1.25, prominence)
+        })
+        .collect();
+    let drawing = spectrum_of(&recording).draw();
     assert!(
         drawing.words().contains(&"mode 17"),
         "{:?}",
@@ -424,16 +426,15 @@ fn prop_the_most_prominent_modes_keep_their_labels() {
 
 #[test]
 fn prop_an_empty_upper_part_is_not_shown_and_said_so() {
-    let mut figure = fixture::figures().remove(1);
-    let whole = spectrum(&figure).expect("there are spectra").draw();
+    let mut recording = fixture::recordings().remove(1);
+    let whole = spectrum_of(&recording).draw();
     assert!(
         !whole.words().join(" ").contains("shown to"),
         "modes to 994 of 2000 Hz"
     );
-    if let Some(spectra) = &mut figure.spectra {
-        spectra.peaks.retain(|peak| peak.frequency < 400.0);
-    }
-    let drawing = spectrum(&figure).expect("there are spectra").draw();
+    let spectra = spectra_of(&mut recording);
+    spectra.readings.retain(|reading| reading.frequency < 400.0);
+    let drawing = spectrum_of(&recording).draw();
     let words = drawing.words().join(" ");
     assert!(words.contains("shown to 500 of 2000 Hz"), "{words}");
 }

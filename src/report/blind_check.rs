@@ -1,16 +1,17 @@
 //! The files of a blind check: its score as JSON, every case as CSV, the truths that were sealed, and
-//! pictures.
+//! pictures. And the table of what a planned test could tell apart.
 
-mod tell_apart;
-
-pub use tell_apart::tell_apart;
+use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
 use super::chart::{PictureFormat, render_picture};
-use super::charts::blind_check::{closure, confusion, reliability};
+use super::charts::blind_check::{classes, closure, confusion, reliability};
 use super::{ReportError, ReportFile};
-use tapjoint_study::blind_check::{Case, Conduct, Planted, Row, Scores, Target, Truth, rows};
+use tapjoint_diagnosis::Verdict;
+use tapjoint_study::blind_check::{
+    Case, Class, Conduct, Planted, Row, Scores, Target, Truth, render_rows, rows, score,
+};
 
 /// All files: `score.json`, `cases.csv`, `truth.json`, and as PNG and SVG `confusion`, `reliability`,
 /// `closure`.
@@ -23,17 +24,19 @@ pub fn render_blind_check(
     conduct: &Conduct,
 ) -> Result<Vec<ReportFile>, ReportError> {
     let truths: Vec<Truth> = cases.iter().map(|(truth, _)| truth.clone()).collect();
-    let text = |name: &str, text: String| ReportFile {
-        name: name.to_owned(),
-        bytes: text.into_bytes(),
-    };
     let score =
         serde_json::to_string_pretty(&score_json(scores, conduct)).map_err(ReportError::Json)?;
-    let mut files = vec![
-        text("score.json", score + "\n"),
-        text("cases.csv", cases_csv(cases)),
-        text("truth.json", truths_json(&truths)?),
-    ];
+    let mut files: Vec<ReportFile> = [
+        ("score.json", score + "\n"),
+        ("cases.csv", cases_csv(cases)),
+        ("truth.json", truths_json(&truths)?),
+    ]
+    .into_iter()
+    .map(|(name, text)| ReportFile {
+        name: name.to_owned(),
+        bytes: text.into_bytes(),
+    })
+    .collect();
     let charts = [
         Some(confusion(cases)),
         Some(reliability(&scores.calibration)),
@@ -161,11 +164,12 @@ fn cases_csv(cases: &[Case]) -> String {
         let (first, probability) = answer.first().map_or(("", String::new()), |(class, p)| {
             (class.name(), format!("{p:.4}"))
         });
-        let yes_or_no = |known: Option<bool>| match known {
-            Some(true) => "yes",
-            Some(false) => "no",
-            None => "",
-        };
+        let [detectable, refutable] =
+            [truth.detectable, truth.refutable].map(|known| match known {
+                Some(true) => "yes",
+                Some(false) => "no",
+                None => "",
+            });
         let closure = answer
             .closure
             .map_or(String::new(), |closure| format!("{closure:.4}"));
@@ -173,8 +177,8 @@ fn cases_csv(cases: &[Case]) -> String {
             "{},{},{},{},{},{},{first},{probability},{closure}\n",
             quoted(&truth.name),
             quoted(&planted.join("+")),
-            yes_or_no(truth.detectable),
-            yes_or_no(truth.refutable),
+            detectable,
+            refutable,
             answer.verdict_name(),
             named.join("+"),
         ));
@@ -189,4 +193,72 @@ fn quoted(word: &str) -> String {
     } else {
         word.to_owned()
     }
+}
+
+/// Meaning of the columns of [`tell_apart`].
+const EXPLAINED: &str = "first: the diagnosis puts its kind first; named: the verdict gives it as the\n\
+                         answer (of none: \"no-gap\"); else first: what came first instead, how often.\n";
+
+/// For each kind of effect: how often it came first, how often it was named, and what came first
+/// instead; then the figures of what was drawn. What a blind check of whole tests aims at is no target here.
+pub fn tell_apart(cases: &[Case]) -> String {
+    let mut text = format!(
+        "{:<20}{:>7}{:>8}  {}\n",
+        "planted", "first", "named", "else first"
+    );
+    for class in classes() {
+        let own: Vec<&Case> = cases
+            .iter()
+            .filter(|(truth, _)| truth.class() == Some(class))
+            .collect();
+        if own.is_empty() {
+            continue;
+        }
+        let first = own
+            .iter()
+            .filter(|(_, answer)| answer.first().is_some_and(|found| found.0 == class))
+            .count();
+        let named = own
+            .iter()
+            .filter(|(_, answer)| match answer.verdict {
+                Some(Verdict::Named(_)) => answer
+                    .named_groups()
+                    .iter()
+                    .any(|g| Class::Group(*g) == class),
+                Some(Verdict::NoGap) => class == Class::None,
+                _ => false,
+            })
+            .count();
+        let line = format!(
+            "{:<20}{:>7}{:>8}  {}",
+            class.name(),
+            format!("{first}/{}", own.len()),
+            format!("{named}/{}", own.len()),
+            others(&own, class)
+        );
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    let mut figures = rows(&score(cases), None);
+    figures.retain(|row| row.value.is_some());
+    for row in &mut figures {
+        row.target = Target::None;
+    }
+    format!("{text}{EXPLAINED}\n{}", render_rows(&figures))
+}
+
+/// "cross-coupling 2, none 1".
+fn others(cases: &[&Case], own: Class) -> String {
+    let mut counts: BTreeMap<Class, usize> = BTreeMap::new();
+    for (_, answer) in cases {
+        match answer.first() {
+            Some((class, _)) if class != own => *counts.entry(class).or_insert(0) += 1,
+            _ => {}
+        }
+    }
+    let words: Vec<String> = counts
+        .iter()
+        .map(|(class, count)| format!("{} {count}", class.name()))
+        .collect();
+    words.join(", ")
 }

@@ -1,4 +1,0 @@
-//! Every sentence about a result, once.
-
-pub mod findings;
-pub mod gap;

@@ -31,34 +31,27 @@ pub(super) fn grouped<C: CommandFactory>() -> Command {
     let mut command = C::command();
     // Building adds `help` to the commands.
     command.build();
-    let (head, tail) = PARTS;
-    let template = format!("{head}{}{tail}", command_list(&command));
-    C::command().help_template(template)
-}
-
-/// Returns the commands, under a heading for each task.
-fn command_list(command: &Command) -> String {
     let named: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
     let width = named.iter().map(|name| name.len()).max().unwrap_or(0);
-    let mut text = String::new();
+    let (mut template, tail) = (PARTS.0.to_owned(), PARTS.1);
     for (task, members) in TASKS {
-        let others = named.iter().filter(|name| {
-            let mut known = TASKS.iter().flat_map(|(_, members)| members.iter());
-            *task == OTHER && known.all(|member| member != *name)
-        });
-        let listed = members
+        let mut listed: Vec<&str> = members.to_vec();
+        if *task == OTHER {
+            let with_task: Vec<&str> = TASKS.iter().flat_map(|(_, names)| names.to_vec()).collect();
+            listed.extend(named.iter().filter(|name| !with_task.contains(name)));
+        }
+        let known = listed
             .iter()
-            .filter(|member| named.contains(member))
-            .chain(others);
-        let lines: Vec<String> = listed
-            .filter_map(|name| Some((name, command.find_subcommand(name)?)))
-            .map(|(name, found)| format!("  {name:width$}  {}\n", summary(found)))
+            .filter_map(|name| command.find_subcommand(name));
+        let lines: Vec<String> = known
+            .map(|found| format!("  {:width$}  {}\n", found.get_name(), summary(found)))
             .collect();
         if !lines.is_empty() {
-            text.push_str(&format!("\n{task}:\n{}", lines.concat()));
+            template.push_str(&format!("\n{task}:\n{}", lines.concat()));
         }
     }
-    text
+    template.push_str(tail);
+    C::command().help_template(template)
 }
 
 /// Returns the first sentence of a command's description, cut to 80 columns.

@@ -244,20 +244,17 @@ impl Place {
 
     fn is(&self, other: &Self) -> bool {
         let same_node = self.node.is_some() && self.node == other.node;
-        same_node || self.path == other.path || self.is_in_other_case(other)
-    }
-
-    /// Returns true if the names differ in their case only, and the file system ignores case.
-    fn is_in_other_case(&self, other: &Self) -> bool {
-        let [one, two] = [self, other].map(|place| place.path.to_string_lossy().to_lowercase());
-        if one != two {
-            return false;
+        if same_node || self.path == other.path {
+            return true;
         }
-        let Some(folder) = self.path.parent() else {
+        // Names that differ in their case only are one file if the file system ignores case: then the folder
+        // also exists in capital letters.
+        let [one, two] = [self, other].map(|place| place.path.to_string_lossy().to_lowercase());
+        let Some(folder) = self.path.parent().filter(|_| one == two) else {
             return false;
         };
-        let shouted = PathBuf::from(folder.to_string_lossy().to_uppercase());
-        shouted != folder && fs::canonicalize(shouted).is_ok_and(|found| found == folder)
+        let capitals = PathBuf::from(folder.to_string_lossy().to_uppercase());
+        capitals != folder && fs::canonicalize(capitals).is_ok_and(|found| found == folder)
     }
 }
 

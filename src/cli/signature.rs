@@ -122,7 +122,13 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
             .is_ok_and(|found| found["version"].is_u64() && found["warnings"].is_array()),
         Some('<') if text.starts_with("<svg") => tail.ends_with(SVG_COMMENT),
         Some('<') => text.contains(PAGE_TITLE),
-        Some('$' | '*') => is_deck(&text),
+        Some('$' | '*') => {
+            // The first comment names the program; a long name of the test wraps its lines.
+            let lines = text.lines().take_while(|line| line.starts_with(['$', '*']));
+            let words =
+                lines.flat_map(|line| line.trim_start_matches(['$', '*']).split_whitespace());
+            words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
+        }
         _ if text.starts_with(PAGE_HEAD) => true,
         _ if path.ends_with(CHECKSUMS) && !checksums(&text).is_empty() => true,
         _ => CSV_HEADS
@@ -130,13 +136,6 @@ pub(super) fn carries_mark(path: &Path) -> io::Result<bool> {
             .chain(&DESCRIPTION_HEADS)
             .any(|begins| text.starts_with(begins)),
     })
-}
-
-/// Returns true if the first comment names the program; a long name of the test wraps its lines.
-fn is_deck(text: &str) -> bool {
-    let lines = text.lines().take_while(|line| line.starts_with(['$', '*']));
-    let words = lines.flat_map(|line| line.trim_start_matches(['$', '*']).split_whitespace());
-    words.collect::<Vec<_>>().join(" ").contains(DECK_HEAD)
 }
 
 /// Returns the earlier list of checksums of a folder, updated for the new files.

@@ -194,7 +194,7 @@ fn regress_lap_joint_with_position_overlap_and_right_half() {
     assert_eq!(joint.position, Some(0.25));
     assert_eq!(
         joint.overlap,
-        Some(Overlap {
+        Some(LapOverlap {
             length: 0.04,
             mass: 0.05
         })
@@ -301,7 +301,7 @@ fn regress_a_mass_that_every_recording_places_has_a_place() {
         let test = TestDescription::parse(&text, "test.toml").unwrap();
         let texts = test.warnings.iter().map(ToString::to_string);
         texts
-            .filter(|text| text.contains("`position` is missing"))
+            .filter(|text| text.contains("has no `position`"))
             .count()
     };
     let placed = "[[recording]]\nfile = \"a.wav\"\nat = { A = 0.2 }\n";

@@ -1,7 +1,7 @@
 //! The model with what a diagnosis found, as text and as frequencies.
 
 use crate::shared::{five_recordings, strip_on_springs, strip_table};
-use tapjoint::description::{Overlap, TestDescription};
+use tapjoint::description::{LapOverlap, TestDescription};
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{GapSettings, Verdict, diagnose, observe};
 use tapjoint::study::updated_model::{described_effects, described_frequencies, updated_model};
@@ -97,7 +97,7 @@ fn regress_a_structure_that_cannot_be_is_not_blamed_on_an_effect() {
         assert!(described_frequencies(&test, 3).is_ok());
         // More than the beam is long: no description says so, but who builds one can.
         let (length, mass) = (1.0, 0.0);
-        test.joint.overlap = Some(Overlap { length, mass });
+        test.joint.overlap = Some(LapOverlap { length, mass });
         let error = described_frequencies(&test, 3).unwrap_err();
         assert_eq!(error.line, None, "{error}");
         assert!(

@@ -273,7 +273,7 @@ pub enum Estimate {
     /// A joint, by the pair regression.
     Joint(Box<JointEstimate>),
     /// A free beam's material.
-    FreeBeam(FreeBeamEstimate),
+    FreeBeam(Box<FreeBeamEstimate>),
 }
 
 /// Estimates under changed frequencies, by each method that has one: first the pair regression, then the consistent

@@ -94,7 +94,8 @@ pub fn identify(
     let closed = match structure.regression {
         Some(model) => estimate_joint(model, &structure.beam, &used)
             .map(|joint| Estimate::Joint(Box::new(joint))),
-        None => estimate_modulus(structure.theory, &structure.beam, &used).map(Estimate::FreeBeam),
+        None => estimate_modulus(structure.theory, &structure.beam, &used)
+            .map(|found| Estimate::FreeBeam(Box::new(found))),
     };
     let (estimate, missing) = match closed {
         Ok(found) => (Some(found), None),

@@ -203,8 +203,8 @@ fn prediction(
     let rows = if detailed {
         super::structure::predict(structure, details, held, beside, count)?
     } else {
-        let held = (structure.assembly, &joint);
-        predict(structure.theory, &beam, held, beside, count)?
+        let (theory, assembly) = (structure.theory, structure.assembly);
+        predict(theory, &beam, assembly, &joint, measured, &numbers, count)?
     };
     Ok((rows, Some(predicted_specimen(structure, details, held))))
 }

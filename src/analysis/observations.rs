@@ -15,7 +15,7 @@ use super::modes::looked_at;
 use super::observed_mode::{ModeSeen, shape_of};
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::SpecimenJoint;
+use tapjoint_beam::specimen::Joint;
 use tapjoint_description::described::{coupling, described_beam, described_specimen, stiffness_of};
 use tapjoint_description::{JointKind, JointModel, KnownStiffness, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
@@ -269,9 +269,9 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
 
 /// Where the search for the joint begins: known stiffnesses, else those found, else usual ones; and the
 /// coupling, where the joint's model has one.
-fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
+fn joint(test: &TestDescription, found: Option<JointStiffness>) -> Option<Joint> {
     if test.joint.kind == JointKind::Free {
-        return SpecimenJoint::Free;
+        return None;
     }
     let units = StiffnessUnits::of(&described_beam(test));
     let start = |known: Option<KnownStiffness>, found: Option<f64>, (usual, unit): (f64, f64)| {
@@ -294,7 +294,7 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint
         }
         _ => 0.0,
     };
-    SpecimenJoint::Springs { kt, kr, coupling }
+    Some(Joint { kt, kr, coupling })
 }
 
 /// f is proportional to h/L^2 sqrt(E/rho): the relative uncertainties that the description states, with

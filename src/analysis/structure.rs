@@ -1,7 +1,7 @@
 //! The tested structure: from its description, for the consistent estimate and for predictions.
 
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
 use tapjoint_description::described::{
     assembly_of, described_beam, fastened_masses, lap_layout, stiffness_of,
@@ -11,8 +11,8 @@ use tapjoint_description::{
     TestDescription, Weights,
 };
 use tapjoint_identify::consistent::{
-    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
-    JointedStructure, LapLayout, Parameter, ResidualWeights,
+    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, JointedStructure,
+    LapLayout, Parameter, ResidualWeights,
 };
 use tapjoint_identify::predict::compare;
 use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
@@ -204,13 +204,14 @@ fn settings(
         .iter()
         .all(|mode| mode.std.is_some_and(|std| std > 0.0));
     ConsistentSettings {
-        held: HeldJoint {
-            kt: known.kx.map(|kx| kx.max(NO_SPRING) * units.kt),
-            kr: known.ky.map(|ky| ky.max(NO_SPRING) * units.kr),
+        held: Joint {
+            kt: (known.kx).map_or(f64::INFINITY, |kx| kx.max(NO_SPRING) * units.kt),
+            kr: (known.ky).map_or(f64::INFINITY, |ky| ky.max(NO_SPRING) * units.kr),
             coupling: known
                 .over(None)
                 .map(|joint| joint.coupling())
-                .filter(|coupling| coupling.is_finite()),
+                .filter(|coupling| coupling.is_finite())
+                .unwrap_or(0.0),
         },
         weights: match details.weights {
             Some(Weights::Relative) => ResidualWeights::Relative,
@@ -255,7 +256,7 @@ fn hold_cross_stiffness(
     let units = StiffnessUnits::of(&structure.beam);
     let mut held = 0.0f64;
     for _ in 0..ROUNDS {
-        settings.held.coupling = Some(held);
+        settings.held.coupling = held;
         let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
         // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
         let spring = |parameter: Parameter, unit: f64| fit.point[parameter as usize].exp() / unit;
@@ -267,7 +268,7 @@ fn hold_cross_stiffness(
             break;
         }
     }
-    settings.held.coupling = Some(held);
+    settings.held.coupling = held;
     Ok(())
 }
 
@@ -282,7 +283,7 @@ pub(super) fn predict(
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
     let there = jointed(structure, details).with_beam(beam);
     let frequencies = frequencies_of(&there, joint, count)?;
-    Ok(compare(beam, &frequencies, measured))
+    Ok(compare(beam, &frequencies, measured.0, measured.1))
 }
 
 /// Frequencies of the described structure on this joint (non-dimensional), with everything that is
@@ -334,12 +335,12 @@ pub(super) fn predicted_specimen(
     let there = jointed(structure, details).with_beam(beam);
     let units = StiffnessUnits::of(beam);
     let held = match structure.assembly {
-        Assembly::Free => SpecimenJoint::Free,
-        Assembly::Cantilever | Assembly::Lap => SpecimenJoint::Springs {
+        Assembly::Free => None,
+        Assembly::Cantilever | Assembly::Lap => Some(Joint {
             kt: joint.kx * units.kt,
             kr: joint.ky * units.kr,
             coupling: joint.coupling(),
-        },
+        }),
     };
     there.specimen(held)
 }

@@ -5,7 +5,7 @@ use crate::{
     FastenedMass, JointKind, KnownStiffness, RecordingDescription, RightHalf, TestDescription,
 };
 use tapjoint_beam::beam::DEFAULT_POISSON;
-use tapjoint_beam::specimen::{LapLayout, PointMass, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Joint, LapLayout, LapOverlap, PointMass, Specimen};
 use tapjoint_beam::{Assembly, Beam};
 
 /// The beam; of a lap joint the left half's properties and the total length.
@@ -57,7 +57,10 @@ pub fn lap_layout(test: &TestDescription) -> LapLayout {
     LapLayout {
         position: joint.position,
         right: joint.right.as_ref().map(|right| right_half(right, &beam)),
-        overlap: joint.overlap.as_ref().map(|o| (o.length, o.mass)),
+        overlap: joint.overlap.as_ref().map(|overlap| LapOverlap {
+            length: overlap.length,
+            mass: overlap.mass,
+        }),
     }
 }
 
@@ -71,7 +74,7 @@ pub fn assembly_of(kind: JointKind) -> Assembly {
 }
 
 /// The specimen on this joint, without sensors and what is fastened for single recordings.
-pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
+pub fn described_specimen(test: &TestDescription, joint: Option<Joint>) -> Specimen {
     let (beam, assembly) = (described_beam(test), assembly_of(test.joint.kind));
     Specimen::jointed(test.joint.beam, &beam, assembly, &lap_layout(test), joint)
 }

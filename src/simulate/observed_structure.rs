@@ -6,9 +6,8 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tapjoint_beam::StructureError;
-use tapjoint_beam::effects::SensorPlace;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
+use tapjoint_beam::specimen::{Body, Joint, Mesh, PointMass, Specimen, SpecimenModes};
 use tapjoint_description::described::{
     coupling, described_beam, described_specimen, fastened_masses, stiffness_of,
 };
@@ -134,7 +133,7 @@ impl SeenStructure {
 
 /// Whether a specimen hangs, since nothing holds it.
 pub(super) fn hangs(specimen: &Specimen) -> bool {
-    matches!(specimen.body, Body::Joined(_)) || specimen.joint.stiffnesses() == [0.0; 2]
+    matches!(specimen.body, Body::Joined(_)) || specimen.joint_stiffnesses() == [0.0; 2]
 }
 
 /// The modes with the motions on the suspension before them, and the number of those.
@@ -146,9 +145,9 @@ fn hang(
     match settings.suspension {
         // No rigid-body motion at all.
         None if hangs(specimen) => Ok((elastic, 0)),
-        Some(frequencies) if hangs(specimen) => elastic.hung(Some(frequencies)),
+        Some(frequencies) if hangs(specimen) => elastic.on_suspension(Some(frequencies)),
         // What turns about a pivot may be held by cables.
-        _ => elastic.hung(None),
+        _ => elastic.on_suspension(None),
     }
 }
 
@@ -167,10 +166,7 @@ fn joint_to(modes: &SpecimenModes, moving: usize, position: f64) -> f64 {
 
 /// What the modes that are not even computed leave of the joint's compliance.
 fn joint_compliance(specimen: &Specimen, modes: &SpecimenModes) -> f64 {
-    match specimen.joint {
-        SpecimenJoint::Free => 0.0,
-        SpecimenJoint::Springs { .. } => modes.joint_compliance_beyond(),
-    }
+    (specimen.joint).map_or(0.0, |_| modes.joint_compliance_beyond())
 }
 
 /// About how many modes lie below a frequency (Hz): lambda grows by pi from mode to mode.
@@ -198,15 +194,10 @@ pub(super) fn nominal_specimen(
     given: Option<GivenJoint>,
 ) -> Result<Specimen, SimulateError> {
     let mut specimen = described_specimen(test, joint(test, given)?);
-    for place in sensor_places(test, recording)? {
-        if place.mass > 0.0 {
-            specimen.masses.push(PointMass {
-                position: place.position,
-                mass: place.mass,
-                inertia: 0.0,
-            });
-        }
-    }
+    let sensors = sensor_places(test, recording)?.into_iter();
+    specimen
+        .masses
+        .extend(sensors.filter(|sensor| sensor.mass > 0.0));
     specimen.masses.extend(fastened_masses(recording));
     Ok(specimen)
 }
@@ -214,27 +205,27 @@ pub(super) fn nominal_specimen(
 fn joint(
     test: &TestDescription,
     given: Option<GivenJoint>,
-) -> Result<SpecimenJoint, SimulateError> {
+) -> Result<Option<Joint>, SimulateError> {
     if test.joint.kind == JointKind::Free {
-        return Ok(SpecimenJoint::Free);
+        return Ok(None);
     }
     let units = StiffnessUnits::of(&described_beam(test));
     if let Some(given) = given {
-        return Ok(SpecimenJoint::Springs {
+        return Ok(Some(Joint {
             kt: given.kx * units.kt,
             kr: given.ky * units.kr,
             coupling: coupling(given.kx, given.ky, given.cross_compliance),
-        });
+        }));
     }
     let (missing, keys) = match (test.joint.kt, test.joint.kr) {
         (Some(kt), Some(kr)) => {
             let (kt, kr) = (stiffness_of(kt), stiffness_of(kr));
             let ktr = test.joint.ktr.map_or(f64::INFINITY, stiffness_of);
-            return Ok(SpecimenJoint::Springs {
+            return Ok(Some(Joint {
                 kt,
                 kr,
                 coupling: coupling(kt, kr, 1.0 / ktr),
-            });
+            }));
         }
         (None, None) => (
             "kt and kr are",
@@ -250,7 +241,7 @@ fn joint(
 pub(super) fn sensor_places(
     test: &TestDescription,
     recording: &RecordingDescription,
-) -> Result<Vec<SensorPlace>, SimulateError> {
+) -> Result<Vec<PointMass>, SimulateError> {
     let places = test.sensors.iter().map(|sensor| {
         if sensor.kind == SensorKind::Sound {
             return Err(SimulateError::Sound {
@@ -258,12 +249,10 @@ pub(super) fn sensor_places(
             });
         }
         let position = recording.place_of(sensor);
-        Ok(SensorPlace {
-            position: position.ok_or_else(|| SimulateError::NoPosition {
-                name: sensor.name.clone(),
-            })?,
-            mass: sensor.mass.unwrap_or(0.0),
-        })
+        let position = position.ok_or_else(|| SimulateError::NoPosition {
+            name: sensor.name.clone(),
+        })?;
+        Ok(PointMass::new(position, sensor.mass.unwrap_or(0.0)))
     });
     places.collect()
 }

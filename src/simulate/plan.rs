@@ -16,8 +16,8 @@ use super::recording_run::{Trial, round_scale, try_out};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
-use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
+use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, apply};
+use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_description::{RecordingDescription, Scale, SensorKind, TestDescription};
 
 /// What is to be simulated.
@@ -241,7 +241,7 @@ fn tip(laboratory: &Laboratory, highest: Option<f64>, sample_rate: u32) -> Tip {
 }
 
 /// What is seen of the specimen on one visit; a joint that is not linear is seen at rest.
-fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[SensorPlace], visit: usize) -> Seen {
+fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[PointMass], visit: usize) -> Seen {
     let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
     // Streams of their own, behind those of the recordings' channels.
     random.set_stream(1 << 40 | visit as u64);
@@ -357,10 +357,7 @@ fn check_softening(effects: &[Effect]) -> Result<(), SimulateError> {
 }
 
 fn turning_stiffness(specimen: &Specimen) -> Result<f64, SimulateError> {
-    let stiffness = match specimen.joint {
-        SpecimenJoint::Free => 0.0,
-        SpecimenJoint::Springs { kr, .. } => kr,
-    };
+    let [_, stiffness] = specimen.joint_stiffnesses();
     if stiffness > 0.0 && stiffness.is_finite() {
         Ok(stiffness)
     } else {

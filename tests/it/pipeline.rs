@@ -14,7 +14,7 @@ use tapjoint::pipeline::{
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, seen_modes, simulate_tap_test};
-use tapjoint::structure::specimen::PointMass;
+use tapjoint::structure::specimen::{LapOverlap, PointMass};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
 
 const KX: f64 = 1400.0;
@@ -420,7 +420,10 @@ fn recover_an_uneven_lap_joint() {
             modulus: 70e9,
             ..beam
         }),
-        overlap: Some((0.04, 0.05)),
+        overlap: Some(LapOverlap {
+            length: 0.04,
+            mass: 0.05,
+        }),
     };
     let (kt, kr) = (5.0e5, 900.0);
     let frequencies = frequencies_of(&structure, (kt, kr), 5);

@@ -9,7 +9,6 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
-use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
 use tapjoint_signal::modal::fit::{FitSettings, FreeDecayCollector, PoleStart, fit_modes};
@@ -90,12 +89,10 @@ impl Truths {
     fn point_of(&self, test: &StudiedTest, joint: &JointStiffness) -> Point {
         let mut point = self.model.nominal();
         if test.structure.assembly != Assembly::Free {
-            let units = StiffnessUnits::of(&test.structure.beam);
-            point[Parameter::Kt as usize] = (joint.kx * units.kt).ln();
-            point[Parameter::Kr as usize] = (joint.ky * units.kr).ln();
-            let coupling = joint.coupling();
-            let coupling = if coupling.is_finite() { coupling } else { 0.0 };
-            point[Parameter::Coupling as usize] = coupling.atanh();
+            let joint = joint.in_si(&test.structure.beam);
+            point[Parameter::Kt as usize] = joint.kt.ln();
+            point[Parameter::Kr as usize] = joint.kr.ln();
+            point[Parameter::Coupling as usize] = joint.coupling.atanh();
         }
         point
     }

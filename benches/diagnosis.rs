@@ -12,7 +12,7 @@ use tapjoint::gap::{
 };
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::specimen::{Body, Mesh, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::{Body, Joint, Mesh, Specimen};
 
 const LENGTH: f64 = 0.423;
 
@@ -26,15 +26,11 @@ fn strip(held: bool) -> Nominal {
         poisson: 0.3,
     };
     let units = StiffnessUnits::of(&beam);
-    let joint = if held {
-        SpecimenJoint::Springs {
-            kt: 1400.0 * units.kt,
-            kr: 1.25 * units.kr,
-            coupling: 0.0,
-        }
-    } else {
-        SpecimenJoint::Free
-    };
+    let joint = held.then_some(Joint {
+        kt: 1400.0 * units.kt,
+        kr: 1.25 * units.kr,
+        coupling: 0.0,
+    });
     Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
         sensors: vec![NominalSensor {

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Duration;
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::specimen::{Body, Hinge, Mesh, PointMass, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::{Body, Hinge, Joint, Mesh, PointMass, Specimen};
 
 /// A steel strip on a three-parameter joint, with a sensor and a crack.
 fn strip() -> Specimen {
@@ -20,11 +20,11 @@ fn strip() -> Specimen {
         poisson: 0.3,
     };
     let units = StiffnessUnits::of(&beam);
-    let joint = SpecimenJoint::Springs {
+    let joint = Some(Joint {
         kt: 1400.0 * units.kt,
         kr: 1.2 * units.kr,
         coupling: 0.1,
-    };
+    });
     Specimen {
         shear_rotary: 1.0,
         masses: vec![PointMass {

@@ -16,7 +16,7 @@ use tapjoint::gap::{
 };
 use tapjoint::identify::observation::Observations;
 use tapjoint::structure::Beam;
-use tapjoint::structure::specimen::{Body, PointMass, PointSpring, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::{Body, Joint, PointMass, PointSpring, Specimen};
 
 /// What was planted.
 #[derive(Debug, Clone, PartialEq)]
@@ -207,10 +207,8 @@ fn case(five: bool, kind: Kind, seed: u64) -> Option<Case> {
     };
     let observed = observed(&plan, &truth, &planted, &mut random, seed)?;
     let mut described = truth.clone();
-    described.specimen = Specimen::new(
-        Body::One(beam()),
-        start_joint(&truth.specimen.joint, &mut random),
-    );
+    described.specimen =
+        Specimen::new(Body::One(beam()), start_joint(&truth.specimen, &mut random));
     described.specimen.shear_rotary = truth.specimen.shear_rotary;
     match diagnose(&observed, &described, &GapSettings::default()) {
         Ok(answer) => Some(Case {
@@ -225,14 +223,14 @@ fn case(five: bool, kind: Kind, seed: u64) -> Option<Case> {
 }
 
 /// The search begins off the truth, as an estimate without the effect would.
-fn start_joint(joint: &SpecimenJoint, random: &mut ChaCha8Rng) -> SpecimenJoint {
-    let [kt, kr] = joint.stiffnesses();
+fn start_joint(truth: &Specimen, random: &mut ChaCha8Rng) -> Option<Joint> {
+    let [kt, kr] = truth.joint_stiffnesses();
     let mut off = || (0.2 * random.sample::<f64, _>(StandardNormal)).exp();
-    SpecimenJoint::Springs {
+    Some(Joint {
         kt: kt * off(),
         kr: kr * off(),
         coupling: 0.0,
-    }
+    })
 }
 
 fn nominal(random: &mut ChaCha8Rng) -> Nominal {
@@ -240,11 +238,11 @@ fn nominal(random: &mut ChaCha8Rng) -> Nominal {
     let unit = beam.bending_stiffness() / beam.length;
     let kx = 1400.0 * (0.4 * random.sample::<f64, _>(StandardNormal)).exp();
     let ky = 1.25 * (0.3 * random.sample::<f64, _>(StandardNormal)).exp();
-    let joint = SpecimenJoint::Springs {
+    let joint = Some(Joint {
         kt: kx * unit / beam.length.powi(2),
         kr: ky * unit,
         coupling: 0.0,
-    };
+    });
     Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
         sensors: vec![NominalSensor {

@@ -180,8 +180,8 @@ fn prediction(
         let there = jointed(structure, details).with_beam(&beam);
         compare(&beam, &frequencies_of(&there, &joint, count)?, beside)
     } else {
-        let held = (structure.assembly, &joint);
-        predict(structure.theory, &beam, held, beside, count)?
+        let (theory, assembly) = (structure.theory, structure.assembly);
+        predict(theory, &beam, assembly, &joint, measured, &numbers, count)?
     };
     let specimen = predicted_specimen(structure, details, &beam, &joint);
     Ok(Some((rows, specimen)))

@@ -10,7 +10,7 @@ use super::analysis::{Analysis, RecordingResult};
 use super::observed_mode::{ModeSeen, SeenTaps, independent, judge_scatter, of_taps, shape_of};
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::SpecimenJoint;
+use tapjoint_beam::specimen::Joint;
 use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
@@ -252,9 +252,9 @@ pub fn nominal_with(test: &TestDescription, found: Option<JointStiffness>) -> No
 
 /// Start of the search for the joint: known stiffnesses, else those found, else usual ones; and the
 /// coupling, where the joint's model has one.
-fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint {
+fn joint(test: &TestDescription, found: Option<JointStiffness>) -> Option<Joint> {
     if test.joint.kind == Assembly::Free {
-        return SpecimenJoint::Free;
+        return None;
     }
     let units = StiffnessUnits::of(&described_beam(test));
     let [kx, ky] = USUAL_JOINT;
@@ -280,7 +280,7 @@ fn joint(test: &TestDescription, found: Option<JointStiffness>) -> SpecimenJoint
         }
         _ => 0.0,
     };
-    SpecimenJoint::Springs { kt, kr, coupling }
+    Some(Joint { kt, kr, coupling })
 }
 
 /// f is proportional to h/L^2 sqrt(E/rho): the relative uncertainties that the description states, with

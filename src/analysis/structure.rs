@@ -1,15 +1,15 @@
 //! The tested structure: from its description, for the consistent estimate and for predictions.
 
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{PointMass, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Joint, PointMass, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness};
 use tapjoint_description::described::{described_beam, lap_layout};
 use tapjoint_description::{
     FitParameter, JointModel, RecordingDescription, SensorKind, TestDescription, Weights,
 };
 use tapjoint_identify::consistent::{
-    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, HeldJoint,
-    JointedStructure, LapLayout, Parameter, ResidualWeights,
+    BeamTolerances, ConsistentEstimator, ConsistentSettings, FrequencyModel, JointedStructure,
+    LapLayout, Parameter, ResidualWeights,
 };
 use tapjoint_identify::predict::compare;
 use tapjoint_identify::{IdentifyError, MeasuredMode, PairsModel, PredictedMode};
@@ -187,13 +187,14 @@ fn settings(
         .iter()
         .all(|mode| mode.std.is_some_and(|std| std > 0.0));
     ConsistentSettings {
-        held: HeldJoint {
-            kt: known.kx.map(|kx| kx.max(NO_SPRING) * units.kt),
-            kr: known.ky.map(|ky| ky.max(NO_SPRING) * units.kr),
+        held: Joint {
+            kt: (known.kx).map_or(f64::INFINITY, |kx| kx.max(NO_SPRING) * units.kt),
+            kr: (known.ky).map_or(f64::INFINITY, |ky| ky.max(NO_SPRING) * units.kr),
             coupling: known
                 .over(None)
                 .map(|joint| joint.coupling())
-                .filter(|coupling| coupling.is_finite()),
+                .filter(|coupling| coupling.is_finite())
+                .unwrap_or(0.0),
         },
         weights: match details.weights {
             Some(Weights::Relative) => ResidualWeights::Relative,
@@ -238,7 +239,7 @@ fn hold_cross_stiffness(
     let units = StiffnessUnits::of(&structure.beam);
     let mut held = 0.0f64;
     for _ in 0..ROUNDS {
-        settings.held.coupling = Some(held);
+        settings.held.coupling = held;
         let fit = ConsistentEstimator::new(jointed, used, settings)?.fit();
         // sqrt(Kt Kr)/Ktr in SI: a beam that is fitted too has other units than the nominal one.
         let kx = fit.point[Parameter::Kt as usize].exp() / units.kt;
@@ -250,7 +251,7 @@ fn hold_cross_stiffness(
             break;
         }
     }
-    settings.held.coupling = Some(held);
+    settings.held.coupling = held;
     Ok(())
 }
 
@@ -305,12 +306,12 @@ pub(super) fn predicted_specimen(
     let there = jointed(structure, details).with_beam(beam);
     let units = StiffnessUnits::of(beam);
     let held = match structure.assembly {
-        Assembly::Free => SpecimenJoint::Free,
-        Assembly::Cantilever | Assembly::Lap => SpecimenJoint::Springs {
+        Assembly::Free => None,
+        Assembly::Cantilever | Assembly::Lap => Some(Joint {
             kt: joint.kx * units.kt,
             kr: joint.ky * units.kr,
             coupling: joint.coupling(),
-        },
+        }),
     };
     there.specimen(held)
 }

@@ -18,7 +18,7 @@ use super::eigen::all_pairs;
 use super::receptance::{EndFunctions, EndSlopes};
 use super::specimen::model::{Model, Motion, Place};
 use super::specimen::modes::SHIFT;
-use super::specimen::{Body, Specimen, SpecimenJoint};
+use super::specimen::{Body, Specimen};
 use super::{Beam, BeamTheory, JointStiffness, Slenderness, StructureError};
 
 /// The five functions P, X, Y, Z, Q at one frequency, or their slopes.
@@ -61,17 +61,6 @@ impl Coefficients {
     }
 }
 
-/// Compliance of a joint in units of L^3/(E I), L/(E I), L^2/(E I).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JointCompliance {
-    /// 1/Kx (1).
-    pub a: f64,
-    /// 1/Ky (1).
-    pub b: f64,
-    /// 1/Kz (1).
-    pub c: f64,
-}
-
 /// The joint's weights of the five functions in the frequency equation.
 ///
 /// Of a stiffness the equation is multiplied by Kx Ky/((1 + |Kx|)(1 + |Ky|)). Then every weight
@@ -96,24 +85,8 @@ pub struct JointWeights {
     unstable: usize,
 }
 
-impl From<&JointCompliance> for JointWeights {
-    /// Weights of a joint that can exist.
-    fn from(&JointCompliance { a, b, c }: &JointCompliance) -> Self {
-        Self {
-            product: a * b - c * c,
-            a,
-            b,
-            c,
-            one: 1.0,
-            sign: 1.0,
-            missing: 0,
-            unstable: 0,
-        }
-    }
-}
-
 impl From<&JointStiffness> for JointWeights {
-    /// Weights of any real stiffness, negative and unphysical ones included.
+    /// Returns the weights of any real stiffness, negative and unphysical ones included.
     fn from(joint: &JointStiffness) -> Self {
         // Stiffness K/(1 + |K|) and compliance 1/(1 + |K|), of which at most one is zero.
         let [(sx, cx), (sy, cy)] = [joint.kx, joint.ky].map(|stiffness| {
@@ -151,7 +124,22 @@ impl From<&JointStiffness> for JointWeights {
 }
 
 impl JointWeights {
-    /// Number of natural motions that are no modes: rigid-body motions at zero frequency, one for
+    /// Returns the weights of a joint that can exist, from 1/Kx, 1/Ky and 1/Kz (1).
+    pub fn from_compliances(compliances: [f64; 3]) -> Self {
+        let [a, b, c] = compliances;
+        Self {
+            product: a * b - c * c,
+            a,
+            b,
+            c,
+            one: 1.0,
+            sign: 1.0,
+            missing: 0,
+            unstable: 0,
+        }
+    }
+
+    /// Returns the number of natural motions that are no modes: rigid-body motions at zero frequency, one for
     /// each spring of exactly zero stiffness, and those that an unphysical joint lets grow.
     pub fn uncounted(&self) -> usize {
         self.missing + self.unstable
@@ -177,18 +165,18 @@ pub struct InterfaceFunctions {
 }
 
 impl InterfaceFunctions {
-    /// Value and slope of the frequency equation with this joint.
+    /// Returns value and slope of the frequency equation with this joint.
     pub fn equation(&self, joint: &JointWeights) -> (f64, f64) {
         (joint.equation(&self.values), joint.equation(&self.slopes))
     }
 
-    /// Newton's step of lambda towards a root: on lambda^4 G, which has no pole at zero frequency
+    /// Returns Newton's step of lambda towards a root: on lambda^4 G, which has no pole at zero frequency
     /// and is nearly linear in omega^2 where the springs are soft.
     pub fn newton_step(&self, value: f64, slope: f64) -> f64 {
         -value / (slope + 4.0 * value / self.lambda)
     }
 
-    /// Natural frequencies below lambda with this joint, where its equation has this value (Wittrick
+    /// Returns the number of natural frequencies below lambda with this joint, where its equation has this value (Wittrick
     /// & Williams 1971): those of the free body, less the negative eigenvalues of compliance plus
     /// receptance, and those of the compliance itself.
     pub fn count(&self, joint: &JointWeights, value: f64) -> usize {
@@ -216,7 +204,7 @@ pub enum JointedBody {
 }
 
 impl JointedBody {
-    /// Two equal halves of one beam of this slenderness.
+    /// Returns two equal halves of one beam of this slenderness.
     pub fn halves(slenderness: &Slenderness) -> Self {
         let half = JoinedHalf {
             slenderness: slenderness.of_piece(0.5),
@@ -227,7 +215,7 @@ impl JointedBody {
         Self::Joined([half; 2])
     }
 
-    /// P, X, Y, Z, Q at `lambda` (1), positive.
+    /// Returns P, X, Y, Z, Q at `lambda` (1), positive.
     pub fn coefficients(&self, lambda: f64) -> Coefficients {
         match self {
             Self::Rooted(slenderness) => {
@@ -240,7 +228,7 @@ impl JointedBody {
         }
     }
 
-    /// The functions and their slopes at `lambda` (1), positive.
+    /// Returns the functions and their slopes at `lambda` (1), positive.
     pub fn functions(&self, lambda: f64) -> InterfaceFunctions {
         match self {
             Self::Rooted(slenderness) => rooted(slenderness, lambda),
@@ -257,7 +245,7 @@ impl JointedBody {
         at.count(joint, joint.equation(&at.values))
     }
 
-    /// Rigid-body motions that no joint with springs takes away; they are no modes.
+    /// Returns the number of rigid-body motions that no joint with springs takes away; they are no modes.
     pub fn uncounted(&self) -> usize {
         match self {
             Self::Rooted(_) => 0,
@@ -266,24 +254,26 @@ impl JointedBody {
         }
     }
 
-    /// Natural frequency number `mode` (from 1) on a joint, looked for from `guess` (1) on. A relative
-    /// step below `last_step` is the last: [`LAST_STEP`] for all digits.
+    /// Returns natural frequency number `mode` (from 1) on a joint of compliances 1/Kx, 1/Ky and 1/Kz (1),
+    /// looked for from `guess` (1) on. A relative step below `last_step` is the last: [`LAST_STEP`] for
+    /// all digits.
     pub fn root(
         &self,
-        joint: &JointCompliance,
+        compliances: [f64; 3],
         mode: usize,
         guess: f64,
         last_step: f64,
     ) -> InterfaceRoot {
-        let weights = JointWeights::from(joint);
+        let [a, b, c] = compliances;
+        let weights = JointWeights::from_compliances(compliances);
         let number = mode + self.uncounted();
         let (lambda, at) = self.find_root(&weights, number, guess, last_step);
         let (_, slope) = at.equation(&weights);
         let v = &at.values;
-        let first = [joint.b * v.p + v.y, -(joint.c * v.p + v.z)];
-        let second = [first[1], joint.a * v.p + v.x];
+        let first = [b * v.p + v.y, -(c * v.p + v.z)];
+        let second = [first[1], a * v.p + v.x];
         // d lambda/da = -(dG/da)/G'.
-        let by = [first[0], second[1], -2.0 * (joint.c * v.p + v.z)];
+        let by = [first[0], second[1], -2.0 * (c * v.p + v.z)];
         InterfaceRoot {
             lambda,
             by_compliance: by.map(|by| -by / slope),
@@ -296,7 +286,7 @@ impl JointedBody {
         }
     }
 
-    /// Root number `number` (from 1, uncounted motions included), and the functions beside it.
+    /// Returns root number `number` (from 1, uncounted motions included), and the functions beside it.
     ///
     /// Newton's steps on the frequency equation as long as the count of frequencies below agrees with
     /// them, bisection by that count where it does not. No root is missed or taken for another.
@@ -536,7 +526,7 @@ impl InterfaceModes {
     /// [`StructureError`] where a part of the specimen cannot exist.
     pub fn new(specimen: &Specimen, elements: usize) -> Result<Self, StructureError> {
         let free = Specimen {
-            joint: SpecimenJoint::Free,
+            joint: None,
             ..specimen.clone()
         };
         let model = Model::new(&free, &vec![elements; free.body.beams().len()])?;

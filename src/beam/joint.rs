@@ -1,4 +1,5 @@
-//! The joint: two or three springs, from none at all to rigid.
+//! The joint: two or three springs, from none at all to rigid, in SI units ([`Joint`]) and as the beam feels
+//! them ([`JointStiffness`]).
 
 use super::{Beam, StructureError};
 use schemars::JsonSchema;
@@ -14,6 +15,26 @@ pub enum Assembly {
     Lap,
     /// A free beam; the joint is ignored.
     Free,
+}
+
+/// Springs of a joint, with the compliance matrix `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// Translational stiffness Kt (N/m); infinite = rigid.
+    pub kt: f64,
+    /// Rotational stiffness Kr (N m/rad); infinite = rigid.
+    pub kr: f64,
+    /// sqrt(Kt Kr)/Ktr (1), between -1 and 1; 0 = no coupling. Lap joints have none.
+    pub coupling: f64,
+}
+
+impl Joint {
+    /// A joint without give: the beam is clamped.
+    pub const RIGID: Self = Self {
+        kt: f64::INFINITY,
+        kr: f64::INFINITY,
+        coupling: 0.0,
+    };
 }
 
 /// Stiffness of a joint, non-dimensional by the beam it holds (Ingole & Chatterjee):
@@ -38,7 +59,7 @@ impl JointStiffness {
     /// Held without give: the beam is clamped.
     pub const RIGID: Self = Self::two_parameter(f64::INFINITY, f64::INFINITY);
 
-    /// A joint without cross coupling, from Kx and Ky (1).
+    /// Returns a joint without cross coupling, from Kx and Ky (1).
     pub const fn two_parameter(kx: f64, ky: f64) -> Self {
         Self {
             kx,
@@ -47,7 +68,7 @@ impl JointStiffness {
         }
     }
 
-    /// A joint with cross coupling, from Kx, Ky and Kz (1); Kz = infinity means no coupling.
+    /// Returns a joint with cross coupling, from Kx, Ky and Kz (1); Kz = infinity means no coupling.
     pub fn three_parameter(kx: f64, ky: f64, kz: f64) -> Self {
         Self {
             kx,
@@ -56,12 +77,23 @@ impl JointStiffness {
         }
     }
 
-    /// Cross-coupling stiffness Kz (1); `None` without coupling.
+    /// Returns the joint's springs where it holds this beam. A rigid spring has no coupling.
+    pub fn in_si(&self, beam: &Beam) -> Joint {
+        let units = StiffnessUnits::of(beam);
+        let coupling = self.coupling();
+        Joint {
+            kt: self.kx * units.kt,
+            kr: self.ky * units.kr,
+            coupling: if coupling.is_finite() { coupling } else { 0.0 },
+        }
+    }
+
+    /// Returns the cross-coupling stiffness Kz (1); `None` without coupling.
     pub fn kz(&self) -> Option<f64> {
         (self.cross_compliance != 0.0).then(|| 1.0 / self.cross_compliance)
     }
 
-    /// Coupling sqrt(Kx Ky)/Kz (1), between -1 and 1 for a physical joint.
+    /// Returns the coupling sqrt(Kx Ky)/Kz (1), between -1 and 1 for a physical joint.
     pub fn coupling(&self) -> f64 {
         if self.cross_compliance == 0.0 {
             0.0
@@ -94,7 +126,7 @@ impl JointStiffness {
     }
 }
 
-/// What one unit of each non-dimensional stiffness is worth for a given beam.
+/// Units of the non-dimensional stiffnesses for a given beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StiffnessUnits {
     /// Kt per Kx: E I/L^3 (N/m).
@@ -106,7 +138,7 @@ pub struct StiffnessUnits {
 }
 
 impl StiffnessUnits {
-    /// Of this beam.
+    /// Returns the units for this beam.
     pub fn of(beam: &Beam) -> Self {
         let (stiffness, length) = (beam.bending_stiffness(), beam.length);
         Self {

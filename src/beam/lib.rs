@@ -31,7 +31,7 @@ mod banded;
 mod eigen;
 
 pub use beam::{Beam, BeamTheory, SHEAR_COEFFICIENT, Slenderness};
-pub use joint::{Assembly, JointStiffness};
+pub use joint::{Assembly, Joint, JointStiffness};
 pub use mode_shape::{ModeShape, mode_shapes};
 pub use natural_modes::{
     NaturalMode, Symmetry, natural_frequencies, natural_lambdas, natural_lambdas_of_any_joint,

@@ -3,7 +3,7 @@
 use crate::TestDescription;
 use tapjoint_beam::Beam;
 use tapjoint_beam::beam::DEFAULT_POISSON;
-use tapjoint_beam::specimen::{LapLayout, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Joint, LapLayout, LapOverlap, Specimen};
 
 /// Returns the beam; for a lap joint the left half's properties and the total length.
 pub fn described_beam(test: &TestDescription) -> Beam {
@@ -41,12 +41,15 @@ pub fn lap_layout(test: &TestDescription) -> LapLayout {
             density: right.density.unwrap_or(left.density),
             poisson: right.poisson.unwrap_or(left.poisson),
         }),
-        overlap: joint.overlap.as_ref().map(|o| (o.length, o.mass)),
+        overlap: joint.overlap.as_ref().map(|overlap| LapOverlap {
+            length: overlap.length,
+            mass: overlap.mass,
+        }),
     }
 }
 
 /// Returns the specimen on this joint, without sensors and without masses of single recordings.
-pub fn described_specimen(test: &TestDescription, joint: SpecimenJoint) -> Specimen {
+pub fn described_specimen(test: &TestDescription, joint: Option<Joint>) -> Specimen {
     Specimen::jointed(
         test.joint.beam,
         &described_beam(test),

@@ -7,8 +7,8 @@ use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter
 use crate::structure::{Arrangement, ModalModel, with_joint};
 use nalgebra::DMatrix;
 use std::sync::Arc;
-use tapjoint_beam::effects::{Circumstances, EffectId, JointLaw, SensorPlace, apply};
-use tapjoint_beam::specimen::{BeamModes, Mesh, Specimen};
+use tapjoint_beam::effects::{Circumstances, EffectId, JointLaw, apply};
+use tapjoint_beam::specimen::{BeamModes, Mesh, PointMass, Specimen};
 use tapjoint_identify::observation::effective_share;
 
 /// Model of a dataset under one hypothesis.
@@ -177,7 +177,7 @@ impl<'a> Forward<'a> {
             {
                 return Some((known.own.clone(), Some(all)));
             }
-            let near = known.own.near(specimen).ok()?.map(Arc::new);
+            let near = known.own.perturbed(specimen).ok()?.map(Arc::new);
             Some((near.or_else(|| self.modes_of(specimen))?, None))
         })
     }
@@ -368,7 +368,7 @@ impl<'a> Forward<'a> {
     }
 
     /// Returns the mass of a sensor (kg): the stated one, or that of the hypothesis if none is stated.
-    fn mass_at(&self, sensor: &SensorPlace, parameters: &[f64]) -> f64 {
+    fn mass_at(&self, sensor: &PointMass, parameters: &[f64]) -> f64 {
         match sensor.mass {
             0.0 => self.size_of(EffectId::SensorMass, parameters),
             stated => stated,
@@ -513,7 +513,7 @@ impl<'a> ModeInPlace<'a> {
     }
 
     /// Sensors with this index among the indices `keys`.
-    fn sensors(&self, keys: &'a [usize], wanted: usize) -> impl Iterator<Item = &'a SensorPlace> {
+    fn sensors(&self, keys: &'a [usize], wanted: usize) -> impl Iterator<Item = &'a PointMass> {
         let own = keys.iter().zip(&self.arrangement.sensors);
         own.filter(move |(key, _)| **key == wanted)
             .map(|(_, sensor)| sensor)

@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tapjoint_beam::StructureError;
-use tapjoint_beam::effects::{JointLaw, Seen, SensorPlace};
+use tapjoint_beam::effects::{JointLaw, Seen};
 use tapjoint_beam::specimen::{
-    BeamModes, Body, Mesh, PointInertia, PointMass, Specimen, SpecimenJoint, SpecimenModes,
+    BeamModes, Body, Joint, Mesh, PointInertia, PointMass, Specimen, SpecimenModes,
 };
 use tapjoint_identify::observation::{
     Configuration, ObservedMode, ObservedSensor, effective_share,
@@ -72,15 +72,10 @@ impl Nominal {
     }
 
     /// Returns the structure with sensors and added masses.
-    pub(crate) fn loaded(&self, sensors: &[SensorPlace], masses: &[PointMass]) -> Specimen {
+    pub(crate) fn loaded(&self, sensors: &[PointMass], masses: &[PointMass]) -> Specimen {
         let mut specimen = self.specimen.clone();
-        for sensor in sensors.iter().filter(|sensor| sensor.mass > 0.0) {
-            specimen.masses.push(PointMass {
-                position: sensor.position,
-                mass: sensor.mass,
-                inertia: 0.0,
-            });
-        }
+        let heavy = sensors.iter().filter(|sensor| sensor.mass > 0.0);
+        specimen.masses.extend(heavy);
         specimen.masses.extend_from_slice(masses);
         specimen
     }
@@ -88,10 +83,10 @@ impl Nominal {
     /// Returns the fitted parameters of the joint: direction (0 translation, 1 rotation, 2 the coupling of a joint that
     /// has one) and start value.
     pub(crate) fn joint_parameters(&self) -> Vec<(usize, f64)> {
-        let SpecimenJoint::Springs { coupling, .. } = self.specimen.joint else {
+        let Some(Joint { coupling, .. }) = self.specimen.joint else {
             return Vec::new();
         };
-        let stiffnesses = self.specimen.joint.stiffnesses().into_iter().enumerate();
+        let stiffnesses = self.specimen.joint_stiffnesses().into_iter().enumerate();
         let mut parameters: Vec<(usize, f64)> = stiffnesses
             .filter(|(_, stiffness)| *stiffness > 0.0 && stiffness.is_finite())
             .collect();
@@ -117,7 +112,7 @@ impl Nominal {
 
     /// Returns whether the structure has a joint.
     pub(crate) fn has_joint(&self) -> bool {
-        !matches!(self.specimen.joint, SpecimenJoint::Free)
+        self.specimen.joint.is_some()
     }
 
     /// Returns whether the structure is one beam, not two.
@@ -149,7 +144,7 @@ impl Nominal {
     /// Returns the beam without its joint.
     pub(crate) fn bare(&self) -> Nominal {
         let mut bare = self.clone();
-        bare.specimen.joint = SpecimenJoint::Free;
+        bare.specimen.joint = None;
         bare.specimen.joint_mass = PointInertia::default();
         bare.specimen.overlap = None;
         bare
@@ -165,11 +160,11 @@ pub struct Arrangement {
     pub specimen: Specimen,
     /// Positions and masses of the sensors, in the order of the observations. A sensor of unknown position has no
     /// mass, and its shape is not compared.
-    pub sensors: Vec<SensorPlace>,
+    pub sensors: Vec<PointMass>,
     /// Known added masses, each with its index among all distinct ones.
     pub fastened: Vec<(usize, PointMass)>,
     /// Sensors that sit on the structure at a known position.
-    pub carried: Vec<SensorPlace>,
+    pub carried: Vec<PointMass>,
     /// Indices of the sensors' names.
     pub names: Vec<usize>,
     /// Indices of the sensors' stated positions.
@@ -221,14 +216,14 @@ impl Arrangement {
         nominal: &Nominal,
         inventory: &mut Inventory,
     ) -> Self {
-        let mut sensors: Vec<SensorPlace> = Vec::new();
+        let mut sensors: Vec<PointMass> = Vec::new();
         let (mut carried, mut names, mut positions) = (Vec::new(), Vec::new(), Vec::new());
         for sensor in &configuration.sensors {
             let mass = sensor
                 .position
                 .map_or(0.0, |_| nominal.mass_of(&sensor.name));
             let position = sensor.position.unwrap_or(0.0);
-            let placed = SensorPlace { position, mass };
+            let placed = PointMass::new(position, mass);
             sensors.push(placed);
             if sensor.position.is_some() && !nominal.is_contactless(&sensor.name) {
                 carried.push(placed);
@@ -310,11 +305,7 @@ impl Arrangement {
 
     /// Fastens a mass (kg) at a position (m), which has this index.
     pub fn fasten(&mut self, mass: f64, position: f64, index: usize) {
-        let mass = PointMass {
-            position,
-            mass,
-            inertia: 0.0,
-        };
+        let mass = PointMass::new(position, mass);
         self.specimen.masses.push(mass);
         self.fastened.push((index, mass));
     }
@@ -428,7 +419,7 @@ impl ModalModel {
     /// unit modal mass that deforms the joint by q against the forces F = K q. With coupled springs the
     /// shares belong to the stiffnesses at a fixed coupling: dK/d ln k_t = (E_t K + K E_t)/2.
     pub fn joint_shares(&self, index: usize) -> [f64; 2] {
-        let SpecimenJoint::Springs { kt, kr, coupling } = self.seen.specimen.joint else {
+        let Some(Joint { kt, kr, coupling }) = self.seen.specimen.joint else {
             return [0.0; 2];
         };
         let q = self.modes().joint_motion(index);
@@ -471,7 +462,7 @@ impl ModalModel {
     fn stiffened_slopes(&self, direction: usize) -> Vec<f64> {
         const STEP: f64 = 1e-4;
         let mut other = self.seen.specimen.clone();
-        if let SpecimenJoint::Springs { kt, kr, coupling } = &mut other.joint {
+        if let Some(Joint { kt, kr, coupling }) = &mut other.joint {
             match direction {
                 0 => *kt *= STEP.exp(),
                 COUPLING => *coupling += STEP,
@@ -668,7 +659,7 @@ impl NominalSensor {
 /// and the coupling.
 pub fn with_joint(specimen: &Specimen, directions: &[usize], parameters: &[f64]) -> Specimen {
     let mut specimen = specimen.clone();
-    if let SpecimenJoint::Springs { kt, kr, coupling } = &mut specimen.joint {
+    if let Some(Joint { kt, kr, coupling }) = &mut specimen.joint {
         for (direction, value) in directions.iter().zip(parameters) {
             match *direction {
                 0 => *kt = value.exp(),

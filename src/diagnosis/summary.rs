@@ -186,7 +186,7 @@ impl<'a> Reference<'a> {
     /// Returns the joint's stiffnesses (N/m, N m/rad); `None` without a joint.
     fn joint(&self, candidate: &Candidate) -> Option<[f64; 2]> {
         let nominal = &self.comparison.dataset.nominal;
-        let mut joint = nominal.specimen.joint.stiffnesses();
+        let mut joint = nominal.specimen.joint_stiffnesses();
         if joint == [0.0; 2] {
             return None;
         }

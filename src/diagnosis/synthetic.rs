@@ -10,8 +10,8 @@ use crate::thresholds::FIXTURE_LEVEL;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use tapjoint_beam::effects::{Circumstances, Effect, EffectId, Seen, SensorPlace, apply};
-use tapjoint_beam::specimen::{BeamModes, Mesh, PointMass, Specimen, SpecimenJoint};
+use tapjoint_beam::effects::{Circumstances, Effect, EffectId, Seen, apply};
+use tapjoint_beam::specimen::{BeamModes, Joint, Mesh, PointMass, Specimen};
 use tapjoint_identify::observation::{
     AlongDecay, Configuration, DecayEnd, DecayVerdict, ExtraPeak, Observations, Observed,
     ObservedMode, ObservedSensor, ShapeValue, UNPAIRED, effective_share,
@@ -167,13 +167,10 @@ impl VirtualTest<'_> {
         planned: &PlannedConfiguration,
         amplitude: f64,
     ) -> Result<VirtualModes, GapError> {
-        let sensors: Vec<SensorPlace> = planned
+        let sensors: Vec<PointMass> = planned
             .sensors
             .iter()
-            .map(|(name, position)| SensorPlace {
-                position: *position,
-                mass: self.truth.mass_of(name),
-            })
+            .map(|(name, position)| PointMass::new(*position, self.truth.mass_of(name)))
             .collect();
         let mut nominal = self.truth.loaded(&sensors, &planned.masses);
         self.drift(&mut nominal);
@@ -209,7 +206,7 @@ impl VirtualTest<'_> {
     fn drift(&mut self, specimen: &mut Specimen) {
         let std = self.plan.drift;
         let factors = [(std * self.normal()).exp(), (std * self.normal()).exp()];
-        if let SpecimenJoint::Springs { kt, kr, .. } = &mut specimen.joint {
+        if let Some(Joint { kt, kr, .. }) = &mut specimen.joint {
             *kt *= factors[0];
             *kr *= factors[1];
         }

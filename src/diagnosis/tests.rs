@@ -13,7 +13,7 @@ use crate::structure::{Nominal, NominalSensor};
 use crate::synthetic::{PlannedConfiguration, TestPlan, observe};
 use tapjoint_beam::Beam;
 use tapjoint_beam::effects::EffectId;
-use tapjoint_beam::specimen::{Body, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Body, Joint, Specimen};
 use tapjoint_identify::observation::{ExtraPeak, Observations, UNPAIRED};
 
 /// A steel strip of 0.42 m on springs, with a sensor of this mass (kg).
@@ -26,11 +26,11 @@ pub fn strip(mass: f64) -> Nominal {
         density: 7850.0,
         poisson: 0.3,
     };
-    let joint = SpecimenJoint::Springs {
+    let joint = Some(Joint {
         kt: 1.994e6,
         kr: 1223.0,
         coupling: 0.0,
-    };
+    });
     let sensor = NominalSensor {
         name: "A".to_owned(),
         mass: Some(mass),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
-//!                         consistent  least squares on the frequencies themselves
+//!                         frequency_fit  least squares on the frequencies themselves
 //!                         free_beam  modulus and density of a beam without a joint
 //!                      -> estimate   with uncertainty, in SI units, with what speaks against it
 //!                      -> predict    frequencies of the estimate beside the measured ones
@@ -15,13 +15,15 @@
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
 
-pub mod consistent;
+pub mod frequency_fit;
 pub mod observation;
 pub mod pairing;
 pub mod pairs;
 pub mod perturbation;
 pub mod predict;
 
+/// The name that reports give the frequency fit.
+pub use frequency_fit as consistent;
 pub use pairing::pair_modes;
 pub use pairs::{
     Doubt, FREQUENCY_FLOOR, JointEstimate, MeasuredMode, ModeLambda, PairsEstimate, PairsModel,

@@ -29,7 +29,7 @@ const RANK_THRESHOLD: f64 = 1e-10;
 /// in the product is about what a whole line of 800 does to the first mode.
 const CLOSURE_LIMIT: f64 = 0.05;
 
-/// Which frequency equation the regression uses. All are those of an Euler beam without added
+/// Frequency equation that the regression uses. All are those of an Euler beam without added
 /// masses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PairsModel {
@@ -349,7 +349,7 @@ pub struct SingleMode {
     pub modulus: Option<f64>,
 }
 
-/// The stiffness that each mode of a lap joint gives alone, for either symmetry.
+/// Returns the stiffness that each mode of a lap joint gives alone, for either symmetry.
 ///
 /// # Errors
 /// [`IdentifyError::Frequency`].
@@ -367,8 +367,6 @@ pub fn single_mode_stiffness(modes: &[ModeLambda]) -> Result<Vec<SingleMode>, Id
     });
     modes.collect()
 }
-
-// What speaks against an estimate that exists: warnings that travel with it.
 
 /// What speaks against an estimate that exists.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -558,23 +556,31 @@ pub fn estimate_joint(
     modes: &[MeasuredMode],
 ) -> Result<JointEstimate, IdentifyError> {
     beam.check()?;
-    let regression = Regression::new(model, beam, modes)?;
-    let pairs = regression.estimate(&regression.frequencies)?;
-    let uncertain = |pick: fn(&PairsEstimate) -> Option<f64>| {
-        pick(&pairs).map(|value| Uncertain::symmetric(value, regression.std_of(pick)))
-    };
-    let kz = uncertain(|pairs| pairs.kz).map(|kz| {
-        let compliance = regression.std_of(|pairs| pairs.kz.map(f64::recip));
-        through_reciprocal(&kz, compliance)
+    for mode in modes {
+        check_frequency(mode.mode, mode.frequency)?;
+    }
+    let frequencies: Vec<f64> = modes.iter().map(|mode| mode.frequency).collect();
+    let lambdas = lambdas_of(beam, modes.iter().map(|mode| mode.mode), &frequencies);
+    let pairs = estimate_pairs(model, &lambdas)?;
+    let nearby = Nearby::new(model, beam, modes, frequencies);
+    let [kx, ky, kz, coupling] = PICKED.map(|pick| {
+        let std = nearby.as_ref().and_then(|nearby| nearby.std_of(pick));
+        pick(&pairs).map(|value| Uncertain::symmetric(value, std))
     });
-    let (kx, ky) = (uncertain(|pairs| pairs.kx), uncertain(|pairs| pairs.ky));
+    let kz = kz.map(|kz| {
+        let of_compliance = |pairs: &PairsEstimate| pairs.kz.map(f64::recip);
+        let std = nearby
+            .as_ref()
+            .and_then(|nearby| nearby.std_of(of_compliance));
+        through_reciprocal(&kz, std)
+    });
     let mut doubts = pairs.doubts.clone();
     if kz.is_some_and(|kz| kz.std.is_some() && kz.low.is_none()) {
         doubts.push(Doubt::CouplingNotEstablished);
     }
     let units = StiffnessUnits::of(beam);
     let single_modes = match model {
-        PairsModel::Lap => single_mode_stiffness(&regression.lambdas(&regression.frequencies))?,
+        PairsModel::Lap => single_mode_stiffness(&lambdas)?,
         PairsModel::TwoParameter | PairsModel::ThreeParameter => Vec::new(),
     };
     Ok(JointEstimate {
@@ -585,7 +591,7 @@ pub fn estimate_joint(
         kx,
         ky,
         kz,
-        coupling: uncertain(|pairs| pairs.coupling),
+        coupling,
         pairs,
         single_modes,
         doubts,
@@ -623,54 +629,59 @@ fn lambdas_of(
         .collect()
 }
 
-/// The regression as a function of the frequencies.
-struct Regression<'a> {
-    model: PairsModel,
-    beam: &'a Beam,
-    modes: &'a [MeasuredMode],
-    frequencies: Vec<f64>,
-    stds: Option<Vec<f64>>,
+/// Returns one number of a regression.
+type Pick = fn(&PairsEstimate) -> Option<f64>;
+const PICKED: [Pick; 4] = [
+    |pairs| pairs.kx,
+    |pairs| pairs.ky,
+    |pairs| pairs.kz,
+    |pairs| pairs.coupling,
+];
+
+/// Regressions with each frequency a little higher and lower, by which uncertainties are propagated.
+struct Nearby {
+    /// For each mode the regressions above and below, and its standard uncertainty over their distance.
+    regressions: Vec<([PairsEstimate; 2], f64)>,
 }
 
-impl<'a> Regression<'a> {
+impl Nearby {
+    /// `None` where a mode has no standard uncertainty, or where a regression has no answer.
     fn new(
         model: PairsModel,
-        beam: &'a Beam,
-        modes: &'a [MeasuredMode],
-    ) -> Result<Self, IdentifyError> {
-        for mode in modes {
-            check_frequency(mode.mode, mode.frequency)?;
+        beam: &Beam,
+        modes: &[MeasuredMode],
+        mut frequencies: Vec<f64>,
+    ) -> Option<Self> {
+        // Relative step: truncation of the order 1e-12, rounding of the order 1e-10.
+        const STEP: f64 = 1e-6;
+        let mut regressions = Vec::with_capacity(modes.len());
+        for (index, mode) in modes.iter().enumerate() {
+            let step = STEP * mode.frequency;
+            let mut shifted = |step: f64| {
+                frequencies[index] = mode.frequency + step;
+                let numbers = modes.iter().map(|mode| mode.mode);
+                estimate_pairs(model, &lambdas_of(beam, numbers, &frequencies)).ok()
+            };
+            let pair = [shifted(step)?, shifted(-step)?];
+            frequencies[index] = mode.frequency;
+            regressions.push((pair, mode.std? / (2.0 * step)));
         }
-        Ok(Self {
-            model,
-            beam,
-            modes,
-            frequencies: modes.iter().map(|mode| mode.frequency).collect(),
-            stds: modes.iter().map(|mode| mode.std).collect(),
-        })
+        Some(Self { regressions })
     }
 
-    fn lambdas(&self, frequencies: &[f64]) -> Vec<ModeLambda> {
-        lambdas_of(
-            self.beam,
-            self.modes.iter().map(|mode| mode.mode),
-            frequencies,
-        )
-    }
-
-    fn estimate(&self, frequencies: &[f64]) -> Result<PairsEstimate, IdentifyError> {
-        estimate_pairs(self.model, &self.lambdas(frequencies))
-    }
-
-    /// Standard uncertainty of one number of the estimate.
-    fn std_of(&self, pick: impl Fn(&PairsEstimate) -> Option<f64>) -> Option<f64> {
-        propagate(&self.frequencies, self.stds.as_deref()?, |shifted| {
-            self.estimate(shifted).ok().as_ref().and_then(&pick)
-        })
+    /// Returns the standard uncertainty of one number, from independent ones of the frequencies: the root of
+    /// the sum of (derivative times std)^2, derivatives by central differences. `None` where the number
+    /// does not exist nearby.
+    fn std_of(&self, pick: Pick) -> Option<f64> {
+        let mut variance = 0.0;
+        for ([above, below], weight) in &self.regressions {
+            variance += ((pick(above)? - pick(below)?) * weight).powi(2);
+        }
+        variance.is_finite().then(|| variance.sqrt())
     }
 }
 
-/// Kz has its interval by way of 1/Kz, which is what the frequencies determine: where that
+/// Returns Kz with its interval by way of 1/Kz, which is what the frequencies determine. Where that
 /// interval contains zero, Kz is unbounded on both sides.
 fn through_reciprocal(kz: &Uncertain, compliance_std: Option<f64>) -> Uncertain {
     let ends = Uncertain::symmetric(1.0 / kz.value, compliance_std);
@@ -686,28 +697,4 @@ fn through_reciprocal(kz: &Uncertain, compliance_std: Option<f64>) -> Uncertain 
             ..*kz
         },
     }
-}
-
-/// Standard deviation of a function of frequencies (Hz) with independent standard uncertainties
-/// (Hz): the root of the sum of (derivative times std)^2, derivatives by central differences.
-/// `None` where the function has no value nearby.
-pub fn propagate(
-    frequencies: &[f64],
-    stds: &[f64],
-    function: impl Fn(&[f64]) -> Option<f64>,
-) -> Option<f64> {
-    // Relative step: truncation of the order 1e-12, rounding of the order 1e-10.
-    const STEP: f64 = 1e-6;
-    let mut shifted = frequencies.to_vec();
-    let mut variance = 0.0;
-    for (index, (&frequency, &std)) in frequencies.iter().zip(stds).enumerate() {
-        let step = STEP * frequency;
-        shifted[index] = frequency + step;
-        let above = function(&shifted)?;
-        shifted[index] = frequency - step;
-        let below = function(&shifted)?;
-        shifted[index] = frequency;
-        variance += ((above - below) / (2.0 * step) * std).powi(2);
-    }
-    variance.is_finite().then(|| variance.sqrt())
 }

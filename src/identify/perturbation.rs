@@ -299,6 +299,18 @@ pub struct Spread {
     pub high: f64,
 }
 
+impl Spread {
+    /// Returns the spread of these values; an infinite one, a rigid joint, counts as the largest there is.
+    pub(crate) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut sorted: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)? as f64;
+        let [median, low, high] =
+            [0.5, 0.025, 0.975].map(|share: f64| sorted[(share * last).round() as usize]);
+        Some(Self { median, low, high })
+    }
+}
+
 /// So many of the estimates are kept one by one: enough for a picture.
 pub const KEPT: usize = 1000;
 
@@ -323,12 +335,12 @@ pub struct MonteCarlo {
 impl MonteCarlo {
     /// From the estimates of `samples` repetitions, those without one left out.
     pub fn of(samples: usize, found: &[Stiffnesses]) -> Self {
-        let compliance = spread(found.iter().filter_map(|e| e.kz).map(f64::recip));
+        let compliance = Spread::of(found.iter().filter_map(|e| e.kz).map(f64::recip));
         Self {
             samples,
             failed: samples - found.len(),
-            kx: spread(found.iter().map(|estimate| estimate.kx)),
-            ky: spread(found.iter().map(|estimate| estimate.ky)),
+            kx: Spread::of(found.iter().map(|estimate| estimate.kx)),
+            ky: Spread::of(found.iter().map(|estimate| estimate.ky)),
             kz: compliance.filter(|c| c.low * c.high > 0.0).map(|c| Spread {
                 median: 1.0 / c.median,
                 low: 1.0 / c.high,
@@ -371,14 +383,4 @@ pub fn monte_carlo(
         found.extend(estimator(&disturbed));
     }
     Ok(MonteCarlo::of(samples, &found))
-}
-
-/// Median and 95 % interval; an infinite value, a rigid joint, counts as the largest there is.
-pub(crate) fn spread(values: impl Iterator<Item = f64>) -> Option<Spread> {
-    let mut sorted: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().checked_sub(1)? as f64;
-    let [median, low, high] =
-        [0.5, 0.025, 0.975].map(|share: f64| sorted[(share * last).round() as usize]);
-    Some(Spread { median, low, high })
 }

@@ -22,7 +22,7 @@ pub struct PredictedMode {
     pub used: bool,
 }
 
-/// The first `count` modes, and all measured ones beyond, of a beam on this joint by this theory.
+/// Returns the first `count` modes, and all measured ones beyond, of a beam on this joint by this theory.
 /// `used` holds the numbers of the modes that entered the estimate.
 ///
 /// # Errors
@@ -30,27 +30,30 @@ pub struct PredictedMode {
 pub fn predict(
     theory: BeamTheory,
     beam: &Beam,
-    (assembly, joint): (Assembly, &JointStiffness),
-    measured: (&[MeasuredMode], &[usize]),
+    assembly: Assembly,
+    joint: &JointStiffness,
+    measured: &[MeasuredMode],
+    used: &[usize],
     count: usize,
 ) -> Result<Vec<PredictedMode>, IdentifyError> {
     beam.check()?;
-    let highest = measured.0.iter().map(|mode| mode.mode).max().unwrap_or(0);
+    let highest = measured.iter().map(|mode| mode.mode).max().unwrap_or(0);
     let slenderness = beam.slenderness(theory);
     let modes = natural_modes(assembly, joint, &slenderness, count.max(highest))?;
     let frequencies: Vec<f64> = modes
         .iter()
         .map(|mode| beam.frequency_of(mode.lambda))
         .collect();
-    Ok(compare(beam, &frequencies, measured))
+    Ok(compare(beam, &frequencies, measured, used))
 }
 
 /// Sets predicted frequencies (Hz) of modes 1, 2, ..., wherever they come from, beside the measured
-/// modes, of which those with numbers in the second list entered the estimate.
+/// modes, of which those with numbers in `used` entered the estimate.
 pub fn compare(
     beam: &Beam,
     predicted: &[f64],
-    (measured, used): (&[MeasuredMode], &[usize]),
+    measured: &[MeasuredMode],
+    used: &[usize],
 ) -> Vec<PredictedMode> {
     let mut modes = Vec::with_capacity(predicted.len());
     for (mode, &predicted) in (1..).zip(predicted) {
@@ -68,7 +71,7 @@ pub fn compare(
     modes
 }
 
-/// The first `count` lambda (1) of an Euler beam, where no beam is described.
+/// Returns the first `count` lambda (1) of an Euler beam, where no beam is described.
 ///
 /// # Errors
 /// [`IdentifyError::Structure`] where the joint cannot exist.
@@ -137,7 +140,14 @@ pub fn estimate_modulus(
     let first: f64 = ratios.iter().map(|ratio| 1.0 / ratio).sum();
     let second: f64 = ratios.iter().map(|ratio| ratio.powi(-2)).sum();
     let root = first / second;
-    let relative = relative_std(modes, &ratios, root);
+    // dx/dr = (2 x/r - 1)/(r^2 sum(1/r^2)).
+    let variances = modes.iter().zip(&ratios).map(|(mode, ratio)| {
+        let spread = ratio * mode.std? / mode.frequency;
+        let slope = (2.0 * root / ratio - 1.0) / (ratio * ratio * second);
+        Some((slope * spread).powi(2))
+    });
+    let variance: Option<f64> = variances.sum();
+    let relative = variance.map(|variance| variance.sqrt() / root);
     let modulus = beam.modulus * root * root;
     let density = beam.density / (root * root);
     Ok(FreeBeamEstimate {
@@ -152,20 +162,7 @@ pub fn estimate_modulus(
     })
 }
 
-/// Relative standard uncertainty of x = sum(1/r)/sum(1/r^2) from those of the frequencies:
-/// dx/dr = (2 x/r - 1)/(r^2 sum(1/r^2)).
-fn relative_std(modes: &[MeasuredMode], ratios: &[f64], root: f64) -> Option<f64> {
-    let second: f64 = ratios.iter().map(|ratio| ratio.powi(-2)).sum();
-    let mut variance = 0.0;
-    for (mode, ratio) in modes.iter().zip(ratios) {
-        let spread = ratio * mode.std? / mode.frequency;
-        let slope = (2.0 * root / ratio - 1.0) / (ratio * ratio * second);
-        variance += (slope * spread).powi(2);
-    }
-    Some(variance.sqrt() / root)
-}
-
-// Which measured frequency is which mode.
+// From measured frequencies to numbers of modes.
 
 /// Numbers the measured frequencies (Hz, ascending) of a structure whose natural frequencies are
 /// predicted (Hz, ascending): each mode gets the measured frequency nearest to it, within `tolerance`

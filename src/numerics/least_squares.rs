@@ -5,7 +5,8 @@
 //! weighted for a robust loss and extended by priors. Each step solves (A + mu D) d = -g on the parameters
 //! that are not pressed against a bound. D holds the largest diagonal of A so far (Moré 1978), so that the
 //! units of the parameters do not matter. The first trial has mu = 0, which is Gauss-Newton's step; a step
-//! that does not lower the cost is tried again with ten times the damping (Levenberg 1944, Marquardt 1963).
+//! that does not lower the cost is tried again with ten times the damping (Levenberg 1944, Marquardt 1963),
+//! and the damping follows how much of its promise each step keeps.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -29,7 +30,8 @@ pub trait Problem {
         &[]
     }
 
-    /// Returns the point one step on; `None` where a step leaves the model's domain.
+    /// Returns the point one step on; `None` where a step leaves the model's domain. A problem that writes
+    /// its own may move more parameters than the linearised problem has columns.
     fn moved(&self, parameters: &[f64], step: &DVector<f64>) -> Option<Vec<f64>> {
         let bounds = self.bounds();
         let mut moved = parameters.to_vec();
@@ -72,7 +74,7 @@ pub struct Settings {
     pub gain: f64,
     /// It ends, too, where the promised decrease is smaller than this share of the cost.
     pub relative_gain: f64,
-    /// It ends after a step that moved no parameter by more than this.
+    /// It ends after a step that moved no parameter by more than this, or would have without success.
     pub step: f64,
     /// It ends after so many steps in a row that lowered the cost by less than the share [`Self::idle`].
     pub idle_steps: usize,
@@ -117,6 +119,13 @@ pub enum StopReason {
     NothingFree,
 }
 
+impl StopReason {
+    /// Returns true where the search came to an end by itself.
+    pub fn converged(self) -> bool {
+        self != Self::StepLimit
+    }
+}
+
 /// The end of a search.
 #[derive(Debug, Clone)]
 pub struct Minimum<S> {
@@ -133,6 +142,11 @@ const WEAKEST: f64 = 1e-3;
 const FACTOR: f64 = 10.0;
 /// Share of the promised decrease from which on the next step is damped less.
 const KEPT: f64 = 0.75;
+/// Share of the promised decrease below which the next step is damped more: with large residuals the curvature
+/// is larger than J'J, and Gauss-Newton's steps go too far.
+const POOR: f64 = 0.5;
+/// Least damping after such a step.
+const FIRM: f64 = 0.1;
 /// Smallest diagonal of the damping matrix, relative to its largest: a parameter that nothing feels stays.
 const FLOOR: f64 = 1e-24;
 
@@ -149,37 +163,40 @@ pub fn minimise<P: Problem>(
     }
     let state = problem.evaluate(&parameters, None)?;
     let mut at = Point::new(problem, parameters, state)?;
-    let mut scales = vec![0.0; start.len()];
+    let mut scales = vec![0.0; at.local.columns()];
     let mut damping = 0.0;
     let mut idle_steps = 0;
     for _ in 0..settings.steps {
         for (k, scale) in scales.iter_mut().enumerate() {
-            *scale = f64::max(*scale, at.linearised.diagonal(k));
+            *scale = f64::max(*scale, at.local.diagonal(k));
         }
         let tolerance = settings.gain.max(settings.relative_gain * at.cost);
-        let full = at.step(problem.bounds(), &scales, 0.0);
-        let near = match &full {
-            Step::NothingFree => return Some(at.ended(StopReason::NothingFree)),
-            Step::Singular => false,
-            Step::To(step) => at.linearised.promise(step) <= tolerance,
-        };
-        if near {
-            let last = full.move_from(problem, &at).filter(|_| settings.polish);
+        let mut step = at.step(problem.bounds(), &scales, 0.0);
+        if let Step::NothingFree = step {
+            return Some(at.ended(StopReason::NothingFree));
+        }
+        if step.promises_at_most(tolerance) {
+            let last = settings
+                .polish
+                .then(|| step.move_from(problem, &at))
+                .flatten();
             return Some(last.unwrap_or(at).ended(StopReason::Minimum));
         }
-        let (next, promised) = loop {
-            let step = at.step(problem.bounds(), &scales, damping);
-            let promised = step.promise(&at.linearised);
-            if promised.is_some_and(|gain| gain <= tolerance) {
+        if damping > 0.0 {
+            step = at.step(problem.bounds(), &scales, damping);
+        }
+        let next = loop {
+            if step.promises_at_most(tolerance) {
                 return Some(at.ended(StopReason::Minimum));
             }
-            if let Some((next, promised)) = step.move_from(problem, &at).zip(promised) {
-                break (next, promised);
+            if let Some(next) = step.move_from(problem, &at) {
+                break next;
             }
-            if damping >= settings.damping {
+            if damping >= settings.damping || step.is_within(settings.step) {
                 return Some(at.ended(StopReason::NoBetterStep));
             }
             damping = f64::max(WEAKEST, FACTOR * damping);
+            step = at.step(problem.bounds(), &scales, damping);
         };
         let gain = at.cost - next.cost;
         let longest = (next.parameters.iter().zip(&at.parameters))
@@ -197,12 +214,14 @@ pub fn minimise<P: Problem>(
         if idle_steps >= settings.idle_steps {
             return Some(at.ended(StopReason::Idle));
         }
-        if gain > KEPT * promised {
+        if step.promises_at_most(gain / KEPT) {
             damping = if damping > WEAKEST {
                 damping / FACTOR
             } else {
                 0.0
             };
+        } else if !step.promises_at_most(gain / POOR) {
+            damping = f64::max(FIRM, FACTOR * damping);
         }
     }
     Some(at.ended(StopReason::StepLimit))
@@ -213,7 +232,7 @@ struct Point<S> {
     parameters: Vec<f64>,
     state: S,
     cost: f64,
-    linearised: Linearised,
+    local: Local,
 }
 
 impl<S> Point<S> {
@@ -223,7 +242,7 @@ impl<S> Point<S> {
             cost: problem.cost(&state),
             parameters,
             state,
-            linearised,
+            local: Local::from(linearised),
         })
     }
 
@@ -237,32 +256,24 @@ impl<S> Point<S> {
 
     /// Returns the damped step on the parameters that no bound holds back.
     fn step(&self, bounds: &[[f64; 2]], scales: &[f64], damping: f64) -> Step {
-        let count = self.parameters.len();
-        let mut free: Vec<usize> = (0..count)
-            .filter(|&k| bounds.get(k).is_none_or(|[low, high]| low < high))
-            .collect();
-        while !free.is_empty() {
-            let Some(lengths) = self.linearised.solve(&free, scales, damping) else {
+        let mut held: Vec<bool> = bounds.iter().map(|[low, high]| low >= high).collect();
+        while held.iter().filter(|held| **held).count() < scales.len() {
+            let Some(step) = self.local.solve(&held, scales, damping) else {
                 return Step::Singular;
             };
-            let mut step = DVector::zeros(count);
-            let mut kept = Vec::with_capacity(free.len());
-            for (&k, &length) in free.iter().zip(lengths.iter()) {
+            let mut is_pressed = false;
+            for (k, [low, high]) in bounds.iter().enumerate() {
                 let value = self.parameters[k];
-                let [low, high] = bounds
-                    .get(k)
-                    .copied()
-                    .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-                let outward = value <= low && length < 0.0 || value >= high && length > 0.0;
-                if !outward {
-                    kept.push(k);
+                let outward = value <= *low && step[k] < 0.0 || value >= *high && step[k] > 0.0;
+                if outward && !held[k] {
+                    held[k] = true;
+                    is_pressed = true;
                 }
-                step[k] = length;
             }
-            if kept.len() == free.len() {
-                return Step::To(step);
+            if !is_pressed {
+                let promise = self.local.promise(&step);
+                return Step::To { step, promise };
             }
-            free = kept;
         }
         Step::NothingFree
     }
@@ -270,7 +281,8 @@ impl<S> Point<S> {
 
 /// A step of the linearised problem.
 enum Step {
-    To(DVector<f64>),
+    /// The step, and the decrease of the cost that the linear model promises.
+    To { step: DVector<f64>, promise: f64 },
     /// The parameters are not independent at this damping.
     Singular,
     /// Every parameter is held or pressed against a bound.
@@ -278,17 +290,19 @@ enum Step {
 }
 
 impl Step {
-    /// Returns the decrease of the cost that the linear model promises.
-    fn promise(&self, linearised: &Linearised) -> Option<f64> {
-        match self {
-            Step::To(step) => Some(linearised.promise(step)),
-            Step::Singular | Step::NothingFree => None,
-        }
+    /// Returns true for a step that promises no larger decrease of the cost.
+    fn promises_at_most(&self, gain: f64) -> bool {
+        matches!(self, Self::To { promise, .. } if *promise <= gain)
+    }
+
+    /// Returns true for a step that moves no parameter by more than `length`.
+    fn is_within(&self, length: f64) -> bool {
+        matches!(self, Self::To { step, .. } if step.amax() <= length)
     }
 
     /// Takes the step; `None` where it does not lower the cost.
     fn move_from<P: Problem>(&self, problem: &P, at: &Point<P::State>) -> Option<Point<P::State>> {
-        let Step::To(step) = self else {
+        let Self::To { step, .. } = self else {
             return None;
         };
         let parameters = problem.moved(&at.parameters, step)?;
@@ -301,12 +315,61 @@ impl Step {
     }
 }
 
-impl Linearised {
+/// The linearised problem as it is solved.
+enum Local {
+    /// Curvature A and gradient g.
+    Normal {
+        curvature: DMatrix<f64>,
+        gradient: DVector<f64>,
+    },
+    /// R and, as the last column, Q'r of J = QR; below them are zeros and what no step changes.
+    Triangle(DMatrix<f64>),
+}
+
+impl From<Linearised> for Local {
+    fn from(linearised: Linearised) -> Self {
+        match linearised {
+            Linearised::Normal {
+                curvature,
+                gradient,
+            } => Self::Normal {
+                curvature,
+                gradient,
+            },
+            Linearised::Rows {
+                jacobian,
+                residuals,
+            } => {
+                let (rows, columns) = jacobian.shape();
+                let mut triangle = DMatrix::zeros(rows.max(columns), columns + 1);
+                triangle
+                    .view_mut((0, 0), (rows, columns))
+                    .copy_from(&jacobian);
+                triangle
+                    .view_mut((0, columns), (rows, 1))
+                    .copy_from(&residuals);
+                triangularise(&mut triangle);
+                Self::Triangle(triangle)
+            }
+        }
+    }
+}
+
+impl Local {
+    /// Returns the number of directions in which a step may go: one for each parameter, unless
+    /// [`Problem::moved`] has it otherwise.
+    fn columns(&self) -> usize {
+        match self {
+            Self::Normal { gradient, .. } => gradient.len(),
+            Self::Triangle(triangle) => triangle.ncols() - 1,
+        }
+    }
+
     /// Returns the curvature along one parameter.
     fn diagonal(&self, k: usize) -> f64 {
         match self {
             Self::Normal { curvature, .. } => curvature[(k, k)],
-            Self::Rows { jacobian, .. } => jacobian.column(k).norm_squared(),
+            Self::Triangle(triangle) => (0..=k).map(|row| triangle[(row, k)].powi(2)).sum(),
         }
     }
 
@@ -317,53 +380,136 @@ impl Linearised {
                 curvature,
                 gradient,
             } => -step.dot(gradient) - 0.5 * step.dot(&(curvature * step)),
-            Self::Rows {
-                jacobian,
-                residuals,
-            } => {
-                let moved = jacobian * step;
-                -moved.dot(residuals) - 0.5 * moved.norm_squared()
+            Self::Triangle(triangle) => {
+                let columns = step.len();
+                let mut gain = 0.0;
+                for row in 0..columns {
+                    let moved: f64 = (row..columns).map(|k| triangle[(row, k)] * step[k]).sum();
+                    gain -= moved * (triangle[(row, columns)] + 0.5 * moved);
+                }
+                gain
             }
         }
     }
 
-    /// Solves (A + damping D) d = -g on the parameters `free`; `None` where these are not independent.
-    fn solve(&self, free: &[usize], scales: &[f64], damping: f64) -> Option<DVector<f64>> {
+    /// Solves (A + damping D) d = -g, with d = 0 for the parameters that are held (none where the list is
+    /// empty); `None` where the others are not independent.
+    fn solve(&self, held: &[bool], scales: &[f64], damping: f64) -> Option<DVector<f64>> {
         let largest = scales.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        let weights = free
-            .iter()
-            .map(|&k| damping * scales[k].max(FLOOR * largest));
         let solution = match self {
             Self::Normal {
                 curvature,
                 gradient,
             } => {
-                let mut matrix = curvature.select_rows(free).select_columns(free);
-                for (k, weight) in weights.enumerate() {
-                    matrix[(k, k)] += weight;
+                let (mut matrix, mut solution) = (curvature.clone(), -gradient);
+                for (k, scale) in scales.iter().enumerate() {
+                    matrix[(k, k)] += damping * scale.max(FLOOR * largest);
+                    if held.get(k) == Some(&true) {
+                        matrix.row_mut(k).fill(0.0);
+                        matrix.column_mut(k).fill(0.0);
+                        matrix[(k, k)] = 1.0;
+                        solution[k] = 0.0;
+                    }
                 }
-                Cholesky::new(matrix)?.solve(&-gradient.select_rows(free))
+                Cholesky::new(matrix)?.solve_mut(&mut solution);
+                solution
             }
-            Self::Rows {
-                jacobian,
-                residuals,
-            } => {
-                let (rows, columns) = (jacobian.nrows(), free.len());
-                let mut matrix = jacobian
-                    .select_columns(free)
-                    .resize_vertically(rows + columns, 0.0);
-                for (k, weight) in weights.enumerate() {
-                    matrix[(rows + k, k)] = weight.sqrt();
+            Self::Triangle(triangle) if damping == 0.0 && !held.contains(&true) => {
+                solve_triangle(triangle)
+            }
+            Self::Triangle(triangle) => {
+                let columns = scales.len();
+                let mut damped = DMatrix::zeros(2 * columns, columns + 1);
+                let mut top = damped.rows_mut(0, columns);
+                top.copy_from(&triangle.rows(0, columns));
+                for (k, scale) in scales.iter().enumerate() {
+                    damped[(columns + k, k)] = (damping * scale.max(FLOOR * largest)).sqrt();
+                    if held.get(k) == Some(&true) {
+                        damped.column_mut(k).fill(0.0);
+                        damped[(columns + k, k)] = 1.0;
+                    }
                 }
-                let mut right = -residuals.clone().resize_vertically(rows + columns, 0.0);
-                let factors = matrix.qr();
-                factors.q_tr_mul(&mut right);
-                factors
-                    .r()
-                    .solve_upper_triangular(&right.rows(0, columns).into_owned())?
+                triangularise(&mut damped);
+                solve_triangle(&damped)
             }
         };
         solution.iter().all(|x| x.is_finite()).then_some(solution)
+    }
+}
+
+/// Solves R d = -b for an upper triangle R with b as its last column. A pivot of zero gives no finite number.
+fn solve_triangle(triangle: &DMatrix<f64>) -> DVector<f64> {
+    let columns = triangle.ncols() - 1;
+    let mut solution = -triangle.view((0, columns), (columns, 1)).column(0);
+    for k in (0..columns).rev() {
+        solution[k] /= triangle[(k, k)];
+        for row in 0..k {
+            solution[row] -= triangle[(row, k)] * solution[k];
+        }
+    }
+    solution
+}
+
+/// Turns a matrix into an upper triangle by Householder's reflections from the left.
+fn triangularise(matrix: &mut DMatrix<f64>) {
+    let (rows, columns) = matrix.shape();
+    for k in 0..columns.min(rows) {
+        let (done, others) = matrix.as_mut_slice().split_at_mut((k + 1) * rows);
+        let own = &mut done[k * rows + k..];
+        let norm = own.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if norm == 0.0 {
+            continue;
+        }
+        let diagonal = if own[0] > 0.0 { -norm } else { norm };
+        // The reflection's vector is the column with this head; 2/(v.v) = -1/(diagonal head).
+        own[0] -= diagonal;
+        let scale = 1.0 / (diagonal * own[0]);
+        for other in others.chunks_exact_mut(rows) {
+            let other = &mut other[k..];
+            let product: f64 = own.iter().zip(&*other).map(|(a, b)| a * b).sum();
+            for (entry, part) in other.iter_mut().zip(&*own) {
+                *entry += scale * product * part;
+            }
+        }
+        own.fill(0.0);
+        own[0] = diagonal;
+    }
+}
+
+/// How large misfits count.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Loss {
+    /// By their square: right for normally distributed errors.
+    #[default]
+    Squares,
+    /// By their square up to so many standard deviations, linearly beyond (Huber). 1.345 keeps 95 % of
+    /// the efficiency where errors are normal.
+    Huber(f64),
+    /// As the negative logarithm of Student's t with so many degrees of freedom: a wild value hardly
+    /// counts. 4 is usual.
+    StudentT(f64),
+}
+
+impl Loss {
+    /// Returns what one standardised residual contributes to the sum of squares.
+    ///
+    /// Student's t: -2 ln p = (nu + 1) ln(1 + r^2/nu), up to a constant.
+    pub fn of(self, residual: f64) -> f64 {
+        let square = residual * residual;
+        match self {
+            Self::Huber(limit) if residual.abs() > limit => limit * (2.0 * residual.abs() - limit),
+            Self::Squares | Self::Huber(_) => square,
+            Self::StudentT(freedom) => (freedom + 1.0) * (square / freedom).ln_1p(),
+        }
+    }
+
+    /// Returns the weight of the residual's square in the linearised problem.
+    pub fn weight(self, residual: f64) -> f64 {
+        match self {
+            Self::Huber(limit) if residual.abs() > limit => limit / residual.abs(),
+            Self::Squares | Self::Huber(_) => 1.0,
+            Self::StudentT(freedom) => (freedom + 1.0) / (freedom + residual * residual),
+        }
     }
 }
 

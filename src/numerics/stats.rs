@@ -1,7 +1,5 @@
 //! Small statistics that several stages share; knows nothing of taps or beams.
 
-pub mod student;
-
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
@@ -42,6 +40,32 @@ pub fn chi_square_quantile(probability: f64, freedom: f64) -> Option<f64> {
     Some(chi_square.inverse_cdf(probability))
 }
 
+/// Returns the probability that chi square of `freedom` degrees of freedom exceeds a value; 1 without a
+/// degree of freedom.
+pub fn chi_square_tail(value: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(1.0, |chi_square| chi_square.sf(value))
+}
+
+/// Student's distribution.
+pub mod student {
+    use statrs::distribution::{ContinuousCDF, StudentsT};
+
+    /// Two-sided probability of a larger |t| with `freedom` degrees of freedom; 1 without any.
+    pub fn two_sided(t: f64, freedom: f64) -> f64 {
+        if !t.is_finite() {
+            return 0.0;
+        }
+        StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |student| 2.0 * student.cdf(-t.abs()))
+    }
+
+    /// |t| that is exceeded with the probability `level`; infinite without a degree of freedom.
+    pub fn quantile(level: f64, freedom: f64) -> f64 {
+        StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |student| {
+            student.inverse_cdf(1.0 - 0.5 * level)
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,5 +98,54 @@ mod tests {
         );
         assert_eq!(median(&mut [4.0, 1.0, 3.0, 2.0]), 3.0);
         assert_eq!(root_mean_square(&[1.0, 7.0]), 5.0);
+    }
+
+    #[test]
+    fn val_chi_square_tail() {
+        // Percentage points of chi square from printed tables, to their last digit.
+        let table = [
+            (3.841_459, 1.0, 0.05),
+            (5.991_465, 2.0, 0.05),
+            (7.814_728, 3.0, 0.05),
+            (11.344_867, 3.0, 0.01),
+            (18.307_038, 10.0, 0.05),
+            (0.351_846, 3.0, 0.95),
+            (30.577_914, 15.0, 0.01),
+        ];
+        for (value, freedom, expected) in table {
+            let found = chi_square_tail(value, freedom);
+            assert!(
+                (found / expected - 1.0).abs() < 2e-6,
+                "{value} with {freedom}: {found}"
+            );
+        }
+        let far_out = chi_square_tail(100.0, 1.0);
+        assert!((far_out / 1.523_970_6e-23 - 1.0).abs() < 1e-6, "{far_out}");
+        assert_eq!(chi_square_tail(f64::INFINITY, 2.0), 0.0);
+        assert_eq!(chi_square_tail(1e9, 2.0), 0.0);
+    }
+
+    #[test]
+    fn val_tabulated_student_quantiles() {
+        // Any table of Student's distribution, 5 % two-sided.
+        let table = [(1.0, 12.706), (2.0, 4.303), (5.0, 2.571), (30.0, 2.042)];
+        for (freedom, t) in table {
+            assert!(
+                (student::quantile(0.05, freedom) - t).abs() < 6e-4,
+                "{freedom}"
+            );
+        }
+    }
+
+    #[test]
+    fn prop_the_student_quantile_is_the_inverse() {
+        for (level, freedom) in [(0.5, 1.0), (0.05, 3.0), (1e-4, 8.0), (0.3, 400.0)] {
+            let t = student::quantile(level, freedom);
+            // Both are exact to some parts in 1e9.
+            assert!(
+                (student::two_sided(t, freedom) / level - 1.0).abs() < 1e-7,
+                "{level}"
+            );
+        }
     }
 }

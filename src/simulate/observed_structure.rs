@@ -4,9 +4,8 @@ use super::laboratory::{SimulateError, SpecimenSettings};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use std::sync::Arc;
-use tapjoint_beam::effects::SensorPlace;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint, SpecimenModes};
+use tapjoint_beam::specimen::{Body, Joint, Mesh, PointMass, Specimen, SpecimenModes};
 use tapjoint_beam::{JointStiffness, StructureError};
 use tapjoint_description::described::{
     coupling, described_beam, described_specimen,
@@ -54,10 +53,7 @@ impl ObservedStructure {
         let count = (below + COMPLIANT_MODES).min(MOST_MODES);
         let elastic = specimen.modes(count, Mesh::SIMULATION)?;
         // Compliance of the joint by the modes that are not even computed.
-        let beyond_computed = match specimen.joint {
-            SpecimenJoint::Free => 0.0,
-            SpecimenJoint::Springs { .. } => elastic.joint_compliance_beyond(),
-        };
+        let beyond_computed = (specimen.joint).map_or(0.0, |_| elastic.joint_compliance_beyond());
         let (modes, suspended) = hang(specimen, settings, elastic)?;
         let mut moving = Vec::new();
         for mode in 0..modes.len() {
@@ -144,7 +140,7 @@ impl ObservedStructure {
 
 /// Whether a specimen hangs, since nothing holds it.
 pub(super) fn hangs(specimen: &Specimen) -> bool {
-    matches!(specimen.body, Body::Joined(_)) || specimen.joint.stiffnesses() == [0.0; 2]
+    matches!(specimen.body, Body::Joined(_)) || specimen.joint_stiffnesses() == [0.0; 2]
 }
 
 /// The modes with the motions on the suspension before them, and the number of those.
@@ -156,9 +152,9 @@ fn hang(
     match settings.suspension {
         // No rigid-body motion at all.
         None if hangs(specimen) => Ok((elastic, 0)),
-        Some(frequencies) if hangs(specimen) => elastic.hung(Some(frequencies)),
+        Some(frequencies) if hangs(specimen) => elastic.on_suspension(Some(frequencies)),
         // What turns about a pivot may be held by cables.
-        _ => elastic.hung(None),
+        _ => elastic.on_suspension(None),
     }
 }
 
@@ -183,15 +179,10 @@ pub(super) fn nominal_specimen(
     given: Option<JointStiffness>,
 ) -> Result<Specimen, SimulateError> {
     let mut specimen = described_specimen(test, joint(test, given)?);
-    for place in sensor_places(test, recording)? {
-        if place.mass > 0.0 {
-            specimen.masses.push(PointMass {
-                position: place.position,
-                mass: place.mass,
-                inertia: 0.0,
-            });
-        }
-    }
+    let sensors = sensor_places(test, recording)?.into_iter();
+    specimen
+        .masses
+        .extend(sensors.filter(|sensor| sensor.mass > 0.0));
     specimen.masses.extend(&recording.masses);
     Ok(specimen)
 }
@@ -199,26 +190,26 @@ pub(super) fn nominal_specimen(
 fn joint(
     test: &TestDescription,
     given: Option<JointStiffness>,
-) -> Result<SpecimenJoint, SimulateError> {
+) -> Result<Option<Joint>, SimulateError> {
     if test.joint.kind == Assembly::Free {
-        return Ok(SpecimenJoint::Free);
+        return Ok(None);
     }
     let units = StiffnessUnits::of(&described_beam(test));
     if let Some(given) = given {
-        return Ok(SpecimenJoint::Springs {
+        return Ok(Some(Joint {
             kt: given.kx * units.kt,
             kr: given.ky * units.kr,
             coupling: coupling(given.kx, given.ky, given.cross_compliance),
-        });
+        }));
     }
     let (missing, keys) = match (test.joint.kt, test.joint.kr) {
         (Some(kt), Some(kr)) => {
             let ktr = test.joint.ktr.unwrap_or(f64::INFINITY);
-            return Ok(SpecimenJoint::Springs {
+            return Ok(Some(Joint {
                 kt,
                 kr,
                 coupling: coupling(kt, kr, 1.0 / ktr),
-            });
+            }));
         }
         (None, None) => (
             "kt and kr are",
@@ -234,7 +225,7 @@ fn joint(
 pub(super) fn sensor_places(
     test: &TestDescription,
     recording: &RecordingDescription,
-) -> Result<Vec<SensorPlace>, SimulateError> {
+) -> Result<Vec<PointMass>, SimulateError> {
     let places = test.sensors.iter().map(|sensor| {
         if sensor.kind == SensorKind::Sound {
             return Err(SimulateError::Sound {
@@ -242,12 +233,10 @@ pub(super) fn sensor_places(
             });
         }
         let position = recording.place_of(sensor);
-        Ok(SensorPlace {
-            position: position.ok_or_else(|| SimulateError::NoPosition {
-                name: sensor.name.clone(),
-            })?,
-            mass: sensor.mass.unwrap_or(0.0),
-        })
+        let position = position.ok_or_else(|| SimulateError::NoPosition {
+            name: sensor.name.clone(),
+        })?;
+        Ok(PointMass::new(position, sensor.mass.unwrap_or(0.0)))
     });
     places.collect()
 }

@@ -13,8 +13,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tapjoint_beam::JointStiffness;
-use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, SensorPlace, apply};
-use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
+use tapjoint_beam::effects::{Circumstances, Effect, EffectId, JointLaw, Seen, apply};
+use tapjoint_beam::specimen::{PointMass, Specimen};
 use tapjoint_description::{RecordingDescription, Scale, SensorKind, TestDescription};
 
 /// What is to be simulated.
@@ -254,7 +254,7 @@ fn marked_position(position: f64, nominal_length: f64, length: f64) -> f64 {
 }
 
 /// What is seen of the specimen on one visit; a joint that is not linear is seen at rest.
-fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[SensorPlace], visit: usize) -> Seen {
+fn see(plan: &TestPlan<'_>, nominal: &Specimen, places: &[PointMass], visit: usize) -> Seen {
     let mut random = ChaCha8Rng::seed_from_u64(plan.seed);
     // Streams of their own, behind those of the recordings' channels.
     random.set_stream(1 << 40 | visit as u64);
@@ -369,10 +369,7 @@ fn check_softening(effects: &[Effect]) -> Result<(), SimulateError> {
 }
 
 fn turning_stiffness(specimen: &Specimen) -> Result<f64, SimulateError> {
-    let stiffness = match specimen.joint {
-        SpecimenJoint::Free => 0.0,
-        SpecimenJoint::Springs { kr, .. } => kr,
-    };
+    let [_, stiffness] = specimen.joint_stiffnesses();
     if stiffness > 0.0 && stiffness.is_finite() {
         Ok(stiffness)
     } else {

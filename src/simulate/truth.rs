@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use tapjoint_beam::effects::Effect;
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Joint, Specimen};
 use tapjoint_description::described::described_beam;
 use tapjoint_description::{Scale, TestDescription};
 use toml::{Table, Value};
@@ -145,7 +145,7 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 fn joint_of(specimen: &Specimen, units: &StiffnessUnits) -> Option<JointTruth> {
-    let SpecimenJoint::Springs { kt, kr, coupling } = specimen.joint else {
+    let Some(Joint { kt, kr, coupling }) = specimen.joint else {
         return None;
     };
     // 1/Ktr = coupling/sqrt(Kt Kr).

@@ -4,9 +4,7 @@
 
 use tapjoint_analysis::nominal_with;
 use tapjoint_beam::StructureError;
-use tapjoint_beam::effects::{
-    Circumstances, Effect, EffectError, EffectId, Seen, SensorPlace, apply,
-};
+use tapjoint_beam::effects::{Circumstances, Effect, EffectError, EffectId, Seen, apply};
 use tapjoint_beam::specimen::{Mesh, PointMass};
 use tapjoint_description::{Assembly, BeamTheory, SensorKind, TestDescription};
 use tapjoint_diagnosis::{Diagnosis, Hypothesis, HypothesisResult, Verdict};
@@ -319,24 +317,20 @@ fn structure_with(
 ) -> Result<(Seen, Vec<f64>), StructureError> {
     let nominal = nominal_with(test, None);
     let mut specimen = nominal.specimen.clone();
-    let places: Vec<SensorPlace> = test
+    let places: Vec<PointMass> = test
         .sensors
         .iter()
         .zip(&nominal.sensors)
         .filter(|(sensor, _)| sensor.kind != SensorKind::Sound)
         .filter_map(|(sensor, known)| {
-            Some(SensorPlace {
-                position: test.place_of(sensor)?,
-                mass: known.mass.unwrap_or(0.0),
-            })
+            Some(PointMass::new(
+                test.place_of(sensor)?,
+                known.mass.unwrap_or(0.0),
+            ))
         })
         .collect();
     let heavy = places.iter().filter(|sensor| sensor.mass > 0.0);
-    specimen.masses.extend(heavy.map(|sensor| PointMass {
-        position: sensor.position,
-        mass: sensor.mass,
-        inertia: 0.0,
-    }));
+    specimen.masses.extend(heavy);
     let masses = test.recordings.first().map(|recording| &recording.masses);
     specimen.masses.extend(masses.into_iter().flatten());
     // A joint that changes with amplitude is seen at the amplitude that counts for a whole decay.

@@ -3,20 +3,21 @@
 use crate::shared::steel_strip;
 use std::f64::consts::PI;
 use tapjoint::effects::{
-    Circumstances, Effect, EffectError, EffectId, Group, JointLaw, JointLawKind, Place, Seen,
-    SensorPlace, apply,
+    Circumstances, Effect, EffectError, EffectId, Group, JointLaw, JointLawKind, Place, Seen, apply,
 };
 use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::specimen::{Body, Mesh, PointMass, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::{Body, Joint, Mesh, PointMass, Specimen};
 
-const SENSORS: &[SensorPlace] = &[
-    SensorPlace {
+const SENSORS: &[PointMass] = &[
+    PointMass {
         position: 0.33,
         mass: 0.0,
+        inertia: 0.0,
     },
-    SensorPlace {
+    PointMass {
         position: 0.21,
         mass: 0.005,
+        inertia: 0.0,
     },
 ];
 
@@ -24,11 +25,11 @@ fn nominal() -> Specimen {
     let units = StiffnessUnits::of(&steel_strip());
     let mut specimen = Specimen::new(
         Body::One(steel_strip()),
-        SpecimenJoint::Springs {
+        Some(Joint {
             kt: 1400.0 * units.kt,
             kr: 1.2 * units.kr,
             coupling: 0.0,
-        },
+        }),
     );
     // The sensor with a datasheet mass belongs to the nominal model.
     specimen.masses.push(PointMass {
@@ -270,7 +271,7 @@ fn val_reading_bias_is_pure_offset() {
 #[test]
 fn val_modulus_and_length_scale_a_clamped_beam() {
     let clamped = Specimen {
-        joint: SpecimenJoint::RIGID,
+        joint: Some(Joint::RIGID),
         ..nominal()
     };
     // f ~ sqrt(E) L^-2; with length the beam's mass grows too, so that only the bare beam scales.
@@ -329,7 +330,7 @@ fn prop_the_base_keeps_its_stiffness_when_the_joint_drifts() {
     let fixture = typical(EffectId::Fixture);
     let stiffness = |effects: &[Effect]| {
         let specimen = apply(effects, &nominal(), &circumstances()).specimen;
-        specimen.joint.stiffnesses()[1] / specimen.base.unwrap().ratio
+        specimen.joint_stiffnesses()[1] / specimen.base.unwrap().ratio
     };
     let alone = stiffness(std::slice::from_ref(&fixture));
     for both in [
@@ -347,7 +348,7 @@ fn val_tap_level_moves_the_joint_by_its_power() {
         &[("ratio", -0.2), ("exponent", 2.0)],
     );
     let effect = effect.unwrap();
-    let [_, soft] = nominal().joint.stiffnesses();
+    let [_, soft] = nominal().joint_stiffnesses();
     for level in [0.0, 0.25, 1.0] {
         let seen = apply(
             std::slice::from_ref(&effect),
@@ -357,7 +358,7 @@ fn val_tap_level_moves_the_joint_by_its_power() {
                 ..circumstances()
             },
         );
-        let [_, kr] = seen.specimen.joint.stiffnesses();
+        let [_, kr] = seen.specimen.joint_stiffnesses();
         assert!((kr / soft - (1.0 - 0.2 * level * level)).abs() < 1e-14);
         assert_eq!(seen.joint_law.unwrap().kind(), JointLawKind::Elastic);
     }

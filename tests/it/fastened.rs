@@ -12,7 +12,7 @@ use tapjoint::gap::{
 };
 use tapjoint::identify::observation::Observations;
 use tapjoint::pipeline::{Analysis, IdentifySettings, run_test};
-use tapjoint::structure::specimen::{Mesh, PointMass, SpecimenJoint};
+use tapjoint::structure::specimen::{Joint, Mesh, PointMass};
 
 use crate::shared::{five_recordings, planned, strip_on_springs, strip_table, tapped_strip};
 
@@ -293,11 +293,11 @@ fn recover_the_bare_beams_joint_and_the_loaded_recordings_modes() {
     );
     let report = read(&folder.path().join("report.json"));
     let described = TestDescription::parse(VIRTUAL, "source.toml").unwrap();
-    let joint = SpecimenJoint::Springs {
+    let joint = Some(Joint {
         kt: 1.994e6,
         kr: 1223.0,
         coupling: 0.0,
-    };
+    });
     let mut specimen = described_specimen(&described, joint);
     let frequencies = |specimen: &tapjoint::structure::specimen::Specimen| {
         let modes = specimen.modes(5, Mesh::SIMULATION).unwrap();

@@ -10,7 +10,7 @@ use tapjoint::identify::observation::{
     Configuration, ExtraPeak, Observations, ObservedMode, UNPAIRED,
 };
 use tapjoint::pipeline::read_elsewhere;
-use tapjoint::structure::specimen::{PointMass, SpecimenJoint};
+use tapjoint::structure::specimen::{Joint, PointMass};
 
 const LENGTH: f64 = 0.423;
 
@@ -613,7 +613,7 @@ fn regress_sensors_that_see_nothing_are_refused() {
         sensor.position = Some(0.0);
     }
     let mut rigid = strip_on_springs(1.0, None);
-    rigid.specimen.joint = SpecimenJoint::RIGID;
+    rigid.specimen.joint = Some(Joint::RIGID);
     let error = diagnose(&observed, &rigid, &GapSettings::default()).unwrap_err();
     assert!(matches!(error, GapError::SensorsAtNodes { .. }), "{error}");
     let told = error.to_string();

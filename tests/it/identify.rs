@@ -408,8 +408,10 @@ fn recover_prediction_of_withheld_modes() {
     let rows = predict(
         BeamTheory::Euler,
         &beam,
-        (Assembly::Cantilever, &found),
-        (&modes, &estimate.modes_used),
+        Assembly::Cantilever,
+        &found,
+        &modes,
+        &estimate.modes_used,
         7,
     )
     .unwrap();
@@ -422,8 +424,8 @@ fn recover_prediction_of_withheld_modes() {
     // Positive where the prediction is too high.
     let mut low = modes[..1].to_vec();
     low[0].frequency *= 0.99;
-    let case = (Assembly::Cantilever, &found);
-    let rows = predict(BeamTheory::Euler, &beam, case, (&low, &[]), 0).unwrap();
+    let (theory, assembly) = (BeamTheory::Euler, Assembly::Cantilever);
+    let rows = predict(theory, &beam, assembly, &found, &low, &[], 0).unwrap();
     assert!(
         (rows[0].error_percent.unwrap() - 100.0 / 99.0).abs() < 1e-6,
         "{rows:?}"

@@ -414,7 +414,10 @@ fn recover_an_uneven_lap_joint() {
             modulus: 70e9,
             ..beam
         }),
-        overlap: Some((0.04, 0.05)),
+        overlap: Some(LapOverlap {
+            length: 0.04,
+            mass: 0.05,
+        }),
     };
     let (kt, kr) = (5.0e5, 900.0);
     let frequencies = frequencies_of(&structure, (kt, kr), 5);

@@ -6,7 +6,7 @@ use tapjoint::effects::{EffectId, Group, Place};
 use tapjoint::gap::Verdict;
 use tapjoint::pipeline::nominal_with;
 use tapjoint::report::blind_check::tell_apart;
-use tapjoint::structure::specimen::{Mesh, SpecimenJoint};
+use tapjoint::structure::specimen::{Joint, Mesh};
 use tapjoint::study::blind_check::{Case, Class, Planted};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
@@ -141,7 +141,7 @@ fn regress_a_described_coupling_beside_usual_stiffnesses_is_a_joint_that_can_be(
     ] {
         let test = described(&format!("kind = \"cantilever\"\nmodel = \"3p\"\n{joint}"));
         let specimen = nominal_with(&test, None).specimen;
-        let SpecimenJoint::Springs { coupling, .. } = specimen.joint else {
+        let Some(Joint { coupling, .. }) = specimen.joint else {
             panic!("{joint}: {:?}", specimen.joint);
         };
         // Square roots and a quotient.

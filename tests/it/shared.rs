@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use tapjoint::gap::{Nominal, NominalSensor, PlannedConfiguration, TestPlan};
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::specimen::{Body, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::{Body, Joint, Specimen};
 
 /// The cantilever of Ingole & Chatterjee, table 2.
 pub fn steel_strip() -> Beam {
@@ -61,11 +61,11 @@ pub fn strip_on_springs(off: f64, mass: Option<f64>) -> Nominal {
     };
     let beam = steel_strip();
     let units = StiffnessUnits::of(&beam);
-    let joint = SpecimenJoint::Springs {
+    let joint = Some(Joint {
         kt: off * 1400.0 * units.kt,
         kr: off * 1.25 * units.kr,
         coupling: 0.0,
-    };
+    });
     Nominal {
         specimen: Specimen::new(Body::One(beam), joint),
         sensors: vec![sensor],

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use tapjoint::simulate::{ObservedStructure, SpecimenSettings};
 use tapjoint::structure::Beam;
 use tapjoint::structure::joint::StiffnessUnits;
-use tapjoint::structure::specimen::{Body, PointSpring, Specimen, SpecimenJoint};
+use tapjoint::structure::specimen::{Body, Joint, PointSpring, Specimen};
 
 /// Modes up to this frequency (Hz) move; what is compared lies below a tenth of it.
 const HIGHEST: f64 = 6000.0;
@@ -19,11 +19,11 @@ fn hung(suspension: Option<[f64; 2]>) -> SpecimenSettings {
     }
 }
 
-fn springs(ky: f64) -> (SpecimenJoint, f64, f64) {
+fn springs(ky: f64) -> (Option<Joint>, f64, f64) {
     let units = StiffnessUnits::of(&steel_strip());
     let (kt, kr) = (1400.0 * units.kt, ky * units.kr);
     let coupling = 0.0;
-    (SpecimenJoint::Springs { kt, kr, coupling }, kt, kr)
+    (Some(Joint { kt, kr, coupling }), kt, kr)
 }
 
 fn halves() -> Body {
@@ -68,7 +68,7 @@ fn limit_joint_compliance_of_a_beam_that_nothing_else_holds_is_its_springs() {
         assert_compliance(&specimen, None, 1.0 / kr, "cantilever");
         // The compliance matrix has 1/Kr on its diagonal, coupled or not.
         let coupling = -0.4;
-        specimen.joint = SpecimenJoint::Springs { kt, kr, coupling };
+        specimen.joint = Some(Joint { kt, kr, coupling });
         assert_compliance(&specimen, None, 1.0 / kr, "coupled");
         let lap = Specimen::new(halves(), joint);
         assert_compliance(&lap, None, 1.0 / kr, "lap");
@@ -148,11 +148,11 @@ fn val_joint_compliance_of_a_lap_joint_on_three_cables() {
 #[test]
 fn regress_a_pivot_has_a_finite_joint_compliance() {
     let (_, kt, _) = springs(1.0);
-    let joint = SpecimenJoint::Springs {
+    let joint = Some(Joint {
         kt,
         kr: 0.0,
         coupling: 0.0,
-    };
+    });
     let specimen = Specimen::new(Body::One(steel_strip()), joint);
     let seen = ObservedStructure::new(&specimen, &hung(None), &[], 0.0, HIGHEST).unwrap();
     let left = seen.reduced().joint_compliance;
@@ -218,13 +218,13 @@ impl Hanging {
 
     fn seen(&self, sensors: &[f64]) -> ObservedStructure {
         let joint = if self.pivot > 0.0 {
-            SpecimenJoint::Springs {
+            Some(Joint {
                 kt: self.pivot,
                 kr: 0.0,
                 coupling: 0.0,
-            }
+            })
         } else {
-            SpecimenJoint::Free
+            None
         };
         let mut specimen = Specimen::new(Body::One(steel_strip()), joint);
         specimen.springs = self
@@ -357,7 +357,7 @@ fn val_a_beam_on_a_pivot_turns_against_its_cable() {
 #[test]
 fn val_tension_adds_to_rocking_and_not_to_up_and_down() {
     let beam = steel_strip();
-    let mut specimen = Specimen::new(Body::One(beam), SpecimenJoint::Free);
+    let mut specimen = Specimen::new(Body::One(beam), None);
     specimen.axial_force = 0.5;
     let seen = ObservedStructure::new(&specimen, &hung(Some([1.5, 2.0])), &[], 0.0, HIGHEST);
     let found: Vec<f64> = seen.unwrap().suspension_frequencies().collect();

@@ -5,20 +5,20 @@ use proptest::prelude::*;
 use std::f64::consts::PI;
 use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::specimen::{
-    Base, Body, Hinge, LapOverlap, Mesh, PointInertia, PointMass, PointSpring, Specimen,
-    SpecimenJoint, SpecimenModes,
+    Base, Body, Hinge, Joint, LapOverlap, Mesh, PointInertia, PointMass, PointSpring, Specimen,
+    SpecimenModes,
 };
 use tapjoint::structure::{
     Assembly, Beam, BeamTheory, JointStiffness, StructureError, mode_shapes, natural_frequencies,
 };
 
-fn springs(kx: f64, ky: f64, coupling: f64) -> SpecimenJoint {
+fn springs(kx: f64, ky: f64, coupling: f64) -> Option<Joint> {
     let units = StiffnessUnits::of(&steel_strip());
-    SpecimenJoint::Springs {
+    Some(Joint {
         kt: kx * units.kt,
         kr: ky * units.kr,
         coupling,
-    }
+    })
 }
 
 fn cantilever(kx: f64, ky: f64, coupling: f64) -> Specimen {
@@ -35,7 +35,7 @@ fn lap(kx: f64, ky: f64) -> Specimen {
 }
 
 fn free() -> Specimen {
-    Specimen::new(Body::One(steel_strip()), SpecimenJoint::Free)
+    Specimen::new(Body::One(steel_strip()), None)
 }
 
 fn frequencies(specimen: &Specimen, count: usize, elements: usize) -> Vec<f64> {
@@ -445,7 +445,7 @@ fn lambdas(specimen: &Specimen, beam: &Beam, count: usize) -> Vec<f64> {
 fn held_at_both_ends(ratio: f64, clamped: bool) -> (Specimen, Beam) {
     let beam = thick(ratio);
     let units = StiffnessUnits::of(&beam);
-    let mut specimen = Specimen::new(Body::One(beam), SpecimenJoint::RIGID);
+    let mut specimen = Specimen::new(Body::One(beam), Some(Joint::RIGID));
     specimen.shear_rotary = 1.0;
     specimen.springs.push(PointSpring {
         position: 1.0,
@@ -459,11 +459,11 @@ fn held_at_both_ends(ratio: f64, clamped: bool) -> (Specimen, Beam) {
         });
     } else {
         // A rotational spring that is far too soft to count, but makes no motion rigid.
-        specimen.joint = SpecimenJoint::Springs {
+        specimen.joint = Some(Joint {
             kt: f64::INFINITY,
             kr: 1e-7 * units.kr,
             coupling: 0.0,
-        };
+        });
     }
     (specimen, beam)
 }
@@ -490,7 +490,7 @@ fn val_thick_free_and_clamped_beams() {
     let table = [
         (
             0.01,
-            SpecimenJoint::Free,
+            None,
             [
                 4.729175446,
                 7.849078875,
@@ -502,7 +502,7 @@ fn val_thick_free_and_clamped_beams() {
         ),
         (
             0.1,
-            SpecimenJoint::Free,
+            None,
             [
                 4.648492810,
                 7.497187729,
@@ -514,7 +514,7 @@ fn val_thick_free_and_clamped_beams() {
         ),
         (
             0.01,
-            SpecimenJoint::RIGID,
+            Some(Joint::RIGID),
             [
                 1.875029274,
                 4.692785985,
@@ -526,7 +526,7 @@ fn val_thick_free_and_clamped_beams() {
         ),
         (
             0.1,
-            SpecimenJoint::RIGID,
+            Some(Joint::RIGID),
             [
                 1.867713830,
                 4.572408057,
@@ -667,11 +667,11 @@ fn val_fixture_has_the_frequencies_of_two_inertias() {
     let kr = 300.0;
     let mut specimen = Specimen::new(
         Body::One(beam),
-        SpecimenJoint::Springs {
+        Some(Joint {
             kt: f64::INFINITY,
             kr,
             coupling: 0.0,
-        },
+        }),
     );
     let bar = beam.mass() * beam.length.powi(2) / 3.0;
     for (frequency, ratio) in [(40.0, 0.3), (8.0, 0.05), (200.0, 1.0)] {
@@ -824,7 +824,7 @@ fn limit_shapes_do_not_serve_other_structures() {
         .unwrap();
     for other in [lap(1400.0, 1.2), cantilever(f64::INFINITY, 1.2, 0.0)] {
         assert!(modes.rayleigh_frequencies(&other).is_err());
-        assert!(modes.near(&other).unwrap().is_none());
+        assert!(modes.perturbed(&other).unwrap().is_none());
     }
 }
 
@@ -854,7 +854,7 @@ proptest! {
         let here = specimen(1.0).modes(7, Mesh::DIAGNOSIS).unwrap();
         let other = specimen(1.00001);
         let exact = other.modes(7, Mesh::DIAGNOSIS).unwrap();
-        let near = here.near(&other).unwrap().unwrap();
+        let near = here.perturbed(&other).unwrap().unwrap();
         // Two modes so close that they exchange their shapes change by more.
         let f = exact.frequencies();
         prop_assume!(f.windows(2).all(|two| two[1] / two[0] > 1.05));
@@ -896,7 +896,7 @@ fn limit_what_cannot_exist_is_named() {
     let coupling = text(|s| s.joint = springs(1400.0, 1.2, 1.0));
     assert!(coupling.contains("between -1 and 1"), "{coupling}");
     let base = text(|s| {
-        s.joint = SpecimenJoint::RIGID;
+        s.joint = Some(Joint::RIGID);
         s.base = Some(Base {
             frequency: 100.0,
             ratio: 0.1,

@@ -455,9 +455,7 @@ fn prop_unphysical_joints_have_their_oscillations_counted_from_zero() {
 mod finite_elements {
     use super::*;
     use tapjoint::structure::joint::StiffnessUnits;
-    use tapjoint::structure::specimen::{
-        Body, LapLayout, Mesh, PointMass, Specimen, SpecimenJoint,
-    };
+    use tapjoint::structure::specimen::{Body, Joint, LapLayout, Mesh, PointMass, Specimen};
 
     fn assemblies() -> Vec<(Assembly, JointStiffness)> {
         vec![
@@ -499,13 +497,13 @@ mod finite_elements {
             .to_vec()
     }
 
-    fn springs(beam: &Beam, joint: &JointStiffness) -> SpecimenJoint {
+    fn springs(beam: &Beam, joint: &JointStiffness) -> Option<Joint> {
         let units = StiffnessUnits::of(beam);
-        SpecimenJoint::Springs {
+        Some(Joint {
             kt: joint.kx * units.kt,
             kr: joint.ky * units.kr,
             coupling: joint.coupling(),
-        }
+        })
     }
 
     fn specimen(
@@ -515,7 +513,7 @@ mod finite_elements {
         joint: &JointStiffness,
     ) -> Specimen {
         let held = match assembly {
-            Assembly::Free => SpecimenJoint::Free,
+            Assembly::Free => None,
             Assembly::Cantilever | Assembly::Lap => springs(beam, joint),
         };
         Specimen::jointed(theory, beam, assembly, &LapLayout::default(), held)
@@ -654,7 +652,7 @@ mod finite_elements {
             ..beam
         });
         let rigid = JointStiffness::RIGID;
-        let split = Specimen::new(Body::Joined([short, long]), SpecimenJoint::RIGID);
+        let split = Specimen::new(Body::Joined([short, long]), Some(Joint::RIGID));
         let split = split.modes(4, Mesh::SIMULATION).unwrap();
         let free =
             natural_frequencies(BeamTheory::Euler, &beam, Assembly::Free, &rigid, 4).unwrap();

@@ -151,14 +151,14 @@ impl EffectId {
     /// # Errors
     /// [`EffectError::UnknownEffect`], with the nearest name.
     pub fn parse(name: &str) -> Result<Self, EffectError> {
-        let known = || Self::ALL.into_iter().map(Self::name);
+        let known = Self::ALL.map(Self::name);
         Self::ALL
             .into_iter()
             .find(|id| id.name() == name)
             .ok_or_else(|| EffectError::UnknownEffect {
                 name: name.to_owned(),
-                nearest: nearest_name(name, known()),
-                known: known().collect::<Vec<_>>().join(", "),
+                nearest: nearest_name(name, &known),
+                known: known.join(", "),
             })
     }
 
@@ -278,195 +278,198 @@ pub struct ParameterInfo {
     pub typical: Option<f64>,
 }
 
-const fn parameter(
-    (name, dimension, meaning): (&'static str, Dimension, &'static str),
-    (lowest, highest): (f64, f64),
-    scale: ParameterScale,
-    typical: Option<f64>,
+/// Returns a parameter that is a size, from 0 to `highest`.
+const fn size(
+    name: &'static str,
+    dimension: Dimension,
+    meaning: &'static str,
+    highest: f64,
+    typical: f64,
 ) -> ParameterInfo {
     ParameterInfo {
         name,
         dimension,
         meaning,
-        lowest,
+        lowest: 0.0,
         highest,
-        scale,
-        typical,
+        scale: Log,
+        typical: Some(typical),
     }
 }
 
-/// Limits of sizes are those of the kind of structure that is tapped by hand: beams of decimetres,
-/// first frequencies of some tens of hertz.
-const POSITION: ParameterInfo = parameter(
-    ("position", D::Length, "distance from the left end"),
-    (0.0, f64::INFINITY),
-    Linear,
-    None,
-);
-const fn relative(meaning: &'static str, most: f64, typical: f64) -> ParameterInfo {
-    parameter(
-        ("relative", D::None, meaning),
-        (-most, most),
-        Linear,
-        Some(typical),
-    )
+/// Returns a parameter that may have either sign, from -`most` to `most`.
+const fn signed(
+    name: &'static str,
+    dimension: Dimension,
+    meaning: &'static str,
+    most: f64,
+    typical: f64,
+) -> ParameterInfo {
+    ParameterInfo {
+        lowest: -most,
+        scale: Linear,
+        ..size(name, dimension, meaning, most, typical)
+    }
 }
 
-const SENSOR_MASS: &[ParameterInfo] = &[parameter(
-    (
-        "mass",
-        D::Mass,
-        "mass of each accelerometer that the model leaves out",
-    ),
-    (0.0, 1.0),
-    Log,
-    Some(0.01),
+// Limits of sizes are those of the kind of structure that is tapped by hand: beams of decimetres,
+// first frequencies of some tens of hertz.
+const POSITION: ParameterInfo = ParameterInfo {
+    scale: Linear,
+    typical: None,
+    ..size(
+        "position",
+        D::Length,
+        "distance from the left end",
+        f64::INFINITY,
+        0.0,
+    )
+};
+const SENSOR_MASS: &[ParameterInfo] = &[size(
+    "mass",
+    D::Mass,
+    "mass of each accelerometer that the model leaves out",
+    1.0,
+    0.01,
 )];
-const SENSOR_CABLE: &[ParameterInfo] = &[parameter(
-    (
-        "stiffness",
-        D::Stiffness,
-        "stiffness to the ground at each sensor",
-    ),
-    (0.0, 1e5),
-    Log,
-    Some(50.0),
+const SENSOR_CABLE: &[ParameterInfo] = &[size(
+    "stiffness",
+    D::Stiffness,
+    "stiffness to the ground at each sensor",
+    1e5,
+    50.0,
 )];
-const CROSS_COUPLING: &[ParameterInfo] = &[parameter(
-    ("coupling", D::None, "sqrt(Kx Ky)/Kz of the joint"),
-    (-0.99, 0.99),
-    Linear,
-    Some(-0.1),
+const CROSS_COUPLING: &[ParameterInfo] = &[signed(
+    "coupling",
+    D::None,
+    "sqrt(Kx Ky)/Kz of the joint",
+    0.99,
+    -0.1,
 )];
 const JOINT_MASS: &[ParameterInfo] = &[
-    parameter(
-        ("mass", D::Mass, "mass moving with the joint"),
-        (0.0, 10.0),
-        Log,
-        Some(0.01),
-    ),
-    parameter(
-        (
-            "inertia",
-            D::Inertia,
-            "moment of inertia turning with the joint",
-        ),
-        (0.0, 1.0),
-        Log,
-        Some(0.0),
+    size("mass", D::Mass, "mass moving with the joint", 10.0, 0.01),
+    size(
+        "inertia",
+        D::Inertia,
+        "moment of inertia turning with the joint",
+        1.0,
+        0.0,
     ),
 ];
 const JOINT_NONLINEARITY: &[ParameterInfo] = &[
-    parameter(
-        (
+    ParameterInfo {
+        lowest: -0.95,
+        ..signed(
             "ratio",
             D::None,
             "relative change of the rotational stiffness at the hardest tap",
-        ),
-        (-0.95, 1.0),
-        Linear,
-        Some(-0.05),
-    ),
-    parameter(
-        (
+            1.0,
+            -0.05,
+        )
+    },
+    ParameterInfo {
+        lowest: 0.1,
+        ..signed(
             "exponent",
             D::None,
             "power of the amplitude with which the stiffness changes",
-        ),
-        (0.1, 4.0),
-        Linear,
-        Some(1.0),
-    ),
+            4.0,
+            1.0,
+        )
+    },
 ];
-const JOINT_DAMPING: &[ParameterInfo] = &[parameter(
-    ("loss_factor", D::None, "loss factor of the joint's springs"),
-    (0.0, 1.0),
-    Log,
-    Some(0.02),
+const JOINT_DAMPING: &[ParameterInfo] = &[size(
+    "loss_factor",
+    D::None,
+    "loss factor of the joint's springs",
+    1.0,
+    0.02,
 )];
-const JOINT_DRIFT: &[ParameterInfo] = &[parameter(
-    (
-        "std",
-        D::None,
-        "standard deviation of the relative stiffness between visits",
-    ),
-    (0.0, 0.5),
-    Log,
-    Some(0.01),
+const JOINT_DRIFT: &[ParameterInfo] = &[size(
+    "std",
+    D::None,
+    "standard deviation of the relative stiffness between visits",
+    0.5,
+    0.01,
 )];
 const FIXTURE: &[ParameterInfo] = &[
-    parameter(
-        (
+    ParameterInfo {
+        lowest: 1.0,
+        ..size(
             "frequency",
             D::Frequency,
             "natural frequency of the base alone",
-        ),
-        (1.0, 1e5),
-        Log,
-        Some(300.0),
-    ),
-    parameter(
-        (
-            "ratio",
-            D::None,
-            "rotational stiffness of the joint over that of the base",
-        ),
-        (0.0, 1.0),
-        Log,
-        Some(0.03),
+            1e5,
+            300.0,
+        )
+    },
+    size(
+        "ratio",
+        D::None,
+        "rotational stiffness of the joint over that of the base",
+        1.0,
+        0.03,
     ),
 ];
-const MODULUS: &[ParameterInfo] = &[relative("relative change of the modulus", 0.5, 0.02)];
-const LENGTH: &[ParameterInfo] = &[relative("relative change of the length", 0.2, 0.005)];
-const TIMEBASE: &[ParameterInfo] = &[relative("relative change of all frequencies", 0.2, 0.005)];
+const MODULUS: &[ParameterInfo] = &[signed(
+    "relative",
+    D::None,
+    "relative change of the modulus",
+    0.5,
+    0.02,
+)];
+const LENGTH: &[ParameterInfo] = &[signed(
+    "relative",
+    D::None,
+    "relative change of the length",
+    0.2,
+    0.005,
+)];
+const TIMEBASE: &[ParameterInfo] = &[signed(
+    "relative",
+    D::None,
+    "relative change of all frequencies",
+    0.2,
+    0.005,
+)];
 const ADDED_MASS: &[ParameterInfo] = &[
-    parameter(
-        ("mass", D::Mass, "mass on the beam"),
-        // As much as a description takes for fastened: what was known can be written as an effect.
-        (0.0, 1e3),
-        Log,
-        Some(0.01),
-    ),
+    // As much as a description takes for fastened: what was known can be written as an effect.
+    size("mass", D::Mass, "mass on the beam", 1e3, 0.01),
     POSITION,
 ];
 const LOCAL_CRACK: &[ParameterInfo] = &[
-    parameter(
-        (
-            "compliance",
-            D::None,
-            "rotational compliance of the crack times E I/L",
-        ),
-        (0.0, 10.0),
-        Log,
-        Some(0.02),
+    size(
+        "compliance",
+        D::None,
+        "rotational compliance of the crack times E I/L",
+        10.0,
+        0.02,
     ),
     POSITION,
 ];
-const AXIAL_LOAD: &[ParameterInfo] = &[parameter(
-    ("force", D::Force, "axial force, tension positive"),
-    (-1e7, 1e7),
-    Linear,
-    Some(50.0),
+const AXIAL_LOAD: &[ParameterInfo] = &[signed(
+    "force",
+    D::Force,
+    "axial force, tension positive",
+    1e7,
+    50.0,
 )];
-const SHEAR_ROTARY: &[ParameterInfo] = &[parameter(
-    (
+const SHEAR_ROTARY: &[ParameterInfo] = &[ParameterInfo {
+    lowest: 0.0,
+    ..signed(
         "factor",
         D::None,
         "share of shear and rotary inertia, 1 = the full effect",
-    ),
-    (0.0, 10.0),
-    Linear,
-    Some(1.0),
-)];
-const RESOLUTION: &[ParameterInfo] = &[parameter(
-    (
-        "offset",
-        D::Frequency,
-        "constant bias of every frequency read",
-    ),
-    (-1e4, 1e4),
-    Linear,
-    Some(0.25),
+        10.0,
+        1.0,
+    )
+}];
+const RESOLUTION: &[ParameterInfo] = &[signed(
+    "offset",
+    D::Frequency,
+    "constant bias of every frequency read",
+    1e4,
+    0.25,
 )];
 
 impl EffectId {

@@ -9,7 +9,7 @@
 mod catalogue;
 mod joint_law;
 
-use crate::specimen::{Base, Hinge, PointMass, PointSpring, Specimen, SpecimenJoint};
+use crate::specimen::{Base, Hinge, PointMass, PointSpring, Specimen};
 pub use catalogue::{Dimension, EffectId, Group, ParameterInfo, ParameterScale, Place};
 pub use joint_law::{JointLaw, JointLawKind, ModeMotion};
 
@@ -57,7 +57,7 @@ pub enum EffectError {
         meaning: &'static str,
     },
     /// A value outside its range.
-    #[error("`{effect}`: {name} is {value}, but must lie between {lowest} and {highest}{}", with_space(.unit))]
+    #[error("`{effect}`: {name} is {value}, but must lie between {lowest} and {highest}{}{unit}", if .unit.is_empty() { "" } else { " " })]
     OutOfRange {
         /// The effect.
         effect: &'static str,
@@ -78,20 +78,14 @@ fn did_you_mean(nearest: &Option<&'static str>) -> String {
     nearest.map_or_else(String::new, |name| format!(", did you mean `{name}`?"))
 }
 
-fn with_space(unit: &str) -> String {
-    if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {unit}")
-    }
-}
-
-/// The name nearest to `given`, if one is near at all.
-fn nearest_name(given: &str, known: impl Iterator<Item = &'static str>) -> Option<&'static str> {
+/// Returns the name nearest to `given`, if one is near at all.
+fn nearest_name(given: &str, known: &[&'static str]) -> Option<&'static str> {
     // Below this two words have little in common.
     const LEAST_LIKENESS: f64 = 0.7;
-    known
-        .map(|name| (strsim::jaro_winkler(given, name), name))
+    let rated = known
+        .iter()
+        .map(|name| (strsim::jaro_winkler(given, name), *name));
+    rated
         .filter(|(likeness, _)| *likeness > LEAST_LIKENESS)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, name)| name)
@@ -172,9 +166,9 @@ impl Effect {
         self.id.parameters().iter().zip(self.values.iter().copied())
     }
 
-    /// First and second value; every effect has one, 0 stands for a second that does not exist.
-    pub(super) fn pair(&self) -> (f64, f64) {
-        (self.values[0], self.values.get(1).copied().unwrap_or(0.0))
+    /// Returns first and second value; every effect has one, 0 stands for a second that does not exist.
+    fn sizes(&self) -> [f64; 2] {
+        [self.values[0], self.values.get(1).copied().unwrap_or(0.0)]
     }
 }
 
@@ -189,14 +183,15 @@ impl EffectId {
 }
 
 fn index_of(id: EffectId, name: &str) -> Result<usize, EffectError> {
-    let known = || id.parameters().iter().map(|info| info.name);
-    known()
-        .position(|known| known == name)
+    let known: Vec<&'static str> = id.parameters().iter().map(|info| info.name).collect();
+    known
+        .iter()
+        .position(|known| *known == name)
         .ok_or_else(|| EffectError::UnknownParameter {
             effect: id.name(),
             name: name.to_owned(),
-            nearest: nearest_name(name, known()),
-            known: known().collect::<Vec<_>>().join(", "),
+            nearest: nearest_name(name, &known),
+            known: known.join(", "),
         })
 }
 
@@ -217,20 +212,12 @@ fn in_range(id: EffectId, info: &ParameterInfo, value: f64) -> Result<f64, Effec
 
 // What effects make of a nominal specimen under the circumstances of one recording.
 
-/// A sensor on the beam.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensorPlace {
-    /// Distance from the left end (m).
-    pub position: f64,
-    /// Mass by its datasheet (kg), which the nominal specimen already carries; 0 = unknown.
-    pub mass: f64,
-}
-
-/// Under what circumstances a specimen is seen.
+/// Circumstances under which a specimen is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circumstances<'a> {
-    /// Sensors on the beam.
-    pub sensors: &'a [SensorPlace],
+    /// Sensors on the beam, with their masses by datasheet, which the nominal specimen already carries; 0 =
+    /// unknown.
+    pub sensors: &'a [PointMass],
     /// Amplitude relative to the hardest tap's (1), from 0 to 1.
     pub level: f64,
     /// Draws for this visit's drift of Kt and Kr (1), in standard deviations.
@@ -293,68 +280,36 @@ pub fn apply(effects: &[Effect], nominal: &Specimen, circumstances: &Circumstanc
         .iter()
         .filter(|effect| effect.id == EffectId::Length)
     {
-        stretch(&mut seen.specimen, 1.0 + effect.pair().0);
+        stretch(&mut seen.specimen, 1.0 + effect.values[0]);
     }
     seen
 }
 
+/// Adds one effect.
 fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, seen: &mut Seen) {
-    let (first, second) = effect.pair();
+    let [first, second] = effect.sizes();
     let specimen = &mut seen.specimen;
     match effect.id {
-        EffectId::SensorMass | EffectId::SensorCable => {
-            add_at_sensors(effect, circumstances.sensors, specimen);
+        EffectId::SensorMass => {
+            let unknown = circumstances
+                .sensors
+                .iter()
+                .filter(|sensor| sensor.mass == 0.0);
+            let masses = unknown.map(|sensor| PointMass::new(sensor.position, first));
+            specimen.masses.extend(masses);
         }
-        EffectId::CrossCoupling
-        | EffectId::JointMass
-        | EffectId::JointNonlinearity
-        | EffectId::JointDamping
-        | EffectId::JointDrift => add_to_joint(effect, circumstances, seen),
-        EffectId::Fixture => specimen.base = Some(base(effect, nominal, &specimen.joint)),
-        EffectId::Modulus => {
-            for beam in specimen.body.beams_mut() {
-                beam.modulus *= 1.0 + first;
+        EffectId::SensorCable => {
+            let cables = circumstances.sensors.iter().map(|sensor| PointSpring {
+                position: sensor.position,
+                stiffness: first,
+            });
+            specimen.springs.extend(cables);
+        }
+        EffectId::CrossCoupling => {
+            if let Some(joint) = &mut specimen.joint {
+                joint.coupling += first;
             }
         }
-        // After all others, by `stretch`.
-        EffectId::Length => {}
-        EffectId::Timebase => seen.frequency_scale *= 1.0 + first,
-        EffectId::AddedMass => specimen.masses.push(mass_at(second, first)),
-        EffectId::LocalCrack => {
-            // c = compliance L/(E I) of the nominal (left) beam, over the whole length.
-            let beam = nominal.body.beams()[0];
-            specimen.hinges.push(Hinge {
-                position: second,
-                compliance: first * nominal.body.length() / beam.bending_stiffness(),
-            });
-        }
-        EffectId::AxialLoad => specimen.axial_force += first,
-        EffectId::ShearRotary => specimen.shear_rotary += first,
-        EffectId::Resolution => seen.frequency_offset += first,
-    }
-}
-
-fn add_at_sensors(effect: &Effect, sensors: &[SensorPlace], specimen: &mut Specimen) {
-    let (size, _) = effect.pair();
-    if effect.id == EffectId::SensorMass {
-        let unknown = sensors.iter().filter(|sensor| sensor.mass == 0.0);
-        let masses = unknown.map(|sensor| mass_at(sensor.position, size));
-        specimen.masses.extend(masses);
-    } else {
-        specimen
-            .springs
-            .extend(sensors.iter().map(|sensor| PointSpring {
-                position: sensor.position,
-                stiffness: size,
-            }));
-    }
-}
-
-fn add_to_joint(effect: &Effect, circumstances: &Circumstances<'_>, seen: &mut Seen) {
-    let (first, second) = effect.pair();
-    let specimen = &mut seen.specimen;
-    match effect.id {
-        EffectId::CrossCoupling => add_coupling(specimen, first),
         EffectId::JointMass => {
             specimen.joint_mass.mass += first;
             specimen.joint_mass.inertia += second;
@@ -369,69 +324,68 @@ fn add_to_joint(effect: &Effect, circumstances: &Circumstances<'_>, seen: &mut S
         }
         EffectId::JointDamping => seen.joint_loss_factor += first,
         // An exponential, so that no draw makes a stiffness negative.
-        _ => scale_joint(
-            specimen,
-            circumstances.drift.map(|draw| (first * draw).exp()),
-        ),
+        EffectId::JointDrift => {
+            let factors = circumstances.drift.map(|draw| (first * draw).exp());
+            scale_joint(specimen, factors);
+        }
+        EffectId::Fixture => {
+            // The base's stiffness follows from the nominal joint's; the ratio is to the joint as it is now.
+            let [[_, before], [_, now]] = [nominal, &*specimen].map(Specimen::joint_stiffnesses);
+            let is_spring = before > 0.0 && before.is_finite();
+            specimen.base = Some(Base {
+                frequency: first,
+                ratio: second * if is_spring { now / before } else { 1.0 },
+            });
+        }
+        EffectId::Modulus => {
+            for beam in specimen.body.beams_mut() {
+                beam.modulus *= 1.0 + first;
+            }
+        }
+        // After all others, by `stretch`.
+        EffectId::Length => {}
+        EffectId::Timebase => seen.frequency_scale *= 1.0 + first,
+        EffectId::AddedMass => specimen.masses.push(PointMass::new(second, first)),
+        EffectId::LocalCrack => {
+            // c = compliance L/(E I) of the nominal (left) beam, over the whole length.
+            let beam = nominal.body.beams()[0];
+            specimen.hinges.push(Hinge {
+                position: second,
+                compliance: first * nominal.body.length() / beam.bending_stiffness(),
+            });
+        }
+        EffectId::AxialLoad => specimen.axial_force += first,
+        EffectId::ShearRotary => specimen.shear_rotary += first,
+        EffectId::Resolution => seen.frequency_offset += first,
     }
 }
 
-/// The base's stiffness follows from the nominal joint's; the ratio is to the joint as it is now.
-fn base(effect: &Effect, nominal: &Specimen, joint: &SpecimenJoint) -> Base {
-    let (frequency, ratio) = effect.pair();
-    let ([_, before], [_, now]) = (nominal.joint.stiffnesses(), joint.stiffnesses());
-    let changed = if before > 0.0 && before.is_finite() {
-        now / before
-    } else {
-        1.0
-    };
-    Base {
-        frequency,
-        ratio: ratio * changed,
-    }
-}
-
-fn mass_at(position: f64, mass: f64) -> PointMass {
-    PointMass {
-        position,
-        mass,
-        inertia: 0.0,
-    }
-}
-
-fn add_coupling(specimen: &mut Specimen, more: f64) {
-    if let SpecimenJoint::Springs { coupling, .. } = &mut specimen.joint {
-        *coupling += more;
-    }
-}
-
-/// Multiplies the joint's stiffnesses; the base keeps its own.
-fn scale_joint(specimen: &mut Specimen, [translation, rotation]: [f64; 2]) {
-    if let SpecimenJoint::Springs { kt, kr, .. } = &mut specimen.joint {
-        *kt *= translation;
-        *kr *= rotation;
+/// Multiplies the joint's stiffnesses, translational and rotational; the base keeps its own.
+fn scale_joint(specimen: &mut Specimen, factors: [f64; 2]) {
+    if let Some(joint) = &mut specimen.joint {
+        joint.kt *= factors[0];
+        joint.kr *= factors[1];
         if let Some(base) = &mut specimen.base {
-            base.ratio *= rotation;
+            base.ratio *= factors[1];
         }
     }
 }
 
-/// Another length, with all places in proportion.
+/// Changes the length, with all places in proportion.
 fn stretch(specimen: &mut Specimen, factor: f64) {
     for beam in specimen.body.beams_mut() {
         beam.length *= factor;
     }
     let length = specimen.body.length();
-    // A point at the end stays on the beam, whatever the last digit of the product.
-    let moved = |position: f64| (position * factor).min(length);
-    for mass in &mut specimen.masses {
-        mass.position = moved(mass.position);
-    }
-    for spring in &mut specimen.springs {
-        spring.position = moved(spring.position);
-    }
-    for hinge in &mut specimen.hinges {
-        hinge.position = moved(hinge.position);
+    let masses = specimen.masses.iter_mut().map(|mass| &mut mass.position);
+    let springs = specimen
+        .springs
+        .iter_mut()
+        .map(|spring| &mut spring.position);
+    let hinges = specimen.hinges.iter_mut().map(|hinge| &mut hinge.position);
+    for position in masses.chain(springs).chain(hinges) {
+        // A point at the end stays on the beam, whatever the last digit of the product.
+        *position = (*position * factor).min(length);
     }
     if let Some(overlap) = &mut specimen.overlap {
         overlap.length *= factor;

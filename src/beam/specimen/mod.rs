@@ -13,6 +13,7 @@ mod element;
 pub(crate) mod model;
 pub(crate) mod modes;
 
+pub use crate::joint::Joint;
 use crate::{Assembly, Beam, BeamTheory, StructureError};
 pub use modes::{BeamModes, SpecimenModes};
 use schemars::JsonSchema;
@@ -28,7 +29,7 @@ pub enum Body {
 }
 
 impl Body {
-    /// The beam, cut at the joint where that is a lap joint.
+    /// Returns the beam, cut at the joint where that is a lap joint.
     pub fn of(beam: &Beam, assembly: Assembly, lap: &LapLayout) -> Self {
         if assembly != Assembly::Lap {
             return Self::One(*beam);
@@ -45,7 +46,7 @@ impl Body {
         Self::Joined([left, right])
     }
 
-    /// The beams from left to right.
+    /// Returns the beams from left to right.
     pub fn beams(&self) -> &[Beam] {
         match self {
             Self::One(beam) => std::slice::from_ref(beam),
@@ -53,7 +54,7 @@ impl Body {
         }
     }
 
-    /// The beams from left to right, to be changed.
+    /// Returns the beams from left to right, to be changed.
     pub fn beams_mut(&mut self) -> &mut [Beam] {
         match self {
             Self::One(beam) => std::slice::from_mut(beam),
@@ -61,42 +62,9 @@ impl Body {
         }
     }
 
-    /// Length of all beams together (m).
+    /// Returns the length of all beams together (m).
     pub fn length(&self) -> f64 {
         self.beams().iter().map(|beam| beam.length).sum()
-    }
-}
-
-/// The joint: it holds the beam's left end, or the two halves of a lap joint together.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SpecimenJoint {
-    /// Nothing.
-    Free,
-    /// Springs with the compliance matrix `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`.
-    Springs {
-        /// Translational stiffness (N/m); infinite = rigid.
-        kt: f64,
-        /// Rotational stiffness (N m/rad); infinite = rigid.
-        kr: f64,
-        /// sqrt(Kt Kr)/Ktr (1), between -1 and 1; 0 = no coupling. Not for lap joints.
-        coupling: f64,
-    },
-}
-
-impl SpecimenJoint {
-    /// Held without give.
-    pub const RIGID: Self = Self::Springs {
-        kt: f64::INFINITY,
-        kr: f64::INFINITY,
-        coupling: 0.0,
-    };
-
-    /// Translational and rotational stiffness (N/m, N m/rad): 0 where there is no joint.
-    pub fn stiffnesses(&self) -> [f64; 2] {
-        match *self {
-            Self::Free => [0.0; 2],
-            Self::Springs { kt, kr, .. } => [kt, kr],
-        }
     }
 }
 
@@ -140,6 +108,17 @@ pub struct PointMass {
     pub inertia: f64,
 }
 
+impl PointMass {
+    /// Returns a mass (kg) without rotary inertia at a distance (m) from the left end.
+    pub fn new(position: f64, mass: f64) -> Self {
+        Self {
+            position,
+            mass,
+            inertia: 0.0,
+        }
+    }
+}
+
 /// A spring between beam and ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointSpring {
@@ -149,7 +128,7 @@ pub struct PointSpring {
     pub stiffness: f64,
 }
 
-/// A crack, seen as a hinge with a rotational spring.
+/// A crack: a hinge with a rotational spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hinge {
     /// Distance from the left end (m).
@@ -189,8 +168,8 @@ pub struct LapLayout {
     pub position: Option<f64>,
     /// The right half, where it differs; its `length` is not used.
     pub right: Option<Beam>,
-    /// Length (m) of the overlap and the mass (kg) it adds.
-    pub overlap: Option<(f64, f64)>,
+    /// The overlap.
+    pub overlap: Option<LapOverlap>,
 }
 
 /// The tested structure.
@@ -200,8 +179,9 @@ pub struct Specimen {
     pub body: Body,
     /// Share of shear flexibility and rotary inertia (1): 0 = Euler's beam, 1 = Timoshenko's.
     pub shear_rotary: f64,
-    /// The joint.
-    pub joint: SpecimenJoint,
+    /// The joint: it holds the beam's left end, or the two halves of a lap joint together. `None` where
+    /// nothing does.
+    pub joint: Option<Joint>,
     /// Mass and inertia that move with the beam's end at the joint; of a lap joint half of it with
     /// either end.
     pub joint_mass: PointInertia,
@@ -220,8 +200,8 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// Beam and joint with nothing on them.
-    pub fn new(body: Body, joint: SpecimenJoint) -> Self {
+    /// Returns beam and joint with nothing on them.
+    pub fn new(body: Body, joint: Option<Joint>) -> Self {
         Self {
             body,
             shear_rotary: 0.0,
@@ -236,26 +216,29 @@ impl Specimen {
         }
     }
 
-    /// A beam on its joint, with nothing on it but a lap joint's overlap. Of a lap joint `beam` has the
+    /// Returns a beam on its joint, with nothing on it but a lap joint's overlap. Of a lap joint `beam` has the
     /// left half's properties and the total length; `lap` has no meaning for one beam.
     pub fn jointed(
         theory: BeamTheory,
         beam: &Beam,
         assembly: Assembly,
         lap: &LapLayout,
-        joint: SpecimenJoint,
+        joint: Option<Joint>,
     ) -> Self {
         let mut specimen = Self::new(Body::of(beam, assembly, lap), joint);
         if theory == BeamTheory::Timoshenko {
             specimen.shear_rotary = 1.0;
         }
-        if let (Assembly::Lap, Some((length, mass))) = (assembly, lap.overlap) {
-            specimen.overlap = Some(LapOverlap { length, mass });
-        }
+        specimen.overlap = lap.overlap.filter(|_| assembly == Assembly::Lap);
         specimen
     }
 
-    /// The lowest `count` modes, ascending. Motions that are rigid but for the springs to the ground
+    /// Returns translational and rotational stiffness of the joint (N/m, N m/rad): 0 where there is none.
+    pub fn joint_stiffnesses(&self) -> [f64; 2] {
+        self.joint.map_or([0.0; 2], |joint| [joint.kt, joint.kr])
+    }
+
+    /// Returns the lowest `count` modes, ascending. Motions that are rigid but for the springs to the ground
     /// are left out and listed apart ([`SpecimenModes::suspension_frequencies`]).
     ///
     /// # Errors
@@ -265,7 +248,7 @@ impl Specimen {
         SpecimenModes::new(self, count, mesh)
     }
 
-    /// The lowest `count` modes of the beam, on a fixture that may give.
+    /// Returns the lowest `count` modes of the beam, on a fixture that may give.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
@@ -273,7 +256,7 @@ impl Specimen {
         BeamModes::new(self, count, mesh)
     }
 
-    /// A lap joint's overlap as masses: two points in either half, where Gauss's rule puts them, carry
+    /// Returns a lap joint's overlap as masses: two points in either half, where Gauss's rule puts them, carry
     /// the uniform mass as a cubic shape feels it.
     pub fn overlap_masses(&self) -> Vec<PointMass> {
         let (Some(overlap), Body::Joined([left, _])) = (&self.overlap, &self.body) else {
@@ -282,12 +265,10 @@ impl Specimen {
         // Half of the overlap reaches from 0 to 1/2: its points are 1/4 -+ 1/(4 sqrt 3).
         let gauss = 0.25 / 3f64.sqrt();
         let points = [-0.25 + gauss, -0.25 - gauss, 0.25 - gauss, 0.25 + gauss];
-        let masses = points.map(|point| PointMass {
-            position: left.length + point * overlap.length,
-            mass: 0.25 * overlap.mass,
-            inertia: 0.0,
-        });
-        masses.to_vec()
+        let positions = points.map(|point| left.length + point * overlap.length);
+        positions
+            .map(|position| PointMass::new(position, 0.25 * overlap.mass))
+            .to_vec()
     }
 
     /// Checks that every part can exist and lies on the beam.
@@ -350,7 +331,7 @@ impl Specimen {
     }
 
     fn check_joint(&self) -> Result<(), StructureError> {
-        let SpecimenJoint::Springs { kt, kr, coupling } = self.joint else {
+        let Some(Joint { kt, kr, coupling }) = self.joint else {
             return Ok(());
         };
         for (quantity, value) in [("kt", kt), ("kr", kr)] {
@@ -383,7 +364,7 @@ impl Specimen {
             return Err(unphysical("frequency of the base", base.frequency, remedy));
         }
         not_negative("stiffness ratio of the base", base.ratio)?;
-        let [_, kr] = self.joint.stiffnesses();
+        let [_, kr] = self.joint_stiffnesses();
         if base.ratio == 0.0 {
             return Ok(());
         }

@@ -6,7 +6,7 @@
 use super::element::{
     ElementHinge, HingedElement, Section, Square, Units, Weights, dot, quadratic,
 };
-use super::{Body, Specimen, SpecimenJoint};
+use super::{Body, Joint, Specimen};
 use crate::StructureError;
 use crate::banded::BandedMatrix;
 use std::f64::consts::PI;
@@ -31,7 +31,7 @@ pub(super) struct Numbering {
 impl Numbering {
     /// `elements` of each beam; `has_base` where the fixture has a motion of its own.
     fn new(specimen: &Specimen, elements: &[usize], has_base: bool) -> Self {
-        let rigid = specimen.joint.stiffnesses().map(f64::is_infinite);
+        let rigid = specimen.joint_stiffnesses().map(f64::is_infinite);
         let mut numbering = Self {
             nodes: Vec::new(),
             base: None,
@@ -245,7 +245,7 @@ impl Model {
         let mut model = Self {
             numbering: Numbering::new(specimen, elements, base.is_some()),
             runs,
-            joint: joint_matrix(&specimen.joint, &units),
+            joint: joint_matrix(specimen.joint, &units),
             base,
             masses: Vec::new(),
             springs: Vec::new(),
@@ -621,8 +621,8 @@ impl Model {
 
 /// Stiffness of the joint for (w, theta): the inverse of `[[1/Kt, -1/Ktr], [-1/Ktr, 1/Kr]]`, in the
 /// model's units. A spring that is missing or rigid has no coupling.
-fn joint_matrix(joint: &SpecimenJoint, units: &Units) -> [[f64; 2]; 2] {
-    let SpecimenJoint::Springs { kt, kr, coupling } = *joint else {
+fn joint_matrix(joint: Option<Joint>, units: &Units) -> [[f64; 2]; 2] {
+    let Some(Joint { kt, kr, coupling }) = joint else {
         return [[0.0; 2]; 2];
     };
     let kx = kt / units.stiffness();
@@ -643,7 +643,7 @@ fn rotating_base(specimen: &Specimen, units: &Units) -> Option<RotatingBase> {
     if matches!(specimen.body, Body::Joined(_)) {
         return None;
     }
-    let [_, kr] = specimen.joint.stiffnesses();
+    let [_, kr] = specimen.joint_stiffnesses();
     let stiffness = kr / units.rotational_stiffness() / base.ratio;
     let omega = 2.0 * PI * base.frequency / units.omega;
     Some(RotatingBase {

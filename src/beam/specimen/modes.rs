@@ -105,7 +105,7 @@ impl SpecimenModes {
         }
     }
 
-    /// Natural frequencies (Hz), ascending; of [`SpecimenModes::near`] in the order of the modes they
+    /// Natural frequencies (Hz), ascending; of [`SpecimenModes::perturbed`] in the order of the modes they
     /// came from.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
@@ -113,7 +113,7 @@ impl SpecimenModes {
 
     /// Frequencies (Hz) of the motions that only springs to the ground or the axial force keep from
     /// being rigid: a free beam's suspension. Empty where there are none, and after
-    /// [`SpecimenModes::hung`], which counts them among the modes.
+    /// [`SpecimenModes::on_suspension`], which counts them among the modes.
     pub fn suspension_frequencies(&self) -> &[f64] {
         &self.suspension
     }
@@ -219,11 +219,11 @@ impl SpecimenModes {
     /// than their price.
     ///
     /// `None` where the other has other motions (rigid springs, a base) or where some are loose: there
-    /// [`Specimen::modes`] has to solve anew. Modes after [`SpecimenModes::hung`] lose the suspension.
+    /// [`Specimen::modes`] has to solve anew. Modes after [`SpecimenModes::on_suspension`] lose the suspension.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
-    pub fn near(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
+    pub fn perturbed(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
         let model = self.model_of(other)?;
         if model.numbering != self.model.numbering || !self.loose.is_empty() {
             return Ok(None);
@@ -260,7 +260,10 @@ impl SpecimenModes {
     ///
     /// # Errors
     /// [`StructureError`] where the modes do not settle.
-    pub fn hung(&self, suspension: Option<[f64; 2]>) -> Result<(Self, usize), StructureError> {
+    pub fn on_suspension(
+        &self,
+        suspension: Option<[f64; 2]>,
+    ) -> Result<(Self, usize), StructureError> {
         let supported = self.model.is_supported();
         if self.loose.is_empty() || !(supported || suspension.is_some()) {
             return Ok((self.clone(), 0));
@@ -300,8 +303,8 @@ impl SpecimenModes {
             });
         }
         modes.extend(others.iter().cloned());
-        let hung = Self::elastic(self.model.clone(), self.mesh, modes);
-        Ok((hung, self.loose.len() - free))
+        let modes = Self::elastic(self.model.clone(), self.mesh, modes);
+        Ok((modes, self.loose.len() - free))
     }
 
     /// Stiffness of specimen and suspension in the coordinates of its motions.
@@ -339,7 +342,7 @@ impl SpecimenModes {
     /// Rotation of the joint's spring per moment on both its ends (rad/(N m)) by all modes beyond
     /// these: the sum of psi^2/omega^2, which falls too slowly to be added up. It is the static
     /// compliance less that of the modes here. A suspension does not change it, but the modes after
-    /// [`Self::hung`] no longer say which motions are loose: ask the modes before.
+    /// [`Self::on_suspension`] no longer say which motions are loose: ask the modes before.
     pub fn joint_compliance_beyond(&self) -> f64 {
         // Loose motions make K singular, and s M is added: sum psi^2/(omega^2 + s).
         let shift = if self.loose.is_empty() { 0.0 } else { SHIFT };
@@ -397,14 +400,14 @@ impl BeamModes {
         })
     }
 
-    /// Modes of another specimen that differs little, by [`SpecimenModes::near`]. Every mode keeps
+    /// Modes of another specimen that differs little, by [`SpecimenModes::perturbed`]. Every mode keeps
     /// its number.
     ///
     /// # Errors
     /// As [`Specimen::modes`].
-    pub fn near(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
-        let near = self.modes.near(other)?;
-        Ok(near.map(|modes| Self {
+    pub fn perturbed(&self, other: &Specimen) -> Result<Option<Self>, StructureError> {
+        let modes = self.modes.perturbed(other)?;
+        Ok(modes.map(|modes| Self {
             modes,
             numbers: self.numbers.clone(),
             fixture: self.fixture,

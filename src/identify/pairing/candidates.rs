@@ -219,19 +219,20 @@ pub(super) fn comparable(
 /// ln of the ratio of two amplitudes in the recording that sees the weaker one best; `None` where no
 /// recording saw both, or it is not the weaker one.
 fn price(own: &MeasuredPeak, other: &MeasuredPeak) -> Option<f64> {
-    let both = own.strengths.iter().zip(&other.strengths);
-    let prices = both.filter_map(|(own, other)| price_in(own.as_ref()?, other.as_ref()?));
-    let least = prices.reduce(f64::min)?;
-    (least > 0.0).then_some(least.min(MOST))
-}
-
-fn price_in(own: &PeakStrength, other: &PeakStrength) -> Option<f64> {
-    if let (Some(a), Some(b)) = (own.energy, other.energy) {
-        let peakless = own.level_db.is_none() && other.level_db.is_some();
-        let a = if peakless { NO_PEAK * a } else { a };
-        return (a > 0.0 && b > 0.0).then(|| 0.5 * (b / a).ln());
+    let mut prices = Vec::new();
+    for (own, other) in own.strengths.iter().zip(&other.strengths) {
+        let (Some(own), Some(other)) = (own, other) else {
+            continue;
+        };
+        if let Some((a, b)) = own.energy.zip(other.energy) {
+            let peakless = own.level_db.is_none() && other.level_db.is_some();
+            let a = if peakless { NO_PEAK * a } else { a };
+            prices.extend((a > 0.0 && b > 0.0).then(|| 0.5 * (b / a).ln()));
+        } else if let Some((a, b)) = own.level_db.zip(other.level_db) {
+            // 20 dB are a factor of ten in amplitude.
+            prices.push((b - a) / 20.0 * std::f64::consts::LN_10);
+        }
     }
-    // 20 dB are a factor of ten in amplitude.
-    let (a, b) = own.level_db.zip(other.level_db)?;
-    Some((b - a) / 20.0 * std::f64::consts::LN_10)
+    let least = prices.into_iter().reduce(f64::min)?;
+    (least > 0.0).then_some(least.min(MOST))
 }

@@ -2,15 +2,16 @@
 
 use std::f64::consts::{LN_10, PI};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 use super::{MeasuredPeak, PairingSettings};
-use crate::consistent::{FrequencyModel, Parameter, Point};
+use crate::frequency_fit::{FrequencyModel, Parameter, Point};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};
+use tapjoint_numerics::least_squares::{Linearised, Loss, Problem, Settings, minimise};
 
-/// Degrees of freedom of the model's discrepancy: tails in which one mode may lie far off.
-const FREEDOM: f64 = 4.0;
+/// The model's discrepancy has tails in which one mode may lie far off.
+const LOSS: Loss = Loss::StudentT(4.0);
 /// Density of Student's t with that many at its middle: 3/8.
 const DENSITY: f64 = 0.375;
 /// Prior means of ln Kx, ln Ky and atanh of the coupling, and their standard deviations: joints of
@@ -22,8 +23,7 @@ const PRIOR: [(f64, f64); 3] = [(3.0 * LN_10, 3.0), (LN_10, 3.0), (0.0, 0.3)];
 /// and the search for the joint goes on from there.
 const DECADES: [(f64, f64); 2] = [(-1.0, 6.0), (-2.0, 4.5)];
 const STEP: f64 = 0.3;
-/// Steps of the search, and its largest step (1).
-const STEPS: usize = 40;
+/// Largest step of the search (1).
 const LARGEST: f64 = 2.0;
 /// Largest coupling (1) that a held Ktr is taken to have.
 const STRONGEST: f64 = 0.999;
@@ -84,39 +84,42 @@ impl<'a> JointSearch<'a> {
     }
 
     fn is_free(&self, index: usize) -> bool {
-        let parameters = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
-        self.settings.fit.contains(&parameters[index])
+        self.settings.fit.contains(&Parameter::JOINT[index])
     }
 
-    /// The place with the coupling that a held Ktr has there: sqrt(Kx Ky)/Kz, and no joint's is 1.
-    fn coupled(&self, [kx, ky, coupling]: [f64; 3]) -> [f64; 3] {
+    /// Returns the place with the coupling that a held Ktr has there: sqrt(Kx Ky)/Kz, and no joint's is 1.
+    fn coupled(&self, place: [f64; 3]) -> [f64; 3] {
         if self.cross == 0.0 {
-            return [kx, ky, coupling];
+            return place;
         }
+        let [kx, ky, _] = place;
         let held = self.cross * (0.5 * (kx + ky)).exp();
         [kx, ky, held.clamp(-STRONGEST, STRONGEST).atanh()]
     }
 
-    /// Places (ln Kx, ln Ky, atanh of the coupling) over all joints; a held stiffness has one.
+    /// Returns places (ln Kx, ln Ky, atanh of the coupling) over all joints; a held stiffness has one.
     pub fn grid(&self) -> Vec<[f64; 3]> {
-        let axis = |index: usize| -> Vec<f64> {
-            let (low, high) = DECADES[index];
-            if !self.is_free(index) {
+        let units = [self.units.kt, self.units.kr];
+        let [translation, rotation] = [0, 1].map(|index| {
+            let mut values = Vec::new();
+            if self.is_free(index) {
+                let (low, high) = DECADES[index];
+                let steps = ((high - low) / STEP) as u32;
+                values.extend((0..=steps).map(|step| (low + STEP * f64::from(step)) * LN_10));
+            } else {
                 let held = self.settings.held[index].unwrap_or(f64::INFINITY);
-                return vec![(held / [self.units.kt, self.units.kr][index]).ln()];
+                values.push((held / units[index]).ln());
             }
-            let steps = ((high - low) / STEP) as usize;
-            let at = |step| (low + STEP * f64::from(step)) * LN_10;
-            (0..=steps as u32).map(at).collect()
-        };
-        let (translation, rotation) = (axis(0), axis(1));
-        let rows = translation.iter();
-        rows.flat_map(|&kx| rotation.iter().map(move |&ky| [kx, ky, 0.0]))
-            .map(|place| self.coupled(place))
-            .collect()
+            values
+        });
+        let mut places = Vec::with_capacity(translation.len() * rotation.len());
+        for &kx in &translation {
+            places.extend(rotation.iter().map(|&ky| self.coupled([kx, ky, 0.0])));
+        }
+        places
     }
 
-    /// Coordinates of the model at a place.
+    /// Returns the coordinates of the model at a place.
     fn point(&self, place: [f64; 3]) -> Point {
         let mut point = self.model.nominal();
         point[Parameter::Kt as usize] = place[0] + self.units.kt.ln();
@@ -125,40 +128,33 @@ impl<'a> JointSearch<'a> {
         point
     }
 
-    /// Logarithms of the natural frequencies (Hz) of all modes looked at.
+    /// Returns the logarithms of the natural frequencies (Hz) of all modes looked at.
     pub fn predict(&self, place: [f64; 3]) -> Vec<f64> {
         (1..=self.highest)
             .map(|mode| self.response(place, mode).0)
             .collect()
     }
 
-    /// Logarithm of a natural frequency (Hz), and its slopes.
-    fn response(&self, place: [f64; 3], mode: usize) -> (f64, Vector3<f64>) {
+    /// Returns the logarithm of a natural frequency (Hz), and its slopes along the place.
+    fn response(&self, place: [f64; 3], mode: usize) -> (f64, [f64; 3]) {
         let guess = PI * (mode as f64 - 0.5);
         let response = self.model.response(&self.point(place), mode, guess);
-        let slope = |index: usize| {
-            let slope = response.sensitivity[index];
-            if self.is_free(index) && slope.is_finite() {
-                slope
-            } else {
-                0.0
-            }
-        };
-        let mut slopes =
-            [Parameter::Kt, Parameter::Kr, Parameter::Coupling].map(|p| slope(p as usize));
+        let mut slopes = Parameter::JOINT.map(|parameter| response.sensitivity[parameter as usize]);
+        let by_coupling = slopes[2];
         let coupling = place[2].tanh();
-        if self.cross != 0.0 && coupling.abs() < STRONGEST {
-            // The coupling follows: d atanh(c)/d ln Kx = c/(2 (1 - c^2)), and so for Ky.
-            let follows = 0.5 * coupling / (1.0 - coupling * coupling);
-            let by_coupling = response.sensitivity[Parameter::Coupling as usize];
-            for index in [0, 1].into_iter().filter(|&index| self.is_free(index)) {
-                slopes[index] += follows * by_coupling;
+        for (index, slope) in slopes.iter_mut().enumerate() {
+            if !(self.is_free(index) && slope.is_finite()) {
+                *slope = 0.0;
+            }
+            if index < 2 && self.is_free(index) && self.cross != 0.0 && coupling.abs() < STRONGEST {
+                // The coupling follows: d atanh(c)/d ln Kx = c/(2 (1 - c^2)), and so for Ky.
+                *slope += 0.5 * coupling / (1.0 - coupling * coupling) * by_coupling;
             }
         }
-        (response.frequency.ln(), Vector3::from(slopes))
+        (response.frequency.ln(), slopes)
     }
 
-    /// The joint at a place, non-dimensional.
+    /// Returns the joint at a place, non-dimensional.
     pub fn joint(&self, place: [f64; 3]) -> JointStiffness {
         let (kx, ky) = (place[0].exp(), place[1].exp());
         JointStiffness {
@@ -172,81 +168,125 @@ impl<'a> JointSearch<'a> {
         }
     }
 
-    /// Scale of a peak's relative error: its own uncertainty and what the model misses.
+    /// Returns the scale of a peak's relative error: its own uncertainty and what the model misses.
     fn scale(&self, peak: &MeasuredPeak) -> f64 {
         let own = peak.std.unwrap_or(0.0) / peak.frequency;
         self.settings.discrepancy.hypot(own)
     }
 
-    /// Cost of the frequencies and of the place itself, with gradient and (Gauss-Newton) curvature.
+    /// Returns the joint that suits these pairs of peak and mode best, looked for downhill of `start`.
     ///
-    /// Student's t: -ln p = (nu + 1)/2 ln(1 + r^2/nu) + ln(s/density); its weight is
-    /// (nu + 1)/(nu + r^2).
-    fn cost(&self, pairs: &[(usize, usize)], place: [f64; 3]) -> (f64, Vector3<f64>, Matrix3<f64>) {
-        let mut cost = 0.0;
-        let mut gradient = Vector3::zeros();
-        let mut curvature = Matrix3::zeros();
-        for &(peak, mode) in pairs {
-            let peak = &self.peaks[peak];
-            let scale = self.scale(peak);
-            let (predicted, slopes) = self.response(place, mode);
+    /// Laplace: the probability over all joints is the one at the best times the square root of the inverse
+    /// curvature's determinant. The factors 2 pi of prior and curvature cancel.
+    pub fn refine(&self, pairs: &[(usize, usize)], start: [f64; 3]) -> JointFit {
+        let assigned = Assigned {
+            search: self,
+            pairs,
+            bounds: [0, 1, 2].map(|index| {
+                if self.is_free(index) {
+                    [f64::NEG_INFINITY, f64::INFINITY]
+                } else {
+                    [start[index]; 2]
+                }
+            }),
+        };
+        let settings = Settings {
+            gain: 1e-9,
+            ..Settings::default()
+        };
+        match minimise(&assigned, &start, &settings) {
+            None => JointFit {
+                place: start,
+                cost: f64::INFINITY,
+            },
+            Some(found) => JointFit {
+                place: found.state.place,
+                cost: found.state.cost
+                    + 0.5
+                        * found
+                            .state
+                            .curvature
+                            .determinant()
+                            .max(f64::MIN_POSITIVE)
+                            .ln(),
+            },
+        }
+    }
+}
+
+/// An assignment of peaks to modes, whose joint is looked for.
+struct Assigned<'a> {
+    search: &'a JointSearch<'a>,
+    /// Peaks (from 0) with their modes (from 1).
+    pairs: &'a [(usize, usize)],
+    /// Limits of the place: a held coordinate has no room.
+    bounds: [[f64; 2]; 3],
+}
+
+/// The assignment's cost at a place, with gradient and Gauss-Newton curvature.
+struct AssignedAt {
+    place: [f64; 3],
+    /// Negative logarithm of the probability density.
+    cost: f64,
+    gradient: DVector<f64>,
+    curvature: DMatrix<f64>,
+}
+
+impl Problem for Assigned<'_> {
+    type State = AssignedAt;
+
+    fn evaluate(&self, place: &[f64], _: Option<&AssignedAt>) -> Option<AssignedAt> {
+        let place = *place.first_chunk()?;
+        let mut at = AssignedAt {
+            place,
+            cost: 0.0,
+            gradient: DVector::zeros(3),
+            curvature: DMatrix::zeros(3, 3),
+        };
+        for &(peak, mode) in self.pairs {
+            let peak = &self.search.peaks[peak];
+            let scale = self.search.scale(peak);
+            let (predicted, slopes) = self.search.response(place, mode);
             let residual = (predicted - peak.frequency.ln()) / scale;
-            let slopes = slopes / scale;
-            let weight = (FREEDOM + 1.0) / (FREEDOM + residual * residual);
-            cost += 0.5 * (FREEDOM + 1.0) * (residual * residual / FREEDOM).ln_1p();
-            cost += (scale / DENSITY).ln();
-            gradient += slopes * (weight * residual);
-            curvature += slopes * slopes.transpose() * weight;
+            let weight = LOSS.weight(residual);
+            at.cost += 0.5 * LOSS.of(residual) + (scale / DENSITY).ln();
+            for (i, a) in slopes.iter().enumerate() {
+                at.gradient[i] += weight * residual * a / scale;
+                for (j, b) in slopes.iter().enumerate() {
+                    at.curvature[(i, j)] += weight * (a / scale) * (b / scale);
+                }
+            }
         }
         for (index, (mean, std)) in PRIOR.into_iter().enumerate() {
-            if !self.is_free(index) {
-                curvature[(index, index)] = 1.0;
+            if !self.search.is_free(index) {
+                at.curvature[(index, index)] = 1.0;
                 continue;
             }
             let deviation = (place[index] - mean) / std;
-            cost += 0.5 * deviation * deviation + std.ln();
-            gradient[index] += deviation / std;
-            curvature[(index, index)] += 1.0 / (std * std);
+            at.cost += 0.5 * deviation * deviation + std.ln();
+            at.gradient[index] += deviation / std;
+            at.curvature[(index, index)] += 1.0 / (std * std);
         }
-        (cost, gradient, curvature)
+        at.cost.is_finite().then_some(at)
     }
 
-    /// Follows the cost down from `start` (Levenberg and Marquardt). Laplace: the probability over all
-    /// joints is the one at the best times the square root of the inverse curvature's determinant; the
-    /// factors 2 pi of prior and curvature cancel.
-    pub fn refine(&self, pairs: &[(usize, usize)], start: [f64; 3]) -> JointFit {
-        let mut place = start;
-        let mut now = self.cost(pairs, place);
-        let mut damping = 1e-3;
-        for _ in 0..STEPS {
-            let mut damped = now.2;
-            for index in 0..3 {
-                damped[(index, index)] *= 1.0 + damping;
-            }
-            let Some(step) = damped.cholesky().map(|factor| factor.solve(&now.1)) else {
-                break;
-            };
-            let next = [0, 1, 2].map(|i| place[i] - step[i].clamp(-LARGEST, LARGEST));
-            let next = self.coupled(next);
-            let there = self.cost(pairs, next);
-            if there.0 < now.0 {
-                let gain = now.0 - there.0;
-                (place, now) = (next, there);
-                damping = (0.2 * damping).max(1e-9);
-                if gain < 1e-6 {
-                    break;
-                }
-            } else {
-                damping *= 8.0;
-                if damping > 1e9 {
-                    break;
-                }
-            }
-        }
-        let determinant = now.2.determinant().max(f64::MIN_POSITIVE);
-        JointFit {
-            place,
-            cost: now.0 + 0.5 * determinant.ln(),
-        }
+    fn cost(&self, at: &AssignedAt) -> f64 {
+        at.cost
+    }
+
+    fn linearise(&self, _: &[f64], at: &mut AssignedAt) -> Option<Linearised> {
+        Some(Linearised::Normal {
+            curvature: at.curvature.clone(),
+            gradient: at.gradient.clone(),
+        })
+    }
+
+    fn bounds(&self) -> &[[f64; 2]] {
+        &self.bounds
+    }
+
+    fn moved(&self, place: &[f64], step: &DVector<f64>) -> Option<Vec<f64>> {
+        let moved = [0, 1, 2].map(|i| place[i] + step[i].clamp(-LARGEST, LARGEST));
+        Some(self.search.coupled(moved).to_vec())
     }
 }

@@ -21,7 +21,7 @@ mod shape;
 
 pub use candidates::PeakStrength;
 
-use super::consistent::{FrequencyModel, JointedStructure, Parameter};
+use super::frequency_fit::{FrequencyModel, JointedStructure, Parameter};
 use candidates::{Assignment, Neighbours, comparable};
 use joint::JointSearch;
 use tapjoint_beam::StructureError;
@@ -184,7 +184,15 @@ fn score(
         .map(|mode| view.missing(search, &fit, mode))
         .collect();
     let extra = (assignment.len() - pairs.len()) as f64;
-    let unseen: f64 = missing.iter().map(|m| missing_cost(m.cause)).sum();
+    // A mode that could be seen is missed once in ten times: a weak tap, a soft tip, a neighbour's flank.
+    let unseen: f64 = missing
+        .iter()
+        .map(|missing| match missing.cause {
+            MissingCause::OutsideBand => 0.0,
+            MissingCause::AtNode => 0.7,
+            MissingCause::Unknown => 2.3,
+        })
+        .sum();
     let weak = neighbours.cost(assignment);
     let shaped = comparable(&pairs, assignment, search.peaks, neighbours);
     let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
@@ -196,15 +204,6 @@ fn score(
             missing,
             odds: 1.0,
         },
-    }
-}
-
-/// A mode that could be seen is missed once in ten times: a weak tap, a soft tip, a neighbour's flank.
-fn missing_cost(cause: MissingCause) -> f64 {
-    match cause {
-        MissingCause::OutsideBand => 0.0,
-        MissingCause::AtNode => 0.7,
-        MissingCause::Unknown => 2.3,
     }
 }
 
@@ -239,7 +238,7 @@ fn verdict(sorted: Vec<Scored>, odds: f64) -> Pairing {
     }
 }
 
-/// Whether the peaks are numbered 1, 2, 3 and so on.
+/// Returns true where the peaks are numbered 1, 2, 3 and so on.
 pub fn is_plain(numbers: &[Option<usize>]) -> bool {
     let mut places = numbers.iter().enumerate();
     places.all(|(index, number)| *number == Some(index + 1))

@@ -50,18 +50,27 @@ impl View {
         }
     }
 
-    /// What a mode shows at a place: product of the shapes at sensor and tap (1/kg), or the shape at
-    /// the sensor (kg^-1/2).
-    fn at(shape: &ModeShape, (sensor, tap): (f64, Option<f64>)) -> f64 {
+    /// Returns the product of a mode's shapes at sensor and tap (1/kg), or the shape at the sensor
+    /// (kg^-1/2).
+    fn at(shape: &ModeShape, sensor: f64, tap: Option<f64>) -> f64 {
         shape.displacement(sensor) * tap.map_or(1.0, |tap| shape.displacement(tap))
     }
 
-    /// A mode without a peak, and why.
+    /// Returns a mode without a peak, and why.
     pub fn missing(&self, search: &JointSearch<'_>, fit: &JointFit, mode: usize) -> MissingMode {
         let frequency = search.predict(fit.place)[mode - 1].exp();
+        let own = self.shapes.get(mode - 1);
+        let at_node = own.filter(|_| !self.places.is_empty()).is_some_and(|own| {
+            self.places.iter().all(|&(sensor, tap)| {
+                let all = self.shapes.iter();
+                let squares: f64 = all.map(|shape| Self::at(shape, sensor, tap).powi(2)).sum();
+                let usual = (squares / self.shapes.len() as f64).sqrt();
+                Self::at(own, sensor, tap).abs() < AT_NODE * usual
+            })
+        });
         let cause = if !search.in_band(frequency) {
             MissingCause::OutsideBand
-        } else if self.is_at_node(mode) {
+        } else if at_node {
             MissingCause::AtNode
         } else {
             MissingCause::Unknown
@@ -73,22 +82,7 @@ impl View {
         }
     }
 
-    fn is_at_node(&self, mode: usize) -> bool {
-        let Some(own) = self.shapes.get(mode - 1) else {
-            return false;
-        };
-        !self.places.is_empty()
-            && self.places.iter().all(|&place| {
-                let all = self
-                    .shapes
-                    .iter()
-                    .map(|shape| Self::at(shape, place).powi(2));
-                let usual = (all.sum::<f64>() / self.shapes.len() as f64).sqrt();
-                Self::at(own, place).abs() < AT_NODE * usual
-            })
-    }
-
-    /// Negative logarithm of the shapes' probability over that of shapes in any direction.
+    /// Returns the negative logarithm of the shapes' probability over that of shapes in any direction.
     pub fn cost(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> f64 {
         let mut groups: Vec<usize> = search
             .peaks
@@ -116,7 +110,7 @@ impl View {
                 .collect();
             let predicted: Vec<f64> = seen
                 .iter()
-                .map(|at| Self::at(shape, (at.sensor, at.tap)))
+                .map(|at| Self::at(shape, at.sensor, at.tap))
                 .collect();
             cost -= likeness(&seen, &predicted);
             if let Some(positive) = sign(&seen, &predicted, self.usual(&seen)) {
@@ -126,18 +120,18 @@ impl View {
         cost - sign_gain(signs)
     }
 
-    /// What the modes usually show at these places.
+    /// Returns the size that the modes usually show at these places.
     fn usual(&self, seen: &[&ShapeAt]) -> f64 {
         let squares = self.shapes.iter().flat_map(|shape| {
             seen.iter()
-                .map(|at| Self::at(shape, (at.sensor, at.tap)).powi(2))
+                .map(|at| Self::at(shape, at.sensor, at.tap).powi(2))
         });
         let count = (self.shapes.len() * seen.len()).max(1) as f64;
         (squares.sum::<f64>() / count).sqrt()
     }
 }
 
-/// Whether any group of sensors shows a direction.
+/// Returns true where any group of sensors shows a direction.
 pub(super) fn is_clear(shape: &[ShapeAt]) -> bool {
     shape.iter().any(|one| {
         let group = shape.iter().filter(|at| at.group == one.group);
@@ -148,7 +142,7 @@ pub(super) fn is_clear(shape: &[ShapeAt]) -> bool {
     })
 }
 
-/// ln of the density of the angle between two shapes over that of any direction: a normal one of width
+/// Returns ln of the density of the angle between two shapes over that of any direction: a normal one of width
 /// s has pi/(s sqrt(2 pi)) of it in a plane, 1/s^2 in space (half a circle, half a sphere); more
 /// dimensions count as three.
 fn likeness(seen: &[&ShapeAt], predicted: &[f64]) -> f64 {
@@ -172,7 +166,7 @@ fn likeness(seen: &[&ShapeAt], predicted: &[f64]) -> f64 {
     ((1.0 - UNLIKE) * normal + UNLIKE).ln()
 }
 
-/// Whether measured and predicted signs agree; `None` where either has none, or where there is no tap,
+/// Returns true where measured and predicted signs agree; `None` where either has none, or where there is no tap,
 /// so that the sign is free.
 fn sign(seen: &[&ShapeAt], predicted: &[f64], usual: f64) -> Option<bool> {
     if seen.is_empty() || seen.iter().any(|at| at.tap.is_none()) {

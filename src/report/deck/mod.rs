@@ -10,7 +10,7 @@ mod nastran;
 use super::text_table::lines_of;
 use tapjoint_analysis::{Analysis, jointed_structure, structure_details, tested_structure};
 use tapjoint_beam::joint::StiffnessUnits;
-use tapjoint_beam::specimen::{Body, Hinge, Specimen, SpecimenJoint};
+use tapjoint_beam::specimen::{Body, Hinge, Joint, Specimen};
 use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError};
 use tapjoint_description::TestDescription;
 use tapjoint_identify::consistent::JointedStructure;
@@ -172,7 +172,7 @@ pub fn deck_of(name: &str, source: &DeckSource) -> Result<Deck, DeckError> {
     let mut deck = Deck::new(name, &source.origin, structure.theory, &source.frequencies);
     deck.doubts.clone_from(&source.doubts);
     let body = structure.body()?;
-    let specimen = structure.specimen(SpecimenJoint::Free);
+    let specimen = structure.specimen(None);
     let mut masses = specimen.masses.clone();
     masses.extend(specimen.overlap_masses());
     masses.retain(|mass| mass.mass != 0.0);
@@ -454,7 +454,7 @@ fn cut(beams: &[Beam], cracks: &[Hinge]) -> Vec<Beam> {
 
 /// The specimen's joint: at the left end, or between the halves.
 fn joint_of(deck: &Deck, specimen: &Specimen) -> Result<Option<DeckJoint>, DeckError> {
-    let SpecimenJoint::Springs { kt, kr, coupling } = specimen.joint else {
+    let Some(Joint { kt, kr, coupling }) = specimen.joint else {
         return Ok(None);
     };
     let node = match &specimen.body {

@@ -63,7 +63,7 @@ pub fn modes_from(document: &Document) -> Option<String> {
 pub fn mode_details(document: &Document) -> Option<Table> {
     let modes = document.modes.as_deref().filter(|m| !m.is_empty())?;
     let mut notes = Vec::new();
-    if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit) {
+    if modes.iter().any(|mode| mode.method == Some(ReadBy::Fit)) {
         notes.push(INTERVAL_NOTE);
     }
     if modes.iter().any(|mode| tap_deviation(mode).is_some()) {
@@ -320,8 +320,8 @@ pub fn frfs(document: &Document) -> Option<Table> {
                     false => unit_words(&frf.unit),
                 },
                 or_missing(phase),
-                coherence(found.coherence),
-                optional(found.random_error.map(|error| 100.0 * error), 2),
+                coherence(found.quality.coherence),
+                optional(found.quality.random_error.map(|error| 100.0 * error), 2),
             ]);
         }
     }

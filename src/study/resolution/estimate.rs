@@ -6,11 +6,10 @@ use super::result::StudiedStiffness;
 use super::virtual_test::Truth;
 use super::{ResolutionError, StudiedTest};
 use tapjoint_analysis::EstimateMethod;
-use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness};
 use tapjoint_description::ReadBy;
 use tapjoint_identify::consistent::{
-    ConsistentEstimator, ConsistentSettings, HeldJoint, JointedStructure, Neighbourhood, Parameter,
+    ConsistentEstimator, ConsistentSettings, JointedStructure, Neighbourhood, Parameter,
 };
 use tapjoint_identify::{
     IdentifyError, MeasuredMode, PairsModel, estimate_modulus, pairs_estimator,
@@ -69,15 +68,9 @@ impl<'a> Estimators<'a> {
             }
             .into());
         }
-        let units = StiffnessUnits::of(&test.structure.beam);
-        let coupling = test.joint.coupling();
         Ok(Estimators {
             settings: ConsistentSettings {
-                held: HeldJoint {
-                    kt: Some(test.joint.kx * units.kt),
-                    kr: Some(test.joint.ky * units.kr),
-                    coupling: Some(coupling).filter(|coupling| coupling.is_finite()),
-                },
+                held: test.joint.in_si(&test.structure.beam),
                 ..ConsistentSettings::fitting(&parameters)
             },
             parameters,

@@ -4,7 +4,6 @@ use super::result::WindowName;
 use super::{ResolutionError, ResolutionSettings, StudiedTest};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
-use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter, Point};
 use tapjoint_signal::spectral::{
@@ -110,12 +109,10 @@ impl<'a> Truths<'a> {
 fn point_of(model: &FrequencyModel, test: &StudiedTest, joint: &JointStiffness) -> Point {
     let mut point = model.nominal();
     if test.structure.assembly != Assembly::Free {
-        let units = StiffnessUnits::of(&test.structure.beam);
-        point[Parameter::Kt as usize] = (joint.kx * units.kt).ln();
-        point[Parameter::Kr as usize] = (joint.ky * units.kr).ln();
-        let coupling = joint.coupling();
-        let coupling = if coupling.is_finite() { coupling } else { 0.0 };
-        point[Parameter::Coupling as usize] = coupling.atanh();
+        let joint = joint.in_si(&test.structure.beam);
+        point[Parameter::Kt as usize] = joint.kt.ln();
+        point[Parameter::Kr as usize] = joint.kr.ln();
+        point[Parameter::Coupling as usize] = joint.coupling.atanh();
     }
     point
 }

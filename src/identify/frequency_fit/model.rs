@@ -8,11 +8,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::f64::consts::PI;
-use tapjoint_beam::interface::{
-    InterfaceModes, JoinedHalf, JointCompliance, JointedBody, LAST_STEP,
+use tapjoint_beam::interface::{InterfaceModes, JoinedHalf, JointedBody, LAST_STEP};
+use tapjoint_beam::specimen::{Body, LapLayout, PointMass, PointSpring, Specimen};
+use tapjoint_beam::{
+    Assembly, Beam, BeamTheory, Joint, JointStiffness, StructureError, natural_modes,
 };
-use tapjoint_beam::specimen::{Body, LapLayout, PointMass, PointSpring, Specimen, SpecimenJoint};
-use tapjoint_beam::{Assembly, Beam, BeamTheory, JointStiffness, StructureError, natural_modes};
 
 /// Route by which frequencies are computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub struct JointedStructure {
 }
 
 impl JointedStructure {
-    /// A beam with nothing on it; a lap joint in its middle.
+    /// Returns a beam with nothing on it; a lap joint is in its middle.
     pub fn new(theory: BeamTheory, beam: Beam, assembly: Assembly) -> Self {
         Self {
             beam,
@@ -57,8 +57,8 @@ impl JointedStructure {
         }
     }
 
-    /// Returns the structure on a joint.
-    pub fn specimen(&self, joint: SpecimenJoint) -> Specimen {
+    /// Returns the structure on a joint, or free of it.
+    pub fn specimen(&self, joint: Option<Joint>) -> Specimen {
         Specimen {
             masses: self.masses.clone(),
             springs: self.springs.clone(),
@@ -82,8 +82,8 @@ impl JointedStructure {
         if let Some(position) = &mut there.lap.position {
             *position *= longer;
         }
-        if let Some((length, _)) = &mut there.lap.overlap {
-            *length *= longer;
+        if let Some(overlap) = &mut there.lap.overlap {
+            overlap.length *= longer;
         }
         let masses = there.masses.iter_mut().map(|mass| &mut mass.position);
         let springs = there.springs.iter_mut().map(|spring| &mut spring.position);
@@ -113,20 +113,21 @@ impl JointedStructure {
         Ok(body)
     }
 
-    /// Returns true where something is fastened to the beam.
-    fn is_loaded(&self) -> bool {
+    /// Returns the number of elements of each beam by which frequencies up to this mode are right to about
+    /// 1e-6; `None` where they are known in closed form.
+    ///
+    /// By Euler's theory the relative error is (k h)^4/1440 for the wave number k and the element length
+    /// h; with shear and rotary inertia it falls as h^2 only.
+    fn elements(&self, highest: usize, body: &Body) -> Option<usize> {
+        if let Route::FiniteElements(elements) = self.route {
+            return Some(elements);
+        }
         let overlap = self.lap.overlap.filter(|_| self.assembly == Assembly::Lap);
         let masses = self.masses.iter().map(|mass| mass.mass);
-        !self.springs.is_empty()
-            || masses
-                .chain(overlap.map(|(_, mass)| mass))
-                .any(|mass| mass != 0.0)
-    }
-
-    /// Elements of each beam for this highest mode, so that its frequency is right to about 1e-6. By
-    /// Euler's theory the relative error is (k h)^4/1440 for the wave number k and the element length
-    /// h; with shear and rotary inertia it falls as h^2 only.
-    fn elements_for(&self, highest: usize, body: &Body) -> usize {
+        let mut masses = masses.chain(overlap.map(|overlap| overlap.mass));
+        if self.springs.is_empty() && masses.all(|mass| mass == 0.0) {
+            return None;
+        }
         let size = match self.theory {
             BeamTheory::Euler => 0.18,
             BeamTheory::Timoshenko => 0.09,
@@ -134,7 +135,7 @@ impl JointedStructure {
         let lengths = body.beams().iter().map(|beam| beam.length);
         let longest = lengths.fold(0.0, f64::max);
         let wave = (highest as f64 + 0.5) * PI * longest / body.length();
-        ((wave / size).ceil() as usize).max(8)
+        Some(((wave / size).ceil() as usize).max(8))
     }
 }
 
@@ -162,6 +163,9 @@ pub enum Parameter {
 }
 
 impl Parameter {
+    /// The parameters of the joint, in the order of [`Point`].
+    pub const JOINT: [Self; 3] = [Self::Kt, Self::Kr, Self::Coupling];
+
     /// All parameters, in the order of [`Point`].
     pub const ALL: [Self; PARAMETERS] = [
         Self::Kt,
@@ -223,23 +227,16 @@ pub struct FrequencyModel {
 }
 
 impl FrequencyModel {
-    /// For modes up to `highest`.
+    /// Returns the model of modes up to `highest`.
     ///
     /// # Errors
     /// [`StructureError`] where beam, lap joint or attachments cannot exist.
     pub fn new(structure: &JointedStructure, highest: usize) -> Result<Self, StructureError> {
         let beams = structure.body()?;
-        let elements = match structure.route {
-            Route::FiniteElements(elements) => Some(elements),
-            Route::Automatic if structure.is_loaded() => {
-                Some(structure.elements_for(highest, &beams))
-            }
-            Route::Automatic => None,
-        };
         let theory = structure.theory;
-        let body = match (elements, &beams) {
+        let body = match (structure.elements(highest, &beams), &beams) {
             (Some(elements), _) => {
-                let free = structure.specimen(SpecimenJoint::Free);
+                let free = structure.specimen(None);
                 JointedBody::Elements(Box::new(InterfaceModes::new(&free, elements)?))
             }
             (None, Body::One(beam)) => JointedBody::Rooted(beam.slenderness(theory)),
@@ -261,48 +258,45 @@ impl FrequencyModel {
         })
     }
 
-    /// The structure behind it.
+    /// Returns the structure behind it.
     pub fn structure(&self) -> &JointedStructure {
         &self.structure
     }
 
-    /// Beam and joint as described, the joint of stiffness 1 in every direction.
+    /// Returns the point of the beam as described, with a joint of stiffness 1 in every direction.
     pub fn nominal(&self) -> Point {
         nominal_point(&self.structure.beam)
     }
 
-    /// The mode's frequency at a point, its root looked for from `guess` (lambda) on.
+    /// Returns the mode's frequency at a point. Its root is looked for from `guess` (lambda) on.
     pub fn response(&self, point: &Point, mode: usize, guess: f64) -> ModeResponse {
         self.at(point, LAST_STEP).response(mode, guess)
     }
 
-    /// The model at a point: what all modes share. A relative step of lambda below `last_step` ends
-    /// the search for a root.
+    /// Returns what all modes share at a point. A relative step of lambda below `last_step` ends the
+    /// search for a root.
     pub(super) fn at(&self, point: &Point, last_step: f64) -> ModelAt<'_> {
-        let joint = self.compliance(point);
+        let compliances = self.compliances(point);
         let coupling = point[Parameter::Coupling.index()].tanh();
         ModelAt {
             model: self,
             unit_frequency: beam_at(&self.structure.beam, point).unit_frequency(),
-            joint,
+            compliances,
             last_step,
-            by_coupling: (joint.a * joint.b).sqrt() * (1.0 - coupling * coupling),
+            by_coupling: (compliances[0] * compliances[1]).sqrt() * (1.0 - coupling * coupling),
             ratios: self.attachment_ratios(point),
         }
     }
 
-    pub(super) fn compliance(&self, point: &Point) -> JointCompliance {
-        let [kx, ky] = log_nondimensional(point).map(|log| (-log).exp());
+    /// Returns 1/Kx, 1/Ky and 1/Kz at a point.
+    pub(super) fn compliances(&self, point: &Point) -> [f64; 3] {
+        let [a, b] = log_nondimensional(point).map(|log| (-log).exp());
         let coupling = point[Parameter::Coupling.index()].tanh();
-        JointCompliance {
-            a: kx,
-            b: ky,
-            c: coupling * (kx * ky).sqrt(),
-        }
+        [a, b, coupling * (a * b).sqrt()]
     }
 
-    /// Change of the ratios of attached masses to the beam's, and of support springs to the beam's
-    /// stiffness, from those of the body, as logarithms.
+    /// Returns by how much the ratios of attached masses to the beam's, and of support springs to the
+    /// beam's stiffness, differ from those of the body, as logarithms.
     fn attachment_ratios(&self, point: &Point) -> (f64, f64) {
         let moved: Point = std::array::from_fn(|i| point[i] - self.built_at[i]);
         let [_, _, _, modulus, density, length, width, thickness] = moved;
@@ -340,7 +334,8 @@ pub(super) struct ModelAt<'a> {
     model: &'a FrequencyModel,
     /// Frequency (Hz) at lambda = 1.
     unit_frequency: f64,
-    joint: JointCompliance,
+    /// 1/Kx, 1/Ky and 1/Kz (1).
+    compliances: [f64; 3],
     last_step: f64,
     /// Derivative of the cross compliance with the coupling's atanh.
     by_coupling: f64,
@@ -349,13 +344,31 @@ pub(super) struct ModelAt<'a> {
 }
 
 impl ModelAt<'_> {
-    /// The mode's frequency, its root looked for from `guess` (lambda) on.
+    /// Returns the mode's frequency. Its root is looked for from `guess` (lambda) on.
     pub(super) fn response(&self, mode: usize, guess: f64) -> ModeResponse {
-        let (lambda, springs, attached) = match &self.model.free {
-            Some(lambdas) => self.free_mode(lambdas, mode),
-            None => self.jointed_mode(mode, guess),
-        };
-        let [by_kt, by_kr, by_coupling] = springs;
+        let (mut by_joint, mut attached) = ([0.0; 3], [0.0; 2]);
+        let lambda;
+        if let Some(lambdas) = &self.model.free {
+            lambda = lambdas[mode - 1];
+            if let JointedBody::Elements(modes) = &self.model.body {
+                attached = modes.free_attachment_sensitivity(mode - 1);
+            }
+        } else {
+            let root = (self.model.body).root(self.compliances, mode, guess, self.last_step);
+            lambda = root.lambda;
+            // d ln f = 2 d ln lambda, with a = 1/Kx, b = 1/Ky and c = coupling sqrt(ab).
+            let ([a, b, c], [by_a, by_b, by_c]) = (self.compliances, root.by_compliance);
+            let scale = 2.0 / lambda;
+            by_joint = [
+                -scale * (by_a * a + 0.5 * by_c * c),
+                -scale * (by_b * b + 0.5 * by_c * c),
+                scale * by_c * self.by_coupling,
+            ];
+            if let JointedBody::Elements(modes) = &self.model.body {
+                attached = modes.attachment_sensitivity(lambda, root.load);
+            }
+        }
+        let [by_kt, by_kr, by_coupling] = by_joint;
         let [by_masses, by_supports] = attached;
         // Degree 1/2 in all stiffnesses, -1/2 in all masses.
         let by_modulus = 0.5 - by_kt - by_kr - by_supports;
@@ -378,35 +391,9 @@ impl ModelAt<'_> {
             ],
         }
     }
-
-    fn free_mode(&self, lambdas: &[f64], mode: usize) -> (f64, [f64; 3], [f64; 2]) {
-        let attached = match &self.model.body {
-            JointedBody::Elements(modes) => modes.free_attachment_sensitivity(mode - 1),
-            _ => [0.0; 2],
-        };
-        (lambdas[mode - 1], [0.0; 3], attached)
-    }
-
-    /// d ln f = 2 d ln lambda, with a = 1/Kx, b = 1/Ky and c = coupling sqrt(ab).
-    fn jointed_mode(&self, mode: usize, guess: f64) -> (f64, [f64; 3], [f64; 2]) {
-        let (joint, body) = (&self.joint, &self.model.body);
-        let root = body.root(joint, mode, guess, self.last_step);
-        let [by_a, by_b, by_c] = root.by_compliance;
-        let scale = 2.0 / root.lambda;
-        let springs = [
-            -scale * (by_a * joint.a + 0.5 * by_c * joint.c),
-            -scale * (by_b * joint.b + 0.5 * by_c * joint.c),
-            scale * by_c * self.by_coupling,
-        ];
-        let attached = match body {
-            JointedBody::Elements(modes) => modes.attachment_sensitivity(root.lambda, root.load),
-            _ => [0.0; 2],
-        };
-        (root.lambda, springs, attached)
-    }
 }
 
-/// ln Kx and ln Ky at a point: Kx = Kt L^3/(E I), Ky = Kr L/(E I), I = b h^3/12.
+/// Returns ln Kx and ln Ky at a point: Kx = Kt L^3/(E I), Ky = Kr L/(E I), I = b h^3/12.
 pub(super) fn log_nondimensional(point: &Point) -> [f64; 2] {
     let [kt, kr, _, modulus, _, length, width, thickness] = *point;
     let stiffness = modulus + width + 3.0 * thickness - 12f64.ln();

@@ -1,5 +1,5 @@
-//! The consistent estimate: the joint (and beam) whose natural frequencies are nearest to the
-//! measured ones.
+//! The frequency fit, which reports call the consistent estimate: the joint (and beam) whose natural
+//! frequencies are nearest to the measured ones.
 //!
 //! ```text
 //! JointedStructure -> FrequencyModel   frequencies and exact derivatives at any point
@@ -15,26 +15,28 @@
 
 pub mod estimate;
 pub mod estimator;
-pub mod least_squares;
 pub mod model;
 pub mod result;
 
-mod starts;
+mod initial_guesses;
+mod problem;
 
 pub use estimate::estimate_consistently;
 pub use estimator::{
     ConsistentEstimator, ConsistentMonteCarlo, Neighbourhood, PointFit, QuantitySpread,
 };
-pub use least_squares::{Loss, StopReason};
 pub use model::{
     FrequencyModel, JointedStructure, ModeResponse, PARAMETERS, Parameter, Point, Route,
 };
 pub use result::{
     ConsistentEstimate, Correlation, EstimatedQuantity, ExtraMode, FittedMode, FlatDirection,
     Goodness, Identifiability, Limit, NOTABLE_MISFIT, NeededAccuracy, OtherMinimum, Quantity,
-    Verdict, exceedance,
+    Verdict,
 };
 pub use tapjoint_beam::specimen::LapLayout;
+pub use tapjoint_numerics::least_squares::{Loss, StopReason};
+
+use tapjoint_beam::Joint;
 
 // What is to be estimated, and how.
 
@@ -46,17 +48,6 @@ pub enum ResidualWeights {
     Measured,
     /// The frequency itself: equal relative weights, and no intervals.
     Relative,
-}
-
-/// A stiffness or coupling that is held instead of estimated.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct HeldJoint {
-    /// Kt (N/m); infinite = rigid.
-    pub kt: Option<f64>,
-    /// Kr (N m/rad); infinite = rigid.
-    pub kr: Option<f64>,
-    /// sqrt(Kt Kr)/Ktr (1).
-    pub coupling: Option<f64>,
 }
 
 /// Standard uncertainties of the beam's properties, all relative (1); `None` = taken as exact.
@@ -87,7 +78,7 @@ impl BeamTolerances {
     }
 }
 
-/// Whether intervals are found by following the misfit or from the covariance.
+/// The way to a 95 % interval.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Intervals {
     /// Profile likelihood: all values with chi-squared within 3.84 of the smallest, everything
@@ -103,9 +94,9 @@ pub enum Intervals {
 pub struct ConsistentSettings {
     /// What is estimated.
     pub fit: Vec<Parameter>,
-    /// Stiffnesses held at known values. What is neither estimated nor held is rigid (Kt, Kr) or
-    /// absent (coupling).
-    pub held: HeldJoint,
+    /// The joint of which everything is held that is not estimated: rigid and without coupling unless
+    /// known otherwise.
+    pub held: Joint,
     /// Weights of the residuals.
     pub weights: ResidualWeights,
     /// How large misfits count.
@@ -121,11 +112,11 @@ pub struct ConsistentSettings {
 }
 
 impl ConsistentSettings {
-    /// These parameters with measured weights, plain squares and nothing held.
+    /// Returns settings for these parameters with measured weights, plain squares and nothing held.
     pub fn fitting(fit: &[Parameter]) -> Self {
         Self {
             fit: fit.to_vec(),
-            held: HeldJoint::default(),
+            held: Joint::RIGID,
             weights: ResidualWeights::Measured,
             loss: Loss::Squares,
             tolerances: BeamTolerances::default(),
@@ -144,7 +135,7 @@ impl ConsistentSettings {
         Self::fitting(&[Parameter::Kt, Parameter::Kr, Parameter::Coupling])
     }
 
-    /// The same with equal relative weights.
+    /// Returns the same settings with equal relative weights.
     pub fn with_relative_weights(mut self) -> Self {
         self.weights = ResidualWeights::Relative;
         self

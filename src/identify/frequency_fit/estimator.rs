@@ -1,14 +1,12 @@
 //! The estimator: what is free, what is known, and the fit as plain data.
 
-use super::least_squares::Covariance;
-use super::least_squares::{Accuracy, Minimum, StopReason, descend};
-use super::least_squares::{Datum, Evaluation, Loss, Prior, Problem, along};
-use super::model::JointedStructure;
-use super::model::{FrequencyModel, PARAMETERS, Parameter, Point};
-use super::result::Limit;
-use super::result::Quantity;
-use super::result::limit_of;
-use super::starts::{everywhere, promising};
+use super::initial_guesses::{everywhere, promising};
+use super::model::{FrequencyModel, JointedStructure, PARAMETERS, Parameter, Point};
+use super::problem::{
+    Covariance, Datum, Evaluation, FULL, MISFIT, Minimum, Prior, Problem, ROUGH, along,
+    value_along, within_bounds,
+};
+use super::result::{Limit, Quantity, joint_at, limit_of};
 use super::{ConsistentSettings, ResidualWeights};
 use crate::pairs::{ModeLambda, PairsModel, estimate_pairs};
 use crate::perturbation::{MonteCarlo, Spread};
@@ -21,6 +19,7 @@ use tapjoint_beam::interface::LAST_STEP;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::Body;
 use tapjoint_beam::{Assembly, Beam, JointStiffness};
+use tapjoint_numerics::least_squares::{Loss, StopReason};
 
 /// A joint to be estimated from the frequencies of these modes, as often as wanted.
 #[derive(Debug, Clone)]
@@ -49,7 +48,7 @@ pub struct PointFit {
     pub stop: StopReason,
 }
 
-/// Where repetitions of an estimate start: the valleys of a first one, and the body as it belongs to
+/// Where repetitions of an estimate start: the minima of a first one, and the body as it belongs to
 /// the deepest of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Neighbourhood {
@@ -58,7 +57,7 @@ pub struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// These places, with the body of the beam as described.
+    /// Returns these points, with the body of the beam as described.
     pub fn at(starts: &[Point]) -> Self {
         Self {
             model: None,
@@ -68,14 +67,14 @@ impl Neighbourhood {
 }
 
 impl PointFit {
-    /// Non-dimensional joint; a direction that is held rigid is infinite.
+    /// Returns the non-dimensional joint; a direction that is held rigid is infinite.
     pub fn joint(&self) -> JointStiffness {
-        super::result::joint_at(&self.point)
+        joint_at(&self.point)
     }
 }
 
 impl ConsistentEstimator {
-    /// For these modes of a structure.
+    /// Returns the estimator for these modes of a structure.
     ///
     /// # Errors
     /// [`IdentifyError::Frequency`], [`IdentifyError::TooFewFrequencies`],
@@ -93,9 +92,9 @@ impl ConsistentEstimator {
         let mut base = model.nominal();
         if structure.assembly != Assembly::Free {
             let held = settings.held;
-            base[Parameter::Kt.index()] = held.kt.map_or(f64::INFINITY, f64::ln);
-            base[Parameter::Kr.index()] = held.kr.map_or(f64::INFINITY, f64::ln);
-            base[Parameter::Coupling.index()] = held.coupling.unwrap_or(0.0).atanh();
+            base[Parameter::Kt.index()] = held.kt.ln();
+            base[Parameter::Kr.index()] = held.kr.ln();
+            base[Parameter::Coupling.index()] = held.coupling.atanh();
         }
         let units = StiffnessUnits::of(&structure.beam);
         for (parameter, unit) in [(Parameter::Kt, units.kt), (Parameter::Kr, units.kr)] {
@@ -103,8 +102,17 @@ impl ConsistentEstimator {
                 base[parameter.index()] = unit.ln();
             }
         }
+        // Only where the frequencies' uncertainties are known can they be weighed against those of the beam.
+        let mut nuisances = Vec::new();
+        if settings.weights == ResidualWeights::Measured {
+            let unfitted = Parameter::ALL
+                .into_iter()
+                .filter(|p| !settings.fit.contains(p));
+            let known = unfitted.filter_map(|p| Some((p, settings.tolerances.of(p)?)));
+            nuisances.extend(known.filter(|(_, std)| *std > 0.0));
+        }
         Ok(Self {
-            nuisances: nuisances(settings),
+            nuisances,
             model,
             settings: settings.clone(),
             modes: modes.to_vec(),
@@ -112,20 +120,18 @@ impl ConsistentEstimator {
         })
     }
 
-    /// Whether a stiffness of the joint is estimated.
+    /// Returns true where a stiffness of the joint is estimated.
     pub fn estimates_a_spring(&self) -> bool {
-        let springs = [Parameter::Kt, Parameter::Kr];
-        springs
-            .iter()
-            .any(|spring| self.settings.fit.contains(spring))
+        let fit = &self.settings.fit;
+        fit.contains(&Parameter::Kt) || fit.contains(&Parameter::Kr)
     }
 
-    /// The measured frequencies (Hz).
+    /// Returns the measured frequencies (Hz).
     pub fn frequencies(&self) -> Vec<f64> {
         self.modes.iter().map(|mode| mode.frequency).collect()
     }
 
-    /// What is free: first what is estimated, then the beam's uncertain properties.
+    /// Returns the free directions: first what is estimated, then the beam's uncertain properties.
     pub(super) fn directions(&self) -> Vec<Point> {
         let nuisances = self.nuisances.iter().map(|(parameter, _)| *parameter);
         let free = self.settings.fit.iter().copied().chain(nuisances);
@@ -186,43 +192,39 @@ impl ConsistentEstimator {
             } = self.model.structure();
             let body = Body::of(beam, *assembly, lap);
             let described: f64 = body.beams().iter().map(Beam::mass).sum();
-            let terms = gradient.iter().zip(&nominal);
-            let product: f64 = terms
-                .map(|(g, x)| if *g == 0.0 { 0.0 } else { g * x })
-                .sum();
             priors.push(Prior {
                 gradient,
-                value: product + (mass / described).ln(),
+                value: value_along(&gradient, &nominal) + (mass / described).ln(),
                 std: std / mass,
             });
         }
         priors
     }
 
-    /// The least misfit over all joints, from the pair regression's estimate and from wherever the
+    /// Returns the least misfit over all joints, from the pair regression's estimate and from wherever the
     /// frequency equation nearly holds.
     pub fn fit(&self) -> PointFit {
         self.fit_frequencies(&self.frequencies())
     }
 
-    /// The same for other frequencies (Hz) of the same modes.
+    /// Fits other frequencies (Hz) of the same modes.
     pub fn fit_frequencies(&self, frequencies: &[f64]) -> PointFit {
         let (model, minima) = self.solve(frequencies);
         let model = model.as_ref().unwrap_or(&self.model);
         self.summary(&self.problem(model, frequencies), minima)
     }
 
-    /// The places from which repetitions of the estimate start: all valleys of this one.
+    /// Returns the points from which repetitions of the estimate start: all minima of this one.
     pub fn neighbourhood(&self) -> Neighbourhood {
         let (model, minima) = self.solve(&self.frequencies());
         Neighbourhood {
             model,
-            starts: minima.iter().map(|minimum| minimum.at.point).collect(),
+            starts: minima.iter().map(|minimum| minimum.state.point).collect(),
         }
     }
 
-    /// The least misfit downhill of known places, for other frequencies (Hz) of the same modes.
-    /// The body is that of the neighbourhood, renewed where the beam moves far from it.
+    /// Fits other frequencies (Hz) of the same modes downhill of known points. The body is that of the
+    /// neighbourhood, renewed where the beam moves far from it.
     pub fn refit(&self, frequencies: &[f64], near: &Neighbourhood) -> PointFit {
         let model = near.model.as_ref().unwrap_or(&self.model);
         let minima = self.refit_in(model, frequencies, &near.starts);
@@ -239,10 +241,10 @@ impl ConsistentEstimator {
     ) -> Vec<Minimum> {
         let mut problem = self.problem(model, frequencies);
         self.rescale(&mut problem, starts);
-        self.valleys(&problem, starts)
+        self.minima(&problem, starts)
     }
 
-    /// The non-dimensional stiffnesses as a function of the frequencies (Hz), for
+    /// Returns the non-dimensional stiffnesses as a function of the frequencies (Hz), for
     /// [`crate::perturbation`]; `None` where the search does not come to an end.
     pub fn stiffnesses_near<'a>(
         &'a self,
@@ -258,68 +260,44 @@ impl ConsistentEstimator {
         }
     }
 
-    /// Kx and Ky at a point, infinite where rigid, and Kz where the coupling is estimated.
+    /// Returns Kx and Ky at a point, infinite where rigid, and Kz where the coupling is estimated.
     pub(super) fn stiffnesses_at(&self, point: &Point) -> Stiffnesses {
-        let joint = super::result::joint_at(point);
-        let [kx, ky] =
-            [(Quantity::Kx, joint.kx), (Quantity::Ky, joint.ky)].map(|(quantity, value)| {
-                match limit_of(quantity, point) {
-                    Some(Limit::Rigid) => f64::INFINITY,
-                    _ => value,
-                }
-            });
+        let joint = joint_at(point);
+        let rigid = [Quantity::Kx, Quantity::Ky]
+            .map(|quantity| limit_of(quantity, point) == Some(Limit::Rigid));
         let coupled = self.settings.fit.contains(&Parameter::Coupling);
         Stiffnesses {
-            kx,
-            ky,
+            kx: if rigid[0] { f64::INFINITY } else { joint.kx },
+            ky: if rigid[1] { f64::INFINITY } else { joint.ky },
             kz: coupled.then(|| joint.cross_compliance.recip()),
         }
     }
 
     fn summary(&self, problem: &Problem<'_>, minima: Vec<Minimum>) -> PointFit {
         let Some(best) = minima.into_iter().next() else {
-            return self.nothing(problem);
+            // Without a single start there is the nominal point.
+            let at = problem.evaluate(&self.base, &problem.measured_lambdas(&self.base));
+            return PointFit {
+                point: at.point,
+                misfit: at.cost,
+                stds: Vec::new(),
+                frequencies: at.responses.iter().map(|found| found.frequency).collect(),
+                stop: StopReason::NothingFree,
+            };
         };
         let directions = self.directions();
-        let covariance = Covariance::of(&best.at, &directions);
+        let covariance = Covariance::new(&best.state.jacobian, &directions);
+        let fitted = directions.iter().take(self.settings.fit.len());
         PointFit {
-            point: best.at.point,
-            misfit: best.at.cost,
-            stds: directions
-                .iter()
-                .take(self.settings.fit.len())
-                .map(|direction| covariance.std(direction))
+            point: best.state.point,
+            misfit: best.state.cost,
+            stds: fitted.map(|direction| covariance.std(direction)).collect(),
+            frequencies: (best.state.responses.iter())
+                .map(|found| found.frequency)
                 .collect(),
-            frequencies: best.at.frequencies,
             stop: best.stop,
         }
     }
-
-    /// Without a single start there is the nominal point.
-    fn nothing(&self, problem: &Problem<'_>) -> PointFit {
-        let at = problem.evaluate(&self.base, &problem.measured_lambdas(&self.base));
-        PointFit {
-            point: at.point,
-            misfit: at.cost,
-            stds: Vec::new(),
-            frequencies: at.frequencies,
-            stop: StopReason::NothingFree,
-        }
-    }
-}
-
-/// The beam's uncertain properties: only where the frequencies' uncertainties are known can the two
-/// be weighed against each other.
-fn nuisances(settings: &ConsistentSettings) -> Vec<(Parameter, f64)> {
-    if settings.weights == ResidualWeights::Relative {
-        return Vec::new();
-    }
-    Parameter::ALL
-        .into_iter()
-        .filter(|parameter| !settings.fit.contains(parameter))
-        .filter_map(|parameter| Some((parameter, settings.tolerances.of(parameter)?)))
-        .filter(|(_, std)| *std > 0.0)
-        .collect()
 }
 
 fn is_positive(value: f64) -> bool {
@@ -340,10 +318,9 @@ fn check(
             value: mode.frequency,
         });
     }
-    let joint = [Parameter::Kt, Parameter::Kr, Parameter::Coupling];
     let no_joint = structure.assembly == Assembly::Free;
     let fit = &settings.fit;
-    if fit.is_empty() || no_joint && fit.iter().any(|parameter| joint.contains(parameter)) {
+    if fit.is_empty() || no_joint && fit.iter().any(|fitted| Parameter::JOINT.contains(fitted)) {
         return Err(IdentifyError::NothingToEstimate);
     }
     let known = modes.len() + usize::from(settings.weighed_mass.is_some());
@@ -363,31 +340,39 @@ fn check(
     Ok(())
 }
 
-// From frequencies to the point of least misfit, and to every other valley there is.
+// From frequencies to the point of least misfit, and to every other minimum there is.
 
-/// Two valleys nearer than this in every estimated coordinate (1, logarithms) are one.
-const SAME_VALLEY: f64 = 0.05;
+/// Two minima nearer than this in every estimated coordinate (1, logarithms) are one.
+const SAME_MINIMUM: f64 = 0.05;
 /// The attached masses' share is followed to first order; this many renewals make it exact.
 const RENEWALS: usize = 6;
 
 impl ConsistentEstimator {
-    /// All valleys, the deepest first, and the model renewed where the beam has moved far.
+    /// Returns all minima, the deepest first, and the model renewed where the beam has moved far.
     pub(super) fn solve(&self, frequencies: &[f64]) -> (Option<FrequencyModel>, Vec<Minimum>) {
         let mut problem = self.problem(&self.model, frequencies);
-        let starts = self.starts(&problem);
+        let mut starts = promising(&problem, &self.base, &self.settings.fit);
+        starts.extend(self.pairs_guess(&problem));
         self.rescale(&mut problem, &starts);
-        let mut minima = self.valleys(&problem, &starts);
-        if !self.is_good(&problem, &minima) {
-            // A bad fit may be the wrong valley: now no effort is spared.
+        let mut minima = self.minima(&problem, &starts);
+        // A misfit below three times what it should be, or, without stated uncertainties, below what any
+        // reading achieves leaves no room for another minimum.
+        const READING: f64 = 1e-4;
+        let allowed = match self.settings.weights {
+            ResidualWeights::Measured => 9.0,
+            ResidualWeights::Relative => READING * READING,
+        };
+        let enough = allowed * problem.data.len() as f64;
+        if minima.first().is_none_or(|best| best.state.cost >= enough) {
             let mut all = everywhere(&self.base, &self.settings.fit);
-            all.extend(minima.iter().map(|minimum| minimum.at.point));
-            minima = self.valleys(&problem, &all);
+            all.extend(minima.iter().map(|minimum| minimum.state.point));
+            minima = self.minima(&problem, &all);
         }
         self.renew(&self.model, frequencies, minima)
     }
 
-    /// Follows the beam where the deepest valley has moved it far from the one that the model was
-    /// built for: the model built anew, if it was, and the valleys by it.
+    /// Follows the beam where the deepest minimum has moved it far from the one that the model was built
+    /// for. Returns the model built anew, if it was, and the minima by it.
     pub(super) fn renew(
         &self,
         model: &FrequencyModel,
@@ -396,7 +381,7 @@ impl ConsistentEstimator {
     ) -> (Option<FrequencyModel>, Vec<Minimum>) {
         let mut renewed = None;
         for _ in 0..RENEWALS {
-            let Some(best) = minima.first().map(|best| best.at.point) else {
+            let Some(best) = minima.first().map(|best| best.state.point) else {
                 break;
             };
             if !renewed.as_ref().unwrap_or(model).is_far(&best) {
@@ -406,35 +391,15 @@ impl ConsistentEstimator {
             let Ok(built) = self.model.rebuilt(&best, highest) else {
                 break;
             };
-            let starts: Vec<Point> = minima.iter().map(|minimum| minimum.at.point).collect();
+            let starts: Vec<Point> = minima.iter().map(|minimum| minimum.state.point).collect();
             minima = self.refit_in(&built, frequencies, &starts);
             renewed = Some(built);
         }
         (renewed, minima)
     }
 
-    /// Whether the misfit is so small that no other valley can matter: below three times what it
-    /// should be, or, without stated uncertainties, below what any reading achieves.
-    fn is_good(&self, problem: &Problem<'_>, minima: &[Minimum]) -> bool {
-        const READING: f64 = 1e-4;
-        let Some(best) = minima.first() else {
-            return false;
-        };
-        let allowed = match self.settings.weights {
-            ResidualWeights::Measured => 9.0,
-            ResidualWeights::Relative => READING * READING,
-        };
-        best.at.cost < allowed * problem.data.len() as f64
-    }
-
-    fn starts(&self, problem: &Problem<'_>) -> Vec<Point> {
-        let mut starts = promising(problem, &self.base, &self.settings.fit);
-        starts.extend(self.pairs_start(problem));
-        starts
-    }
-
-    /// The pair regression's estimate, where it applies and is a joint.
-    fn pairs_start(&self, problem: &Problem<'_>) -> Option<Point> {
+    /// Returns the pair regression's estimate, where it applies and is a joint.
+    fn pairs_guess(&self, problem: &Problem<'_>) -> Option<Point> {
         let structure = self.model.structure();
         let halves = structure.lap.position.is_none() && structure.lap.right.is_none();
         let model = match (structure.assembly, &self.settings.fit[..]) {
@@ -445,29 +410,27 @@ impl ConsistentEstimator {
             }
             _ => return None,
         };
-        let modes = problem
-            .data
-            .iter()
-            .map(|datum| datum.mode)
-            .zip(problem.measured_lambdas(&self.base));
-        let modes: Vec<ModeLambda> = modes
+        let numbers = problem.data.iter().map(|datum| datum.mode);
+        let lambdas = problem.measured_lambdas(&self.base);
+        let modes: Vec<ModeLambda> = numbers
+            .zip(lambdas)
             .map(|(mode, lambda)| ModeLambda { mode, lambda })
             .collect();
         let joint = estimate_pairs(model, &modes).ok()?.joint()?;
         joint.check().ok()?;
-        let units = StiffnessUnits::of(&structure.beam);
-        let mut start = self.base;
-        start[Parameter::Kt.index()] = (joint.kx * units.kt).ln();
-        start[Parameter::Kr.index()] = (joint.ky * units.kr).ln();
-        start[Parameter::Coupling.index()] = joint.coupling().atanh();
-        let usable = start[..3].iter().all(|coordinate| coordinate.is_finite());
-        usable.then(|| problem.within_bounds(start))
+        let joint = joint.in_si(&structure.beam);
+        let mut guess = self.base;
+        guess[Parameter::Kt.index()] = joint.kt.ln();
+        guess[Parameter::Kr.index()] = joint.kr.ln();
+        guess[Parameter::Coupling.index()] = joint.coupling.atanh();
+        let usable = guess[..3].iter().all(|coordinate| coordinate.is_finite());
+        usable.then(|| within_bounds(guess))
     }
 
-    /// Follows every start down roughly, keeps different valleys, and finishes each.
-    pub(super) fn valleys(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
+    /// Follows every start down roughly, keeps different minima, and finishes each.
+    pub(super) fn minima(&self, problem: &Problem<'_>, starts: &[Point]) -> Vec<Minimum> {
         let directions = self.directions();
-        // A last step of 1e-4 leaves 1e-8: enough to tell valleys apart, and half the work.
+        // A last step of 1e-4 leaves 1e-8: enough to tell minima apart, and half the work.
         let rough = Problem {
             last_step: 1e-4,
             ..problem.clone()
@@ -475,21 +438,18 @@ impl ConsistentEstimator {
         let mut found: Vec<Evaluation> = Vec::new();
         for start in starts {
             let guesses = problem.measured_lambdas(start);
-            let at = rough.evaluate(&problem.within_bounds(*start), &guesses);
-            let end = descend(&rough, at, &directions, Accuracy::ROUGH).at;
-            if end.cost.is_finite() && !found.iter().any(|other| same(other, &end, &directions)) {
-                found.push(end);
-            }
+            let end = rough.minimise(&within_bounds(*start), &guesses, &directions, &ROUGH);
+            let new = end.filter(|end| !found.iter().any(|known| self.is_same(known, &end.state)));
+            found.extend(new.map(|end| end.state));
         }
         let mut minima: Vec<Minimum> = Vec::new();
-        for end in found {
-            let exact = problem.evaluate(&end.point, &end.lambdas);
-            let end = descend(problem, exact, &directions, Accuracy::FULL);
-            let known = minima
-                .iter_mut()
-                .find(|other| same(&other.at, &end.at, &directions));
+        for rough in found {
+            let guesses = rough.guesses_at(&rough.point);
+            let end = problem.minimise(&rough.point, &guesses, &directions, &FULL);
+            let Some(end) = end else { continue };
+            let known = (minima.iter_mut()).find(|known| self.is_same(&known.state, &end.state));
             match known {
-                Some(other) if end.at.cost < other.at.cost => *other = end,
+                Some(known) if end.state.cost < known.state.cost => *known = end,
                 Some(_) => {}
                 None => minima.push(end),
             }
@@ -497,18 +457,27 @@ impl ConsistentEstimator {
         for minimum in &mut minima {
             self.follow_to_the_limit(problem, minimum);
         }
-        minima.sort_by(|a, b| a.at.cost.total_cmp(&b.at.cost));
+        minima.sort_by(|a, b| a.state.cost.total_cmp(&b.state.cost));
         minima
     }
 
-    /// A stiffness that no frequency feels any more ends wherever the search lost interest; where
-    /// the limit itself is no worse, the estimate is there.
+    /// Returns true for two points that no free coordinate tells apart.
+    fn is_same(&self, first: &Evaluation, second: &Evaluation) -> bool {
+        let nuisances = self.nuisances.iter().map(|(parameter, _)| parameter);
+        self.settings.fit.iter().chain(nuisances).all(|parameter| {
+            let index = parameter.index();
+            (first.point[index] - second.point[index]).abs() < SAME_MINIMUM
+        })
+    }
+
+    /// Moves a stiffness that no frequency feels to its limit, where that is no worse than wherever the
+    /// search lost interest.
     fn follow_to_the_limit(&self, problem: &Problem<'_>, minimum: &mut Minimum) {
         // Relative change of every frequency per relative change of the stiffness.
         const UNFELT: f64 = 1e-4;
         for parameter in [Parameter::Kt, Parameter::Kr] {
             let index = parameter.index();
-            let data = problem.data.iter().zip(&minimum.at.jacobian);
+            let data = problem.data.iter().zip(&minimum.state.jacobian);
             let felt = data
                 .map(|(datum, row)| (row[index] * datum.std / datum.frequency).abs())
                 .fold(0.0, f64::max);
@@ -518,19 +487,20 @@ impl ConsistentEstimator {
             let free = self.directions();
             let others: Vec<Point> = free.into_iter().filter(|d| d[index] == 0.0).collect();
             for end in [-1e3, 1e3] {
-                let mut point = minimum.at.point;
+                let mut point = minimum.state.point;
                 point[index] += end;
-                let at = problem.evaluate(&problem.within_bounds(point), &minimum.at.lambdas);
-                let there = descend(problem, at, &others, Accuracy::MISFIT);
-                if there.at.cost <= minimum.at.cost {
+                let point = within_bounds(point);
+                let guesses = minimum.state.guesses_at(&point);
+                let there = problem.minimise(&point, &guesses, &others, &MISFIT);
+                if let Some(there) = there.filter(|there| there.state.cost <= minimum.state.cost) {
                     *minimum = there;
                 }
             }
         }
     }
 
-    /// With relative weights a robust loss needs to know what a usual misfit is: that of the least
-    /// squares, by its median, for as many misfits as there is freedom.
+    /// Finds out, with relative weights, what a usual misfit is, for a robust loss needs to know: that of
+    /// the least squares, by its median, for as many misfits as there is freedom.
     pub(super) fn rescale(&self, problem: &mut Problem<'_>, starts: &[Point]) {
         let relative = self.settings.weights == ResidualWeights::Relative;
         if !relative || problem.loss == Loss::Squares {
@@ -538,8 +508,8 @@ impl ConsistentEstimator {
         }
         let loss = std::mem::take(&mut problem.loss);
         let (data, free) = (problem.data.len(), self.settings.fit.len());
-        if let Some(best) = self.valleys(problem, starts).first() {
-            let mut sizes: Vec<f64> = best.at.residuals.iter().map(|r| r.abs()).collect();
+        if let Some(best) = self.minima(problem, starts).first() {
+            let mut sizes: Vec<f64> = best.state.residuals.iter().map(|r| r.abs()).collect();
             sizes.sort_by(f64::total_cmp);
             let median = sizes[(data - 1) / 2];
             let share = (data as f64 / (data.saturating_sub(free)).max(1) as f64).sqrt();
@@ -554,15 +524,7 @@ impl ConsistentEstimator {
     }
 }
 
-fn same(first: &Evaluation, second: &Evaluation, directions: &[Point]) -> bool {
-    directions.iter().all(|direction| {
-        let free = first.point.iter().zip(&second.point).zip(direction);
-        free.filter(|(_, part)| **part != 0.0)
-            .all(|((a, b), _)| (a - b).abs() < SAME_VALLEY)
-    })
-}
-
-// Random errors of the frequencies carried through the consistent estimate by repetition.
+// Random errors of the frequencies carried through the estimate by repetition.
 
 /// Repetitions that share one stream of random numbers: the answer depends on this division, and
 /// not on how many threads work on it.
@@ -597,7 +559,7 @@ pub struct ConsistentMonteCarlo {
 impl ConsistentEstimator {
     /// Repeats the estimate `samples` times with independent normal errors of the frequencies of
     /// their stated standard deviations, and of the properties of the beam that have a tolerance of
-    /// theirs, each repetition from every valley of the first estimate. The body is that of the first
+    /// theirs, each repetition from every minimum of the first estimate. The body is that of the first
     /// estimate: what a repetition moves of the beam is followed to first order, which leaves less
     /// than a thousandth of a standard deviation. The same seed gives the same answer on any number
     /// of threads.
@@ -612,7 +574,7 @@ impl ConsistentEstimator {
         self.monte_carlo_near(&self.neighbourhood(), samples, seed)
     }
 
-    /// The same from a [`ConsistentEstimator::neighbourhood`] that is known already.
+    /// Repeats the estimate from a [`ConsistentEstimator::neighbourhood`] that is known already.
     ///
     /// # Errors
     /// As [`ConsistentEstimator::monte_carlo`].
@@ -636,23 +598,36 @@ impl ConsistentEstimator {
             })
             .collect();
         let found: Vec<Point> = chunks.into_iter().flatten().flatten().collect();
-        let quantities = self
+        let mut spreads = Vec::new();
+        for &quantity in self
             .settings
             .fit
             .iter()
-            .flat_map(|parameter| Quantity::of(*parameter).iter().copied())
-            .filter(|quantity| !matches!(quantity, Quantity::Kz | Quantity::Ktr));
+            .flat_map(|&fitted| Quantity::of(fitted))
+        {
+            if matches!(quantity, Quantity::Kz | Quantity::Ktr) {
+                continue;
+            }
+            let values = found.iter().filter_map(|point| quantity.value(point));
+            if let Some(Spread { median, low, high }) = Spread::of(values) {
+                spreads.push(QuantitySpread {
+                    quantity,
+                    median,
+                    low,
+                    high,
+                });
+            }
+        }
         let joints: Vec<Stiffnesses> = found.iter().map(|at| self.stiffnesses_at(at)).collect();
         Ok(ConsistentMonteCarlo {
             joint: MonteCarlo::of(samples, &joints),
             samples,
             failed: samples - found.len(),
-            spreads: quantities
-                .filter_map(|quantity| spread(quantity, &found))
-                .collect(),
+            spreads,
         })
     }
 
+    /// Returns the point of each of `count` repetitions, `None` where it did not converge.
     fn repeat(
         &self,
         seed: u64,
@@ -665,35 +640,28 @@ impl ConsistentEstimator {
         random.set_stream(stream);
         let model = near.model.as_ref().unwrap_or(&self.model);
         let stated = self.problem(model, &self.frequencies());
-        let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        (0..count)
-            .map(|_| {
-                let mut problem = stated.clone();
-                for (datum, (mean, std)) in problem.data.iter_mut().zip(errors) {
-                    datum.frequency = mean + std * normal();
-                }
-                // What is stated of the beam is a reading too, with its own error.
-                for prior in &mut problem.priors {
-                    prior.value += prior.std * normal();
-                }
-                if problem.data.iter().any(|datum| datum.frequency <= 0.0) {
-                    return None;
-                }
-                self.rescale(&mut problem, &near.starts);
-                let best = self.valleys(&problem, &near.starts).into_iter().next()?;
-                best.stop.converged().then_some(best.at.point)
-            })
-            .collect()
+        let mut normal = StandardNormal.sample_iter(&mut random);
+        let mut points = Vec::with_capacity(count);
+        for _ in 0..count {
+            let mut problem = stated.clone();
+            let read = problem.data.iter_mut().zip(errors);
+            for ((datum, (mean, std)), error) in read.zip(&mut normal) {
+                let error: f64 = error;
+                datum.frequency = mean + std * error;
+            }
+            // What is stated of the beam is a reading too, with its own error.
+            for (prior, error) in problem.priors.iter_mut().zip(&mut normal) {
+                prior.value += prior.std * error;
+            }
+            if problem.data.iter().any(|datum| datum.frequency <= 0.0) {
+                points.push(None);
+                continue;
+            }
+            self.rescale(&mut problem, &near.starts);
+            let best = self.minima(&problem, &near.starts).into_iter().next();
+            let converged = best.filter(|best| best.stop.converged());
+            points.push(converged.map(|best| best.state.point));
+        }
+        points
     }
-}
-
-fn spread(quantity: Quantity, points: &[Point]) -> Option<QuantitySpread> {
-    let values = points.iter().filter_map(|point| quantity.value(point));
-    let Spread { median, low, high } = crate::perturbation::spread(values)?;
-    Some(QuantitySpread {
-        quantity,
-        median,
-        low,
-        high,
-    })
 }

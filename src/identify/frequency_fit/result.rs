@@ -1,10 +1,12 @@
 //! What an estimate says, as plain data.
 
-use super::least_squares::{LOG_STIFFNESS, StopReason};
 use super::model::{PARAMETERS, Parameter, Point, log_nondimensional};
+use super::problem::LOG_STIFFNESS;
 use schemars::JsonSchema;
 use serde::Serialize;
 use tapjoint_beam::{Beam, JointStiffness};
+use tapjoint_numerics::least_squares::StopReason;
+use tapjoint_numerics::stats::chi_square_tail;
 
 /// A parameter at the end of its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,12 +76,12 @@ pub struct FittedMode {
     pub leverage: f64,
 }
 
-/// A valley that is not the deepest.
+/// A minimum that is not the deepest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherMinimum {
     /// Its values.
     pub values: Vec<(Quantity, f64)>,
-    /// How much larger the misfit (chi-squared, or the sum of squared relative errors) is.
+    /// Its misfit: chi-squared, or the sum of squared relative errors.
     pub misfit: f64,
     /// Root-mean-square error of its frequencies (%).
     pub rms_percent: f64,
@@ -106,7 +108,7 @@ pub struct ConsistentEstimate {
     pub goodness: Goodness,
     /// Each mode.
     pub modes: Vec<FittedMode>,
-    /// Other valleys, the deepest first.
+    /// Other minima, the deepest first.
     pub other_minima: Vec<OtherMinimum>,
     /// Why the search ended.
     pub stop: StopReason,
@@ -136,7 +138,7 @@ impl ConsistentEstimate {
     }
 }
 
-// What a point means: stiffnesses in both units, the coupling, the beam.
+// From a point to stiffnesses in both units, the coupling, the beam.
 
 /// A number that an estimate reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -186,7 +188,7 @@ impl Quantity {
         }
     }
 
-    /// What follows from one estimated parameter.
+    /// Returns the numbers that follow from one estimated parameter.
     pub(super) fn of(parameter: Parameter) -> &'static [Self] {
         match parameter {
             Parameter::Kt => &[Self::Kx, Self::Kt],
@@ -200,7 +202,7 @@ impl Quantity {
         }
     }
 
-    /// The coordinate of a point that it is first of all about.
+    /// Returns the coordinate of a point that it is first of all about.
     pub(super) fn lead(self) -> Parameter {
         match self {
             Self::Kx | Self::Kt => Parameter::Kt,
@@ -214,53 +216,49 @@ impl Quantity {
         }
     }
 
-    /// Gradient of its logarithm (of the coupling: of its atanh), which is constant; of Kz and Ktr
-    /// without the part of the coupling.
+    /// Returns the gradient of its logarithm (of the coupling: of its atanh), which is constant; of Kz and
+    /// Ktr without the part of the coupling.
     pub(super) fn gradient(self) -> Point {
         let mut gradient = [0.0; PARAMETERS];
-        let mut set = |parameter: Parameter, value: f64| gradient[parameter.index()] = value;
-        match self {
+        let [by_kt, by_kr] = match self {
+            Self::Kx => [1.0, 0.0],
+            Self::Ky => [0.0, 1.0],
+            Self::Kz | Self::Ktr => [0.5, 0.5],
+            other => {
+                gradient[other.lead().index()] = 1.0;
+                return gradient;
+            }
+        };
+        gradient[Parameter::Kt.index()] = by_kt;
+        gradient[Parameter::Kr.index()] = by_kr;
+        if self != Self::Ktr {
             // Kx = 12 Kt L^3/(E b h^3) and Ky = 12 Kr L/(E b h^3); Kz of half of either.
-            Self::Kx | Self::Ky | Self::Kz => {
-                set(Parameter::Modulus, -1.0);
-                set(Parameter::Width, -1.0);
-                set(Parameter::Thickness, -3.0);
-                let (kt, kr) = match self {
-                    Self::Kx => (1.0, 0.0),
-                    Self::Ky => (0.0, 1.0),
-                    _ => (0.5, 0.5),
-                };
-                set(Parameter::Kt, kt);
-                set(Parameter::Kr, kr);
-                set(Parameter::Length, 3.0 * kt + kr);
-            }
-            Self::Ktr => {
-                set(Parameter::Kt, 0.5);
-                set(Parameter::Kr, 0.5);
-            }
-            other => set(other.lead(), 1.0),
+            gradient[Parameter::Modulus.index()] = -1.0;
+            gradient[Parameter::Width.index()] = -1.0;
+            gradient[Parameter::Thickness.index()] = -3.0;
+            gradient[Parameter::Length.index()] = 3.0 * by_kt + by_kr;
         }
         gradient
     }
 
-    /// Its value at a point; `None` where it is infinite.
+    /// Returns its value at a point; `None` where it is infinite.
     pub(super) fn value(self, point: &Point) -> Option<f64> {
-        let at = |parameter: Parameter| point[parameter.index()];
         let [log_kx, log_ky] = log_nondimensional(point);
-        let coupling = at(Parameter::Coupling).tanh();
+        let [log_kt, log_kr, coupling, ..] = *point;
+        let coupling = coupling.tanh();
         let value = match self {
             Self::Kx => log_kx.exp(),
             Self::Ky => log_ky.exp(),
             Self::Kz => (0.5 * (log_kx + log_ky)).exp() / coupling,
-            Self::Ktr => (0.5 * (at(Parameter::Kt) + at(Parameter::Kr))).exp() / coupling,
+            Self::Ktr => (0.5 * (log_kt + log_kr)).exp() / coupling,
             Self::Coupling => coupling,
-            other => at(other.lead()).exp(),
+            other => point[other.lead().index()].exp(),
         };
         value.is_finite().then_some(value)
     }
 }
 
-/// The non-dimensional joint at a point.
+/// Returns the non-dimensional joint at a point.
 pub(super) fn joint_at(point: &Point) -> JointStiffness {
     let [kx, ky] = log_nondimensional(point).map(f64::exp);
     let coupling = point[Parameter::Coupling.index()].tanh();
@@ -333,7 +331,7 @@ impl Goodness {
         let misfit_per_freedom = (freedom > 0).then(|| (squares / freedom as f64).sqrt());
         let probability = chi_squared
             .filter(|_| freedom > 0)
-            .map(|chi_squared| exceedance(chi_squared, freedom));
+            .map(|chi_squared| chi_square_tail(chi_squared, freedom as f64));
         let verdict = match (probability, misfit_per_freedom) {
             (_, None) => Verdict::Untestable,
             (Some(p), _) if p < HOPELESS => Verdict::CannotExplain,
@@ -403,47 +401,7 @@ impl Goodness {
     }
 }
 
-/// Probability that chi-squared with so many degrees of freedom exceeds a value: with x half of
-/// it, e^-x sum x^k/k! over k < freedom/2 for even ones; for odd ones the half-integer powers and
-/// erfc(sqrt x) in the place of the rest of the sum.
-pub fn exceedance(chi_squared: f64, freedom: usize) -> f64 {
-    let x = 0.5 * chi_squared.max(0.0);
-    let (mut sum, mut term, mut order) = if freedom.is_multiple_of(2) {
-        (0.0, (-x).exp(), 1.0)
-    } else {
-        // x^(1/2) e^-x / Gamma(3/2) begins the half-integer powers.
-        let first = 2.0 * (x / std::f64::consts::PI).sqrt() * (-x).exp();
-        (complementary_error_function(x.sqrt()), first, 1.5)
-    };
-    for _ in 0..freedom / 2 {
-        sum += term;
-        term *= x / order;
-        order += 1.0;
-    }
-    sum.min(1.0)
-}
-
-/// erfc(x) for x >= 0: the series of erf below 2, the continued fraction above.
-fn complementary_error_function(x: f64) -> f64 {
-    let root_pi = std::f64::consts::PI.sqrt();
-    if x < 2.0 {
-        // erf x = 2/sqrt(pi) sum (-1)^n x^(2n+1)/(n! (2n+1)); e^-x^2 taken out keeps every term
-        // positive: erf x = 2/sqrt(pi) e^-x^2 sum 2^n x^(2n+1)/(2n+1)!!.
-        let (mut term, mut sum) = (x, x);
-        for n in 1..60 {
-            term *= 2.0 * x * x / f64::from(2 * n + 1);
-            sum += term;
-        }
-        return 1.0 - 2.0 / root_pi * (-x * x).exp() * sum;
-    }
-    // erfc x = e^-x^2/sqrt(pi) / (x + (1/2)/(x + 1/(x + (3/2)/(x + ...)))).
-    let fraction = (1..=60)
-        .rev()
-        .fold(x, |tail, k| x + 0.5 * f64::from(k) / tail);
-    (-x * x).exp() / (root_pi * fraction)
-}
-
-/// Where a coordinate is at the end of its range but for rounding.
+/// Returns the end of its range that a coordinate has reached but for rounding.
 pub(super) fn limit_of(quantity: Quantity, point: &Point) -> Option<Limit> {
     // Within a factor e^3 of the end no frequency differs from that at the end.
     const NEAR: f64 = 3.0;

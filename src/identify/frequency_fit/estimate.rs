@@ -1,0 +1,721 @@
+//! The whole estimate: the fit, its uncertainty, its test, and what it cannot tell.
+
+use super::estimator::ConsistentEstimator;
+use super::model::{JointedStructure, Parameter, Point, beam_at, log_nondimensional};
+use super::problem::{
+    Covariance, Evaluation, LOG_STIFFNESS, MISFIT, Minimum, NOTHING_KNOWN, Problem, along, dot,
+    value_along,
+};
+use super::result::{
+    ConsistentEstimate, Correlation, EstimatedQuantity, ExtraMode, FittedMode, FlatDirection,
+    Goodness, Identifiability, Limit, NeededAccuracy, OtherMinimum, Quantity, joint_at, limit_of,
+};
+use super::{ConsistentSettings, Intervals, ResidualWeights};
+use crate::{IdentifyError, MeasuredMode};
+use nalgebra::{DMatrix, SVD};
+use tapjoint_numerics::stats::{NORMAL_95, median, root_mean_square, student};
+
+/// Estimates a joint from the frequencies of these modes.
+///
+/// # Errors
+/// As [`ConsistentEstimator::new`].
+pub fn estimate_consistently(
+    structure: &JointedStructure,
+    modes: &[MeasuredMode],
+    settings: &ConsistentSettings,
+) -> Result<ConsistentEstimate, IdentifyError> {
+    ConsistentEstimator::new(structure, modes, settings)?.estimate()
+}
+
+/// A finished fit with what its report needs.
+struct Finished<'a> {
+    estimator: &'a ConsistentEstimator,
+    problem: Problem<'a>,
+    best: Minimum,
+    directions: Vec<Point>,
+    covariance: Covariance,
+    goodness: Goodness,
+}
+
+impl ConsistentEstimator {
+    /// Returns the estimate with all that is known of it.
+    ///
+    /// # Errors
+    /// [`IdentifyError::NothingToEstimate`] where no start has finite frequencies.
+    pub fn estimate(&self) -> Result<ConsistentEstimate, IdentifyError> {
+        let frequencies = self.frequencies();
+        let (renewed, minima) = self.solve(&frequencies);
+        let model = renewed.as_ref().unwrap_or(&self.model);
+        let mut problem = self.problem(model, &frequencies);
+        let mut minima = minima.into_iter();
+        let best = minima.next().ok_or(IdentifyError::NothingToEstimate)?;
+        // A robust loss without stated uncertainties was fitted in units of the usual misfit.
+        self.rescale(&mut problem, &[best.state.point]);
+        let directions = self.directions();
+        let finished = Finished {
+            estimator: self,
+            covariance: Covariance::new(&best.state.jacobian, &directions),
+            goodness: self.goodness(&problem, &best, directions.len()),
+            problem,
+            best,
+            directions,
+        };
+        let best = &finished.best;
+        Ok(ConsistentEstimate {
+            modes_used: self.modes.iter().map(|mode| mode.mode).collect(),
+            fit: self.settings.fit.clone(),
+            quantities: finished.quantities(),
+            covariance: finished.covariance_matrix(),
+            stiffness_covariance: finished.stiffness_covariance(),
+            correlations: finished.correlations(),
+            goodness: finished.goodness,
+            modes: finished.modes(),
+            other_minima: minima.map(|other| finished.other(&other)).collect(),
+            stop: best.stop,
+            identifiability: finished.identifiability(),
+            joint: joint_at(&best.state.point),
+            beam: beam_at(&self.model.structure().beam, &best.state.point),
+        })
+    }
+
+    fn goodness(&self, problem: &Problem<'_>, best: &Minimum, free: usize) -> Goodness {
+        let pairs = problem.data.iter().zip(&best.state.responses);
+        let misfits: Vec<f64> = pairs
+            .clone()
+            .map(|(datum, found)| (found.frequency - datum.frequency) / datum.frequency)
+            .collect();
+        // The plain sum of squares, whatever the loss: only its distribution is known.
+        let modes: f64 = pairs
+            .map(|(datum, found)| ((found.frequency - datum.frequency) / datum.std).powi(2))
+            .sum();
+        let priors: f64 = best.state.residuals[problem.data.len()..]
+            .iter()
+            .map(|residual| residual * residual)
+            .sum();
+        let measured = self.settings.weights == ResidualWeights::Measured;
+        let known = problem.data.len() + problem.priors.len();
+        Goodness::new(
+            &misfits,
+            measured.then_some(modes + priors),
+            known.saturating_sub(free),
+        )
+    }
+}
+
+impl Finished<'_> {
+    /// Parameters at the end of their range.
+    fn limits(&self) -> Vec<(Parameter, Limit)> {
+        let point = &self.best.state.point;
+        let fit = self.estimator.settings.fit.iter();
+        fit.filter_map(|&parameter| {
+            let quantity = Quantity::of(parameter).first()?;
+            Some((parameter, limit_of(*quantity, point)?))
+        })
+        .collect()
+    }
+
+    fn measured(&self) -> bool {
+        self.estimator.settings.weights == ResidualWeights::Measured
+    }
+
+    /// Factor from the covariance's unit to standard uncertainties scaled by the misfit.
+    fn scale(&self) -> Option<f64> {
+        if self.measured() {
+            self.goodness.uncertainty_factor()
+        } else {
+            // The covariance is in units of the weights' relative deviation, 1 unless a loss rescaled it.
+            let unit = self.problem.data.first().map(|d| d.std / d.frequency)?;
+            self.goodness.misfit_per_freedom.map(|misfit| misfit / unit)
+        }
+    }
+
+    fn quantities(&self) -> Vec<EstimatedQuantity> {
+        let nuisances = self
+            .estimator
+            .nuisances
+            .iter()
+            .map(|(parameter, _)| *parameter);
+        let parameters = self.estimator.settings.fit.iter().copied().chain(nuisances);
+        parameters
+            .flat_map(|parameter| Quantity::of(parameter).iter())
+            .map(|quantity| match quantity {
+                Quantity::Kz | Quantity::Ktr => self.cross_stiffness(*quantity),
+                _ => self.quantity(*quantity),
+            })
+            .collect()
+    }
+
+    /// Returns a quantity that is the exponential, or the coupling that is the tanh, of its coordinate.
+    fn quantity(&self, quantity: Quantity) -> EstimatedQuantity {
+        let point = &self.best.state.point;
+        let value = quantity.value(point);
+        // d value per d coordinate.
+        let slope = match (quantity, value) {
+            (Quantity::Coupling, Some(coupling)) => Some(1.0 - coupling * coupling),
+            (_, value) => value,
+        };
+        let gradient = quantity.gradient();
+        let now = value_along(&gradient, point);
+        let unit = self.covariance.std(&gradient);
+        let std = unit.zip(slope).map(|(std, slope)| std * slope);
+        let scale = self.scale();
+        // The interval with the misfit for uncertainty is that of the coordinate to first order, by
+        // Student's distribution, because so few frequencies know the misfit only roughly.
+        let freedom = self.goodness.degrees_of_freedom as f64;
+        let scaled = unit.zip(scale).map(|(unit, scale)| {
+            let half = student::quantile(0.05, freedom) * unit * scale;
+            let ends = [now - half, now + half];
+            ends.map(|coordinate| self.quantity_at(quantity, coordinate))
+                .into()
+        });
+        let intervals = Some(self.estimator.settings.intervals).filter(|_| self.measured());
+        let ends = match intervals {
+            None => [None; 2],
+            Some(Intervals::Linear) => {
+                [-NORMAL_95, NORMAL_95].map(|factor| unit.map(|std| now + factor * std))
+            }
+            Some(Intervals::Profile) => {
+                [-1.0, 1.0].map(|sign| Profile::new(self, quantity, sign).end())
+            }
+        };
+        let [low, high] =
+            ends.map(|end| end.map(|coordinate| self.quantity_at(quantity, coordinate)));
+        // Where one end of a profile is missing the other is all that is known.
+        let profiled = intervals == Some(Intervals::Profile);
+        EstimatedQuantity {
+            quantity,
+            value,
+            std: std.filter(|_| self.measured()),
+            std_scaled: std.zip(scale).map(|(std, scale)| std * scale),
+            low,
+            high,
+            scaled,
+            at_least: low.filter(|_| profiled && high.is_none()),
+            at_most: high.filter(|_| profiled && low.is_none()),
+            limit: limit_of(quantity, point),
+        }
+    }
+
+    /// Returns the quantity's value where its coordinate has this value.
+    fn quantity_at(&self, quantity: Quantity, coordinate: f64) -> f64 {
+        let point = &self.best.state.point;
+        match quantity {
+            Quantity::Coupling => coordinate.tanh(),
+            _ => {
+                let now = value_along(&quantity.gradient(), point);
+                quantity.value(point).unwrap_or(f64::INFINITY) * (coordinate - now).exp()
+            }
+        }
+    }
+
+    /// Returns Kz or Ktr, whose sign is that of the coupling. They have an interval, of the logarithm to
+    /// first order, only where the coupling's own has one sign.
+    fn cross_stiffness(&self, quantity: Quantity) -> EstimatedQuantity {
+        let point = &self.best.state.point;
+        let coupling = self.quantity(Quantity::Coupling);
+        let value = quantity.value(point);
+        let mut gradient = quantity.gradient();
+        // d ln tanh z/dz = (1 - c^2)/c.
+        let c = coupling.value.unwrap_or(0.0);
+        gradient[Parameter::Coupling.index()] = -(1.0 - c * c) / c;
+        let unit = if c == 0.0 {
+            None
+        } else {
+            self.covariance.std(&gradient)
+        };
+        let one_sign = coupling
+            .low
+            .zip(coupling.high)
+            .is_some_and(|(low, high)| low * high > 0.0);
+        let [low, high] = [-1.0, 1.0].map(|sign: f64| {
+            let (value, unit) = value.zip(unit).filter(|_| one_sign)?;
+            Some(value * (sign * value.signum() * NORMAL_95 * unit).exp())
+        });
+        let std = value.zip(unit).map(|(value, unit)| value.abs() * unit);
+        EstimatedQuantity {
+            quantity,
+            value,
+            std: std.filter(|_| self.measured()),
+            std_scaled: std.zip(self.scale()).map(|(std, scale)| std * scale),
+            low,
+            high,
+            scaled: None,
+            at_least: None,
+            at_most: None,
+            limit: coupling.limit,
+        }
+    }
+
+    fn modes(&self) -> Vec<FittedMode> {
+        let rows = self.problem.data.iter().zip(&self.best.state.responses);
+        rows.zip(&self.best.state.jacobian)
+            .map(|((datum, found), slopes)| FittedMode {
+                mode: datum.mode,
+                measured: datum.frequency,
+                predicted: found.frequency,
+                error_percent: 100.0 * (found.frequency - datum.frequency) / datum.frequency,
+                standardised: self
+                    .measured()
+                    .then_some((found.frequency - datum.frequency) / datum.std),
+                // The diagonal of J (J^T J)^-1 J^T.
+                leverage: self.covariance.between(slopes, slopes),
+            })
+            .collect()
+    }
+
+    fn other(&self, other: &Minimum) -> OtherMinimum {
+        let fit = self.estimator.settings.fit.iter();
+        let quantities = fit.flat_map(|parameter| Quantity::of(*parameter).iter());
+        let errors: Vec<f64> = self
+            .problem
+            .data
+            .iter()
+            .zip(&other.state.responses)
+            .map(|(datum, found)| 100.0 * (found.frequency - datum.frequency) / datum.frequency)
+            .collect();
+        OtherMinimum {
+            values: quantities
+                .filter_map(|quantity| Some((*quantity, quantity.value(&other.state.point)?)))
+                .collect(),
+            misfit: other.state.cost,
+            rms_percent: root_mean_square(&errors),
+        }
+    }
+}
+
+// Covariances and correlations of the estimate's numbers.
+
+impl Finished<'_> {
+    /// Factor from the covariance's unit to a variance: the misfit's where no uncertainty is stated.
+    fn variance_unit(&self) -> Option<f64> {
+        if self.measured() {
+            Some(1.0)
+        } else {
+            Some(self.scale()?.powi(2))
+        }
+    }
+
+    /// Of ln Kx and ln Ky, where both are estimated and neither is at its limit.
+    fn stiffness_covariance(&self) -> Option<[[f64; 2]; 2]> {
+        let both = [Quantity::Kx, Quantity::Ky];
+        let fit = &self.estimator.settings.fit;
+        let point = &self.best.state.point;
+        let is_open = both.iter().all(|quantity| {
+            fit.contains(&quantity.lead())
+                && limit_of(*quantity, point).is_none()
+                && self.covariance.std(&quantity.gradient()).is_some()
+        });
+        let factor = self.variance_unit().filter(|_| is_open)?;
+        let gradients = both.map(Quantity::gradient);
+        Some(
+            gradients.map(|first| {
+                gradients.map(|second| factor * self.covariance.between(&first, &second))
+            }),
+        )
+    }
+
+    fn covariance_matrix(&self) -> Option<Vec<Vec<f64>>> {
+        let factor = self.variance_unit()?;
+        let directions = &self.directions[..self.estimator.settings.fit.len()];
+        let mut rows = Vec::with_capacity(directions.len());
+        for first in directions {
+            let row = directions.iter();
+            rows.push(
+                row.map(|second| factor * self.covariance.between(first, second))
+                    .collect(),
+            );
+        }
+        Some(rows)
+    }
+
+    fn correlations(&self) -> Vec<Correlation> {
+        let fit = &self.estimator.settings.fit;
+        let mut found = Vec::new();
+        for (index, &first) in fit.iter().enumerate() {
+            for &second in &fit[index + 1..] {
+                let (a, b) = (along(first), along(second));
+                let size = self.covariance.between(&a, &a) * self.covariance.between(&b, &b);
+                found.push(Correlation {
+                    first,
+                    second,
+                    value: (self.covariance.between(&a, &b) / size.sqrt()).clamp(-1.0, 1.0),
+                });
+            }
+        }
+        found
+    }
+}
+
+// Profile-likelihood intervals: every value of a quantity under which the rest can still be fitted
+// nearly as well.
+//
+// A quantity's logarithm is a linear function g . u of the point. It is held by moving only along
+// directions that leave g . u alone; what is left is an estimate with one unknown less, warm from
+// the last one. The signed root of the rise in chi-squared is nearly straight in most cases, so
+// that a secant finds its end within a few such estimates.
+
+/// Rise in chi-squared at the ends of a 95 % interval: the 95 % point of chi-squared with one degree
+/// of freedom. The same holds where one end is missing. A limit at the 90 % point, of one side alone,
+/// would be right in 95 % only of those who had decided for it beforehand; here the data decide, and
+/// who takes the interval where it has two ends and that limit where not is wrong more often
+/// (Feldman & Cousins 1998).
+pub const RISE_95: f64 = 3.841_459;
+
+/// One end of a quantity's interval, looked for from the best point on.
+struct Profile<'a> {
+    fit: &'a Finished<'a>,
+    quantity: Quantity,
+    /// Gradient of the quantity's coordinate.
+    gradient: Point,
+    /// Coordinate that makes up for what the directions move of the quantity's.
+    lead: usize,
+    /// Directions that leave the quantity alone.
+    held: Vec<Point>,
+    /// Direction in which the end is looked for: -1 or 1.
+    sign: f64,
+}
+
+/// A place on a profile.
+struct Place {
+    /// Distance from the best point.
+    offset: f64,
+    at: Evaluation,
+    /// Root of the rise in chi-squared less that wanted.
+    excess: f64,
+}
+
+impl<'a> Profile<'a> {
+    fn new(fit: &'a Finished<'a>, quantity: Quantity, sign: f64) -> Self {
+        let gradient = quantity.gradient();
+        let lead = quantity.lead().index();
+        let free = fit
+            .directions
+            .iter()
+            .filter(|direction| direction[lead] == 0.0);
+        let mut held: Vec<Point> = free.copied().collect();
+        for direction in &mut held {
+            direction[lead] -= dot(&gradient, direction) / gradient[lead];
+        }
+        Self {
+            fit,
+            quantity,
+            gradient,
+            lead,
+            held,
+            sign,
+        }
+    }
+
+    /// Returns where the quantity's logarithm (of the coupling: its atanh) has raised chi-squared by
+    /// [`RISE_95`]; `None` where it never does.
+    fn end(&self) -> Option<f64> {
+        let wanted = RISE_95.sqrt();
+        let furthest = self.furthest()?;
+        let std = self.fit.covariance.std(&self.gradient).unwrap_or(1.0);
+        let mut offset = (wanted * std).clamp(1e-9, 1.0).min(furthest);
+        let best = &self.fit.best.state;
+        let mut near = Place {
+            offset: 0.0,
+            at: best.clone(),
+            excess: -wanted,
+        };
+        let far = loop {
+            let far = self.place(offset, &near.at)?;
+            if far.excess >= 0.0 {
+                break far;
+            }
+            if offset >= furthest {
+                return None;
+            }
+            // A straight profile is met at once; a flat one is walked in growing strides.
+            let straight = offset * wanted / (wanted + far.excess).max(0.1 * wanted);
+            offset = (1.05 * straight)
+                .clamp(1.1 * offset, offset + 3.0)
+                .min(furthest);
+            near = far;
+        };
+        let end = self.close_in(near, far)?;
+        Some(value_along(&self.gradient, &best.point) + self.sign * end)
+    }
+
+    /// Returns how far the quantity's coordinate may go; `None` where it is there already.
+    fn furthest(&self) -> Option<f64> {
+        // The coupling's limit and a factor of e^4 of the beam's properties, which no beam has.
+        const COUPLING: f64 = 10.0;
+        const BEAM: f64 = 4.0;
+        let point = &self.fit.best.state.point;
+        let [log_kx, log_ky] = log_nondimensional(point);
+        let (low, high) = LOG_STIFFNESS;
+        let (now, low, high) = match self.quantity.lead() {
+            Parameter::Kt => (log_kx, low, high),
+            Parameter::Kr => (log_ky, low, high),
+            Parameter::Coupling => (point[2], -COUPLING, COUPLING),
+            _ => (0.0, -BEAM, BEAM),
+        };
+        let room = if self.sign < 0.0 {
+            now - low
+        } else {
+            high - now
+        };
+        (room > 1e-6).then_some(room)
+    }
+
+    /// Returns the least misfit at a distance from the best point, looked for from another place on; `None`
+    /// where it is no number.
+    fn place(&self, offset: f64, from: &Evaluation) -> Option<Place> {
+        let best = &self.fit.best.state;
+        let mut point = from.point;
+        let wanted = value_along(&self.gradient, &best.point) + self.sign * offset;
+        point[self.lead] +=
+            (wanted - value_along(&self.gradient, &point)) / self.gradient[self.lead];
+        let problem = &self.fit.problem;
+        let guesses = from.guesses_at(&point);
+        let at = problem
+            .minimise(&point, &guesses, &self.held, &MISFIT)?
+            .state;
+        let excess = (at.cost - best.cost).max(0.0).sqrt() - RISE_95.sqrt();
+        Some(Place { offset, at, excess })
+    }
+
+    /// Regula falsi with the Illinois rule between two places, the nearer with too small a rise.
+    fn close_in(&self, mut near: Place, mut far: Place) -> Option<f64> {
+        // A thousandth of a standard deviation in the root of the rise: no reader sees it.
+        const ENOUGH: f64 = 1e-3;
+        const STEPS: usize = 40;
+        let (mut near_weight, mut far_weight) = (near.excess, far.excess);
+        for _ in 0..STEPS {
+            let share = near_weight / (near_weight - far_weight);
+            let offset = near.offset + share * (far.offset - near.offset);
+            let middle = self.place(offset, &near.at)?;
+            if middle.excess.abs() < ENOUGH || far.offset - near.offset < 1e-9 {
+                return Some(offset);
+            }
+            if middle.excess < 0.0 {
+                near_weight = middle.excess;
+                far_weight *= 0.5;
+                near = middle;
+            } else {
+                far_weight = middle.excess;
+                near_weight *= 0.5;
+                far = middle;
+            }
+        }
+        Some(0.5 * (near.offset + far.offset))
+    }
+}
+
+// What these frequencies can tell and what they cannot.
+
+/// A combination of parameters known no better than this (1, relative) is called flat: a factor of
+/// two either way is within its 95 % interval.
+const FLAT: f64 = 0.35;
+/// A parameter that even alone, all others known, is known no better than this is called dead.
+const DEAD: f64 = 1.0;
+/// Relative accuracy of the usual reading where none is stated: half a line of 800 in a band whose
+/// middle the mode is in.
+const USUAL_ACCURACY: f64 = 1e-3;
+/// A stiffness counts as measurable when its standard uncertainty is this part of it.
+const MEASURABLE: f64 = 0.1;
+/// Shares below this part of the largest are left out of a sentence.
+const NEGLIGIBLE: f64 = 0.05;
+
+impl Finished<'_> {
+    fn identifiability(&self) -> Identifiability {
+        let fit = &self.estimator.settings.fit;
+        // Without stated uncertainties misfits stand in units of the frequency: taken for usual ones.
+        let unit = match self.estimator.settings.weights {
+            ResidualWeights::Measured => 1.0,
+            ResidualWeights::Relative => 1.0 / USUAL_ACCURACY,
+        };
+        let rows = self.best.state.jacobian.iter();
+        let jacobian: Vec<Point> = rows.map(|row| row.map(|slope| unit * slope)).collect();
+        let (singular_values, directions) = decompose(&jacobian, fit);
+        let (largest, smallest) = (singular_values.first(), singular_values.last());
+        let dead = fit.iter().filter(|parameter| {
+            let column = parameter.index();
+            let squares: f64 = jacobian.iter().map(|row| row[column].powi(2)).sum();
+            squares.sqrt() * DEAD < 1.0
+        });
+        Identifiability {
+            condition: largest
+                .zip(smallest)
+                .map(|(largest, smallest)| largest / smallest)
+                .filter(|condition| condition.is_finite()),
+            dead: dead.copied().collect(),
+            flat: flat(&singular_values, &directions, fit),
+            at_limit: self.limits(),
+            extra_modes: self.extra_modes(&jacobian, unit),
+            needed: self.needed(),
+            singular_values,
+        }
+    }
+
+    fn extra_modes(&self, jacobian: &[Point], unit: f64) -> Vec<ExtraMode> {
+        let data = &self.problem.data;
+        let highest = data.iter().map(|datum| datum.mode).max().unwrap_or(0);
+        let mut relative: Vec<f64> = data
+            .iter()
+            .map(|datum| datum.std / datum.frequency / unit)
+            .collect();
+        let relative_std = median(&mut relative);
+        let covariance = Covariance::new(jacobian, &self.directions);
+        let mut found = Vec::new();
+        for mode in 1..=highest + 1 {
+            if data.iter().any(|datum| datum.mode == mode) {
+                continue;
+            }
+            let guess = mode as f64 * std::f64::consts::PI;
+            let response = (self.problem.model).response(&self.best.state.point, mode, guess);
+            let slopes = response.sensitivity.map(|slope| slope / relative_std);
+            let fit = self.estimator.settings.fit.iter();
+            let stds = fit.map(|parameter| {
+                let variance = covariance.variance_with(&along(*parameter), &slopes);
+                Some(variance.max(0.0).sqrt()).filter(|std| *std < NOTHING_KNOWN)
+            });
+            found.push(ExtraMode {
+                mode,
+                frequency: response.frequency,
+                relative_std,
+                stds: stds.collect(),
+            });
+        }
+        found
+    }
+
+    /// Returns the accuracy that each parameter needs. With all frequencies known equally well, a
+    /// parameter's uncertainty is proportional to theirs.
+    fn needed(&self) -> Vec<NeededAccuracy> {
+        let at = &self.best.state;
+        let rows = at.jacobian.iter().zip(&at.responses);
+        let relative: Vec<Point> = (self.problem.data.iter().zip(rows))
+            .map(|(datum, (row, found))| row.map(|slope| slope * datum.std / found.frequency))
+            .collect();
+        let fit = &self.estimator.settings.fit;
+        let directions = &self.directions[..fit.len()];
+        let covariance = Covariance::new(&relative, directions);
+        fit.iter()
+            .zip(directions)
+            .map(|(&parameter, direction)| {
+                let slope = match parameter {
+                    Parameter::Coupling => 1.0 - at.point[parameter.index()].tanh().powi(2),
+                    _ => 1.0,
+                };
+                let std = slope * covariance.std_or_infinite(direction);
+                NeededAccuracy {
+                    parameter,
+                    // An accuracy that no clock has is none.
+                    relative_std: Some(MEASURABLE / std).filter(|needed| *needed > 1e-9),
+                }
+            })
+            .collect()
+    }
+}
+
+/// Singular values, descending, and their directions in parameter space.
+fn decompose(jacobian: &[Point], fit: &[Parameter]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let rows = jacobian.len().max(fit.len());
+    let matrix = DMatrix::from_fn(rows, fit.len(), |row, column| {
+        jacobian
+            .get(row)
+            .map_or(0.0, |slopes| slopes[fit[column].index()])
+    });
+    let Some(svd) = SVD::try_new(matrix, false, true, f64::EPSILON, 1000) else {
+        return (Vec::new(), Vec::new());
+    };
+    let Some(vectors) = svd.v_t else {
+        return (Vec::new(), Vec::new());
+    };
+    let mut order: Vec<usize> = (0..svd.singular_values.len()).collect();
+    order.sort_by(|&a, &b| svd.singular_values[b].total_cmp(&svd.singular_values[a]));
+    let directions = order
+        .iter()
+        .map(|&row| vectors.row(row).iter().copied().collect())
+        .collect();
+    let values = order.iter().map(|&i| svd.singular_values[i]).collect();
+    (values, directions)
+}
+
+fn flat(values: &[f64], directions: &[Vec<f64>], fit: &[Parameter]) -> Vec<FlatDirection> {
+    let mut found = Vec::new();
+    for (index, (value, direction)) in values.iter().zip(directions).enumerate() {
+        if value * FLAT >= 1.0 {
+            continue;
+        }
+        let words = match (fit.len(), index) {
+            // With two parameters the other direction says it more plainly.
+            (2, 1) => determined_words(&directions[0], fit, value.recip()),
+            _ => flat_words(direction, fit, value.recip()),
+        };
+        found.push(FlatDirection {
+            direction: fit.iter().copied().zip(direction.iter().copied()).collect(),
+            std: Some(value.recip()).filter(|std| *std < NOTHING_KNOWN),
+            words,
+        });
+    }
+    found
+}
+
+/// Writes "only kt * kr^0.30 is determined".
+fn determined_words(direction: &[f64], fit: &[Parameter], std: f64) -> String {
+    let largest = largest_part(direction);
+    let mut product = String::new();
+    for (parameter, part) in fit.iter().zip(direction) {
+        let exponent = part / largest;
+        if exponent.abs() <= NEGLIGIBLE {
+            continue;
+        }
+        product += match (product.is_empty(), exponent > 0.0) {
+            (true, true) => "",
+            (true, false) => "1 / ",
+            (false, true) => " * ",
+            (false, false) => " / ",
+        };
+        product += match parameter {
+            Parameter::Coupling => "exp(atanh coupling)",
+            other => other.name(),
+        };
+        if (exponent.abs() - 1.0).abs() >= 0.005 {
+            product += &format!("^{:.2}", exponent.abs());
+        }
+    }
+    format!(
+        "only {product} is determined; across it the estimate is open by {}",
+        factor_words(std)
+    )
+}
+
+/// Writes "kt +10 % with kr -3 % together change hardly any frequency".
+fn flat_words(direction: &[f64], fit: &[Parameter], std: f64) -> String {
+    let largest = largest_part(direction);
+    let mut changes = Vec::new();
+    for (parameter, part) in fit.iter().zip(direction) {
+        let share = part / largest;
+        if share.abs() > NEGLIGIBLE {
+            changes.push(match parameter {
+                Parameter::Coupling => format!("coupling {:+.2}", 0.1 * share),
+                other => format!("{} {:+.0} %", other.name(), 10.0 * share),
+            });
+        }
+    }
+    format!(
+        "{} together change hardly any frequency; along this the estimate is open by {}",
+        changes.join(" with "),
+        factor_words(std)
+    )
+}
+
+/// Returns the part of largest size, with its sign; of nearly equal ones the first.
+fn largest_part(direction: &[f64]) -> f64 {
+    let size = direction.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    let first = direction.iter().find(|part| part.abs() >= 0.999 * size);
+    first.copied().unwrap_or(1.0)
+}
+
+fn factor_words(std: f64) -> String {
+    let factor = (1.96 * std).exp();
+    if factor < 1e3 {
+        format!("a factor of {factor:.1} either way")
+    } else {
+        "orders of magnitude".to_owned()
+    }
+}

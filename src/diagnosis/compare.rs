@@ -99,12 +99,6 @@ fn with_locations(test: Test<'_>) -> Vec<Observations> {
     all
 }
 
-/// Returns the largest evidence of all candidates.
-fn best_evidence(candidates: &[Candidate]) -> f64 {
-    let evidences = candidates.iter().map(|one| one.fit.log_evidence);
-    evidences.fold(f64::NEG_INFINITY, f64::max)
-}
-
 /// Averages the evidence over the locations of sensors; fits and residuals are those of the location that explains most.
 fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
     let mut averages: Vec<(Hypothesis, f64)> = Vec::new();
@@ -126,7 +120,8 @@ fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
     }
     let mut best: Option<(f64, ModelComparison)> = None;
     for one in all {
-        let own = best_evidence(&one.candidates);
+        let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
+        let own = evidences.fold(f64::NEG_INFINITY, f64::max);
         if best.as_ref().is_none_or(|(most, _)| own > *most) {
             best = Some((own, one));
         }

@@ -10,11 +10,9 @@
 use crate::observations::{
     UnpairedPeaks, average_std, constant_model_std, highest_mode, split_pole, up_to,
 };
-use crate::parameters::{
-    CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior, priors, with_drift,
-};
+use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
 use crate::settings::GapSettings;
-use crate::structure::{Arrangement, ELEMENTS, Inventory, Nominal};
+use crate::structure::{Arrangement, COUPLING, ELEMENTS, Inventory, Nominal};
 use crate::thresholds::DISTINCT_AMPLITUDES;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
@@ -292,6 +290,9 @@ const SLOPE_FLOOR: f64 = 5e-6;
 /// Standard deviation of the logarithm of the joint's amplitude about the one that follows from the sensors' amplitudes
 /// and the shapes: the largest rotation under the hammer is not measured, nor all modes that share in it.
 const AMPLITUDE_STD: f64 = 0.25;
+
+/// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
+const COUPLING_STD: f64 = 0.5;
 
 impl Dataset {
     /// Takes the data from observations in which every sensor with a mass has a position.
@@ -617,14 +618,57 @@ impl Dataset {
         Layout::new(&self.nominal, effects)
     }
 
-    /// Priors of all parameters, with the middle spread of the drift.
+    /// Returns the priors of all parameters, with the middle spread of the drift, with which a search begins.
     pub fn priors(&self, layout: &Layout) -> Vec<Prior> {
-        priors(&self.nominal, layout, &self.nuisances, &self.settings)
+        let mut all = Vec::new();
+        let std = self.settings.joint_std;
+        for (direction, start) in self.nominal.joint_parameters() {
+            all.push(match direction {
+                COUPLING => Prior {
+                    low: -0.95,
+                    high: 0.95,
+                    ..Prior::normal(0.0, COUPLING_STD)
+                },
+                // Beyond these bounds a beam's frequencies no longer feel the joint.
+                _ => Prior {
+                    low: start.ln() - 8.0 * std,
+                    high: start.ln() + 8.0 * std,
+                    ..Prior::normal(start.ln(), std)
+                },
+            });
+        }
+        for effect in &layout.effects {
+            all.push(Prior {
+                low: effect.size.low,
+                high: effect.size.high,
+                ..Prior::normal(effect.size.neutral, 3.0 * effect.size.scale)
+            });
+            if let Some(range) = effect.location {
+                let (low, high) = range.searched_bounds();
+                all.push(Prior {
+                    centre: 0.0,
+                    std: f64::INFINITY,
+                    low,
+                    high,
+                });
+            }
+        }
+        let nuisances = self.nuisances.iter();
+        all.extend(nuisances.map(|one| Prior::normal(one.centre, one.std)));
+        let drifts = &self.settings.drift_stds;
+        self.with_drift(layout, &all, drifts[drifts.len() / 2])
     }
 
-    /// Priors with this spread of the drift.
+    /// Returns priors with this spread of the drift.
     pub fn with_drift(&self, layout: &Layout, priors: &[Prior], drift: f64) -> Vec<Prior> {
-        with_drift(&self.nuisances, layout, priors, drift)
+        let mut priors = priors.to_vec();
+        let own = &mut priors[layout.first_nuisance()..];
+        for (prior, nuisance) in own.iter_mut().zip(&self.nuisances) {
+            if nuisance.parameter.is_drift() {
+                prior.std = drift;
+            }
+        }
+        priors
     }
 }
 

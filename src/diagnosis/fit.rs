@@ -6,9 +6,9 @@ use crate::evidence::{
     Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean, log_sum,
     over_drifts, profile_correction, start_with,
 };
-use crate::fixture::{peak_locations, with_peaks};
+use crate::fixture::{log_unread, peak_locations, with_peaks};
 use crate::forward::Forward;
-use crate::least_squares::Optimum;
+use crate::optimum::Optimum;
 use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
 use crate::structure::COUPLING;
 use crate::thresholds::{LOCATED, SIZE_DETECTED};
@@ -106,7 +106,7 @@ impl<'a> Search<'a> {
     /// Fits the effects of a model from one start.
     pub fn fit_from(&self, forward: &Forward<'_>, start: &[f64]) -> Option<Fit> {
         let best = evaluate(forward, &forward.priors(), start)?;
-        let evidence = best.log_evidence;
+        let evidence = evidence_of(forward, &best);
         Some(self.finish(forward, best, evidence))
     }
 
@@ -128,12 +128,11 @@ impl<'a> Search<'a> {
         for value in self.sizes(forward) {
             let start = start_with(self.without, &forward.layout, value, None);
             if let Some(one) = evaluate(forward, &priors, &start) {
-                keep(&mut found, one, &[size]);
+                keep(forward, &mut found, one, &[size]);
             }
         }
-        let total: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
-        let best = found.into_iter().rev().min_by(by_objective)?;
-        Some(self.finish(forward, best, log_sum(&total)))
+        let best = best_of(forward, &found)?.clone();
+        Some(self.finish(forward, best, log_sum(&evidences_of(forward, &found))))
     }
 
     /// Returns sizes from which the search begins: that of the model linearised without the effect, and
@@ -147,7 +146,7 @@ impl<'a> Search<'a> {
         let away = asked - size.neutral;
         let other = (size.neutral - 0.5 * away).clamp(size.low, size.high);
         if away.abs() < 1e-3 * size.scale {
-            vec![size.neutral + 0.05 * size.scale]
+            vec![size.small()]
         } else if (other - size.neutral).abs() < 1e-3 * size.scale {
             vec![asked]
         } else {
@@ -217,7 +216,7 @@ impl<'a> Search<'a> {
         descend(forward, &starts, &mut found);
         // A search along a bent valley may stop short of its end: search again from either side of it. Between
         // nodes that are far apart for the resolution of the data a deeper one may lie: search again from these.
-        if let Some(best) = found.first()
+        if let Some(best) = best_of(forward, &found)
             && is_located(best, at, spacing)
         {
             let parameters = &best.optimum.parameters;
@@ -229,12 +228,11 @@ impl<'a> Search<'a> {
             }
             descend(forward, &starts, &mut found);
         }
-        let best = found.first()?.clone();
-        let of_maxima: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
+        let best = best_of(forward, &found)?.clone();
         let total = if is_located(&best, at, spacing) {
-            log_sum(&of_maxima)
+            log_sum(&evidences_of(forward, &found))
         } else {
-            log_mean(&evidence)
+            log_mean(&evidences_of(forward, nodes))
         };
         Some(self.finish(forward, best, total))
     }
@@ -257,19 +255,42 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Adds the local optima that are reached from some starts; the deepest first.
+/// Adds the local optima that are reached from some starts.
 fn descend(forward: &Forward<'_>, starts: &[Vec<f64>], found: &mut Vec<LocalOptimum>) {
     let (at, priors) = (forward.layout.last_size(), forward.priors());
     for from in starts {
         if let Some(one) = evaluate(forward, &priors, from) {
-            keep(found, one, &[at, at + 1]);
+            keep(forward, found, one, &[at, at + 1]);
         }
     }
-    found.sort_by(by_objective);
 }
 
-fn by_objective(a: &LocalOptimum, b: &LocalOptimum) -> std::cmp::Ordering {
-    a.optimum.objective.total_cmp(&b.optimum.objective)
+/// Returns the logarithm of an optimum's evidence, with the probability that no peak states its fixture.
+fn evidence_of(forward: &Forward<'_>, one: &LocalOptimum) -> f64 {
+    one.log_evidence + log_unread(forward, one)
+}
+
+/// Returns the logarithms of the evidence of several optima.
+fn evidences_of(forward: &Forward<'_>, all: &[LocalOptimum]) -> Vec<f64> {
+    all.iter().map(|one| evidence_of(forward, one)).collect()
+}
+
+/// Difference of two objectives below which two optima explain the data equally well (1). Searches end within less.
+const EQUAL_OBJECTIVES: f64 = 0.01;
+
+/// Returns whether an optimum explains the data better than another one, or as well and is more probable. An effect of
+/// next to no size explains the data equally well wherever it is: rounding must not choose among its locations.
+fn is_better(forward: &Forward<'_>, one: &LocalOptimum, other: &LocalOptimum) -> bool {
+    let lower = other.optimum.objective - one.optimum.objective;
+    if lower.abs() > EQUAL_OBJECTIVES {
+        return lower > 0.0;
+    }
+    evidence_of(forward, one) > evidence_of(forward, other)
+}
+
+/// Returns the best of several optima.
+fn best_of<'a>(forward: &Forward<'_>, found: &'a [LocalOptimum]) -> Option<&'a LocalOptimum> {
+    (found.iter()).reduce(|best, one| if is_better(forward, one, best) { one } else { best })
 }
 
 /// Returns the parameters of the nodes whose location, the parameter `at`, is next to this one or next but one.
@@ -302,8 +323,8 @@ fn is_located(found: &LocalOptimum, size: usize, spacing: f64) -> bool {
 fn local_maxima(evidence: &[f64]) -> Vec<usize> {
     let mut maxima: Vec<usize> = (0..evidence.len())
         .filter(|&k| {
-            let is_above = |other: Option<&f64>| other.is_none_or(|other| evidence[k] >= *other);
-            is_above(evidence[..k].last()) && is_above(evidence.get(k + 1))
+            let mut beside = evidence[..k].last().into_iter().chain(evidence.get(k + 1));
+            beside.all(|other| evidence[k] >= *other)
         })
         .collect();
     maxima.sort_by(|&a, &b| evidence[b].total_cmp(&evidence[a]));
@@ -318,7 +339,12 @@ fn local_maxima(evidence: &[f64]) -> Vec<usize> {
 }
 
 /// Adds a local optimum unless the same one is there already (in the parameters `which`).
-fn keep(found: &mut Vec<LocalOptimum>, one: LocalOptimum, which: &[usize]) {
+fn keep(
+    forward: &Forward<'_>,
+    found: &mut Vec<LocalOptimum>,
+    one: LocalOptimum,
+    which: &[usize],
+) {
     let covariance = one.covariance();
     let same = found.iter().position(|other| {
         which.iter().all(|&k| {
@@ -328,9 +354,7 @@ fn keep(found: &mut Vec<LocalOptimum>, one: LocalOptimum, which: &[usize]) {
         })
     });
     match same {
-        Some(index) if found[index].optimum.objective > one.optimum.objective => {
-            found[index] = one;
-        }
+        Some(index) if is_better(forward, &one, &found[index]) => found[index] = one,
         Some(_) => {}
         None => found.push(one),
     }

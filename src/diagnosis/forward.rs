@@ -2,7 +2,7 @@
 
 use crate::dataset::{Dataset, Observable, ObservableKind};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
-use crate::least_squares::{Linearised, Model};
+use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
 use crate::structure::{Arrangement, ModalModel, with_joint};
 use nalgebra::DMatrix;
@@ -34,7 +34,7 @@ pub struct Solution {
 type SolvedModes = (Arc<BeamModes>, Option<Vec<f64>>);
 
 impl Model for Forward<'_> {
-    type Rest = Solution;
+    type Solution = Solution;
 
     fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Solution)> {
         let models = self.solve(parameters)?;
@@ -49,13 +49,12 @@ impl Model for Forward<'_> {
         Some((predicted, solution))
     }
 
-    fn complete(
+    fn slopes(
         &self,
         parameters: &[f64],
         priors: &[Prior],
-        predicted: Vec<f64>,
         solution: Solution,
-    ) -> Option<Linearised> {
+    ) -> Option<DMatrix<f64>> {
         let Solution {
             models,
             base,
@@ -79,7 +78,7 @@ impl Model for Forward<'_> {
                 slopes.set_column(column, &change.into());
             }
         }
-        Some(Linearised { predicted, slopes })
+        Some(slopes)
     }
 }
 

@@ -9,7 +9,6 @@
 //! E I/L^3, axial forces of E I/L^2. Those of sensors and clocks are absolute.
 
 use crate::result::LARGEST_STIFFNESS_CHANGE;
-use crate::settings::GapSettings;
 use crate::structure::{Arrangement, COUPLING, Nominal, ROTATION};
 use tapjoint_beam::effects::{Effect, EffectId};
 
@@ -214,6 +213,11 @@ impl Size {
         (sides * density).ln()
     }
 
+    /// Returns a size next to nothing, at which slopes with respect to a location do not vanish yet.
+    pub fn small(&self) -> f64 {
+        self.neutral + 0.05 * self.scale
+    }
+
     fn positive(name: &'static str, scale: f64, high: f64) -> Self {
         Size {
             low: 0.0,
@@ -390,70 +394,4 @@ impl Layout {
             })
             .collect()
     }
-}
-
-/// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
-const COUPLING_STD: f64 = 0.5;
-
-/// Returns the priors of all parameters, the joint's drift the middle one of those
-/// that are tried: a search begins with it.
-pub fn priors(
-    nominal: &Nominal,
-    layout: &Layout,
-    nuisances: &[Nuisance],
-    settings: &GapSettings,
-) -> Vec<Prior> {
-    let mut all = Vec::new();
-    for (direction, start) in nominal.joint_parameters() {
-        all.push(match direction {
-            COUPLING => Prior {
-                low: -0.95,
-                high: 0.95,
-                ..Prior::normal(0.0, COUPLING_STD)
-            },
-            // Beyond these bounds a beam's frequencies no longer feel the joint.
-            _ => Prior {
-                low: start.ln() - 8.0 * settings.joint_std,
-                high: start.ln() + 8.0 * settings.joint_std,
-                ..Prior::normal(start.ln(), settings.joint_std)
-            },
-        });
-    }
-    for effect in &layout.effects {
-        all.push(Prior {
-            low: effect.size.low,
-            high: effect.size.high,
-            ..Prior::normal(effect.size.neutral, 3.0 * effect.size.scale)
-        });
-        if let Some(range) = effect.location {
-            let (low, high) = range.searched_bounds();
-            all.push(Prior {
-                centre: 0.0,
-                std: f64::INFINITY,
-                low,
-                high,
-            });
-        }
-    }
-    let others = nuisances.iter();
-    all.extend(others.map(|one| Prior::normal(one.centre, one.std)));
-    let drift = settings.drift_stds[settings.drift_stds.len() / 2];
-    with_drift(nuisances, layout, &all, drift)
-}
-
-/// Returns priors with this spread of the drift.
-pub fn with_drift(
-    nuisances: &[Nuisance],
-    layout: &Layout,
-    priors: &[Prior],
-    drift: f64,
-) -> Vec<Prior> {
-    let first = layout.first_nuisance();
-    let mut priors = priors.to_vec();
-    for (k, nuisance) in nuisances.iter().enumerate() {
-        if nuisance.parameter.is_drift() {
-            priors[first + k].std = drift;
-        }
-    }
-    priors
 }

@@ -80,11 +80,21 @@ pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
 /// has [`NO_GAP_PRIOR`] of them. The pairs that were `tried` share one unit among themselves, the accepted
 /// and the others. Sorts the most probable first.
 pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
-    let priors: Vec<f64> = (candidates.iter())
-        .map(|one| prior_of(one, candidates, tried))
-        .collect();
-    for (candidate, prior) in candidates.iter_mut().zip(priors) {
-        candidate.prior = prior;
+    for k in 0..candidates.len() {
+        let one = &candidates[k];
+        candidates[k].prior = if one.effects().len() > 1 {
+            1.0 / tried.max(1) as f64
+        } else {
+            let same = candidates.iter().filter(|other| {
+                let is_single = one.effects().len() == 1 && other.effects().len() == 1;
+                is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
+            });
+            let weight = match one.hypothesis {
+                Hypothesis::None => NO_GAP_PRIOR,
+                _ => 1.0,
+            };
+            weight / same.count() as f64
+        };
     }
     let logs: Vec<f64> = candidates.iter().map(Candidate::log_weight).collect();
     let total = log_sum(&logs);
@@ -92,21 +102,6 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
         candidate.probability = (log - total).exp();
     }
     sort(candidates);
-}
-
-fn prior_of(one: &Candidate, all: &[Candidate], tried: usize) -> f64 {
-    if one.effects().len() > 1 {
-        return 1.0 / tried.max(1) as f64;
-    }
-    let same = all.iter().filter(|other| {
-        let is_single = one.effects().len() == 1 && other.effects().len() == 1;
-        is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
-    });
-    let weight = match one.hypothesis {
-        Hypothesis::None => NO_GAP_PRIOR,
-        _ => 1.0,
-    };
-    weight / same.count() as f64
 }
 
 fn sort(candidates: &mut [Candidate]) {

@@ -58,17 +58,14 @@ pub struct NominalSensor {
 }
 
 impl Nominal {
-    /// Returns whether a sensor is known not to touch the structure.
-    fn is_contactless(&self, name: &str) -> bool {
-        let mut sensors = self.sensors.iter();
-        sensors.any(|sensor| sensor.name == name && sensor.mass == Some(0.0))
+    /// Returns the stated mass of a sensor (kg); 0 for one that does not touch the structure.
+    fn stated_mass(&self, name: &str) -> Option<f64> {
+        self.sensors.iter().find(|one| one.name == name)?.mass
     }
 
     /// Returns the mass of a sensor (kg), 0 where it is unknown.
     pub(crate) fn mass_of(&self, name: &str) -> f64 {
-        let mut sensors = self.sensors.iter();
-        let own = sensors.find(|sensor| sensor.name == name);
-        own.and_then(|sensor| sensor.mass).unwrap_or(0.0)
+        self.stated_mass(name).unwrap_or(0.0)
     }
 
     /// Returns the structure with sensors and added masses.
@@ -224,24 +221,26 @@ impl Arrangement {
         let mut sensors: Vec<SensorPlace> = Vec::new();
         let (mut carried, mut names, mut positions) = (Vec::new(), Vec::new(), Vec::new());
         for sensor in &configuration.sensors {
-            let mass = sensor
-                .position
-                .map_or(0.0, |_| nominal.mass_of(&sensor.name));
-            let position = sensor.position.unwrap_or(0.0);
-            let placed = SensorPlace { position, mass };
+            let stated = nominal.stated_mass(&sensor.name);
+            let mass = stated.filter(|_| sensor.position.is_some());
+            let placed = SensorPlace {
+                position: sensor.position.unwrap_or(0.0),
+                mass: mass.unwrap_or(0.0),
+            };
             sensors.push(placed);
-            if sensor.position.is_some() && !nominal.is_contactless(&sensor.name) {
+            if sensor.position.is_some() && stated != Some(0.0) {
                 carried.push(placed);
             }
             let name = index_in(&mut inventory.names, sensor.name.clone());
             names.push(name);
-            positions.push(index_in(&mut inventory.positions, (name, position)));
+            positions.push(index_in(&mut inventory.positions, (name, placed.position)));
         }
         let masses = configuration.masses.iter();
-        let fastened = masses.map(|mass| (index_in(&mut inventory.fastened, *mass), *mass));
         let file = configuration.file.clone();
         Arrangement {
-            fastened: fastened.collect(),
+            fastened: masses
+                .map(|mass| (index_in(&mut inventory.fastened, *mass), *mass))
+                .collect(),
             file: file.unwrap_or_else(|| "the given frequencies".to_owned()),
             specimen: nominal.loaded(&sensors, &configuration.masses),
             sensors,

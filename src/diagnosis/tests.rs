@@ -6,7 +6,7 @@ use crate::dataset::{Dataset, Datum, Observable, ObservableKind};
 use crate::evidence::Fit;
 use crate::fit::fit_nominal;
 use crate::forward::Forward;
-use crate::least_squares::Model;
+use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effect};
 use crate::settings::GapSettings;
 use crate::structure::{Nominal, NominalSensor};

@@ -5,7 +5,7 @@
 use crate::dataset::{Dataset, Datum, Observable, ObservableKind, chi_square_tail};
 use crate::evidence::{Fit, log_sum};
 use crate::forward::Forward;
-use crate::least_squares::{Model, maximise};
+use crate::optimum::{Model, maximise};
 use crate::parameters::NuisanceParameter;
 use crate::result::{Block, Closure, CrossValidation, LeftOutRecording, Misfit, Residual};
 use crate::thresholds::{

@@ -3,7 +3,7 @@
 use super::proposals::{PlannedTests, TestedStructure};
 use crate::dataset::{Dataset, Observable};
 use crate::forward::Forward;
-use crate::least_squares::{Model, Optimum, covariance, log_determinant};
+use crate::optimum::{Model, Optimum, log_determinant};
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
 use crate::posterior::Candidate;
 use crate::result::Proposal;
@@ -405,7 +405,7 @@ fn sharpened(
             better.curvature[(location, location)] += 12.0 / ((high - low) * (high - low));
         }
     }
-    let covariance = covariance(priors, &better)?;
+    let covariance = better.covariance(priors)?;
     let step = -&covariance * pull;
     let parameters = optimum.parameters.iter().zip(step.iter()).zip(priors);
     let parameters = parameters

@@ -434,7 +434,7 @@ mod tests {
             Some(((self.model)(parameters[0], parameters[1]), ()))
         }
 
-        fn slopes(&self, parameters: &[f64], _: &[Prior], (): ()) -> Option<DMatrix<f64>> {
+        fn slopes(&self, parameters: &[f64], _: &[Prior], _: ()) -> Option<DMatrix<f64>> {
             const STEP: f64 = 1e-6;
             let [a, t] = [parameters[0], parameters[1]];
             let here = (self.model)(a, t);
@@ -573,7 +573,7 @@ mod tests {
             self.0.predict(parameters)
         }
 
-        fn slopes(&self, parameters: &[f64], known: &[Prior], (): ()) -> Option<DMatrix<f64>> {
+        fn slopes(&self, parameters: &[f64], known: &[Prior], _: ()) -> Option<DMatrix<f64>> {
             let own = self.0.slopes(parameters, known, ())?;
             Some(own.insert_column(2, 1e-5))
         }

@@ -138,8 +138,14 @@ impl<'a> Search<'a> {
     /// Returns sizes from which the search begins: that of the model linearised without the effect, and
     /// the other sign or a size well inside the range.
     fn sizes(&self, forward: &Forward<'_>) -> Vec<f64> {
+        let at = forward.layout.last_size();
         let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
-        let asked = self.linear_size(forward).unwrap_or(size.neutral).clamp(
+        // One step of Gauss-Newton from nothing of it, not stopped by a bound.
+        let mut priors = forward.priors();
+        (priors[at].low, priors[at].high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let linear = linear_fit(forward, self.without, &priors, None);
+        let asked = linear.map_or(size.neutral, |optimum| optimum.parameters[at]);
+        let asked = asked.clamp(
             (size.neutral - 2.0 * size.scale).max(size.low),
             (size.neutral + 2.0 * size.scale).min(size.high),
         );
@@ -152,16 +158,6 @@ impl<'a> Search<'a> {
         } else {
             vec![asked, other]
         }
-    }
-
-    /// Returns the size by one step of Gauss-Newton from nothing of it.
-    fn linear_size(&self, forward: &Forward<'_>) -> Option<f64> {
-        let mut priors = forward.priors();
-        let at = forward.layout.last_size();
-        priors[at].low = f64::NEG_INFINITY;
-        priors[at].high = f64::INFINITY;
-        let optimum = linear_fit(forward, self.without, &priors, None)?;
-        Some(optimum.parameters[at])
     }
 
     /// Fits the linearised model at every node of the location's range; then the true one, free, from the best.
@@ -290,7 +286,13 @@ fn is_better(forward: &Forward<'_>, one: &LocalOptimum, other: &LocalOptimum) ->
 
 /// Returns the best of several optima.
 fn best_of<'a>(forward: &Forward<'_>, found: &'a [LocalOptimum]) -> Option<&'a LocalOptimum> {
-    (found.iter()).reduce(|best, one| if is_better(forward, one, best) { one } else { best })
+    (found.iter()).reduce(|best, one| {
+        if is_better(forward, one, best) {
+            one
+        } else {
+            best
+        }
+    })
 }
 
 /// Returns the parameters of the nodes whose location, the parameter `at`, is next to this one or next but one.
@@ -339,12 +341,7 @@ fn local_maxima(evidence: &[f64]) -> Vec<usize> {
 }
 
 /// Adds a local optimum unless the same one is there already (in the parameters `which`).
-fn keep(
-    forward: &Forward<'_>,
-    found: &mut Vec<LocalOptimum>,
-    one: LocalOptimum,
-    which: &[usize],
-) {
+fn keep(forward: &Forward<'_>, found: &mut Vec<LocalOptimum>, one: LocalOptimum, which: &[usize]) {
     let covariance = one.covariance();
     let same = found.iter().position(|other| {
         which.iter().all(|&k| {

@@ -436,23 +436,22 @@ fn common_peaks(searched: &[(usize, &Configuration)]) -> Vec<UnpairedPeak> {
         let able = able.filter(|(one, shows)| **shows || one.1.reaches(group[0].log.exp()));
         2 * showing.iter().filter(|shows| **shows).count() >= able.count()
     });
-    common.map(mean_peak).collect()
-}
-
-/// Returns the mean of one peak in several recordings.
-fn mean_peak(group: &[ObservedPeak]) -> UnpairedPeak {
-    let count = group.len() as f64;
-    let log = group.iter().map(|one| one.log).sum::<f64>() / count;
-    let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
-    let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
-    let constants = group.iter();
-    UnpairedPeak {
-        log,
-        std: scatter.sqrt().hypot(read).hypot(FIXTURE_FREQUENCY_STD),
-        constants: constants
-            .filter_map(|one| Some((one.configuration, one.constant?)))
-            .collect(),
+    let mut means = Vec::new();
+    for group in common {
+        let count = group.len() as f64;
+        let log = group.iter().map(|one| one.log).sum::<f64>() / count;
+        let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
+        let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
+        let constants = group.iter();
+        means.push(UnpairedPeak {
+            log,
+            std: scatter.sqrt().hypot(read).hypot(FIXTURE_FREQUENCY_STD),
+            constants: constants
+                .filter_map(|one| Some((one.configuration, one.constant?)))
+                .collect(),
+        });
     }
+    means
 }
 
 /// Returns the peaks of a recording that belong to no mode and are no halves of a split decay.

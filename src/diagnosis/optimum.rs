@@ -57,7 +57,7 @@ impl Model for LinearModel<'_> {
         Some((predicted.map(|(at, by)| at + by).collect(), ()))
     }
 
-    fn slopes(&self, _: &[f64], _: &[Prior], (): ()) -> Option<DMatrix<f64>> {
+    fn slopes(&self, _: &[f64], _: &[Prior], _: ()) -> Option<DMatrix<f64>> {
         Some(self.slopes.clone())
     }
 }

@@ -561,7 +561,7 @@ pub enum Proposal {
     ReferenceTone,
     /// Put a sensor elsewhere.
     MoveSensor {
-        /// The cause, or the name of the sensor.
+        /// Name of the sensor.
         name: String,
         /// Its new position (m).
         position: f64,
@@ -581,7 +581,7 @@ pub enum Proposal {
     BareBeam,
     /// See directly whether a cause that was named is there.
     Confirm {
-        /// The cause, or the name of the sensor.
+        /// The cause.
         effect: EffectId,
     },
 }

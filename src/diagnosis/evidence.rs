@@ -44,6 +44,19 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Returns the fit without effects of some equally probable variants of the nominal model; `None` without any.
+    pub fn of_variants(found: Vec<LocalOptimum>) -> Option<Self> {
+        let all: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
+        let best = found
+            .into_iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        Some(Fit {
+            effects: Vec::new(),
+            best,
+            log_evidence: log_mean(&all),
+        })
+    }
+
     /// Best parameters.
     pub fn parameters(&self) -> &[f64] {
         &self.best.optimum.parameters

@@ -25,12 +25,7 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
             *parameter = value;
         }
     }
-    let best = evaluate(&forward, &priors, &start)?;
-    Some(Fit {
-        effects: Vec::new(),
-        log_evidence: best.log_evidence,
-        best,
-    })
+    Fit::of_variants(vec![evaluate(&forward, &priors, &start)?])
 }
 
 /// Nodes of a location at which the true model is fitted.

@@ -86,13 +86,9 @@ impl FixtureMode {
             let tap = arrangement.tap;
             let strength = fixture_strength(one.modes(), fixture, &numbers, &sensors, tap);
             own.constants.push(strength.map(|strength| strength.own));
-            let mut searched = peaks.searched.iter();
-            let searched = searched.find(|searched| searched.configuration == index);
-            if let (Some(strength), Some(searched)) = (strength, searched) {
+            if let (Some(strength), Some(read)) = (strength, peaks.searched.get(&index)) {
                 let half = strength.median + FIXTURE_LEVEL / DECIBEL;
-                let least = searched
-                    .least_log_constant
-                    .map_or(half, |least| half.min(least));
+                let least = read.map_or(half, |least| half.min(least));
                 over.push(DECIBEL * (strength.own - least));
             }
         }

@@ -7,6 +7,7 @@ use crate::thresholds::{
     CHANGED_FREQUENCY, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
     NODE_DISPLACEMENT, READABLE_LEVEL, SAME_MODE_RATIO, SAME_PEAK, SPLIT_POLE,
 };
+use std::collections::BTreeMap;
 use tapjoint_identify::observation::{
     Configuration, DecayVerdict, Observations, ObservedMode, UNCLEAR, UNPAIRED,
 };
@@ -311,17 +312,9 @@ pub struct UnpairedPeaks {
     pub doubtful: Vec<f64>,
     /// Logarithms of the lowest and the highest frequency of a mode; `None` where no peaks were searched.
     pub band: Option<(f64, f64)>,
-    /// Configurations whose peaks were searched.
-    pub searched: Vec<SearchedConfiguration>,
-}
-
-/// Configuration whose peaks were searched.
-#[derive(Debug, Clone)]
-pub struct SearchedConfiguration {
-    /// Index of the configuration.
-    pub configuration: usize,
-    /// Logarithm of the least modal constant (1/kg) that is read; `None` where no peak shows it.
-    pub least_log_constant: Option<f64>,
+    /// Configurations whose peaks were searched, with the logarithm of the least modal constant (1/kg) that is read;
+    /// `None` where no peak shows it.
+    pub searched: BTreeMap<usize, Option<f64>>,
 }
 
 /// Peak of no mode that several recordings show.
@@ -375,10 +368,7 @@ impl UnpairedPeaks {
             band: (low < high).then_some((low, high)),
             searched: searched
                 .iter()
-                .map(|(index, one)| SearchedConfiguration {
-                    configuration: *index,
-                    least_log_constant: least_log_constant(one),
-                })
+                .map(|(index, one)| (*index, least_log_constant(one)))
                 .collect(),
         }
     }
@@ -527,7 +517,7 @@ mod tests {
         let doubtful = [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_doubtful(f.ln()));
         assert_eq!(doubtful, [true, true, false, false, false]);
         // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
-        let weakest = peaks.searched[0].least_log_constant.unwrap();
+        let weakest = peaks.searched[&0].unwrap();
         assert!((weakest - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);
     }
 

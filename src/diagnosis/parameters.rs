@@ -181,12 +181,31 @@ impl LocationRange {
         }
     }
 
+    /// Returns the name of the effect's own parameter.
+    pub fn name(self) -> &'static str {
+        match self.kind {
+            LocationKind::Position => "position",
+            LocationKind::FixtureFrequency => "frequency",
+            LocationKind::Exponent => "exponent",
+            LocationKind::Gyration => "inertia",
+        }
+    }
+
+    /// Returns the effect's own parameter: the value itself, or the inertia J = m r^2 of a mass.
+    pub fn own_value(self, value: f64, size: f64) -> f64 {
+        match self.kind {
+            LocationKind::Gyration => size * value * value,
+            _ => value,
+        }
+    }
+
     /// Returns the lowest and the highest value in the searched form.
     pub fn searched_bounds(self) -> (f64, f64) {
         (self.to_searched(self.low), self.to_searched(self.high))
     }
 
-    fn is_logarithmic(self) -> bool {
+    /// Returns whether its logarithm is searched.
+    pub fn is_logarithmic(self) -> bool {
         matches!(
             self.kind,
             LocationKind::FixtureFrequency | LocationKind::Gyration
@@ -383,12 +402,7 @@ impl Layout {
                 let mut pairs = vec![(candidate.size.name, size)];
                 if let (Some(range), Some(location)) = (candidate.location, self.location(index)) {
                     let value = range.value_at(parameters[location]);
-                    pairs.push(match range.kind {
-                        LocationKind::Position => ("position", value),
-                        LocationKind::FixtureFrequency => ("frequency", value),
-                        LocationKind::Exponent => ("exponent", value),
-                        LocationKind::Gyration => ("inertia", size * value * value),
-                    });
+                    pairs.push((range.name(), range.own_value(value, size)));
                 }
                 Effect::from_pairs(candidate.effect, &pairs).ok()
             })

@@ -258,10 +258,18 @@ pub fn by_group(candidates: &[Candidate]) -> Vec<CandidateGroup> {
 /// Returns the probability of each location, given that there is a gap.
 pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities {
     let mut all = LocationProbabilities::default();
+    let gaps = candidates
+        .iter()
+        .filter(|one| one.hypothesis != Hypothesis::None);
+    let total: f64 = gaps.map(|one| one.probability).sum();
+    if total <= 0.0 {
+        return all;
+    }
     for candidate in candidates {
-        let share = candidate.probability / candidate.effects().len().max(1) as f64;
+        let probability = candidate.probability / total;
+        let share = probability / candidate.effects().len().max(1) as f64;
         if candidate.is_unknown() {
-            all.unknown += candidate.probability;
+            all.unknown += probability;
         }
         for effect in candidate.effects() {
             *match effect.place() {
@@ -271,20 +279,6 @@ pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities
                 Place::Body => &mut all.body,
                 Place::Acquisition => &mut all.acquisition,
             } += share;
-        }
-    }
-    let each = [
-        &mut all.joint,
-        &mut all.fixture,
-        &mut all.sensor,
-        &mut all.body,
-        &mut all.acquisition,
-        &mut all.unknown,
-    ];
-    let total: f64 = each.iter().map(|one| **one).sum();
-    if total > 0.0 {
-        for one in each {
-            *one /= total;
         }
     }
     all

@@ -235,27 +235,21 @@ impl<'a> Reference<'a> {
             });
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
                 let value = range.value_at(values[location]);
-                let std = match range.kind {
-                    LocationKind::FixtureFrequency | LocationKind::Gyration => {
-                        value * stds[location]
-                    }
-                    LocationKind::Position | LocationKind::Exponent => stds[location],
+                let std = if range.is_logarithmic() {
+                    value * stds[location]
+                } else {
+                    stds[location]
                 };
                 let is_known = std < 0.5 * (range.high - range.low);
-                let (name, value, std) = match range.kind {
-                    LocationKind::Position => ("position", value, std),
-                    LocationKind::FixtureFrequency => ("frequency", value, std),
-                    LocationKind::Exponent => ("exponent", value, std),
-                    // J = m r^2
-                    LocationKind::Gyration => {
-                        ("inertia", size * value * value, 2.0 * size * value * std)
-                    }
+                let own_std = match range.kind {
+                    LocationKind::Gyration => 2.0 * size * value * std,
+                    _ => std,
                 };
                 parameters.push(value_of(
                     effect.effect,
-                    name,
-                    value,
-                    is_known.then_some(std),
+                    range.name(),
+                    range.own_value(value, size),
+                    is_known.then_some(own_std),
                 ));
             }
         }

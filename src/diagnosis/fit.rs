@@ -6,7 +6,7 @@ use crate::evidence::{
     Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean, log_sum,
     over_drifts, profile_correction, start_with,
 };
-use crate::fixture::{log_unread, peak_locations, with_peaks};
+use crate::fixture::{log_unread, with_peaks};
 use crate::forward::Forward;
 use crate::optimum::Optimum;
 use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
@@ -71,8 +71,12 @@ impl<'a> Search<'a> {
         let (low, high) = range.searched_bounds();
         let nodes = (0..range.nodes)
             .map(|node| low + (high - low) * (node as f64 + 0.5) / range.nodes as f64);
+        let peaks = match range.kind {
+            LocationKind::FixtureFrequency => &self.dataset.peaks.all[..],
+            _ => &[],
+        };
         nodes
-            .chain(peak_locations(self.dataset, range.kind))
+            .chain(peaks.iter().map(|peak| peak.log))
             .filter_map(|location| Some(self.linear_at(&forward, location)?.0.objective))
             .min_by(f64::total_cmp)
     }

@@ -204,14 +204,6 @@ pub fn log_unread(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
         .map_or(0.0, f64::ln)
 }
 
-/// Returns the logarithms of the frequencies at which a fixture is tried beyond the nodes of its range.
-pub fn peak_locations(dataset: &Dataset, kind: LocationKind) -> Vec<f64> {
-    match kind {
-        LocationKind::FixtureFrequency => dataset.peaks.all.iter().map(|peak| peak.log).collect(),
-        _ => Vec::new(),
-    }
-}
-
 /// Returns the fit with those in addition whose fixture has the frequency of a peak; any other as it is. `without` is
 /// the fit without the last effect. The evidence of `fit` is that no peak states the frequency ([`log_unread`]).
 pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit) -> Fit {

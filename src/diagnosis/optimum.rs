@@ -92,7 +92,7 @@ const SEARCH: Settings = Settings {
 };
 
 /// Search for the parameters that maximise likelihood times prior.
-struct Search<'a, M> {
+struct Maximisation<'a, M> {
     data: &'a [Datum],
     priors: &'a [Prior],
     model: &'a M,
@@ -108,7 +108,7 @@ struct Point<S> {
     optimum: Option<Optimum>,
 }
 
-impl<M: Model> Problem for Search<'_, M> {
+impl<M: Model> Problem for Maximisation<'_, M> {
     type State = Point<M::Solution>;
 
     fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
@@ -155,13 +155,13 @@ pub fn maximise(
     start: &[f64],
     model: &impl Model,
 ) -> Option<Optimum> {
-    let search = Search {
+    let problem = Maximisation {
         data,
         priors,
         model,
         bounds: priors.iter().map(|prior| [prior.low, prior.high]).collect(),
     };
-    minimise(&search, start, &SEARCH)?.state.optimum
+    minimise(&problem, start, &SEARCH)?.state.optimum
 }
 
 /// Returns -ln(likelihood x prior) at a point from the predictions there, without constants of the data.

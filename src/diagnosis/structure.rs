@@ -451,19 +451,15 @@ impl ModalModel {
     /// Returns d ln f/d ln k of all modes for a spring of the joint, or d ln f/d coupling: half the strain energy of that
     /// spring in the mode over that of the structure (Rayleigh's quotient is stationary in the shape).
     pub fn joint_slopes(&self, direction: usize) -> Vec<f64> {
-        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
-        if based || direction == COUPLING {
-            // The base's spring is tied to the joint's by their ratio: both move.
-            return self.stiffened_slopes(direction);
-        }
-        (0..self.modes().len())
-            .map(|index| 0.5 * self.joint_shares(index)[direction])
-            .collect()
-    }
-
-    /// Returns these slopes by Rayleigh's quotient of the changed structure.
-    fn stiffened_slopes(&self, direction: usize) -> Vec<f64> {
         const STEP: f64 = 1e-4;
+        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        if !based && direction != COUPLING {
+            return (0..self.modes().len())
+                .map(|index| 0.5 * self.joint_shares(index)[direction])
+                .collect();
+        }
+        // By Rayleigh's quotient of a changed structure. The base's spring is tied to the joint's by their ratio: both
+        // move.
         let mut other = self.seen.specimen.clone();
         if let SpecimenJoint::Springs { kt, kr, coupling } = &mut other.joint {
             match direction {

@@ -51,7 +51,7 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
                 .is_some_and(|without| without.goodness_of_fit < MISFIT) =>
         {
             Verdict::NotEnoughData(
-                "sensors whose place nobody said explain them, and so would other causes; state the places"
+                "sensors of unknown position explain them, and so would other causes; state their positions"
                     .to_owned(),
             )
         }

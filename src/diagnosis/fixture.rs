@@ -14,7 +14,7 @@
 //!
 //! Integrated with the likelihood of all other data over the fixture's frequency, every peak gives a
 //! fit whose frequency the peak states, with the factor v B/n. The remaining fit
-//! without a peak has the factor 1 - v. Nothing changes where the mode lies outside the band or is too
+//! without a peak has the factor 1 - v, which is averaged over the frequency where the data leave it open. Nothing changes where the mode lies outside the band or is too
 //! weak (v = 0), and a fixture of zero size has no peak. A fit that should show a peak and has none is
 //! refuted with the probability 1 - v; one whose frequency is stated, by how well it fits.
 

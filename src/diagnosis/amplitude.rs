@@ -6,7 +6,7 @@ use crate::evidence::Fit;
 use crate::forward::{Forward, slope_along_decay};
 use crate::joint_motion::JointMotion;
 use crate::result::{AmplitudeDependence, FrequencyChange, LARGEST_STIFFNESS_CHANGE};
-use crate::structure::{ModalModel, ROTATION};
+use crate::structure::{ModalModel, ROTATION, joint_amplitude};
 use crate::thresholds::{CHANGE_BY_CHANCE, LAW_DETECTED};
 use tapjoint_beam::effects::{JointLaw, JointLawKind};
 use tapjoint_identify::observation::Observations;
@@ -207,7 +207,11 @@ pub fn set_levels(dataset: &mut Dataset, nominal: &Fit) {
         return;
     };
     let all: Option<Vec<f64>> = (dataset.arrangements.iter().zip(&models))
-        .map(|(arrangement, one)| one.joint_amplitude(arrangement, dataset.fitted_modes))
+        .map(|(arrangement, one)| {
+            let numbers = (1..=dataset.fitted_modes).filter_map(|mode| one.index(mode));
+            let (tap, level) = (arrangement.tap?, arrangement.level);
+            Some(joint_amplitude(one.modes(), tap, level, numbers))
+        })
         .collect();
     let Some(all) = all else { return };
     let most = all.iter().copied().fold(0.0, f64::max);
@@ -308,21 +312,17 @@ fn inflate_shared(dataset: &mut Dataset, models: &[ModalModel], law: &JointLaw) 
             datum.inflate_std(share * felt);
         } else if observable.is_slope() {
             let arrangement = &dataset.arrangements[configuration];
-            let tones = intermodulation(arrangement.joint_motion.as_ref(), mode);
+            // A joint whose stiffness changes makes tones at sums and differences of the modes' frequencies, in
+            // proportion to the amplitudes of those that make them. A tone near a mode rings with it, and pulls its
+            // frequency by what the mode feels of the joint's change times the ratio of the initial amplitudes. Six modes
+            // make some hundred tones of the third order, so that one near each mode is assumed. Frequencies keep their
+            // own share: they are averages over whole decays.
+            let motion = arrangement.joint_motion.as_ref();
+            let ratio = motion.and_then(|motion| motion.others_over_own(mode));
+            let tones = ratio.unwrap_or(1.0).max(1.0);
             datum.inflate_std(tones * share * felt / arrangement.log_amplitude_span(mode));
         }
     }
-}
-
-/// Returns the factor, 1 at least, by which other modes may disturb the change of a mode more than its own motion. A
-/// joint whose stiffness changes makes tones at sums and differences of the modes' frequencies, in proportion to the
-/// amplitudes of those that make them. A tone near a mode rings with it, and pulls its frequency by what the mode feels
-/// of the joint's change times the ratio of the initial amplitudes. Whether a tone lies near
-/// is not tested: six modes make some hundred of the third order, so that this is the worst case. Frequencies keep
-/// their own share: they are averages over whole decays.
-fn intermodulation(motion: Option<&JointMotion>, mode: usize) -> f64 {
-    let ratio = motion.and_then(|motion| motion.others_over_own(mode));
-    ratio.map_or(1.0, |ratio| ratio.max(1.0))
 }
 
 /// Returns d ln f/d ln kr of a mode by its number.

@@ -50,12 +50,7 @@ pub struct Test<'a> {
 /// # Errors
 /// [`GapError::NoFit`] where the nominal model has no fit.
 pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
-    let located = with_locations(test);
-    let located = located.iter().map(|observations| Test {
-        observations,
-        ..test
-    });
-    let all: Vec<ModelComparison> = located.filter_map(compare_singles).collect();
+    let all = at_locations(test, compare_singles);
     let mut comparison = over_locations(all).ok_or(GapError::NoFit)?;
     set_probabilities(&mut comparison.candidates, 0);
     add_pairs(&comparison.dataset, &mut comparison.candidates);
@@ -75,34 +70,31 @@ fn with_sensors(observations: &Observations, nominal: &Nominal) -> Observations 
     filled
 }
 
-/// Returns the observations with every unknown position of a sensor filled in: once each for a row of positions along
-/// the structure.
-fn with_locations(test: Test<'_>) -> Vec<Observations> {
-    let (nominal, count) = (test.nominal, test.settings.unknown_positions);
+/// Fits the observations with every unknown position of a sensor filled in: once each for a row of positions along the
+/// structure.
+fn at_locations<T>(test: Test<'_>, fit: impl Fn(Test<'_>) -> Option<T>) -> Vec<T> {
+    let (nominal, mut count) = (test.nominal, test.settings.unknown_positions);
     let filled = with_sensors(test.observations, nominal);
     // A sensor without a position and without a mass has no effect.
     let mut sensors = filled.configurations.iter().flat_map(|c| &c.sensors);
-    if !sensors.any(|s| s.position.is_none() && nominal.mass_of(&s.name) > 0.0) {
-        return vec![filled];
+    let is_open = sensors.any(|s| s.position.is_none() && nominal.mass_of(&s.name) > 0.0);
+    if !is_open {
+        count = 1;
     }
     let mut all = Vec::new();
     for k in 0..count {
         let position = nominal.length() * (k as f64 + 0.5) / count as f64;
         let mut located = filled.clone();
-        for configuration in &mut located.configurations {
-            for sensor in &mut configuration.sensors {
-                sensor.position.get_or_insert(position);
-            }
+        let configurations = located.configurations.iter_mut().filter(|_| is_open);
+        for sensor in configurations.flat_map(|one| &mut one.sensors) {
+            sensor.position.get_or_insert(position);
         }
-        all.push(located);
+        all.extend(fit(Test {
+            observations: &located,
+            ..test
+        }));
     }
     all
-}
-
-/// Returns the largest evidence of all candidates.
-fn best_evidence(candidates: &[Candidate]) -> f64 {
-    let evidences = candidates.iter().map(|one| one.fit.log_evidence);
-    evidences.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Averages the evidence over the locations of sensors; fits and residuals are those of the location that explains most.
@@ -126,7 +118,8 @@ fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
     }
     let mut best: Option<(f64, ModelComparison)> = None;
     for one in all {
-        let own = best_evidence(&one.candidates);
+        let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
+        let own = evidences.fold(f64::NEG_INFINITY, f64::max);
         if best.as_ref().is_none_or(|(most, _)| own > *most) {
             best = Some((own, one));
         }
@@ -143,13 +136,9 @@ fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
 
 /// Returns the least chi square of the nominal model over the unknown positions of sensors.
 pub fn least_nominal_chi_square(test: Test<'_>) -> Option<f64> {
-    let located = with_locations(test);
-    let located = located.iter().map(|observations| Test {
-        observations,
-        ..test
-    });
-    let fits = located.filter_map(|test| Some(prepared(test)?.1));
-    fits.map(|none| 2.0 * none.best.optimum.objective)
+    let fits = at_locations(test, |test| Some(prepared(test)?.1));
+    fits.iter()
+        .map(|none| 2.0 * none.best.optimum.objective)
         .min_by(f64::total_cmp)
 }
 
@@ -307,15 +296,7 @@ fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
         start.resize(priors.len(), 0.0);
         found.extend(evaluate(&forward, &priors, &start));
     }
-    let all: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
-    let best = found
-        .into_iter()
-        .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-    Some(Fit {
-        effects: Vec::new(),
-        best,
-        log_evidence: log_mean(&all),
-    })
+    Fit::of_variants(found)
 }
 
 /// Returns the data if no prediction is better than `spread`.
@@ -348,24 +329,11 @@ fn fit_drift(dataset: &Dataset, nominal: &Fit) -> Option<(Fit, f64)> {
     dataset.first_drift()?;
     let layout = dataset.layout(&[]);
     let (priors, optimum) = (&nominal.best.priors, &nominal.best.optimum);
-    let mut all = Vec::new();
-    let mut best: Option<(LocalOptimum, f64)> = None;
-    for drift in LARGE_DRIFTS {
-        let found = over_drifts(dataset, &layout, priors, optimum, &[drift]);
-        all.push(found.log_evidence);
-        if best
-            .as_ref()
-            .is_none_or(|(best, _)| found.log_evidence > best.log_evidence)
-        {
-            best = Some((found, drift));
-        }
-    }
-    let (best, drift) = best?;
-    let fit = Fit {
-        effects: Vec::new(),
-        best,
-        log_evidence: log_mean(&all),
-    };
+    let found = LARGE_DRIFTS
+        .into_iter()
+        .map(|drift| over_drifts(dataset, &layout, priors, optimum, &[drift]));
+    let fit = Fit::of_variants(found.collect())?;
+    let (drift, _) = *fit.best.drifts.first()?;
     Some((fit, drift))
 }
 

@@ -10,15 +10,14 @@
 use crate::observations::{
     UnpairedPeaks, average_std, constant_model_std, highest_mode, split_pole, up_to,
 };
-use crate::parameters::{
-    CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior, priors, with_drift,
-};
+use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
 use crate::settings::GapSettings;
-use crate::structure::{Arrangement, ELEMENTS, Inventory, Nominal};
+use crate::structure::{Arrangement, COUPLING, ELEMENTS, Inventory, Nominal};
 use crate::thresholds::DISTINCT_AMPLITUDES;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::{digamma, ln_gamma};
+use std::collections::BTreeMap;
 use tapjoint_identify::observation::{Configuration, DecayVerdict, Observations, ObservedMode};
 use tapjoint_numerics::stats::root_mean_square;
 
@@ -270,7 +269,7 @@ pub struct Dataset {
     pub holdout: Vec<(Observable, Datum)>,
     /// Change of a frequency's logarithm for one standard deviation of the taps' common scatter, by configuration and
     /// mode.
-    pub scatter: Vec<((usize, usize), f64)>,
+    pub scatter: BTreeMap<(usize, usize), f64>,
     /// Derivatives of the frequencies' logarithms with respect to the relative size of shear and rotary inertia, by
     /// mode, at the nominal optimum of the first configuration: what is fastened to the beam changes
     /// them little. They include the modes that a next test may add.
@@ -278,8 +277,8 @@ pub struct Dataset {
     /// Slopes of all observables but frequencies with respect to the joint's stiffnesses, at the
     /// nominal optimum: shapes depend little on the joint.
     pub shape_slopes: Option<DMatrix<f64>>,
-    /// Modes with a damping ratio, and the logarithm of the frequency of each over their geometric mean.
-    pub tilts: Vec<(usize, f64)>,
+    /// Logarithm of the frequency of each mode with a damping ratio over their geometric mean.
+    pub tilts: BTreeMap<usize, f64>,
     /// Peaks of no mode.
     pub peaks: UnpairedPeaks,
 }
@@ -292,6 +291,9 @@ const SLOPE_FLOOR: f64 = 5e-6;
 /// Standard deviation of the logarithm of the joint's amplitude about the one that follows from the sensors' amplitudes
 /// and the shapes: the largest rotation under the hammer is not measured, nor all modes that share in it.
 const AMPLITUDE_STD: f64 = 0.25;
+
+/// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
+const COUPLING_STD: f64 = 0.5;
 
 impl Dataset {
     /// Takes the data from observations in which every sensor with a mass has a position.
@@ -319,10 +321,10 @@ impl Dataset {
             settings: settings.clone(),
             fitted_modes: highest.saturating_sub(held_out),
             holdout: Vec::new(),
-            scatter: Vec::new(),
+            scatter: BTreeMap::new(),
             shear_slopes: Vec::new(),
             shape_slopes: None,
-            tilts: Vec::new(),
+            tilts: BTreeMap::new(),
             peaks: UnpairedPeaks::new(observations),
         };
         dataset.add_frequencies(observations);
@@ -353,11 +355,13 @@ impl Dataset {
         moderate(&mut data);
         for ((configuration, observed), mut datum) in observed.into_iter().zip(data) {
             let (one, mode) = (&observations.configurations[configuration], observed.mode);
-            let share = self.common_share(configuration, mode);
-            if share != 0.0 {
+            // Share of the scatter that the configuration has in common; none for held-out modes.
+            let shares = &self.arrangements[configuration].scatter;
+            let share = shares.get(&mode).filter(|_| mode <= self.fitted_modes);
+            if let Some(&share) = share {
                 // The common part is a nuisance parameter of its own.
                 let moved = share * datum.std;
-                self.scatter.push(((configuration, mode), moved));
+                self.scatter.insert((configuration, mode), moved);
                 datum.std *= (1.0 - share * share).max(0.0).sqrt();
             }
             // The common part of a recording is far below the floor: as good as independent.
@@ -372,14 +376,6 @@ impl Dataset {
                 self.push(observable, datum);
             }
         }
-    }
-
-    /// Share of a frequency's scatter that its configuration has in common; 0 for held-out modes.
-    fn common_share(&self, configuration: usize, mode: usize) -> f64 {
-        let shares = &self.arrangements[configuration].scatter;
-        let own = shares.iter().find(|share| share.0 == mode);
-        own.filter(|_| mode <= self.fitted_modes)
-            .map_or(0.0, |share| share.1)
     }
 
     fn add_shapes(&mut self, observations: &Observations) {
@@ -442,12 +438,12 @@ impl Dataset {
                 let datum = Datum::new(sum / weights, std, None);
                 let own = Observable::frequency(0, mode);
                 self.push(own.with_kind(ObservableKind::Damping), datum);
-                self.tilts.push((mode, observed[0].frequency.ln()));
+                self.tilts.insert(mode, observed[0].frequency.ln());
             }
         }
-        let mean = self.tilts.iter().map(|tilt| tilt.1).sum::<f64>() / self.tilts.len() as f64;
-        for tilt in &mut self.tilts {
-            tilt.1 -= mean;
+        let mean = self.tilts.values().sum::<f64>() / self.tilts.len() as f64;
+        for tilt in self.tilts.values_mut() {
+            *tilt -= mean;
         }
     }
 
@@ -477,8 +473,7 @@ impl Dataset {
 
     fn add_nuisances(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{
-            AddedInertia, Amplitude, FastenedMass, FastenedPosition, Scale, Scatter, SensorInertia,
-            SensorMass, Shear,
+            AddedInertia, Amplitude, Scale, Scatter, SensorInertia, SensorMass, Shear,
         };
         let scale = self.nominal.scale_std.unwrap_or(self.settings.scale_std);
         self.add_nuisance(Scale, 0.0, scale);
@@ -502,10 +497,16 @@ impl Dataset {
         self.add_damping_level();
         self.add_nuisance(Amplitude, 0.0, AMPLITUDE_STD);
         for fastened in 0..inventory.fastened.len() {
-            let (mass, position) = (self.settings.fastened_mass_std, self.settings.position_std);
-            self.add_nuisance(FastenedMass { fastened }, 0.0, mass);
-            self.add_nuisance(FastenedPosition { fastened }, 0.0, position);
+            self.add_fastened(fastened);
         }
+    }
+
+    /// Adds the mass and the position of a known added mass.
+    pub fn add_fastened(&mut self, fastened: usize) {
+        let (mass, position) = (self.settings.fastened_mass_std, self.settings.position_std);
+        self.add_nuisance(NuisanceParameter::FastenedMass { fastened }, 0.0, mass);
+        let parameter = NuisanceParameter::FastenedPosition { fastened };
+        self.add_nuisance(parameter, 0.0, position);
     }
 
     /// Numbers of the set-ups, ascending.
@@ -578,15 +579,13 @@ impl Dataset {
 
     /// Returns the logarithm of a mode's frequency over the geometric mean of all that have a damping ratio; 0 for others.
     pub fn tilt(&self, mode: usize) -> f64 {
-        let own = self.tilts.iter().find(|tilt| tilt.0 == mode);
-        own.map_or(0.0, |tilt| tilt.1)
+        self.tilts.get(&mode).copied().unwrap_or(0.0)
     }
 
     /// Returns the change of a frequency for one standard deviation of the taps' common scatter (logarithm).
     pub fn scatter_of(&self, configuration: usize, mode: usize) -> f64 {
-        let mut all = self.scatter.iter();
-        all.find(|one| one.0 == (configuration, mode))
-            .map_or(0.0, |one| one.1)
+        let own = self.scatter.get(&(configuration, mode));
+        own.copied().unwrap_or(0.0)
     }
 
     /// Index of a nuisance parameter, if the data have it.
@@ -617,14 +616,57 @@ impl Dataset {
         Layout::new(&self.nominal, effects)
     }
 
-    /// Priors of all parameters, with the middle spread of the drift.
+    /// Returns the priors of all parameters, with the middle spread of the drift, with which a search begins.
     pub fn priors(&self, layout: &Layout) -> Vec<Prior> {
-        priors(&self.nominal, layout, &self.nuisances, &self.settings)
+        let mut all = Vec::new();
+        let std = self.settings.joint_std;
+        for (direction, start) in self.nominal.joint_parameters() {
+            all.push(match direction {
+                COUPLING => Prior {
+                    low: -0.95,
+                    high: 0.95,
+                    ..Prior::normal(0.0, COUPLING_STD)
+                },
+                // Beyond these bounds a beam's frequencies no longer feel the joint.
+                _ => Prior {
+                    low: start.ln() - 8.0 * std,
+                    high: start.ln() + 8.0 * std,
+                    ..Prior::normal(start.ln(), std)
+                },
+            });
+        }
+        for effect in &layout.effects {
+            all.push(Prior {
+                low: effect.size.low,
+                high: effect.size.high,
+                ..Prior::normal(effect.size.neutral, 3.0 * effect.size.scale)
+            });
+            if let Some(range) = effect.location {
+                let (low, high) = range.searched_bounds();
+                all.push(Prior {
+                    centre: 0.0,
+                    std: f64::INFINITY,
+                    low,
+                    high,
+                });
+            }
+        }
+        let nuisances = self.nuisances.iter();
+        all.extend(nuisances.map(|one| Prior::normal(one.centre, one.std)));
+        let drifts = &self.settings.drift_stds;
+        self.with_drift(layout, &all, drifts[drifts.len() / 2])
     }
 
-    /// Priors with this spread of the drift.
+    /// Returns priors with this spread of the drift.
     pub fn with_drift(&self, layout: &Layout, priors: &[Prior], drift: f64) -> Vec<Prior> {
-        with_drift(&self.nuisances, layout, priors, drift)
+        let mut priors = priors.to_vec();
+        let own = &mut priors[layout.first_nuisance()..];
+        for (prior, nuisance) in own.iter_mut().zip(&self.nuisances) {
+            if nuisance.parameter.is_drift() {
+                prior.std = drift;
+            }
+        }
+        priors
     }
 }
 

@@ -3,9 +3,9 @@
 
 use crate::dataset::{Dataset, Datum};
 use crate::forward::Forward;
-use crate::least_squares::{
-    LinearModel, Model, Optimum, covariance, factor_of, free_parameters, log_determinant, maximise,
-    objective_at, optimum_at,
+use crate::optimum::{
+    LinearModel, Model, Optimum, factor_of, free_parameters, log_determinant, maximise,
+    objective_at,
 };
 use crate::parameters::{CandidateEffect, Layout, Prior, Size};
 use crate::thresholds::POORLY_KNOWN_SIZE;
@@ -28,7 +28,7 @@ pub struct LocalOptimum {
 impl LocalOptimum {
     /// Returns the covariance of the parameters.
     pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        covariance(&self.priors, &self.optimum)
+        self.optimum.covariance(&self.priors)
     }
 }
 
@@ -44,6 +44,19 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Returns the fit without effects of some equally probable variants of the nominal model; `None` without any.
+    pub fn of_variants(found: Vec<LocalOptimum>) -> Option<Self> {
+        let all: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
+        let best = found
+            .into_iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
+        Some(Fit {
+            effects: Vec::new(),
+            best,
+            log_evidence: log_mean(&all),
+        })
+    }
+
     /// Best parameters.
     pub fn parameters(&self) -> &[f64] {
         &self.best.optimum.parameters
@@ -79,7 +92,7 @@ pub fn evaluate(forward: &Forward<'_>, priors: &[Prior], start: &[f64]) -> Optio
     // A search that does not settle counts with the true model, without other drifts.
     let own = dataset.with_drift(layout, &found.priors, middle);
     let there = forward.linearise(&optimum.parameters, &own)?;
-    let optimum = optimum_at(&dataset.data, &own, optimum.parameters, there);
+    let optimum = Optimum::new(&dataset.data, &own, optimum.parameters, there);
     let log_evidence = log_evidence(&dataset.data, layout, &own, &optimum);
     Some(LocalOptimum {
         optimum,
@@ -147,7 +160,7 @@ fn moved_optimum(data: &[Datum], layout: &Layout, priors: &[Prior], at: &Optimum
         *prior = Prior::held(*value);
     }
     match linear_optimum(data, &held, at) {
-        Some(moved) => optimum_at(data, priors, moved.parameters, moved.model),
+        Some(moved) => Optimum::new(data, priors, moved.parameters, moved.model),
         None => at.clone(),
     }
 }
@@ -171,12 +184,10 @@ pub fn linear_fit(
     location: Option<f64>,
 ) -> Option<Optimum> {
     let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
-    // Slopes that vanish at zero size (with respect to a location, a frequency) are taken a little inside.
-    let inside = size.neutral + 0.05 * size.scale;
-    let start = start_with(without, &forward.layout, inside, location);
+    let start = start_with(without, &forward.layout, size.small(), location);
     let there = forward.linearise(&start, priors)?;
     let data = &forward.dataset.data;
-    let here = optimum_at(data, priors, start, there);
+    let here = Optimum::new(data, priors, start, there);
     linear_optimum(data, priors, &here)
 }
 
@@ -419,7 +430,6 @@ fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::least_squares::Linearised;
     use crate::parameters::{LocationKind, LocationRange};
     use tapjoint_beam::effects::EffectId;
 
@@ -431,26 +441,20 @@ mod tests {
     }
 
     impl Model for TwoParameters {
-        type Rest = ();
+        type Solution = ();
 
         fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
             Some(((self.model)(parameters[0], parameters[1]), ()))
         }
 
-        fn complete(
-            &self,
-            parameters: &[f64],
-            _: &[Prior],
-            predicted: Vec<f64>,
-            (): (),
-        ) -> Option<Linearised> {
+        fn slopes(&self, parameters: &[f64], _: &[Prior], _: ()) -> Option<DMatrix<f64>> {
             const STEP: f64 = 1e-6;
             let [a, t] = [parameters[0], parameters[1]];
+            let here = (self.model)(a, t);
             let columns = [(self.model)(a + STEP, t), (self.model)(a, t + STEP)];
-            let slopes = DMatrix::from_fn(predicted.len(), 2, |row, column| {
-                (columns[column][row] - predicted[row]) / STEP
-            });
-            Some(Linearised { predicted, slopes })
+            Some(DMatrix::from_fn(here.len(), 2, |row, column| {
+                (columns[column][row] - here[row]) / STEP
+            }))
         }
     }
 
@@ -576,22 +580,15 @@ mod tests {
     struct Placed(TwoParameters);
 
     impl Model for Placed {
-        type Rest = ();
+        type Solution = ();
 
         fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
             self.0.predict(parameters)
         }
 
-        fn complete(
-            &self,
-            parameters: &[f64],
-            known: &[Prior],
-            predicted: Vec<f64>,
-            (): (),
-        ) -> Option<Linearised> {
-            let own = self.0.complete(parameters, known, predicted, ())?;
-            let slopes = own.slopes.insert_column(2, 1e-5);
-            Some(Linearised { slopes, ..own })
+        fn slopes(&self, parameters: &[f64], known: &[Prior], _: ()) -> Option<DMatrix<f64>> {
+            let own = self.0.slopes(parameters, known, ())?;
+            Some(own.insert_column(2, 1e-5))
         }
     }
 

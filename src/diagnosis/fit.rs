@@ -6,9 +6,9 @@ use crate::evidence::{
     Fit, LocalOptimum, evaluate, linear_fit, linear_optimum, log_likelihood, log_mean, log_sum,
     over_drifts, profile_correction, start_with,
 };
-use crate::fixture::{peak_locations, with_peaks};
+use crate::fixture::{log_unread, with_peaks};
 use crate::forward::Forward;
-use crate::least_squares::Optimum;
+use crate::optimum::Optimum;
 use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
 use crate::structure::COUPLING;
 use crate::thresholds::{LOCATED, SIZE_DETECTED};
@@ -25,12 +25,7 @@ pub fn fit_nominal(dataset: &Dataset) -> Option<Fit> {
             *parameter = value;
         }
     }
-    let best = evaluate(&forward, &priors, &start)?;
-    Some(Fit {
-        effects: Vec::new(),
-        log_evidence: best.log_evidence,
-        best,
-    })
+    Fit::of_variants(vec![evaluate(&forward, &priors, &start)?])
 }
 
 /// Nodes of a location at which the true model is fitted.
@@ -76,8 +71,12 @@ impl<'a> Search<'a> {
         let (low, high) = range.searched_bounds();
         let nodes = (0..range.nodes)
             .map(|node| low + (high - low) * (node as f64 + 0.5) / range.nodes as f64);
+        let peaks = match range.kind {
+            LocationKind::FixtureFrequency => &self.dataset.peaks.all[..],
+            _ => &[],
+        };
         nodes
-            .chain(peak_locations(self.dataset, range.kind))
+            .chain(peaks.iter().map(|peak| peak.log))
             .filter_map(|location| Some(self.linear_at(&forward, location)?.0.objective))
             .min_by(f64::total_cmp)
     }
@@ -106,7 +105,7 @@ impl<'a> Search<'a> {
     /// Fits the effects of a model from one start.
     pub fn fit_from(&self, forward: &Forward<'_>, start: &[f64]) -> Option<Fit> {
         let best = evaluate(forward, &forward.priors(), start)?;
-        let evidence = best.log_evidence;
+        let evidence = evidence_of(forward, &best);
         Some(self.finish(forward, best, evidence))
     }
 
@@ -128,41 +127,36 @@ impl<'a> Search<'a> {
         for value in self.sizes(forward) {
             let start = start_with(self.without, &forward.layout, value, None);
             if let Some(one) = evaluate(forward, &priors, &start) {
-                keep(&mut found, one, &[size]);
+                keep(forward, &mut found, one, &[size]);
             }
         }
-        let total: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
-        let best = found.into_iter().rev().min_by(by_objective)?;
-        Some(self.finish(forward, best, log_sum(&total)))
+        let best = best_of(forward, &found)?.clone();
+        Some(self.finish(forward, best, log_sum(&evidences_of(forward, &found))))
     }
 
     /// Returns sizes from which the search begins: that of the model linearised without the effect, and
     /// the other sign or a size well inside the range.
     fn sizes(&self, forward: &Forward<'_>) -> Vec<f64> {
+        let at = forward.layout.last_size();
         let size = &forward.layout.effects[forward.layout.effects.len() - 1].size;
-        let asked = self.linear_size(forward).unwrap_or(size.neutral).clamp(
+        // One step of Gauss-Newton from nothing of it, not stopped by a bound.
+        let mut priors = forward.priors();
+        (priors[at].low, priors[at].high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let linear = linear_fit(forward, self.without, &priors, None);
+        let asked = linear.map_or(size.neutral, |optimum| optimum.parameters[at]);
+        let asked = asked.clamp(
             (size.neutral - 2.0 * size.scale).max(size.low),
             (size.neutral + 2.0 * size.scale).min(size.high),
         );
         let away = asked - size.neutral;
         let other = (size.neutral - 0.5 * away).clamp(size.low, size.high);
         if away.abs() < 1e-3 * size.scale {
-            vec![size.neutral + 0.05 * size.scale]
+            vec![size.small()]
         } else if (other - size.neutral).abs() < 1e-3 * size.scale {
             vec![asked]
         } else {
             vec![asked, other]
         }
-    }
-
-    /// Returns the size by one step of Gauss-Newton from nothing of it.
-    fn linear_size(&self, forward: &Forward<'_>) -> Option<f64> {
-        let mut priors = forward.priors();
-        let at = forward.layout.last_size();
-        priors[at].low = f64::NEG_INFINITY;
-        priors[at].high = f64::INFINITY;
-        let optimum = linear_fit(forward, self.without, &priors, None)?;
-        Some(optimum.parameters[at])
     }
 
     /// Fits the linearised model at every node of the location's range; then the true one, free, from the best.
@@ -217,7 +211,7 @@ impl<'a> Search<'a> {
         descend(forward, &starts, &mut found);
         // A search along a bent valley may stop short of its end: search again from either side of it. Between
         // nodes that are far apart for the resolution of the data a deeper one may lie: search again from these.
-        if let Some(best) = found.first()
+        if let Some(best) = best_of(forward, &found)
             && is_located(best, at, spacing)
         {
             let parameters = &best.optimum.parameters;
@@ -229,12 +223,11 @@ impl<'a> Search<'a> {
             }
             descend(forward, &starts, &mut found);
         }
-        let best = found.first()?.clone();
-        let of_maxima: Vec<f64> = found.iter().map(|one| one.log_evidence).collect();
+        let best = best_of(forward, &found)?.clone();
         let total = if is_located(&best, at, spacing) {
-            log_sum(&of_maxima)
+            log_sum(&evidences_of(forward, &found))
         } else {
-            log_mean(&evidence)
+            log_mean(&evidences_of(forward, nodes))
         };
         Some(self.finish(forward, best, total))
     }
@@ -257,19 +250,48 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Adds the local optima that are reached from some starts; the deepest first.
+/// Adds the local optima that are reached from some starts.
 fn descend(forward: &Forward<'_>, starts: &[Vec<f64>], found: &mut Vec<LocalOptimum>) {
     let (at, priors) = (forward.layout.last_size(), forward.priors());
     for from in starts {
         if let Some(one) = evaluate(forward, &priors, from) {
-            keep(found, one, &[at, at + 1]);
+            keep(forward, found, one, &[at, at + 1]);
         }
     }
-    found.sort_by(by_objective);
 }
 
-fn by_objective(a: &LocalOptimum, b: &LocalOptimum) -> std::cmp::Ordering {
-    a.optimum.objective.total_cmp(&b.optimum.objective)
+/// Returns the logarithm of an optimum's evidence, with the probability that no peak states its fixture.
+fn evidence_of(forward: &Forward<'_>, one: &LocalOptimum) -> f64 {
+    one.log_evidence + log_unread(forward, one)
+}
+
+/// Returns the logarithms of the evidence of several optima.
+fn evidences_of(forward: &Forward<'_>, all: &[LocalOptimum]) -> Vec<f64> {
+    all.iter().map(|one| evidence_of(forward, one)).collect()
+}
+
+/// Difference of two objectives below which two optima explain the data equally well (1). Searches end within less.
+const EQUAL_OBJECTIVES: f64 = 0.01;
+
+/// Returns whether an optimum explains the data better than another one, or as well and is more probable. An effect of
+/// next to no size explains the data equally well wherever it is: rounding must not choose among its locations.
+fn is_better(forward: &Forward<'_>, one: &LocalOptimum, other: &LocalOptimum) -> bool {
+    let lower = other.optimum.objective - one.optimum.objective;
+    if lower.abs() > EQUAL_OBJECTIVES {
+        return lower > 0.0;
+    }
+    evidence_of(forward, one) > evidence_of(forward, other)
+}
+
+/// Returns the best of several optima.
+fn best_of<'a>(forward: &Forward<'_>, found: &'a [LocalOptimum]) -> Option<&'a LocalOptimum> {
+    (found.iter()).reduce(|best, one| {
+        if is_better(forward, one, best) {
+            one
+        } else {
+            best
+        }
+    })
 }
 
 /// Returns the parameters of the nodes whose location, the parameter `at`, is next to this one or next but one.
@@ -302,8 +324,8 @@ fn is_located(found: &LocalOptimum, size: usize, spacing: f64) -> bool {
 fn local_maxima(evidence: &[f64]) -> Vec<usize> {
     let mut maxima: Vec<usize> = (0..evidence.len())
         .filter(|&k| {
-            let is_above = |other: Option<&f64>| other.is_none_or(|other| evidence[k] >= *other);
-            is_above(evidence[..k].last()) && is_above(evidence.get(k + 1))
+            let mut beside = evidence[..k].last().into_iter().chain(evidence.get(k + 1));
+            beside.all(|other| evidence[k] >= *other)
         })
         .collect();
     maxima.sort_by(|&a, &b| evidence[b].total_cmp(&evidence[a]));
@@ -318,7 +340,7 @@ fn local_maxima(evidence: &[f64]) -> Vec<usize> {
 }
 
 /// Adds a local optimum unless the same one is there already (in the parameters `which`).
-fn keep(found: &mut Vec<LocalOptimum>, one: LocalOptimum, which: &[usize]) {
+fn keep(forward: &Forward<'_>, found: &mut Vec<LocalOptimum>, one: LocalOptimum, which: &[usize]) {
     let covariance = one.covariance();
     let same = found.iter().position(|other| {
         which.iter().all(|&k| {
@@ -328,9 +350,7 @@ fn keep(found: &mut Vec<LocalOptimum>, one: LocalOptimum, which: &[usize]) {
         })
     });
     match same {
-        Some(index) if found[index].optimum.objective > one.optimum.objective => {
-            found[index] = one;
-        }
+        Some(index) if is_better(forward, &one, &found[index]) => found[index] = one,
         Some(_) => {}
         None => found.push(one),
     }

@@ -14,7 +14,7 @@
 //!
 //! Integrated with the likelihood of all other data over the fixture's frequency, every peak gives a
 //! fit whose frequency the peak states, with the factor v B/n. The remaining fit
-//! without a peak has the factor 1 - v. Nothing changes where the mode lies outside the band or is too
+//! without a peak has the factor 1 - v, which is averaged over the frequency where the data leave it open. Nothing changes where the mode lies outside the band or is too
 //! weak (v = 0), and a fixture of zero size has no peak. A fit that should show a peak and has none is
 //! refuted with the probability 1 - v; one whose frequency is stated, by how well it fits.
 
@@ -26,6 +26,7 @@ use crate::parameters::{LocationKind, Prior};
 use crate::structure::{ModalModel, fixture_strength};
 use crate::thresholds::{FIXTURE_LEVEL, SPLIT_POLE};
 use std::f64::consts::TAU;
+use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::median;
 
 /// Standard deviation (dB) of the level at which a fixture's peak is read: damping of the fixture and noise, within a
@@ -85,13 +86,9 @@ impl FixtureMode {
             let tap = arrangement.tap;
             let strength = fixture_strength(one.modes(), fixture, &numbers, &sensors, tap);
             own.constants.push(strength.map(|strength| strength.own));
-            let mut searched = peaks.searched.iter();
-            let searched = searched.find(|searched| searched.configuration == index);
-            if let (Some(strength), Some(searched)) = (strength, searched) {
+            if let (Some(strength), Some(read)) = (strength, peaks.searched.get(&index)) {
                 let half = strength.median + FIXTURE_LEVEL / DECIBEL;
-                let least = searched
-                    .least_log_constant
-                    .map_or(half, |least| half.min(least));
+                let least = read.map_or(half, |least| half.min(least));
                 over.push(DECIBEL * (strength.own - least));
             }
         }
@@ -108,8 +105,9 @@ impl FixtureMode {
     }
 
     /// Returns the probability that its peak is not read, over all sizes that a fit leaves open: normal about `size` and
-    /// above zero. The modal constant of a weak mode is proportional to the size.
-    fn missed_by_size(&self, size: f64, std: f64) -> f64 {
+    /// above zero. The mode was solved at the size `solved`; the modal constant of a weak mode is proportional to
+    /// the size.
+    fn missed_by_size(&self, size: f64, std: f64, solved: f64) -> f64 {
         const SIZES: usize = 400;
         let Some(over) = self.over else { return 1.0 };
         let first = (size - 5.0 * std).max(0.0);
@@ -119,7 +117,7 @@ impl FixtureMode {
             let own = first + step * (k as f64 + 0.5);
             let weight = (-0.5 * ((own - size) / std).powi(2)).exp();
             all += weight;
-            unread += weight * missed(over + 20.0 * (own / size).log10());
+            unread += weight * missed(over + 20.0 * (own / solved).log10());
         }
         unread / all
     }
@@ -178,25 +176,36 @@ pub fn goodness(dataset: &Dataset, fit: &Fit) -> Option<f64> {
     Some(two_sided(excess))
 }
 
-/// Returns the probability that the peak is not read, over the sizes that the fit leaves open.
+/// Returns the probability that the peak is not read, over the sizes that the fit leaves open; `None` where the fit
+/// has no uncertainty of the size. `at` is the parameter of the fixture's frequency, after its size.
+///
+/// A fixture that hardly moves is solved with a small size instead: the shape of its mode on the beam is otherwise
+/// rounding.
 fn unread(forward: &Forward<'_>, at: usize, found: &LocalOptimum) -> Option<f64> {
-    let parameters = &found.optimum.parameters;
+    let mut effects = forward.layout.effects.iter();
+    let fixture = effects.find(|one| one.effect == EffectId::Fixture)?;
+    let mut parameters = found.optimum.parameters.clone();
     let size = parameters[at - 1];
-    let std = size * size_std(found, at);
-    let own = FixtureMode::new(forward, parameters)?;
-    (size > 0.0 && std > 0.0 && std.is_finite()).then(|| own.missed_by_size(size, std))
+    let solved = size.max(fixture.size.small());
+    parameters[at - 1] = solved;
+    let std = found.covariance()?[(at - 1, at - 1)].max(0.0).sqrt();
+    let own = FixtureMode::new(forward, &parameters)?;
+    (std > 0.0 && std.is_finite()).then(|| own.missed_by_size(size, std, solved))
 }
 
-/// Returns the logarithms of the frequencies at which a fixture is tried beyond the nodes of its range.
-pub fn peak_locations(dataset: &Dataset, kind: LocationKind) -> Vec<f64> {
-    match kind {
-        LocationKind::FixtureFrequency => dataset.peaks.all.iter().map(|peak| peak.log).collect(),
-        _ => Vec::new(),
-    }
+/// Returns the logarithm of the probability that no peak states the frequency of a fit's fixture; 0 for fits without a
+/// fixture, and where no peaks were searched.
+pub fn log_unread(forward: &Forward<'_>, found: &LocalOptimum) -> f64 {
+    let at = forward
+        .layout
+        .location_of_kind(LocationKind::FixtureFrequency);
+    at.filter(|_| forward.dataset.peaks.band.is_some())
+        .and_then(|at| unread(forward, at, found))
+        .map_or(0.0, f64::ln)
 }
 
-/// Returns the fit with the likelihood of the peaks for its fixture; any other as it is. `without` is the fit without
-/// the last effect.
+/// Returns the fit with those in addition whose fixture has the frequency of a peak; any other as it is. `without` is
+/// the fit without the last effect. The evidence of `fit` is that no peak states the frequency ([`log_unread`]).
 pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit) -> Fit {
     let peaks = &forward.dataset.peaks;
     let at = forward
@@ -205,8 +214,7 @@ pub fn with_peaks(forward: &Forward<'_>, fit: Fit, without: &Fit) -> Fit {
     let (Some(at), Some((low, high))) = (at, peaks.band) else {
         return fit;
     };
-    let missed = unread(forward, at, &fit.best).unwrap_or(1.0);
-    let mut all = vec![(fit.log_evidence + missed.ln(), fit.best.clone())];
+    let mut all = vec![(fit.log_evidence, fit.best.clone())];
     let factor = ((high - low) / peaks.all.len().max(1) as f64).ln();
     for peak in &peaks.all {
         let search = PeakSearch { forward, at, peak };
@@ -321,8 +329,8 @@ mod tests {
     #[test]
     fn limit_a_size_that_may_be_nothing_may_have_no_peak() {
         let strong = own(40.0);
-        assert!((strong.missed_by_size(0.02, 1e-9) / strong.missed() - 1.0).abs() < 0.01);
-        let doubtful = strong.missed_by_size(0.02, 0.02);
+        assert!((strong.missed_by_size(0.02, 1e-9, 0.02) / strong.missed() - 1.0).abs() < 0.01);
+        let doubtful = strong.missed_by_size(0.02, 0.02, 0.02);
         assert!(
             doubtful > 1e3 * strong.missed() && doubtful < 0.1,
             "{doubtful}"
@@ -331,7 +339,7 @@ mod tests {
             over: None,
             ..own(0.0)
         };
-        assert_eq!(nowhere.missed_by_size(0.02, 0.02), 1.0);
+        assert_eq!(nowhere.missed_by_size(0.02, 0.02, 0.02), 1.0);
     }
 
     /// Over all strengths the density integrates to that of a peak of another cause.

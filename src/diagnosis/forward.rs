@@ -2,7 +2,7 @@
 
 use crate::dataset::{Dataset, Observable, ObservableKind};
 use crate::joint_motion::{LEAST_STIFFNESS, StiffnessChanges};
-use crate::least_squares::{Linearised, Model};
+use crate::optimum::Model;
 use crate::parameters::{CandidateEffect, Layout, LocationKind, NuisanceParameter, Prior};
 use crate::structure::{Arrangement, ModalModel, with_joint};
 use nalgebra::DMatrix;
@@ -34,13 +34,28 @@ pub struct Solution {
 type SolvedModes = (Arc<BeamModes>, Option<Vec<f64>>);
 
 impl Model for Forward<'_> {
-    type Rest = Solution;
+    type Solution = Solution;
 
     fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Solution)> {
+        use NuisanceParameter::{Amplitude, Damping, DampingTilt};
         let models = self.solve(parameters)?;
         let base = self.predictions_of(&models, parameters)?;
-        let slopes = self.nuisance_slopes(&models, &base, parameters);
-        let predicted = self.with_nuisances(&base, &slopes, parameters);
+        let mut predicted = base.clone();
+        let mut slopes = DMatrix::zeros(base.len(), parameters.len());
+        let first = self.layout.first_nuisance();
+        for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
+            let nuisance = nuisance.parameter;
+            // These enter the solution itself.
+            let is_solved = matches!(nuisance, Damping | DampingTilt | Amplitude);
+            for (row, observable) in self.observables.iter().enumerate() {
+                let slope =
+                    self.nuisance_slope(observable, nuisance, &models, base[row], parameters);
+                slopes[(row, first + k)] = slope;
+                if !is_solved {
+                    predicted[row] += parameters[first + k] * slope;
+                }
+            }
+        }
         let solution = Solution {
             models,
             base,
@@ -49,13 +64,12 @@ impl Model for Forward<'_> {
         Some((predicted, solution))
     }
 
-    fn complete(
+    fn slopes(
         &self,
         parameters: &[f64],
         priors: &[Prior],
-        predicted: Vec<f64>,
         solution: Solution,
-    ) -> Option<Linearised> {
+    ) -> Option<DMatrix<f64>> {
         let Solution {
             models,
             base,
@@ -79,7 +93,7 @@ impl Model for Forward<'_> {
                 slopes.set_column(column, &change.into());
             }
         }
-        Some(Linearised { predicted, slopes })
+        Some(slopes)
     }
 }
 
@@ -289,41 +303,6 @@ impl<'a> Forward<'a> {
                 }
             }
         }
-    }
-
-    /// Returns the slopes with respect to the nuisance parameters; the columns of all others are 0.
-    fn nuisance_slopes(
-        &self,
-        models: &[ModalModel],
-        base: &[f64],
-        parameters: &[f64],
-    ) -> DMatrix<f64> {
-        let first = self.layout.first_nuisance();
-        let mut slopes = DMatrix::zeros(base.len(), parameters.len());
-        for (row, observable) in self.observables.iter().enumerate() {
-            for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
-                let nuisance = nuisance.parameter;
-                slopes[(row, first + k)] =
-                    self.nuisance_slope(observable, nuisance, models, base[row], parameters);
-            }
-        }
-        slopes
-    }
-
-    /// Returns the predictions with the nuisance parameters.
-    fn with_nuisances(&self, base: &[f64], slopes: &DMatrix<f64>, parameters: &[f64]) -> Vec<f64> {
-        use NuisanceParameter::{Amplitude, Damping, DampingTilt};
-        let first = self.layout.first_nuisance();
-        let mut predicted = base.to_vec();
-        for (k, nuisance) in self.dataset.nuisances.iter().enumerate() {
-            // These enter the solution itself.
-            if !matches!(nuisance.parameter, Damping | DampingTilt | Amplitude) {
-                for (row, predicted) in predicted.iter_mut().enumerate() {
-                    *predicted += parameters[first + k] * slopes[(row, first + k)];
-                }
-            }
-        }
-        predicted
     }
 
     /// Returns the derivative of a prediction with respect to a nuisance parameter.

@@ -4,6 +4,7 @@
 //! depends on its own amplitude and on those of all others. A fitted frequency is an average over its
 //! decay; a followed one is taken at two times.
 
+use std::collections::BTreeMap;
 use tapjoint_beam::effects::{JointLaw, ModeMotion};
 use tapjoint_identify::observation::ObservedMode;
 
@@ -55,8 +56,8 @@ pub struct JointMotion {
 /// Relative changes of the stiffness that the modes of one configuration feel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StiffnessChanges {
-    /// Number of each mode and its change.
-    modes: Vec<(usize, f64)>,
+    /// Change by the number of the mode.
+    modes: BTreeMap<usize, f64>,
     /// Mean of all modes, with which the structure is solved.
     pub mean: f64,
 }
@@ -64,8 +65,7 @@ pub struct StiffnessChanges {
 impl StiffnessChanges {
     /// Returns the change that one mode feels, where its amplitude is known.
     pub fn of(&self, mode: usize) -> Option<f64> {
-        let found = self.modes.iter().find(|one| one.0 == mode);
-        found.map(|one| one.1)
+        self.modes.get(&mode).copied()
     }
 }
 
@@ -172,11 +172,15 @@ impl JointMotion {
 
     /// Returns the change that the frequency of each mode stands for, and their mean.
     pub fn stiffness_changes(&self, law: &JointLaw) -> StiffnessChanges {
-        let modes: Vec<(usize, f64)> = (self.modes.iter())
-            .filter_map(|m| Some((m.mode, self.whole(self.index(m.mode)?, law))))
+        let changes: Vec<f64> = (0..self.modes.len())
+            .map(|index| self.whole(index, law))
             .collect();
-        let mean = modes.iter().map(|mode| mode.1).sum::<f64>() / modes.len().max(1) as f64;
-        StiffnessChanges { modes, mean }
+        let mean = changes.iter().sum::<f64>() / changes.len().max(1) as f64;
+        let modes = self.modes.iter().map(|one| one.mode).zip(changes);
+        StiffnessChanges {
+            modes: modes.collect(),
+            mean,
+        }
     }
 }
 

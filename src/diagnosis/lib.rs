@@ -7,7 +7,7 @@
 //!                          structure      the described structure and its modal models
 //!                          parameters     effects, priors, order of the parameters
 //!                          forward        predictions of a hypothesis and their slopes
-//!                          evidence       evidence of a hypothesis (with least_squares)
+//!                          evidence       evidence of a hypothesis (with optimum)
 //!                          amplitude      joints whose stiffness depends on the amplitude (with joint_motion)
 //!                          fixture        the fixture's own resonance
 //!                          fit            local optima of one hypothesis (with multi_start)
@@ -38,11 +38,11 @@ mod fixture;
 mod forward;
 mod goodness_of_fit;
 mod joint_motion;
-mod least_squares;
 mod location_map;
 mod multi_start;
 mod next_test;
 mod observations;
+mod optimum;
 mod parameters;
 mod posterior;
 mod result;

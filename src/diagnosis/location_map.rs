@@ -8,7 +8,7 @@
 use crate::dataset::Dataset;
 use crate::evidence::Fit;
 use crate::forward::Forward;
-use crate::least_squares::{LinearModel, Optimum, covariance, maximise};
+use crate::optimum::{LinearModel, Optimum, maximise};
 use crate::parameters::Prior;
 use crate::result::LocationMap;
 use crate::structure::{ModalModel, Property};
@@ -85,7 +85,7 @@ fn changes(
 ) -> Option<(Vec<f64>, Vec<f64>)> {
     let first = nominal.parameters().len();
     let (priors, found) = with_pieces(dataset, nominal, slopes, CHANGE_STD)?;
-    let variances = covariance(&priors, &found)?.diagonal();
+    let variances = found.covariance(&priors)?.diagonal();
     let stds = variances.iter().skip(first).map(|v| v.max(0.0).sqrt());
     Some((found.parameters[first..].to_vec(), stds.collect()))
 }

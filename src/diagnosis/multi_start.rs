@@ -13,7 +13,7 @@ use crate::dataset::{Dataset, Datum};
 use crate::evidence::Fit;
 use crate::fit::Search;
 use crate::forward::Forward;
-use crate::least_squares::{Model, maximise, objective_at};
+use crate::optimum::{Model, maximise, objective_at};
 use crate::parameters::{CandidateEffect, Layout};
 use crate::structure::COUPLING;
 use crate::thresholds::FOLLOWED_SHARE;

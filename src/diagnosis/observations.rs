@@ -7,6 +7,7 @@ use crate::thresholds::{
     CHANGED_FREQUENCY, LEAST_PEAKS, LEAST_SHARED_MODES, MOVED_FREQUENCY, NEAR_FIXTURE,
     NODE_DISPLACEMENT, READABLE_LEVEL, SAME_MODE_RATIO, SAME_PEAK, SPLIT_POLE,
 };
+use std::collections::BTreeMap;
 use tapjoint_identify::observation::{
     Configuration, DecayVerdict, Observations, ObservedMode, UNCLEAR, UNPAIRED,
 };
@@ -311,17 +312,9 @@ pub struct UnpairedPeaks {
     pub doubtful: Vec<f64>,
     /// Logarithms of the lowest and the highest frequency of a mode; `None` where no peaks were searched.
     pub band: Option<(f64, f64)>,
-    /// Configurations whose peaks were searched.
-    pub searched: Vec<SearchedConfiguration>,
-}
-
-/// Configuration whose peaks were searched.
-#[derive(Debug, Clone)]
-pub struct SearchedConfiguration {
-    /// Index of the configuration.
-    pub configuration: usize,
-    /// Logarithm of the least modal constant (1/kg) that is read; `None` where no peak shows it.
-    pub least_log_constant: Option<f64>,
+    /// Configurations whose peaks were searched, with the logarithm of the least modal constant (1/kg) that is read;
+    /// `None` where no peak shows it.
+    pub searched: BTreeMap<usize, Option<f64>>,
 }
 
 /// Peak of no mode that several recordings show.
@@ -375,10 +368,7 @@ impl UnpairedPeaks {
             band: (low < high).then_some((low, high)),
             searched: searched
                 .iter()
-                .map(|(index, one)| SearchedConfiguration {
-                    configuration: *index,
-                    least_log_constant: least_log_constant(one),
-                })
+                .map(|(index, one)| (*index, least_log_constant(one)))
                 .collect(),
         }
     }
@@ -436,23 +426,22 @@ fn common_peaks(searched: &[(usize, &Configuration)]) -> Vec<UnpairedPeak> {
         let able = able.filter(|(one, shows)| **shows || one.1.reaches(group[0].log.exp()));
         2 * showing.iter().filter(|shows| **shows).count() >= able.count()
     });
-    common.map(mean_peak).collect()
-}
-
-/// Returns the mean of one peak in several recordings.
-fn mean_peak(group: &[ObservedPeak]) -> UnpairedPeak {
-    let count = group.len() as f64;
-    let log = group.iter().map(|one| one.log).sum::<f64>() / count;
-    let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
-    let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
-    let constants = group.iter();
-    UnpairedPeak {
-        log,
-        std: scatter.sqrt().hypot(read).hypot(FIXTURE_FREQUENCY_STD),
-        constants: constants
-            .filter_map(|one| Some((one.configuration, one.constant?)))
-            .collect(),
+    let mut means = Vec::new();
+    for group in common {
+        let count = group.len() as f64;
+        let log = group.iter().map(|one| one.log).sum::<f64>() / count;
+        let scatter = group.iter().map(|one| (one.log - log).powi(2)).sum::<f64>() / count;
+        let read = group.iter().map(|one| one.std).fold(0.0, f64::max);
+        let constants = group.iter();
+        means.push(UnpairedPeak {
+            log,
+            std: scatter.sqrt().hypot(read).hypot(FIXTURE_FREQUENCY_STD),
+            constants: constants
+                .filter_map(|one| Some((one.configuration, one.constant?)))
+                .collect(),
+        });
     }
+    means
 }
 
 /// Returns the peaks of a recording that belong to no mode and are no halves of a split decay.
@@ -528,7 +517,7 @@ mod tests {
         let doubtful = [688.0, 712.0, 730.0, 183.0, 50.0].map(|f: f64| peaks.is_doubtful(f.ln()));
         assert_eq!(doubtful, [true, true, false, false, false]);
         // 45 dB over the noise is 30 more than it takes: a constant 31.6 times smaller would do.
-        let weakest = peaks.searched[0].least_log_constant.unwrap();
+        let weakest = peaks.searched[&0].unwrap();
         assert!((weakest - (0.2 / 10.0_f64.powf(1.5)).ln()).abs() < 1e-9);
     }
 

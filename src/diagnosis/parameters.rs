@@ -9,7 +9,6 @@
 //! E I/L^3, axial forces of E I/L^2. Those of sensors and clocks are absolute.
 
 use crate::result::LARGEST_STIFFNESS_CHANGE;
-use crate::settings::GapSettings;
 use crate::structure::{Arrangement, COUPLING, Nominal, ROTATION};
 use tapjoint_beam::effects::{Effect, EffectId};
 
@@ -182,12 +181,31 @@ impl LocationRange {
         }
     }
 
+    /// Returns the name of the effect's own parameter.
+    pub fn name(self) -> &'static str {
+        match self.kind {
+            LocationKind::Position => "position",
+            LocationKind::FixtureFrequency => "frequency",
+            LocationKind::Exponent => "exponent",
+            LocationKind::Gyration => "inertia",
+        }
+    }
+
+    /// Returns the effect's own parameter: the value itself, or the inertia J = m r^2 of a mass.
+    pub fn own_value(self, value: f64, size: f64) -> f64 {
+        match self.kind {
+            LocationKind::Gyration => size * value * value,
+            _ => value,
+        }
+    }
+
     /// Returns the lowest and the highest value in the searched form.
     pub fn searched_bounds(self) -> (f64, f64) {
         (self.to_searched(self.low), self.to_searched(self.high))
     }
 
-    fn is_logarithmic(self) -> bool {
+    /// Returns whether its logarithm is searched.
+    pub fn is_logarithmic(self) -> bool {
         matches!(
             self.kind,
             LocationKind::FixtureFrequency | LocationKind::Gyration
@@ -212,6 +230,11 @@ impl Size {
         let density: f64 = parts.sum::<f64>() / WIDTHS.len() as f64;
         let sides: f64 = if self.low >= self.neutral { 2.0 } else { 1.0 };
         (sides * density).ln()
+    }
+
+    /// Returns a size next to nothing, at which slopes with respect to a location do not vanish yet.
+    pub fn small(&self) -> f64 {
+        self.neutral + 0.05 * self.scale
     }
 
     fn positive(name: &'static str, scale: f64, high: f64) -> Self {
@@ -379,81 +402,10 @@ impl Layout {
                 let mut pairs = vec![(candidate.size.name, size)];
                 if let (Some(range), Some(location)) = (candidate.location, self.location(index)) {
                     let value = range.value_at(parameters[location]);
-                    pairs.push(match range.kind {
-                        LocationKind::Position => ("position", value),
-                        LocationKind::FixtureFrequency => ("frequency", value),
-                        LocationKind::Exponent => ("exponent", value),
-                        LocationKind::Gyration => ("inertia", size * value * value),
-                    });
+                    pairs.push((range.name(), range.own_value(value, size)));
                 }
                 Effect::from_pairs(candidate.effect, &pairs).ok()
             })
             .collect()
     }
-}
-
-/// Spread of the coupling of a joint that has one: anything between -1 and 1 (2 standard deviations).
-const COUPLING_STD: f64 = 0.5;
-
-/// Returns the priors of all parameters, the joint's drift the middle one of those
-/// that are tried: a search begins with it.
-pub fn priors(
-    nominal: &Nominal,
-    layout: &Layout,
-    nuisances: &[Nuisance],
-    settings: &GapSettings,
-) -> Vec<Prior> {
-    let mut all = Vec::new();
-    for (direction, start) in nominal.joint_parameters() {
-        all.push(match direction {
-            COUPLING => Prior {
-                low: -0.95,
-                high: 0.95,
-                ..Prior::normal(0.0, COUPLING_STD)
-            },
-            // Beyond these bounds a beam's frequencies no longer feel the joint.
-            _ => Prior {
-                low: start.ln() - 8.0 * settings.joint_std,
-                high: start.ln() + 8.0 * settings.joint_std,
-                ..Prior::normal(start.ln(), settings.joint_std)
-            },
-        });
-    }
-    for effect in &layout.effects {
-        all.push(Prior {
-            low: effect.size.low,
-            high: effect.size.high,
-            ..Prior::normal(effect.size.neutral, 3.0 * effect.size.scale)
-        });
-        if let Some(range) = effect.location {
-            let (low, high) = range.searched_bounds();
-            all.push(Prior {
-                centre: 0.0,
-                std: f64::INFINITY,
-                low,
-                high,
-            });
-        }
-    }
-    let others = nuisances.iter();
-    all.extend(others.map(|one| Prior::normal(one.centre, one.std)));
-    let drift = settings.drift_stds[settings.drift_stds.len() / 2];
-    with_drift(nuisances, layout, &all, drift)
-}
-
-/// Returns priors with this spread of the drift.
-pub fn with_drift(
-    nuisances: &[Nuisance],
-    layout: &Layout,
-    priors: &[Prior],
-    drift: f64,
-) -> Vec<Prior> {
-    let first = layout.first_nuisance();
-    let mut priors = priors.to_vec();
-    for (k, nuisance) in nuisances.iter().enumerate() {
-        if nuisance.parameter.is_drift() {
-            priors[first + k].std = drift;
-        }
-    }
-    priors
 }

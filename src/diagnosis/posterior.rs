@@ -80,11 +80,21 @@ pub fn none_of(candidates: &[Candidate]) -> Option<&Candidate> {
 /// has [`NO_GAP_PRIOR`] of them. The pairs that were `tried` share one unit among themselves, the accepted
 /// and the others. Sorts the most probable first.
 pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
-    let priors: Vec<f64> = (candidates.iter())
-        .map(|one| prior_of(one, candidates, tried))
-        .collect();
-    for (candidate, prior) in candidates.iter_mut().zip(priors) {
-        candidate.prior = prior;
+    for k in 0..candidates.len() {
+        let one = &candidates[k];
+        candidates[k].prior = if one.effects().len() > 1 {
+            1.0 / tried.max(1) as f64
+        } else {
+            let same = candidates.iter().filter(|other| {
+                let is_single = one.effects().len() == 1 && other.effects().len() == 1;
+                is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
+            });
+            let weight = match one.hypothesis {
+                Hypothesis::None => NO_GAP_PRIOR,
+                _ => 1.0,
+            };
+            weight / same.count() as f64
+        };
     }
     let logs: Vec<f64> = candidates.iter().map(Candidate::log_weight).collect();
     let total = log_sum(&logs);
@@ -92,21 +102,6 @@ pub fn set_probabilities(candidates: &mut [Candidate], tried: usize) {
         candidate.probability = (log - total).exp();
     }
     sort(candidates);
-}
-
-fn prior_of(one: &Candidate, all: &[Candidate], tried: usize) -> f64 {
-    if one.effects().len() > 1 {
-        return 1.0 / tried.max(1) as f64;
-    }
-    let same = all.iter().filter(|other| {
-        let is_single = one.effects().len() == 1 && other.effects().len() == 1;
-        is_single && other.groups() == one.groups() || one.hypothesis == other.hypothesis
-    });
-    let weight = match one.hypothesis {
-        Hypothesis::None => NO_GAP_PRIOR,
-        _ => 1.0,
-    };
-    weight / same.count() as f64
 }
 
 fn sort(candidates: &mut [Candidate]) {
@@ -263,10 +258,18 @@ pub fn by_group(candidates: &[Candidate]) -> Vec<CandidateGroup> {
 /// Returns the probability of each location, given that there is a gap.
 pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities {
     let mut all = LocationProbabilities::default();
+    let gaps = candidates
+        .iter()
+        .filter(|one| one.hypothesis != Hypothesis::None);
+    let total: f64 = gaps.map(|one| one.probability).sum();
+    if total <= 0.0 {
+        return all;
+    }
     for candidate in candidates {
-        let share = candidate.probability / candidate.effects().len().max(1) as f64;
+        let probability = candidate.probability / total;
+        let share = probability / candidate.effects().len().max(1) as f64;
         if candidate.is_unknown() {
-            all.unknown += candidate.probability;
+            all.unknown += probability;
         }
         for effect in candidate.effects() {
             *match effect.place() {
@@ -276,20 +279,6 @@ pub fn location_probabilities(candidates: &[Candidate]) -> LocationProbabilities
                 Place::Body => &mut all.body,
                 Place::Acquisition => &mut all.acquisition,
             } += share;
-        }
-    }
-    let each = [
-        &mut all.joint,
-        &mut all.fixture,
-        &mut all.sensor,
-        &mut all.body,
-        &mut all.acquisition,
-        &mut all.unknown,
-    ];
-    let total: f64 = each.iter().map(|one| **one).sum();
-    if total > 0.0 {
-        for one in each {
-            *one /= total;
         }
     }
     all

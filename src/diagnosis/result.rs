@@ -1,6 +1,5 @@
 //! The result of a diagnosis, as plain data.
 
-use crate::thresholds::{DIRECTED_CHANGE, LAW_MISFIT, LEAST_DIRECTED};
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -79,8 +78,8 @@ impl Verdict {
         match self {
             Verdict::Named(effects) => vec![Hypothesis::Effects(effects.clone())],
             Verdict::Group(effects) => {
-                let single = |effect: &EffectId| Hypothesis::Effects(vec![*effect]);
-                effects.iter().map(single).collect()
+                let effects = effects.iter();
+                effects.map(|one| Hypothesis::Effects(vec![*one])).collect()
             }
             Verdict::Set(list) => list.clone(),
             Verdict::NoGap | Verdict::Unknown | Verdict::NotEnoughData(_) => Vec::new(),
@@ -102,11 +101,12 @@ struct WrittenVerdict {
 
 impl From<Verdict> for WrittenVerdict {
     fn from(verdict: Verdict) -> Self {
-        let named = |effects: &[EffectId]| effects.iter().map(|id| id.name().to_owned()).collect();
         WrittenVerdict {
             kind: verdict.kind(),
             effects: match &verdict {
-                Verdict::Named(effects) | Verdict::Group(effects) => named(effects),
+                Verdict::Named(effects) | Verdict::Group(effects) => {
+                    effects.iter().map(|one| one.name().to_owned()).collect()
+                }
                 Verdict::Set(list) => list.iter().map(Hypothesis::name).collect(),
                 _ => Vec::new(),
             },
@@ -227,16 +227,15 @@ fn by_name<S: Serializer>(parameters: &[ParameterValue], to: S) -> Result<S::Ok,
     let mut effects = parameters.iter().map(|one| one.effect);
     let first = effects.next();
     let alone = effects.all(|effect| Some(effect) == first);
-    let key = |one: &ParameterValue| match alone {
-        true => one.name.to_owned(),
-        false => format!("{}.{}", one.effect.name(), one.name),
-    };
-    to.collect_map(
-        parameters
-            .iter()
-            .map(|one| (key(one), one))
-            .collect::<BTreeMap<_, _>>(),
-    )
+    let mut named = BTreeMap::new();
+    for one in parameters {
+        let name = match alone {
+            true => one.name.to_owned(),
+            false => format!("{}.{}", one.effect.name(), one.name),
+        };
+        named.insert(name, one);
+    }
+    named.serialize(to)
 }
 
 /// Parameter of an effect.
@@ -413,6 +412,13 @@ pub enum DecidedBy {
 
 /// Largest relative change of the joint's stiffness with the amplitude that is searched (1).
 pub const LARGEST_STIFFNESS_CHANGE: f64 = 0.7;
+/// Goodness of fit below which a law of the joint does not explain the changes.
+const LAW_MISFIT: f64 = 0.001;
+/// Standard uncertainties beyond which a change has a direction, 95 % two-sided: it is certain before that there are
+/// changes at all.
+const DIRECTED_CHANGE: f64 = 2.0;
+/// Number of directed changes of one sign that belong to the joint: a single one always has one sign.
+const LEAST_DIRECTED: usize = 2;
 
 /// Joint law that explains how frequencies change along the decays.
 ///
@@ -555,7 +561,7 @@ pub enum Proposal {
     ReferenceTone,
     /// Put a sensor elsewhere.
     MoveSensor {
-        /// The cause, or the name of the sensor.
+        /// Name of the sensor.
         name: String,
         /// Its new position (m).
         position: f64,
@@ -575,7 +581,7 @@ pub enum Proposal {
     BareBeam,
     /// See directly whether a cause that was named is there.
     Confirm {
-        /// The cause, or the name of the sensor.
+        /// The cause.
         effect: EffectId,
     },
 }

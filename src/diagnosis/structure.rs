@@ -7,6 +7,7 @@ use crate::joint_motion::{
 };
 use crate::thresholds::{COMMON_SCATTER, DISTINCT_AMPLITUDES};
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tapjoint_beam::StructureError;
@@ -58,17 +59,14 @@ pub struct NominalSensor {
 }
 
 impl Nominal {
-    /// Returns whether a sensor is known not to touch the structure.
-    fn is_contactless(&self, name: &str) -> bool {
-        let mut sensors = self.sensors.iter();
-        sensors.any(|sensor| sensor.name == name && sensor.mass == Some(0.0))
+    /// Returns the stated mass of a sensor (kg); 0 for one that does not touch the structure.
+    fn stated_mass(&self, name: &str) -> Option<f64> {
+        self.sensors.iter().find(|one| one.name == name)?.mass
     }
 
     /// Returns the mass of a sensor (kg), 0 where it is unknown.
     pub(crate) fn mass_of(&self, name: &str) -> f64 {
-        let mut sensors = self.sensors.iter();
-        let own = sensors.find(|sensor| sensor.name == name);
-        own.and_then(|sensor| sensor.mass).unwrap_or(0.0)
+        self.stated_mass(name).unwrap_or(0.0)
     }
 
     /// Returns the structure with sensors and added masses.
@@ -175,16 +173,16 @@ pub struct Arrangement {
     pub level: f64,
     /// Tap force over that of the hardest configuration (1), where it was measured.
     pub known_level: Option<f64>,
-    /// Mode, and amplitude at the begin and end of its followed decay over that of its first instant.
-    pub spans: Vec<(usize, [f64; 2])>,
+    /// By mode: amplitude at the begin and end of its followed decay over that of its first instant.
+    pub spans: BTreeMap<usize, [f64; 2]>,
     /// Motion of the joint; `None` where no amplitude is known.
     pub joint_motion: Option<JointMotion>,
     /// Number of the set-up: configurations of one recording share it.
     pub setup: usize,
     /// There is a recording that could be read again.
     pub is_recorded: bool,
-    /// Common scatter of the taps: mode, and share of its standard deviation with its sign.
-    pub scatter: Vec<(usize, f64)>,
+    /// Common scatter of the taps: share of the standard deviation of each mode, with its sign.
+    pub scatter: BTreeMap<usize, f64>,
 }
 
 /// Sensors and masses of all configurations, each once.
@@ -219,24 +217,23 @@ impl Arrangement {
         let mut sensors: Vec<PointMass> = Vec::new();
         let (mut carried, mut names, mut positions) = (Vec::new(), Vec::new(), Vec::new());
         for sensor in &configuration.sensors {
-            let mass = sensor
-                .position
-                .map_or(0.0, |_| nominal.mass_of(&sensor.name));
-            let position = sensor.position.unwrap_or(0.0);
-            let placed = PointMass::new(position, mass);
+            let stated = nominal.stated_mass(&sensor.name);
+            let mass = stated.filter(|_| sensor.position.is_some());
+            let placed = PointMass::new(sensor.position.unwrap_or(0.0), mass.unwrap_or(0.0));
             sensors.push(placed);
-            if sensor.position.is_some() && !nominal.is_contactless(&sensor.name) {
+            if sensor.position.is_some() && stated != Some(0.0) {
                 carried.push(placed);
             }
             let name = index_in(&mut inventory.names, sensor.name.clone());
             names.push(name);
-            positions.push(index_in(&mut inventory.positions, (name, position)));
+            positions.push(index_in(&mut inventory.positions, (name, placed.position)));
         }
         let masses = configuration.masses.iter();
-        let fastened = masses.map(|mass| (index_in(&mut inventory.fastened, *mass), *mass));
         let file = configuration.file.clone();
         Arrangement {
-            fastened: fastened.collect(),
+            fastened: masses
+                .map(|mass| (index_in(&mut inventory.fastened, *mass), *mass))
+                .collect(),
             file: file.unwrap_or_else(|| "the given frequencies".to_owned()),
             specimen: nominal.loaded(&sensors, &configuration.masses),
             sensors,
@@ -262,21 +259,15 @@ impl Arrangement {
         }
     }
 
-    /// Returns the amplitudes between which the decay of a mode was followed.
-    fn span(&self, mode: usize) -> Option<[f64; 2]> {
-        let span = self.spans.iter().find(|span| span.0 == mode);
-        span.map(|span| span.1)
-    }
-
     /// Logarithm of the ratio of the amplitudes between which a decay was followed; 1 where they are unknown.
     pub fn log_amplitude_span(&self, mode: usize) -> f64 {
-        self.span(mode)
-            .map_or(1.0, |[early, late]| (early / late).ln())
+        let span = self.spans.get(&mode);
+        span.map_or(1.0, |[early, late]| (early / late).ln())
     }
 
     /// Returns d ln kr/d ln a that a mode feels, averaged over the followed part of its decay.
     pub fn stiffness_slope(&self, mode: usize, law: &JointLaw) -> f64 {
-        if let (Some([early, late]), Some(motion)) = (self.span(mode), &self.joint_motion)
+        if let (Some(&[early, late]), Some(motion)) = (self.spans.get(&mode), &self.joint_motion)
             && let Some([first, last]) = motion.changes_at_shares(mode, [early, late], law)
         {
             return (log_stiffness(first) - log_stiffness(last)) / (early / late).ln();
@@ -339,21 +330,21 @@ fn span(mode: &ObservedMode) -> Option<(usize, [f64; 2])> {
 /// Returns the one factor that explains most of the correlation of the taps' scatter. With the largest eigenvalue l
 /// of the correlation matrix and its vector v, the shares sqrt(l - 1) v leave the diagonal as it is and
 /// explain most of the rest (all of it where all correlations are equal and many).
-fn common_scatter(configuration: &Configuration) -> Vec<(usize, f64)> {
+fn common_scatter(configuration: &Configuration) -> BTreeMap<usize, f64> {
     let Some(covariance) = &configuration.covariance else {
-        return Vec::new();
+        return BTreeMap::new();
     };
     let size = configuration.modes.len();
     let correlation = DMatrix::from_fn(size, size, |i, j| {
         covariance[i][j] / (covariance[i][i] * covariance[j][j]).sqrt()
     });
     if size < 2 || correlation.iter().any(|value| !value.is_finite()) {
-        return Vec::new();
+        return BTreeMap::new();
     }
     let eigen = correlation.symmetric_eigen();
     let (at, largest) = eigen.eigenvalues.argmax();
     if largest < COMMON_SCATTER {
-        return Vec::new();
+        return BTreeMap::new();
     }
     let vector = eigen.eigenvectors.column(at);
     let shares = vector.iter().map(|v| (largest - 1.0).sqrt() * v);
@@ -448,19 +439,15 @@ impl ModalModel {
     /// Returns d ln f/d ln k of all modes for a spring of the joint, or d ln f/d coupling: half the strain energy of that
     /// spring in the mode over that of the structure (Rayleigh's quotient is stationary in the shape).
     pub fn joint_slopes(&self, direction: usize) -> Vec<f64> {
-        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
-        if based || direction == COUPLING {
-            // The base's spring is tied to the joint's by their ratio: both move.
-            return self.stiffened_slopes(direction);
-        }
-        (0..self.modes().len())
-            .map(|index| 0.5 * self.joint_shares(index)[direction])
-            .collect()
-    }
-
-    /// Returns these slopes by Rayleigh's quotient of the changed structure.
-    fn stiffened_slopes(&self, direction: usize) -> Vec<f64> {
         const STEP: f64 = 1e-4;
+        let based = self.seen.specimen.base.is_some_and(|base| base.ratio > 0.0);
+        if !based && direction != COUPLING {
+            return (0..self.modes().len())
+                .map(|index| 0.5 * self.joint_shares(index)[direction])
+                .collect();
+        }
+        // By Rayleigh's quotient of a changed structure. The base's spring is tied to the joint's by their ratio: both
+        // move.
         let mut other = self.seen.specimen.clone();
         if let Some(Joint { kt, kr, coupling }) = &mut other.joint {
             match direction {
@@ -548,7 +535,8 @@ impl ModalModel {
     }
 
     /// Returns the motion of the joint from the amplitudes that were observed at the sensors; `None`
-    /// where no amplitude is known.
+    /// where no amplitude is known. Taps without a position count as if they were at the sensor: the sign of a mode shape
+    /// by itself means nothing.
     pub fn joint_motion(
         &self,
         configuration: &Configuration,
@@ -567,7 +555,7 @@ impl ModalModel {
             let sensor = configuration.sensors.get(reference)?.position?;
             let at_sensor = self.modes().displacement(index, sensor);
             let tap = arrangement.tap;
-            let at_tap = tap.map_or(1.0, |tap| self.modes().displacement(index, tap));
+            let at_tap = tap.map_or(at_sensor, |tap| self.modes().displacement(index, tap));
             let omega = TAU * mode.frequency;
             let size = (amplitude * rotation / at_sensor).abs();
             if size.is_finite() {
@@ -581,19 +569,6 @@ impl ModalModel {
         }
         let seconds = configuration.decay_seconds.unwrap_or(f64::INFINITY);
         (!modes.is_empty()).then_some(JointMotion { modes, seconds })
-    }
-
-    /// Returns the amplitude of the joint's rotation after a tap, over the modes up to this number; `None` where the
-    /// tap has no position.
-    pub fn joint_amplitude(&self, arrangement: &Arrangement, modes: usize) -> Option<f64> {
-        let numbers = (1..=modes).filter_map(|mode| self.index(mode));
-        let tap = arrangement.tap?;
-        Some(joint_amplitude(
-            self.modes(),
-            tap,
-            arrangement.level,
-            numbers,
-        ))
     }
 }
 

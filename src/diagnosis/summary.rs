@@ -12,7 +12,7 @@ use crate::posterior::{
     Candidate, best_known, confounded, delta_chi_square, location_probabilities, none_of,
 };
 use crate::result::{
-    Closure, CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
+    CrossValidation, DecidedBy, Diagnosis, Hypothesis, HypothesisResult, JointShift,
     ParameterValue, UnlocatedSensors, Verdict,
 };
 use crate::structure::COUPLING;
@@ -38,7 +38,9 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
     if let Some(tested) = &mut tested {
         tested.freedom = Some(DegreesOfFreedom::of(dataset, fit));
         tested.closure = hypotheses[best].closure;
-        tested.is_decisive = reference.is_holdout_decisive(&candidates[best]);
+        let after = HoldoutErrors::new(dataset, fit);
+        tested.is_decisive = (after.zip(reference.holdout_before.as_ref()))
+            .is_some_and(|(after, before)| after.are_decisive(before));
     }
     let none = none_of(candidates).and_then(|none| GoodnessOfFit::new(dataset, &none.fit));
     let verdict = match verdict(candidates, tested.as_ref(), none.as_ref()) {
@@ -49,7 +51,7 @@ pub fn diagnosis(comparison: &ModelComparison, unlocated: Option<UnlocatedSensor
                 .is_some_and(|without| without.goodness_of_fit < MISFIT) =>
         {
             Verdict::NotEnoughData(
-                "sensors whose place nobody said explain them, and so would other causes; state the places"
+                "sensors of unknown position explain them, and so would other causes; state their positions"
                     .to_owned(),
             )
         }
@@ -147,7 +149,8 @@ impl<'a> Reference<'a> {
             holdout_before: self.holdout_before.as_ref().map(HoldoutErrors::rms),
             holdout_after: holdout.as_ref().map(HoldoutErrors::rms),
             holdout_floor: holdout.as_ref().map(HoldoutErrors::floor),
-            closure: self.closure(holdout.as_ref()),
+            closure: (self.holdout_before.as_ref().zip(holdout.as_ref()))
+                .and_then(|(before, after)| closure(before, after, dataset.settings.seed)),
             cross_validation: self.cross_validation(candidate),
             goodness_of_fit: residuals.as_ref().and_then(Residuals::goodness),
             misfit: residuals.as_ref().map(Residuals::misfit),
@@ -158,18 +161,6 @@ impl<'a> Reference<'a> {
             coupling: coupling.map_or(0.0, |k| parameters[k]),
             scale: scale.map_or(0.0, |k| parameters[layout.first_nuisance() + k]),
         }
-    }
-
-    /// Returns whether the hold-out data could separate a hypothesis from the nominal model.
-    fn is_holdout_decisive(&self, candidate: &Candidate) -> bool {
-        let after = HoldoutErrors::new(&self.comparison.dataset, &candidate.fit);
-        let pair = after.zip(self.holdout_before.as_ref());
-        pair.is_some_and(|(after, before)| after.are_decisive(before))
-    }
-
-    fn closure(&self, after: Option<&HoldoutErrors>) -> Option<Closure> {
-        let seed = self.comparison.dataset.settings.seed;
-        closure(self.holdout_before.as_ref()?, after?, seed)
     }
 
     /// Predicts each recording from the others, for probable hypotheses and for `none`.
@@ -244,27 +235,21 @@ impl<'a> Reference<'a> {
             });
             if let (Some(range), Some(location)) = (effect.location, layout.location(k)) {
                 let value = range.value_at(values[location]);
-                let std = match range.kind {
-                    LocationKind::FixtureFrequency | LocationKind::Gyration => {
-                        value * stds[location]
-                    }
-                    LocationKind::Position | LocationKind::Exponent => stds[location],
+                let std = if range.is_logarithmic() {
+                    value * stds[location]
+                } else {
+                    stds[location]
                 };
                 let is_known = std < 0.5 * (range.high - range.low);
-                let (name, value, std) = match range.kind {
-                    LocationKind::Position => ("position", value, std),
-                    LocationKind::FixtureFrequency => ("frequency", value, std),
-                    LocationKind::Exponent => ("exponent", value, std),
-                    // J = m r^2
-                    LocationKind::Gyration => {
-                        ("inertia", size * value * value, 2.0 * size * value * std)
-                    }
+                let own_std = match range.kind {
+                    LocationKind::Gyration => 2.0 * size * value * std,
+                    _ => std,
                 };
                 parameters.push(value_of(
                     effect.effect,
-                    name,
-                    value,
-                    is_known.then_some(std),
+                    range.name(),
+                    range.own_value(value, size),
+                    is_known.then_some(own_std),
                 ));
             }
         }

@@ -43,13 +43,6 @@ pub const DISTINCT_AMPLITUDES: f64 = 1.05;
 
 /// Probability by chance below which a change along the decays counts: one false finding in a thousand tests.
 pub const CHANGE_BY_CHANCE: f64 = 0.001;
-/// Goodness of fit below which a law of the joint does not explain the changes.
-pub const LAW_MISFIT: f64 = 0.001;
-/// Standard uncertainties beyond which a change has a direction, 95 % two-sided: that there are changes at
-/// all is certain before.
-pub const DIRECTED_CHANGE: f64 = 2.0;
-/// Number of directed changes of one sign that belong to the joint: a single one always has one sign.
-pub const LEAST_DIRECTED: usize = 2;
 /// Standard uncertainties from which on the size of a joint law counts.
 pub const LAW_DETECTED: f64 = 3.0;
 

@@ -5,7 +5,7 @@
 use crate::dataset::{Dataset, Datum, Observable, ObservableKind, chi_square_tail};
 use crate::evidence::{Fit, log_sum};
 use crate::forward::Forward;
-use crate::least_squares::{Model, maximise};
+use crate::optimum::{Model, maximise};
 use crate::parameters::NuisanceParameter;
 use crate::result::{Block, Closure, CrossValidation, LeftOutRecording, Misfit, Residual};
 use crate::thresholds::{
@@ -83,23 +83,20 @@ impl Residuals {
         }
     }
 
-    /// Returns the probability of a chi square as large or larger of some data. Their sum of squares is taken as g chi2_n
-    /// with the mean tr B and the variance 2 tr B^2 that their covariance B gives it (Satterthwaite).
-    fn goodness_of(&self, rows: &[usize]) -> Option<f64> {
-        let block = self.spread.select_rows(rows).select_columns(rows);
-        let (mean, square) = (block.trace(), (&block * &block).trace());
-        if mean < LEAST_BLOCK_FREEDOM {
-            return None;
-        }
-        let sum: f64 = rows.iter().map(|&row| self.unit[row].powi(2)).sum();
-        chi_square_tail(sum * mean / square, (mean * mean / square).max(0.5))
-    }
-
-    /// Returns all blocks with more data than parameters that follow them, the worst first.
+    /// Returns all blocks with more data than parameters that follow them, the worst first. The sum of squares of a
+    /// block is taken as g chi2_n with the mean tr B and the variance 2 tr B^2 that the covariance B of its data gives
+    /// it (Satterthwaite).
     pub fn blocks(&self, dataset: &Dataset) -> Vec<Block> {
         let mut blocks = Vec::new();
         for (name, rows) in block_rows(dataset) {
-            if let Some(goodness_of_fit) = self.goodness_of(&rows) {
+            let spread = self.spread.select_rows(&rows).select_columns(&rows);
+            let (mean, square) = (spread.trace(), (&spread * &spread).trace());
+            if mean < LEAST_BLOCK_FREEDOM {
+                continue;
+            }
+            let sum: f64 = rows.iter().map(|&row| self.unit[row].powi(2)).sum();
+            let freedom = (mean * mean / square).max(0.5);
+            if let Some(goodness_of_fit) = chi_square_tail(sum * mean / square, freedom) {
                 blocks.push(Block {
                     name,
                     goodness_of_fit,

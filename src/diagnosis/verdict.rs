@@ -20,7 +20,9 @@ pub fn verdict(
     // Neither is a misfit that speaks less against the nominal model than an effect has to speak for itself.
     let p_value = none.and_then(GoodnessOfFit::refuting_p_value);
     let is_refuted = p_value.map_or(1.0, odds_by_p_value) >= DETECTED.exp();
-    if !is_refuted && most_over_none(candidates) < DETECTED {
+    let over_none = candidates.iter();
+    let over_none = over_none.map(|one| evidence_over_none(candidates, one));
+    if !is_refuted && over_none.fold(f64::NEG_INFINITY, f64::max) < DETECTED {
         return Verdict::NoGap;
     }
     let groups = by_group(candidates);
@@ -69,13 +71,6 @@ pub fn verdict(
         return Verdict::Group(effects_of(candidates, &aliases));
     }
     set_of(candidates, &groups)
-}
-
-/// Returns the logarithm of the largest Bayes factor against the nominal model.
-fn most_over_none(candidates: &[Candidate]) -> f64 {
-    let over = candidates.iter();
-    over.map(|one| evidence_over_none(candidates, one))
-        .fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Returns the logarithm of the Bayes factor of one hypothesis against the nominal model.

@@ -16,8 +16,8 @@ use crate::thresholds::{
     MOST_PROPOSED,
 };
 use nalgebra::DMatrix;
-use predicted_data::{Posterior, PredictedData, Prediction, distances, expected_information};
-use proposals::{PlannedData, PlannedTests, TestedStructure, sentence};
+use predicted_data::{Posterior, PredictedData, distances, expected_information};
+use proposals::{PlannedTests, TestedStructure, sentence};
 use rayon::prelude::*;
 
 /// Standard gravity (m/s2).
@@ -69,9 +69,9 @@ fn deciding(comparison: &ModelComparison, verdict: &Verdict) -> Vec<NextTest> {
     let mut tests = Vec::new();
     for (k, test) in planned.all.iter().enumerate() {
         let of_test = posteriors.iter().zip(&predictions);
-        let of_test = of_test.map(|(posterior, predictions)| match &test.data {
-            PlannedData::Direct => posterior.as_ref()?.predict_direct(dataset, &test.proposal),
-            PlannedData::Frequencies(..) => predictions.as_ref()?.of_test(&planned, k),
+        let of_test = of_test.map(|(posterior, predictions)| {
+            let direct = posterior.as_ref()?.predict_direct(dataset, &test.proposal);
+            direct.or_else(|| predictions.as_ref()?.of_test(&planned, k))
         });
         tests.extend(compared.judge(&test.proposal, of_test.collect()));
     }
@@ -190,7 +190,7 @@ fn separated(probabilities: &[f64], names: &[String], apart: &DMatrix<f64>) -> V
 }
 
 /// Predictions of one hypothesis for all planned frequencies, by tested structure.
-struct Predictions([Option<Prediction>; 3]);
+struct Predictions([Option<PredictedData>; 3]);
 
 impl Predictions {
     fn new(posterior: &Posterior, planned: &PlannedTests) -> Self {
@@ -207,15 +207,16 @@ impl Predictions {
 
     /// Returns the predicted data of the k-th test.
     fn of_test(&self, planned: &PlannedTests, k: usize) -> Option<PredictedData> {
-        let PlannedData::Frequencies(structure, own) = &planned.all[k].data else {
+        let test = &planned.all[k];
+        if test.frequencies.is_empty() {
             return None;
-        };
+        }
         let before = planned.all[..k].iter();
         let from = before
-            .map(|test| test.frequencies_of(*structure).len())
+            .map(|one| one.frequencies_of(test.structure).len())
             .sum();
-        let stds: Vec<f64> = own.iter().map(|(_, std)| *std).collect();
-        let prediction = self.0[*structure as usize].as_ref()?;
+        let stds: Vec<f64> = test.frequencies.iter().map(|(_, std)| *std).collect();
+        let prediction = self.0[test.structure as usize].as_ref()?;
         Some(prediction.in_units_of(from, &stds))
     }
 }

@@ -3,21 +3,33 @@
 use super::proposals::{PlannedTests, TestedStructure};
 use crate::dataset::{Dataset, Observable};
 use crate::forward::Forward;
-use crate::least_squares::{Model, Optimum, covariance, log_determinant};
+use crate::optimum::{Model, Optimum, log_determinant};
 use crate::parameters::{CandidateEffect, Layout, Nuisance, NuisanceParameter, Prior};
 use crate::posterior::Candidate;
 use crate::result::Proposal;
 use nalgebra::{DMatrix, DVector};
 use tapjoint_beam::effects::EffectId;
 
-/// Data that one hypothesis predicts for a test: a normal distribution, in units in which each
-/// datum's own standard uncertainty is 1.
+/// Data that one hypothesis predicts for a test: a normal distribution.
 #[derive(Debug, Clone)]
 pub struct PredictedData {
     /// Expected data.
     pub mean: DVector<f64>,
-    /// Covariance: the data's own uncertainty and that of the prediction.
+    /// Covariance of the prediction, and of the data where they are in units of their own uncertainty.
     pub covariance: DMatrix<f64>,
+}
+
+impl PredictedData {
+    /// Returns some of the data, from this index on, in units of their standard uncertainties, and with these.
+    pub fn in_units_of(&self, from: usize, stds: &[f64]) -> PredictedData {
+        let count = stds.len();
+        let mean = DVector::from_fn(count, |i, _| self.mean[from + i] / stds[i]);
+        let covariance = DMatrix::from_fn(count, count, |i, j| {
+            let own = if i == j { 1.0 } else { 0.0 };
+            own + self.covariance[(from + i, from + j)] / (stds[i] * stds[j])
+        });
+        PredictedData { mean, covariance }
+    }
 }
 
 /// Returns Bhattacharyya's distance of two normal distributions,
@@ -180,7 +192,7 @@ impl Posterior {
         planned: &PlannedTests,
         structure: TestedStructure,
         observables: &[Observable],
-    ) -> Option<Prediction> {
+    ) -> Option<PredictedData> {
         let dataset = self.dataset(planned, structure)?;
         let (parameters, priors, covariance) = self.extended(planned);
         let full = planned.whole.layout(&self.effects);
@@ -219,7 +231,7 @@ impl Posterior {
                 }
             }
         }
-        let mut prediction = Prediction {
+        let mut prediction = PredictedData {
             mean: DVector::from_vec(model.predicted),
             covariance: &slopes * covariance * slopes.transpose(),
         };
@@ -284,7 +296,7 @@ impl Posterior {
             covariance[(row, row)] += one.std * one.std;
         }
         let mean = DVector::from_iterator(expected.len(), expected.iter().map(|one| one.value));
-        Some(Prediction { mean, covariance }.in_units_of(0, &stds))
+        Some(PredictedData { mean, covariance }.in_units_of(0, &stds))
     }
 
     /// Predicts the size of an effect times a factor, or what is usual if the hypothesis does not have it.
@@ -358,25 +370,6 @@ const CLOCK_STD: f64 = 2e-5;
 /// Usual relative error of clocks (1).
 const USUAL_CLOCK_ERROR: f64 = 5e-5;
 
-/// Prediction of a hypothesis, without the uncertainty of the data.
-pub struct Prediction {
-    mean: DVector<f64>,
-    covariance: DMatrix<f64>,
-}
-
-impl Prediction {
-    /// Returns some of the data, from this index on, in units of their standard uncertainties.
-    pub fn in_units_of(&self, from: usize, stds: &[f64]) -> PredictedData {
-        let count = stds.len();
-        let mean = DVector::from_fn(count, |i, _| self.mean[from + i] / stds[i]);
-        let covariance = DMatrix::from_fn(count, count, |i, j| {
-            let own = if i == j { 1.0 } else { 0.0 };
-            own + self.covariance[(from + i, from + j)] / (stds[i] * stds[j])
-        });
-        PredictedData { mean, covariance }
-    }
-}
-
 /// Returns the optimum and its covariance with the priors of sizes and locations as Gaussians of the same second
 /// moment: the search has only a wide one on sizes, and none on locations.
 fn sharpened(
@@ -405,7 +398,7 @@ fn sharpened(
             better.curvature[(location, location)] += 12.0 / ((high - low) * (high - low));
         }
     }
-    let covariance = covariance(priors, &better)?;
+    let covariance = better.covariance(priors)?;
     let step = -&covariance * pull;
     let parameters = optimum.parameters.iter().zip(step.iter()).zip(priors);
     let parameters = parameters

@@ -14,21 +14,14 @@ use tapjoint_numerics::stats::median;
 pub struct PlannedTest {
     /// The test.
     pub proposal: Proposal,
-    /// Its data.
-    pub data: PlannedData,
+    /// Structure whose frequencies it measures.
+    pub structure: TestedStructure,
+    /// Logarithms of the frequencies; none for quantities that are measured without the beam's vibration.
+    pub frequencies: Planned,
 }
 
 /// Observables with the standard uncertainties of their planned data.
 pub type Planned = Vec<(Observable, f64)>;
-
-/// Data of a planned test.
-#[derive(Debug, Clone)]
-pub enum PlannedData {
-    /// Frequencies of modes (logarithms) of a structure.
-    Frequencies(TestedStructure, Planned),
-    /// Quantities that are measured without the beam's vibration.
-    Direct,
-}
 
 /// Structure whose frequencies are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,9 +59,10 @@ impl TestedStructure {
 impl PlannedTest {
     /// Returns its frequencies if they are those of this structure.
     pub fn frequencies_of(&self, wanted: TestedStructure) -> &[(Observable, f64)] {
-        match &self.data {
-            PlannedData::Frequencies(structure, planned) if *structure == wanted => planned,
-            _ => &[],
+        if self.structure == wanted {
+            &self.frequencies
+        } else {
+            &[]
         }
     }
 }
@@ -106,7 +100,7 @@ impl PlannedTests {
         let mut whole = dataset.clone();
         whole.arrangements.truncate(KEPT_CONFIGURATIONS);
         // The common scatter of other taps does not hold for planned ones.
-        whole.scatter.retain(|one| one.0.0 < KEPT_CONFIGURATIONS);
+        whole.scatter.retain(|of, _| of.0 < KEPT_CONFIGURATIONS);
         whole.modes += MORE_MODES;
         whole.observables.clear();
         whole.data.clear();
@@ -131,15 +125,17 @@ impl PlannedTests {
             Proposal::Calipers,
             Proposal::ReferenceTone,
         ] {
-            let data = PlannedData::Direct;
-            planned.all.push(PlannedTest { proposal, data });
+            planned.propose(proposal, TestedStructure::Whole, Vec::new());
         }
         planned
     }
 
-    fn propose(&mut self, proposal: Proposal, structure: TestedStructure, planned: Planned) {
-        let data = PlannedData::Frequencies(structure, planned);
-        self.all.push(PlannedTest { proposal, data });
+    fn propose(&mut self, proposal: Proposal, structure: TestedStructure, frequencies: Planned) {
+        self.all.push(PlannedTest {
+            proposal,
+            structure,
+            frequencies,
+        });
     }
 
     /// Plans to read higher modes.
@@ -147,12 +143,7 @@ impl PlannedTests {
         let (first, last) = (dataset.modes + 1, dataset.modes + MORE_MODES);
         let mut planned = Vec::new();
         for configuration in 0..self.whole.arrangements.len() {
-            for mode in first..=last {
-                planned.push((
-                    Observable::frequency(configuration, mode),
-                    std_of(dataset, mode),
-                ));
-            }
+            planned.extend(frequencies_of(dataset, configuration, first..=last));
         }
         let proposal = Proposal::HigherModes {
             first,
@@ -242,14 +233,7 @@ impl PlannedTests {
         for position in [length, 0.5 * length] {
             let used = self.highest(dataset, |one| one.fastened.iter().map(|one| one.0).max());
             let fastened = used.map_or(0, |most| most + 1);
-            let (mass_std, position_std) = (
-                dataset.settings.fastened_mass_std,
-                dataset.settings.position_std,
-            );
-            let parameter = NuisanceParameter::FastenedMass { fastened };
-            self.whole.add_nuisance(parameter, 0.0, mass_std);
-            let parameter = NuisanceParameter::FastenedPosition { fastened };
-            self.whole.add_nuisance(parameter, 0.0, position_std);
+            self.whole.add_fastened(fastened);
             let mut heavier = dataset.arrangements[0].clone();
             heavier.fasten(mass, position, fastened);
             let planned = self.new_setup(dataset, heavier, 0.0);
@@ -306,14 +290,19 @@ impl PlannedTests {
 
 /// Returns the frequencies of all observed modes in a configuration, as uncertain as so far.
 fn planned_frequencies(dataset: &Dataset, configuration: usize) -> Planned {
-    observed_modes(dataset)
-        .map(|mode| {
-            (
-                Observable::frequency(configuration, mode),
-                std_of(dataset, mode),
-            )
-        })
-        .collect()
+    frequencies_of(dataset, configuration, observed_modes(dataset)).collect()
+}
+
+/// Returns the frequencies of some modes in a configuration, as uncertain as so far.
+fn frequencies_of(
+    dataset: &Dataset,
+    configuration: usize,
+    modes: impl Iterator<Item = usize>,
+) -> impl Iterator<Item = (Observable, f64)> {
+    modes.map(move |mode| {
+        let frequency = Observable::frequency(configuration, mode);
+        (frequency, std_of(dataset, mode))
+    })
 }
 
 /// Returns the numbers of the modes that take part in the fit.
@@ -465,15 +454,12 @@ fn confirming(effect: EffectId) -> String {
 
 /// Returns a mass (kg) as "15 g" or "1.5 kg".
 fn weight(mass: f64) -> String {
-    if mass < 1.0 {
-        format!("{} g", rounded(1e3 * mass))
+    let (value, unit) = if mass < 1.0 {
+        (1e3 * mass, "g")
     } else {
-        format!("{} kg", rounded(mass))
-    }
-}
-
-fn rounded(value: f64) -> f64 {
-    (1e3 * value).round() / 1e3
+        (mass, "kg")
+    };
+    format!("{} {unit}", (1e3 * value).round() / 1e3)
 }
 
 #[cfg(test)]

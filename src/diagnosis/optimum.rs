@@ -1,0 +1,252 @@
+//! Optimum of likelihood times prior: where it is, and how the objective bends there.
+
+use crate::dataset::Datum;
+use crate::parameters::Prior;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use tapjoint_numerics::least_squares::{self, Problem, Settings, minimise};
+
+/// Predictions of all data at a point, and their slopes.
+#[derive(Debug, Clone)]
+pub struct Linearised {
+    /// Prediction of each datum.
+    pub predicted: Vec<f64>,
+    /// Derivative of each datum (row) with respect to each parameter (column).
+    pub slopes: DMatrix<f64>,
+}
+
+/// Model that predicts at many points and gives slopes, which cost more, at few of them.
+pub trait Model {
+    /// Intermediate results of a prediction, for the slopes at the same point.
+    type Solution;
+    /// Returns the predictions at a point; `None` where there is no such structure.
+    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, Self::Solution)>;
+    /// Returns the slopes at a solved point with respect to all parameters that are not held.
+    fn slopes(
+        &self,
+        parameters: &[f64],
+        priors: &[Prior],
+        solution: Self::Solution,
+    ) -> Option<DMatrix<f64>>;
+
+    /// Returns predictions and slopes at a point.
+    fn linearise(&self, parameters: &[f64], priors: &[Prior]) -> Option<Linearised> {
+        let (predicted, solution) = self.predict(parameters)?;
+        let slopes = self.slopes(parameters, priors, solution)?;
+        Some(Linearised { predicted, slopes })
+    }
+}
+
+/// Linear model: at `origin` it predicts `there`.
+pub struct LinearModel<'a> {
+    /// Parameters at which it was linearised.
+    pub origin: &'a [f64],
+    /// Predictions there.
+    pub there: &'a [f64],
+    /// Slopes.
+    pub slopes: &'a DMatrix<f64>,
+}
+
+impl Model for LinearModel<'_> {
+    type Solution = ();
+
+    fn predict(&self, parameters: &[f64]) -> Option<(Vec<f64>, ())> {
+        let steps = parameters.iter().zip(self.origin);
+        let steps = DVector::from_iterator(parameters.len(), steps.map(|(new, old)| new - old));
+        let moved = self.slopes * steps;
+        let predicted = self.there.iter().zip(moved.iter());
+        Some((predicted.map(|(at, by)| at + by).collect(), ()))
+    }
+
+    fn slopes(&self, _: &[f64], _: &[Prior], _: ()) -> Option<DMatrix<f64>> {
+        Some(self.slopes.clone())
+    }
+}
+
+/// End of a search.
+#[derive(Debug, Clone)]
+pub struct Optimum {
+    /// All parameters.
+    pub parameters: Vec<f64>,
+    /// Prediction and slopes there.
+    pub model: Linearised,
+    /// -ln(likelihood x prior), without constants of the data.
+    pub objective: f64,
+    /// Curvature of the objective (all parameters; held ones have unit rows).
+    pub curvature: DMatrix<f64>,
+    /// Slope of the objective (0 for all that are neither held nor at a bound).
+    pub gradient: DVector<f64>,
+}
+
+/// Limits of a search. From starts within the valley five steps suffice, along bent valleys (a location and a size that
+/// trade against each other) thirty. A search that hardly moves far from any agreement finds no explanation; it
+/// need not be exact.
+const SEARCH: Settings = Settings {
+    steps: 30,
+    gain: 1e-4,
+    relative_gain: 0.0,
+    step: 0.0,
+    idle_steps: 2,
+    idle: 1e-3,
+    damping: 100.0,
+    polish: false,
+};
+
+/// Search for the parameters that maximise likelihood times prior.
+struct Maximisation<'a, M> {
+    data: &'a [Datum],
+    priors: &'a [Prior],
+    model: &'a M,
+    bounds: Vec<[f64; 2]>,
+}
+
+/// Point of a search: its predictions, and more once it is accepted.
+struct Point<S> {
+    objective: f64,
+    predicted: Vec<f64>,
+    /// For the slopes, until they are asked for.
+    solution: Option<S>,
+    optimum: Option<Optimum>,
+}
+
+impl<M: Model> Problem for Maximisation<'_, M> {
+    type State = Point<M::Solution>;
+
+    fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
+        let (predicted, solution) = self.model.predict(parameters)?;
+        Some(Point {
+            objective: objective_at(self.data, self.priors, parameters, &predicted),
+            predicted,
+            solution: Some(solution),
+            optimum: None,
+        })
+    }
+
+    fn cost(&self, point: &Self::State) -> f64 {
+        point.objective
+    }
+
+    fn linearise(
+        &self,
+        parameters: &[f64],
+        point: &mut Self::State,
+    ) -> Option<least_squares::Linearised> {
+        let solution = point.solution.take()?;
+        let slopes = self.model.slopes(parameters, self.priors, solution)?;
+        let predicted = std::mem::take(&mut point.predicted);
+        let model = Linearised { predicted, slopes };
+        let optimum = Optimum::new(self.data, self.priors, parameters.to_vec(), model);
+        let linearised = least_squares::Linearised::Normal {
+            curvature: optimum.curvature.clone(),
+            gradient: optimum.gradient.clone(),
+        };
+        point.optimum = Some(optimum);
+        Some(linearised)
+    }
+
+    fn bounds(&self) -> &[[f64; 2]] {
+        &self.bounds
+    }
+}
+
+/// Returns the parameters that maximise likelihood times prior; `None` where there is no structure at the start.
+pub fn maximise(
+    data: &[Datum],
+    priors: &[Prior],
+    start: &[f64],
+    model: &impl Model,
+) -> Option<Optimum> {
+    let problem = Maximisation {
+        data,
+        priors,
+        model,
+        bounds: priors.iter().map(|prior| [prior.low, prior.high]).collect(),
+    };
+    minimise(&problem, start, &SEARCH)?.state.optimum
+}
+
+/// Returns -ln(likelihood x prior) at a point from the predictions there, without constants of the data.
+pub fn objective_at(
+    data: &[Datum],
+    priors: &[Prior],
+    parameters: &[f64],
+    predicted: &[f64],
+) -> f64 {
+    let mut objective = 0.0;
+    for (datum, predicted) in data.iter().zip(predicted) {
+        objective -= datum.log_density_drop(datum.residual(*predicted));
+    }
+    for (prior, parameter) in priors.iter().zip(parameters) {
+        if !prior.is_held() && prior.std.is_finite() {
+            let away = (parameter - prior.centre) / prior.std;
+            objective += 0.5 * away * away;
+        }
+    }
+    objective
+}
+
+impl Optimum {
+    /// Returns objective, curvature and gradient at a point.
+    pub fn new(data: &[Datum], priors: &[Prior], parameters: Vec<f64>, model: Linearised) -> Self {
+        let objective = objective_at(data, priors, &parameters, &model.predicted);
+        let mut weighted = model.slopes.clone();
+        let mut pulled = DVector::zeros(data.len());
+        for (row, datum) in data.iter().enumerate() {
+            let weight = datum.weight(datum.residual(model.predicted[row]));
+            let precision = weight / (datum.std * datum.std);
+            pulled[row] = precision * (datum.value - model.predicted[row]);
+            weighted.row_mut(row).scale_mut(precision);
+        }
+        let mut curvature = model.slopes.tr_mul(&weighted);
+        let mut gradient = -model.slopes.tr_mul(&pulled);
+        for (k, prior) in priors.iter().enumerate() {
+            if prior.is_held() {
+                curvature.row_mut(k).fill(0.0);
+                curvature.column_mut(k).fill(0.0);
+                curvature[(k, k)] = 1.0;
+                gradient[k] = 0.0;
+            } else if prior.std.is_finite() {
+                let away = (parameters[k] - prior.centre) / prior.std;
+                curvature[(k, k)] += prior.std.powi(-2);
+                gradient[k] += away / prior.std;
+            }
+        }
+        Optimum {
+            parameters,
+            model,
+            objective,
+            curvature,
+            gradient,
+        }
+    }
+
+    /// Returns the covariance of the parameters; held ones have none.
+    pub fn covariance(&self, priors: &[Prior]) -> Option<DMatrix<f64>> {
+        let free = free_parameters(priors);
+        let inverse = factor_of(&self.curvature, &free)?.inverse();
+        let mut full = DMatrix::zeros(priors.len(), priors.len());
+        for (i, &a) in free.iter().enumerate() {
+            for (j, &b) in free.iter().enumerate() {
+                full[(a, b)] = inverse[(i, j)];
+            }
+        }
+        Some(full)
+    }
+}
+
+/// Returns ln det A of A = L L'.
+pub fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
+    let diagonal = factor.l_dirty().diagonal();
+    2.0 * diagonal.iter().map(|x| x.ln()).sum::<f64>()
+}
+
+/// Returns the Cholesky factor of the rows and columns `kept` of a matrix.
+pub fn factor_of(matrix: &DMatrix<f64>, kept: &[usize]) -> Option<Cholesky<f64, Dyn>> {
+    Cholesky::new(matrix.select_rows(kept).select_columns(kept))
+}
+
+/// Returns the indices of the parameters that are not held.
+pub fn free_parameters(priors: &[Prior]) -> Vec<usize> {
+    (0..priors.len())
+        .filter(|&k| !priors[k].is_held())
+        .collect()
+}

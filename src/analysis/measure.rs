@@ -325,7 +325,7 @@ impl<'a> Stage<'a> {
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = self.fit(&mut readings)?;
         for reading in &mut readings {
-            reading.prefer(self.settings.reading);
+            reading.select_estimate(self.settings.reading);
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
@@ -518,14 +518,11 @@ fn is_force_gap(force: &[f64], level: &CompositeLevel, peak: usize) -> bool {
 fn as_mains(reading: &ModeReading, line_frequency: f64, label: PeakLabel) -> ModeReading {
     let mut reading = ModeReading {
         line_frequency,
-        interpolated: None,
-        bound: None,
-        damping_ratio: None,
-        damping_std: None,
+        between: None,
         label: Some(label),
         ..reading.clone()
     };
-    reading.prefer(ReadBy::Line);
+    reading.select_estimate(ReadBy::Line);
     reading
 }
 

@@ -548,7 +548,7 @@ fn spectra(
         add_constants(&mut readings, (functions, settings));
     }
     for reading in &mut readings {
-        reading.prefer(settings.reading);
+        reading.select_estimate(settings.reading);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     MeasuredSpectra {

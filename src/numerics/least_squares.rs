@@ -78,6 +78,11 @@ pub struct Settings {
     pub idle_steps: usize,
     /// Share of the cost below which a decrease counts as idle.
     pub idle: f64,
+    /// Damping of the first trial, as a share of the curvature's diagonal. Above 0 the first steps stay short
+    /// where parameters are nearly dependent.
+    pub first_damping: f64,
+    /// Weakest damping that is not none.
+    pub least_damping: f64,
     /// Largest damping, as a share of the curvature's diagonal.
     pub damping: f64,
     /// One more step is taken after the promise has become small: for digits beyond the tolerance.
@@ -94,6 +99,8 @@ impl Default for Settings {
             step: 0.0,
             idle_steps: usize::MAX,
             idle: 0.0,
+            first_damping: 0.0,
+            least_damping: 1e-3,
             damping: 1e9,
             polish: true,
         }
@@ -128,8 +135,7 @@ pub struct Minimum<S> {
     pub stop: StopReason,
 }
 
-/// Weakest damping that is not none, and the factor from one damping to the next.
-const WEAKEST: f64 = 1e-3;
+/// Factor from one damping to the next.
 const FACTOR: f64 = 10.0;
 /// Share of the promised decrease from which on the next step is damped less.
 const KEPT: f64 = 0.75;
@@ -150,7 +156,7 @@ pub fn minimise<P: Problem>(
     let state = problem.evaluate(&parameters, None)?;
     let mut at = Point::new(problem, parameters, state)?;
     let mut scales = vec![0.0; start.len()];
-    let mut damping = 0.0;
+    let mut damping = settings.first_damping;
     let mut idle_steps = 0;
     for _ in 0..settings.steps {
         for (k, scale) in scales.iter_mut().enumerate() {
@@ -179,7 +185,7 @@ pub fn minimise<P: Problem>(
             if damping >= settings.damping {
                 return Some(at.ended(StopReason::NoBetterStep));
             }
-            damping = f64::max(WEAKEST, FACTOR * damping);
+            damping = f64::max(settings.least_damping, FACTOR * damping);
         };
         let gain = at.cost - next.cost;
         let longest = (next.parameters.iter().zip(&at.parameters))
@@ -198,7 +204,7 @@ pub fn minimise<P: Problem>(
             return Some(at.ended(StopReason::Idle));
         }
         if gain > KEPT * promised {
-            damping = if damping > WEAKEST {
+            damping = if damping > settings.least_damping {
                 damping / FACTOR
             } else {
                 0.0

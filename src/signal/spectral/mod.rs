@@ -14,7 +14,7 @@ pub use average::{
     average_records, random_error,
 };
 pub use lines::{DISPLAY_RATIO, Lines, largest_smooth_block, smallest_smooth_block};
-pub(crate) use transform::Decimator;
+pub(crate) use transform::{Decimator, bessel_i0, kaiser_beta};
 pub use transform::{Transformer, Workspace, band_limited, chirp_z, transform_block};
 pub use window::{
     DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,

@@ -175,12 +175,12 @@ const STOP_BAND_DB: f64 = 100.0;
 
 /// Kaiser's relation between attenuation (dB) and the shape parameter beta, above 50 dB
 /// (Oppenheim & Schafer).
-fn kaiser_beta(attenuation: f64) -> f64 {
+pub(crate) fn kaiser_beta(attenuation: f64) -> f64 {
     0.1102 * (attenuation - 8.7)
 }
 
 /// Modified Bessel function I0, by its power series: converges for every argument used here.
-fn bessel_i0(x: f64) -> f64 {
+pub(crate) fn bessel_i0(x: f64) -> f64 {
     let quarter = x * x / 4.0;
     let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
     while term > sum * 1e-17 {

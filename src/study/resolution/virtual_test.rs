@@ -402,7 +402,7 @@ fn read_band(
 
 fn read_as(reading: &ModeReading, name: ReadBy) -> Read {
     let mut reading = reading.clone();
-    reading.prefer(name);
+    reading.select_estimate(name);
     Read {
         frequency: reading.frequency,
         std: reading.std.unwrap_or(reading.half_line),

@@ -305,7 +305,7 @@ impl<'a> Stage<'a> {
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
         let stabilisation = self.fit(&mut readings)?;
         for reading in &mut readings {
-            reading.prefer(self.settings.reading);
+            reading.select_estimate(self.settings.reading);
         }
         readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         Ok(MeasuredSpectra {
@@ -449,7 +449,7 @@ impl<'a> Stage<'a> {
                 reading.damping_ratio = None;
                 reading.damping_std = None;
                 reading.label = Some(label);
-                reading.prefer(ReadBy::Line);
+                reading.select_estimate(ReadBy::Line);
             }
         }
         readings

@@ -523,7 +523,7 @@ fn spectra_of_functions(
         }
     }
     for reading in &mut readings {
-        reading.prefer(wanted);
+        reading.select_estimate(wanted);
     }
     readings.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     MeasuredSpectra {

@@ -80,6 +80,11 @@ pub struct Settings {
     pub idle_steps: usize,
     /// Share of the cost below which a decrease counts as idle.
     pub idle: f64,
+    /// Damping of the first trial, as a share of the curvature's diagonal. Above 0 the first steps stay short
+    /// where parameters are nearly dependent.
+    pub first_damping: f64,
+    /// Weakest damping that is not none.
+    pub least_damping: f64,
     /// Largest damping, as a share of the curvature's diagonal.
     pub damping: f64,
     /// One more step is taken after the promise has become small: for digits beyond the tolerance.
@@ -96,6 +101,8 @@ impl Default for Settings {
             step: 0.0,
             idle_steps: usize::MAX,
             idle: 0.0,
+            first_damping: 0.0,
+            least_damping: 1e-3,
             damping: 1e9,
             polish: true,
         }
@@ -137,8 +144,7 @@ pub struct Minimum<S> {
     pub stop: StopReason,
 }
 
-/// Weakest damping that is not none, and the factor from one damping to the next.
-const WEAKEST: f64 = 1e-3;
+/// Factor from one damping to the next.
 const FACTOR: f64 = 10.0;
 /// Share of the promised decrease from which on the next step is damped less.
 const KEPT: f64 = 0.75;
@@ -164,7 +170,7 @@ pub fn minimise<P: Problem>(
     let state = problem.evaluate(&parameters, None)?;
     let mut at = Point::new(problem, parameters, state)?;
     let mut scales = vec![0.0; at.local.columns()];
-    let mut damping = 0.0;
+    let mut damping = settings.first_damping;
     let mut idle_steps = 0;
     for _ in 0..settings.steps {
         for (k, scale) in scales.iter_mut().enumerate() {
@@ -195,7 +201,7 @@ pub fn minimise<P: Problem>(
             if damping >= settings.damping || step.is_within(settings.step) {
                 return Some(at.ended(StopReason::NoBetterStep));
             }
-            damping = f64::max(WEAKEST, FACTOR * damping);
+            damping = f64::max(settings.least_damping, FACTOR * damping);
             step = at.step(problem.bounds(), &scales, damping);
         };
         let gain = at.cost - next.cost;
@@ -215,7 +221,7 @@ pub fn minimise<P: Problem>(
             return Some(at.ended(StopReason::Idle));
         }
         if step.promises_at_most(gain / KEPT) {
-            damping = if damping > WEAKEST {
+            damping = if damping > settings.least_damping {
                 damping / FACTOR
             } else {
                 0.0

@@ -127,7 +127,8 @@ fn recover_frequencies_and_joint_over_200_virtual_tests() {
                 "seed {seed}: {truth} Hz"
             );
             let line = (reading.line_frequency - truth).abs() / reading.half_line;
-            let between = (reading.interpolated.unwrap() - truth).abs() / reading.bound.unwrap();
+            let between = reading.between.unwrap();
+            let between = (between.frequency - truth).abs() / between.bound;
             readings.push((line, between));
         }
     }

@@ -308,7 +308,10 @@ fn recover_everything_about_a_cantilever_simulated_elsewhere() {
             let reading = place.map(|place| &spectra.readings[place]);
             let reading = reading.unwrap_or_else(|| panic!("{file}: mode {} is missing", mode + 1));
             // The table has four decimals; mode 1 lasts 90 periods, so 0.002 Hz are the least bound.
-            let bound = reading.bound.unwrap_or(0.0).max(0.002);
+            let bound = reading
+                .between
+                .map_or(0.0, |between| between.bound)
+                .max(0.002);
             assert!(
                 (reading.frequency - frequency).abs() <= bound,
                 "{file}, mode {}: {} Hz for {frequency} Hz, bound {bound} Hz",

@@ -5,18 +5,16 @@
 //! decaying oscillation with the same decaying oscillation wherever it lies wholly within the record;
 //! only those samples are used, so that no transient enters. The rest of the record's start is lost:
 //! two over the bandwidth, in seconds.
-//!
-//! Poles from the signal subspace of Hankel matrices, and how many there are.
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
 
-use super::projection::{Basis, conjugate_product, norm};
+use super::Subspace;
 use crate::spectral::Decimator;
 
-/// What makes a matrix pencil impossible.
+/// Reason why a matrix pencil is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MatrixPencilError {
     /// The band does not fit the sample rate.
@@ -49,7 +47,7 @@ pub enum MatrixPencilError {
     },
 }
 
-/// How poles are sought in free decays.
+/// Settings of the search for poles in free decays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MatrixPencilSettings {
     /// Most poles before the selection. 12: a band around a few modes holds no more.
@@ -91,7 +89,7 @@ pub struct PencilPole {
     pub damping_ratio: f64,
     /// Standard deviation of the frequency (Hz): of the last step of least squares, for white noise.
     pub frequency_std: f64,
-    /// The same of the damping ratio.
+    /// Standard deviation of the damping ratio.
     pub damping_std: f64,
     /// A of each record, which is Re(A e^{pt}) with t from its start (unit of the records).
     pub amplitudes: Vec<Complex64>,
@@ -107,17 +105,21 @@ const OVERSAMPLING: f64 = 2.5;
 /// Steps of the refinement; two suffice from a pencil's poles.
 const REFINEMENTS: usize = 4;
 
+/// Least part of an oscillation that is its own beside the others', relative to its length.
+const INDEPENDENT: f64 = 1e-9;
+
 /// Records at the band's own rate, around its centre.
-pub(super) struct Demodulated {
-    columns: Vec<Vec<Complex64>>,
+struct Demodulated {
+    /// A column for each record.
+    records: DMatrix<Complex64>,
     /// Time of each sample from the record's start (s).
     times: Vec<f64>,
     rate: f64,
     centre: f64,
 }
 
-/// Poles that `columns` (free decays of all taps and sensors, equally sampled from the same moment of
-/// their taps on) share within `band` (Hz), ascending in frequency.
+/// Finds the poles that `columns` (free decays of all taps and sensors, equally sampled from the same moment
+/// of their taps on) share within `band` (Hz), ascending in frequency.
 ///
 /// The number of poles follows from the singular values by the minimum description length of Wax &
 /// Kailath (1985); then poles that grow, lie outside the band, or explain nothing that the others do
@@ -132,275 +134,261 @@ pub fn pencil_poles(
     band: (f64, f64),
     settings: &MatrixPencilSettings,
 ) -> Result<Vec<PencilPole>, MatrixPencilError> {
-    let data = demodulate(columns, sample_rate, band)?;
+    let data = Demodulated::new(columns, sample_rate, band.0, band.1)?;
     let duration = data.times.last().copied().unwrap_or(0.0);
-    let centre = Complex64::new(0.0, TAU * data.centre);
-    // The window's decay does not make a steady tone a mode.
-    let usable = |shift: &Complex64| {
-        let pole = shift + centre + settings.added_decay;
-        let decays = -pole.re * duration >= settings.least_decay;
-        let inside = (band.0..=band.1).contains(&(pole.im / TAU));
-        decays && inside && -pole.re < settings.most_damping * pole.norm()
-    };
-    let mut shifts = subspace_poles(&data, settings.most_poles);
+    let mut shifts = data.subspace_poles(settings.most_poles);
     // A pole outside the band, or one that grows a little, still describes what is there: the others
     // are refined beside it, and it is left out at the end.
     shifts.retain(|shift| shift.is_finite() && shift.re * duration < 3.0);
-    shifts = needed(&data, shifts, settings);
-    let mut covariance = None;
+    shifts = data.needed(shifts, settings);
+    let mut variances = None;
     for _ in 0..REFINEMENTS {
-        covariance = refine(&data, &mut shifts);
+        variances = data.refine(&mut shifts);
     }
-    shifts = needed(&data, shifts, settings);
-    if covariance.as_ref().map(Vec::len) != Some(shifts.len()) {
-        covariance = refine(&data, &mut shifts);
+    shifts = data.needed(shifts, settings);
+    if variances.as_ref().map(Vec::len) != Some(shifts.len()) {
+        variances = data.refine(&mut shifts);
     }
-    let variances = covariance.unwrap_or_default();
-    let mut found: Vec<PencilPole> = (0..shifts.len())
-        .filter(|&index| usable(&shifts[index]))
-        .filter_map(|index| {
-            let variance = *variances.get(index)?;
-            let part = explained(&data, &shifts, index)?;
-            Some(pole_of(shifts[index] + centre, variance, part, settings))
-        })
-        .collect();
-    let level = |pole: &PencilPole| norm(&pole.amplitudes);
-    let strongest = found.iter().map(level).fold(0.0, f64::max);
-    found.retain(|pole| level(pole) >= settings.least_level * strongest);
+    let mut found: Vec<PencilPole> = Vec::new();
+    for (index, variance) in variances.unwrap_or_default().into_iter().enumerate() {
+        let pole = shifts[index] + Complex64::new(settings.added_decay, TAU * data.centre);
+        // The window's decay does not make a steady tone a mode.
+        let decays = -pole.re * duration >= settings.least_decay;
+        let inside = (band.0..=band.1).contains(&(pole.im / TAU));
+        if !decays || !inside || -pole.re >= settings.most_damping * pole.norm() {
+            continue;
+        }
+        let Some(part) = data.explained(&shifts, index) else {
+            continue;
+        };
+        let std = variance.sqrt();
+        found.push(PencilPole {
+            pole,
+            frequency: pole.norm() / TAU,
+            damping_ratio: -pole.re / pole.norm(),
+            frequency_std: std / TAU,
+            damping_std: std / pole.norm(),
+            // Mixing down leaves half of a real oscillation.
+            amplitudes: part.amplitudes.iter().map(|a| 2.0 * a).collect(),
+            above_noise_db: 10.0 * part.above_noise.log10(),
+        });
+    }
+    let levels: Vec<f64> = found.iter().map(PencilPole::level).collect();
+    let least = settings.least_level * levels.into_iter().fold(0.0, f64::max);
+    found.retain(|pole| pole.level() >= least);
     found.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     Ok(found)
 }
 
-fn pole_of(
-    seen: Complex64,
-    variance: f64,
-    (amplitudes, above_noise): (Vec<Complex64>, f64),
-    settings: &MatrixPencilSettings,
-) -> PencilPole {
-    let pole = seen + settings.added_decay;
-    let std = variance.sqrt();
-    PencilPole {
-        pole,
-        frequency: pole.norm() / TAU,
-        damping_ratio: -pole.re / pole.norm(),
-        frequency_std: std / TAU,
-        damping_std: std / pole.norm(),
-        // Mixing down leaves half of a real oscillation.
-        amplitudes: amplitudes.iter().map(|a| 2.0 * a).collect(),
-        above_noise_db: 10.0 * above_noise.log10(),
+impl PencilPole {
+    /// Root of the sum of squares of the amplitudes.
+    fn level(&self) -> f64 {
+        let squares = self.amplitudes.iter().map(Complex64::norm_sqr);
+        squares.sum::<f64>().sqrt()
     }
 }
 
-fn demodulate(
-    columns: &[&[f64]],
-    sample_rate: f64,
-    (low, high): (f64, f64),
-) -> Result<Demodulated, MatrixPencilError> {
-    if !(low >= 0.0 && low < high && high < 0.5 * sample_rate) {
-        return Err(MatrixPencilError::Band {
-            low,
-            high,
-            sample_rate,
-        });
-    }
-    let samples = columns.iter().map(|column| column.len()).min().unwrap_or(0);
-    let (centre, width) = (0.5 * (low + high), high - low);
-    let factor = ((sample_rate / (OVERSAMPLING * width)) as usize).max(1);
-    let mut times = Vec::new();
-    let mut shifted = Vec::with_capacity(columns.len());
-    let decimator = Decimator::new(sample_rate, centre, width, factor, samples);
-    let delay = decimator.delay();
-    for column in columns {
-        let zoomed = decimator.run(&column[..samples]);
-        // Output m is centred on sample m factor - delay; the filter reaches `delay` to either side.
-        let whole = |m: &usize| {
-            let reach = m * factor;
-            reach >= 2 * delay && reach < samples
-        };
-        let kept: Vec<usize> = (0..zoomed.len()).filter(whole).collect();
-        times = kept
-            .iter()
-            .map(|&m| (m * factor - delay) as f64 / sample_rate)
-            .collect();
-        shifted.push(kept.iter().map(|&m| zoomed[m]).collect());
-    }
-    if times.len() < LEAST_SAMPLES {
-        return Err(MatrixPencilError::TooShort {
-            samples,
-            left: times.len(),
-            least: LEAST_SAMPLES,
-            low,
-            high,
-        });
-    }
-    Ok(Demodulated {
-        columns: shifted,
-        times,
-        rate: sample_rate / factor as f64,
-        centre,
-    })
-}
-
-/// e^{qt}, or its derivative t e^{qt}.
-fn oscillation(data: &Demodulated, shift: Complex64, power: i32) -> Vec<Complex64> {
-    let times = data.times.iter();
-    times.map(|&t| (shift * t).exp() * t.powi(power)).collect()
-}
-
-/// Amplitude of pole `index` in each record, and the mean ratio of the sum of squares that it alone
-/// explains to the noise variance; neighbours may move a little, as in the polyreference fit.
-fn explained(
-    data: &Demodulated,
-    shifts: &[Complex64],
-    index: usize,
-) -> Option<(Vec<Complex64>, f64)> {
-    let mut others = Basis::new(2);
-    for (other, &shift) in shifts.iter().enumerate() {
-        if other != index {
-            others.add(oscillation(data, shift, 0));
-        }
-    }
-    let own = oscillation(data, *shifts.get(index)?, 0);
-    let rest = others.rest(own.clone());
-    let mut loose = others.clone();
-    for (other, &shift) in shifts.iter().enumerate() {
-        if other != index {
-            loose.add(oscillation(data, shift, 1));
-        }
-    }
-    let alone = loose.rest(own);
-    let degrees = data.times.len().checked_sub(loose.columns.len() + 1)?;
-    let (mut amplitudes, mut ratio) = (Vec::new(), 0.0);
-    for column in &data.columns {
-        amplitudes.push(conjugate_product(&rest, column) / norm(&rest).powi(2));
-        let left = loose.rest(column.clone());
-        let share = conjugate_product(&alone, &left).norm_sqr() / norm(&alone).powi(2);
-        let variance = (norm(&left).powi(2) - share).max(0.0) / degrees.max(1) as f64;
-        ratio += share / variance.max(rounding_of(column)).max(f64::MIN_POSITIVE);
-    }
-    Some((amplitudes, ratio / data.columns.len() as f64))
-}
-
-/// Variance that rounding alone leaves.
-fn rounding_of(column: &[Complex64]) -> f64 {
-    (f64::EPSILON * norm(column)).powi(2) / column.len().max(1) as f64
-}
-
-/// Drops the pole that explains least, as long as one explains less than the limit.
-fn needed(
-    data: &Demodulated,
-    mut shifts: Vec<Complex64>,
-    settings: &MatrixPencilSettings,
-) -> Vec<Complex64> {
-    let least = 10f64.powf(0.1 * settings.above_noise_db);
-    loop {
-        let weakest = (0..shifts.len())
-            .map(|index| {
-                let part = explained(data, &shifts, index);
-                (index, part.map_or(0.0, |(_, ratio)| ratio))
-            })
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        match weakest {
-            Some((index, ratio)) if ratio < least => shifts.remove(index),
-            _ => return shifts,
-        };
-    }
-}
-
-/// One step of variable projection over all records, and the variance of either part of each pole.
-///
-/// With the amplitudes eliminated, the residual of record c changes by -P A_ck t e^{q_k t} dq_k, where P
-/// takes out what the oscillations explain; the variance of real and imaginary part is half the
-/// diagonal of the inverse normal matrix.
-fn refine(data: &Demodulated, shifts: &mut [Complex64]) -> Option<Vec<f64>> {
-    let count = shifts.len();
-    let mut basis = Basis::new(2);
-    for &shift in shifts.iter() {
-        basis.add(oscillation(data, shift, 0));
-    }
-    let slopes: Vec<Vec<Complex64>> = shifts
-        .iter()
-        .map(|&shift| basis.rest(oscillation(data, shift, 1)))
-        .collect();
-    let degrees = data.times.len().checked_sub(2 * count).filter(|&d| d > 0)?;
-    let mut normal = DMatrix::<Complex64>::zeros(count, count);
-    let mut right = DMatrix::<Complex64>::zeros(count, 1);
-    let parts: Option<Vec<Vec<Complex64>>> = (0..count)
-        .map(|index| explained(data, shifts, index).map(|(amplitudes, _)| amplitudes))
-        .collect();
-    let parts = parts?;
-    for (c, column) in data.columns.iter().enumerate() {
-        let left = basis.rest(column.clone());
-        let variance = norm(&left).powi(2).max(f64::MIN_POSITIVE) / degrees as f64;
-        for i in 0..count {
-            let amplitude = parts[i][c];
-            right[(i, 0)] += amplitude.conj() * conjugate_product(&slopes[i], &left) / variance;
-            for j in 0..count {
-                let product = conjugate_product(&slopes[i], &slopes[j]) / variance;
-                normal[(i, j)] += amplitude.conj() * parts[j][c] * product;
-            }
-        }
-    }
-    let inverse = normal.try_inverse()?;
-    let steps = &inverse * right;
-    for (shift, step) in shifts.iter_mut().zip(steps.iter()) {
-        *shift += step;
-    }
-    Some((0..count).map(|k| 0.5 * inverse[(k, k)].re).collect())
+/// Contribution of one pole to the records.
+struct Explained {
+    /// Amplitude in each record.
+    amplitudes: Vec<Complex64>,
+    /// Sum of squares that the pole alone explains over the noise variance, mean over the records.
+    above_noise: f64,
 }
 
 /// Most columns of the Hankel matrix; beyond, cost grows and accuracy does not.
 const MOST_COLUMNS: usize = 80;
-/// Poles from the signal subspace, relative to the band's centre (1/s).
-///
-/// Rows of the Hankel matrices of all records are sums of (1, z, ..., z^L); the leading eigenvectors of
-/// H^H H span their conjugates, and shifting them by one row turns them by conj(z).
-fn subspace_poles(data: &Demodulated, most: usize) -> Vec<Complex64> {
-    let count = data.times.len();
-    let size = (count / 3).min(MOST_COLUMNS) + 1;
-    let gram = DMatrix::from_fn(size, size, |i, j| {
-        let rows = count + 1 - size;
-        data.columns
+
+impl Demodulated {
+    fn new(
+        columns: &[&[f64]],
+        sample_rate: f64,
+        low: f64,
+        high: f64,
+    ) -> Result<Self, MatrixPencilError> {
+        if !(low >= 0.0 && low < high && high < 0.5 * sample_rate) {
+            return Err(MatrixPencilError::Band {
+                low,
+                high,
+                sample_rate,
+            });
+        }
+        let samples = columns.iter().map(|column| column.len()).min().unwrap_or(0);
+        let (centre, width) = (0.5 * (low + high), high - low);
+        let factor = ((sample_rate / (OVERSAMPLING * width)) as usize).max(1);
+        let decimator = Decimator::new(sample_rate, centre, width, factor, samples);
+        let delay = decimator.delay();
+        // Output m is centred on sample m factor - delay; the filter reaches `delay` to either side.
+        let whole = (2 * delay).div_ceil(factor)..samples.div_ceil(factor);
+        if whole.len() < LEAST_SAMPLES {
+            return Err(MatrixPencilError::TooShort {
+                samples,
+                left: whole.len(),
+                least: LEAST_SAMPLES,
+                low,
+                high,
+            });
+        }
+        let zoomed: Vec<DVector<Complex64>> = columns
             .iter()
-            .map(|column| conjugate_product(&column[i..i + rows], &column[j..j + rows]))
-            .sum::<Complex64>()
-    });
-    let eigen = SymmetricEigen::new(gram);
-    let mut order: Vec<usize> = (0..size).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let values: Vec<f64> = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
-    let rows = data.columns.len() * (count + 1 - size);
-    let poles = description_order(&values, rows).min(most).min(size - 2);
-    if poles == 0 {
-        return Vec::new();
+            .map(|column| DVector::from_vec(decimator.run(&column[..samples])))
+            .collect();
+        Ok(Demodulated {
+            records: DMatrix::from_columns(&zoomed)
+                .rows_range(whole.clone())
+                .into_owned(),
+            times: whole
+                .map(|m| (m * factor - delay) as f64 / sample_rate)
+                .collect(),
+            rate: sample_rate / factor as f64,
+            centre,
+        })
     }
-    let basis = DMatrix::from_fn(size, poles, |row, k| eigen.eigenvectors[(row, order[k])]);
-    let (upper, lower) = (basis.rows(0, size - 1), basis.rows(1, size - 1));
-    let square = upper.ad_mul(&upper);
-    let Some(shift) = square.lu().solve(&upper.ad_mul(&lower)) else {
-        return Vec::new();
-    };
-    shift.eigenvalues().map_or_else(Vec::new, |roots| {
-        roots.iter().map(|z| z.conj().ln() * data.rate).collect()
-    })
+
+    /// Returns a column e^{qt} for each pole, then a column t e^{qt} for each.
+    fn oscillations(&self, shifts: &[Complex64]) -> DMatrix<Complex64> {
+        let count = shifts.len();
+        DMatrix::from_fn(self.times.len(), 2 * count, |row, k| {
+            let t = self.times[row];
+            let value = (shifts[k % count] * t).exp();
+            if k < count { value } else { value * t }
+        })
+    }
+
+    /// Returns the contribution of pole `index`; `None` with too few samples. Neighbours may move a little,
+    /// as in the polyreference fit.
+    fn explained(&self, shifts: &[Complex64], index: usize) -> Option<Explained> {
+        let own = self.oscillations(shifts.get(index..=index)?);
+        let own = own.column(0).into_owned();
+        let mut neighbours = shifts.to_vec();
+        neighbours.remove(index);
+        let columns = self.oscillations(&neighbours);
+        let loose = Subspace::new(&columns, INDEPENDENT);
+        let fixed = columns.columns(0, neighbours.len()).into_owned();
+        let rest = Subspace::new(&fixed, INDEPENDENT).complement(own.clone());
+        let alone = loose.complement(own);
+        let residuals = loose.complement(self.records.clone());
+        let degrees = self.times.len().checked_sub(loose.rank() + 1)?;
+        let (mut amplitudes, mut ratio) = (Vec::new(), 0.0);
+        for (record, residual) in self.records.column_iter().zip(residuals.column_iter()) {
+            amplitudes.push(rest.dotc(&record) / rest.norm_squared());
+            let share = alone.dotc(&residual).norm_sqr() / alone.norm_squared();
+            let unexplained = (residual.norm_squared() - share).max(0.0);
+            // Rounding stands for the noise where there is none.
+            let rounding = (f64::EPSILON * record.norm()).powi(2) / record.len().max(1) as f64;
+            let variance = (unexplained / degrees.max(1) as f64).max(rounding);
+            ratio += share / variance.max(f64::MIN_POSITIVE);
+        }
+        Some(Explained {
+            amplitudes,
+            above_noise: ratio / self.records.ncols() as f64,
+        })
+    }
+
+    /// Drops the pole that explains least, as long as one explains less than the limit.
+    fn needed(
+        &self,
+        mut shifts: Vec<Complex64>,
+        settings: &MatrixPencilSettings,
+    ) -> Vec<Complex64> {
+        let least = 10f64.powf(0.1 * settings.above_noise_db);
+        loop {
+            let ratios = (0..shifts.len())
+                .map(|index| (self.explained(&shifts, index)).map_or(0.0, |part| part.above_noise));
+            match ratios.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) {
+                Some((index, ratio)) if ratio < least => shifts.remove(index),
+                _ => return shifts,
+            };
+        }
+    }
+
+    /// Takes one step of variable projection over all records. Returns the variance of either part of each
+    /// pole.
+    ///
+    /// With the amplitudes eliminated, the residual of record c changes by -P A_ck t e^{q_k t} dq_k, where P
+    /// takes out what the oscillations explain; the variance of real and imaginary part is half the
+    /// diagonal of the inverse normal matrix.
+    fn refine(&self, shifts: &mut [Complex64]) -> Option<Vec<f64>> {
+        let count = shifts.len();
+        let columns = self.oscillations(shifts);
+        let basis = Subspace::new(&columns.columns(0, count).into_owned(), INDEPENDENT);
+        let slopes = basis.complement(columns.columns(count, count).into_owned());
+        let residuals = basis.complement(self.records.clone());
+        let degrees = self.times.len().checked_sub(2 * count).filter(|&d| d > 0)?;
+        let amplitudes: Vec<Vec<Complex64>> = (0..count)
+            .map(|index| Some(self.explained(shifts, index)?.amplitudes))
+            .collect::<Option<_>>()?;
+        let products = slopes.ad_mul(&slopes);
+        let with_residuals = slopes.ad_mul(&residuals);
+        let mut normal = DMatrix::<Complex64>::zeros(count, count);
+        let mut right = DVector::<Complex64>::zeros(count);
+        for (c, residual) in residuals.column_iter().enumerate() {
+            let variance = residual.norm_squared().max(f64::MIN_POSITIVE) / degrees as f64;
+            for i in 0..count {
+                let amplitude = amplitudes[i][c].conj() / variance;
+                right[i] += amplitude * with_residuals[(i, c)];
+                for j in 0..count {
+                    normal[(i, j)] += amplitude * amplitudes[j][c] * products[(i, j)];
+                }
+            }
+        }
+        let inverse = normal.try_inverse()?;
+        let steps = &inverse * right;
+        for (shift, step) in shifts.iter_mut().zip(steps.iter()) {
+            *shift += step;
+        }
+        Some((0..count).map(|k| 0.5 * inverse[(k, k)].re).collect())
+    }
+
+    /// Returns the poles of the signal subspace, relative to the band's centre (1/s).
+    ///
+    /// Rows of the Hankel matrices of all records are sums of (1, z, ..., z^L); the leading eigenvectors of
+    /// H^H H span their conjugates, and shifting them by one row turns them by conj(z).
+    fn subspace_poles(&self, most: usize) -> Vec<Complex64> {
+        let count = self.times.len();
+        let size = (count / 3).min(MOST_COLUMNS) + 1;
+        let rows = count + 1 - size;
+        let gram = DMatrix::from_fn(size, size, |i, j| {
+            self.records.rows(i, rows).dotc(&self.records.rows(j, rows))
+        });
+        let eigen = SymmetricEigen::new(gram);
+        let mut order: Vec<usize> = (0..size).collect();
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let values: Vec<f64> = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
+        let signals = number_of_signals(&values, self.records.ncols() * rows);
+        let poles = signals.min(most).min(size - 2);
+        if poles == 0 {
+            return Vec::new();
+        }
+        let basis = DMatrix::from_fn(size, poles, |row, k| eigen.eigenvectors[(row, order[k])]);
+        let (upper, lower) = (basis.rows(0, size - 1), basis.rows(1, size - 1));
+        let square = upper.ad_mul(&upper);
+        let Some(shift) = square.lu().solve(&upper.ad_mul(&lower)) else {
+            return Vec::new();
+        };
+        shift.eigenvalues().map_or_else(Vec::new, |roots| {
+            roots.iter().map(|z| z.conj().ln() * self.rate).collect()
+        })
+    }
 }
 
-/// Number of signals k with the least description length
+/// Returns the number of signals k with the least description length
 /// -n (m - k) ln(geometric/arithmetic mean of the m - k smallest) + k (2m - k)/2 ln n.
-fn description_order(values: &[f64], rows: usize) -> usize {
-    let size = values.len();
+fn number_of_signals(values: &[f64], rows: usize) -> usize {
     // Rounding of the sums stands below all noise.
     let floor = values.first().copied().unwrap_or(0.0) * 1e-15;
-    let length = |signals: usize| {
-        let rest = &values[signals..];
-        let count = rest.len() as f64;
-        let mean = rest.iter().map(|v| v.max(floor)).sum::<f64>() / count;
-        let logarithm = rest.iter().map(|v| v.max(floor).ln()).sum::<f64>() / count;
-        let samples = rows as f64;
-        let k = signals as f64;
-        samples * count * (mean.ln() - logarithm) + 0.5 * k * (2.0 * size as f64 - k) * samples.ln()
-    };
-    (0..size - 1)
-        .min_by(|&a, &b| length(a).total_cmp(&length(b)))
-        .unwrap_or(0)
+    let (size, samples) = (values.len() as f64, rows as f64);
+    let (mut best, mut shortest) = (0, f64::INFINITY);
+    for signals in 0..values.len() - 1 {
+        let rest: Vec<f64> = values[signals..].iter().map(|v| v.max(floor)).collect();
+        let (count, k) = (rest.len() as f64, signals as f64);
+        let mean = rest.iter().sum::<f64>() / count;
+        let logarithm = rest.iter().map(|v| v.ln()).sum::<f64>() / count;
+        let length =
+            samples * count * (mean.ln() - logarithm) + 0.5 * k * (2.0 * size - k) * samples.ln();
+        if length < shortest {
+            (best, shortest) = (signals, length);
+        }
+    }
+    best
 }

@@ -2,33 +2,85 @@
 //!
 //! Peaks are found on a composite level over all sensors ([`find_peaks`]), read between the lines by
 //! a pole ([`interpolate_pole`]) and on the line nearest to that, with the half-line bound
-//! ([`read_peaks`]); mains lines are recognised, and the readings of several recordings are merged
+//! ([`read_peaks`]). Mains lines are recognised, and the readings of several recordings are merged
 //! ([`merge_modes`]).
 //!
 //! [`polyreference`] finds the poles of a whole band from several responses at once, also where two
-//! modes show as one peak; [`matrix_pencil`] does so for free decays in the time domain; [`fit`] refines
-//! poles to the greatest likelihood and says how well they are known; [`amplitude`] follows frequency and
+//! modes show as one peak. [`matrix_pencil`] does so for free decays in the time domain. [`fit`] refines
+//! poles to the greatest likelihood and says how well they are known. [`amplitude`] follows frequency and
 //! damping along a decay.
 
 pub mod amplitude;
 pub mod fit;
 pub mod matrix_pencil;
-mod mode;
 mod peaks;
 pub mod polyreference;
-mod projection;
 mod reading;
 
-pub use mode::{
-    BandReadings, FittedReading, MergedMode, ModeReading, PeakLabel, ReadBy, merge_modes,
-};
 pub use peaks::{
     CompositeLevel, LineAmplitudes, MainsSettings, Peak, PeakSettings, find_peaks, mains_harmonic,
     near_mains,
 };
-pub use reading::{Interpolation, Unfit, interpolate_parabola, interpolate_pole, read_peaks};
+pub use reading::{
+    BandReadings, FittedReading, Interpolation, MergedMode, ModeReading, PeakLabel, ReadBy, Unfit,
+    interpolate_parabola, interpolate_pole, merge_modes, read_peaks,
+};
+
+use nalgebra::allocator::Allocator;
+use nalgebra::{ComplexField, DMatrix, DVector, DefaultAllocator, Dim, Dyn, OMatrix};
 
 /// Writes a number that counts from 0 as one that counts from 1.
 fn from_one<S: serde::Serializer>(index: &usize, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_u64(*index as u64 + 1)
+}
+
+/// The space that some columns span, as orthonormal columns: a linear least-squares fit projects it out.
+#[derive(Debug, Clone)]
+struct Subspace<T> {
+    columns: DMatrix<T>,
+}
+
+impl<T: ComplexField<RealField = f64>> Subspace<T> {
+    /// Orthonormalises columns by Gram and Schmidt's method. A column is left out where less than the share
+    /// `distinct` of its length lies outside the columns before it.
+    fn new(raw: &DMatrix<T>, distinct: f64) -> Self {
+        let mut kept: Vec<DVector<T>> = Vec::new();
+        for column in raw.column_iter() {
+            let length = column.norm();
+            if length.is_nan() || length <= 0.0 {
+                continue;
+            }
+            let mut rest = column.unscale(length);
+            // The second pass removes the rounding of nearly dependent columns.
+            for _ in 0..2 {
+                for other in &kept {
+                    let share = other.dotc(&rest);
+                    rest.axpy(-share, other, T::one());
+                }
+            }
+            let remains = rest.norm();
+            if remains > distinct && kept.len() + 1 < raw.nrows() {
+                kept.push(rest.unscale(remains));
+            }
+        }
+        let columns = DMatrix::from_fn(raw.nrows(), kept.len(), |row, k| kept[k][row].clone());
+        Subspace { columns }
+    }
+
+    /// Number of independent columns.
+    fn rank(&self) -> usize {
+        self.columns.ncols()
+    }
+
+    /// Returns columns without their projections on the space.
+    fn complement<C: Dim>(&self, mut columns: OMatrix<T, Dyn, C>) -> OMatrix<T, Dyn, C>
+    where
+        DefaultAllocator: Allocator<Dyn, C>,
+    {
+        if self.rank() > 0 {
+            let shares = self.columns.ad_mul(&columns);
+            columns.gemm(-T::one(), &self.columns, &shares, T::one());
+        }
+        columns
+    }
 }

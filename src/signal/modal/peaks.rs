@@ -22,12 +22,12 @@ impl CompositeLevel {
     ///
     /// `noise` are the powers that noise alone would leave, per sensor, where known.
     pub fn new(lines: Lines, powers: &[Vec<f64>], noise: Option<&[Vec<f64>]>) -> Self {
-        let weights: Vec<f64> = powers
-            .iter()
-            .map(|power| {
-                1.0 / median_of_positive(power).max(f64::MIN_POSITIVE) / powers.len() as f64
-            })
-            .collect();
+        let mut weights = Vec::with_capacity(powers.len());
+        for power in powers {
+            let mut positive: Vec<f64> = power.iter().copied().filter(|&v| v > 0.0).collect();
+            let scale = median(&mut positive).max(f64::MIN_POSITIVE);
+            weights.push(1.0 / scale / powers.len() as f64);
+        }
         CompositeLevel {
             lines,
             level_db: weighted_db(powers, &weights, lines.points()),
@@ -37,35 +37,24 @@ impl CompositeLevel {
 }
 
 fn weighted_db(powers: &[Vec<f64>], weights: &[f64], points: usize) -> Vec<f64> {
-    (0..points)
-        .map(|index| {
-            let sum: f64 = powers
-                .iter()
-                .zip(weights)
-                .map(|(power, weight)| weight * power.get(index).copied().unwrap_or(0.0))
-                .sum();
-            // A power of exactly zero has no level; -400 dB keeps it out of every comparison.
-            if sum > 0.0 {
-                10.0 * sum.log10()
-            } else {
-                -400.0
-            }
-        })
-        .collect()
+    let mut levels = vec![0.0; points];
+    for (power, weight) in powers.iter().zip(weights) {
+        for (sum, power) in levels.iter_mut().zip(power) {
+            *sum += weight * power;
+        }
+    }
+    for level in &mut levels {
+        // A power of exactly zero has no level; -400 dB keeps it out of every comparison.
+        *level = if *level > 0.0 {
+            10.0 * level.log10()
+        } else {
+            -400.0
+        };
+    }
+    levels
 }
 
-/// Median of the positive entries; 0 when there are none.
-fn median_of_positive(values: &[f64]) -> f64 {
-    median(
-        &mut values
-            .iter()
-            .copied()
-            .filter(|&v| v > 0.0)
-            .collect::<Vec<_>>(),
-    )
-}
-
-/// What counts as a resonance.
+/// Settings of the search for resonances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeakSettings {
     /// Least prominence (dB): how far the level falls on both sides before it rises above the peak.
@@ -100,37 +89,50 @@ impl Default for PeakSettings {
 pub struct Peak {
     /// Index of its line.
     pub index: usize,
-    /// How far it stands out (dB).
+    /// Prominence (dB).
     pub prominence_db: f64,
     /// Height above the noise (dB), where the noise is known.
     pub above_noise_db: Option<f64>,
 }
 
-/// Resonances of a composite level, ascending in frequency.
+/// Finds the resonances of a composite level, ascending in frequency.
 ///
 /// The first two resolution widths are left out: drift and offsets live there.
 pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> {
     let lines = &level.lines;
     let first = lines.frequency(0);
-    let mut peaks: Vec<Peak> = local_maxima(&level.level_db)
-        .into_iter()
-        .filter(|&index| first > 0.0 || lines.frequency(index) > 2.0 * lines.resolution())
-        .map(|index| Peak {
+    let db = &level.level_db;
+    let mut peaks: Vec<Peak> = Vec::new();
+    for index in 1..db.len().saturating_sub(1) {
+        // The first line of a plateau stands for it.
+        let is_maximum = db[index] > db[index - 1] && db[index] >= db[index + 1];
+        let is_drift = first <= 0.0 && lines.frequency(index) <= 2.0 * lines.resolution();
+        if !is_maximum || is_drift {
+            continue;
+        }
+        let peak = Peak {
             index,
-            prominence_db: prominence(&level.level_db, index),
+            prominence_db: prominence(db, index),
             above_noise_db: level
                 .noise_db
                 .as_ref()
-                .map(|noise| level.level_db[index] - noise[index]),
-        })
-        .filter(|peak| peak.prominence_db >= needed_prominence(peak, settings))
-        .filter(|peak| {
+                .map(|noise| db[index] - noise[index]),
+        };
+        let least = match peak.above_noise_db {
+            // Noise s dB below a level makes it ripple by 8.7 10^(-s/20) dB; six times that is out of its
+            // reach on any line.
+            Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
+            None => settings.blind_prominence_db,
+        };
+        if peak.prominence_db >= least {
             let height = peak
                 .above_noise_db
-                .unwrap_or_else(|| above_surroundings(&level.level_db, peak.index));
-            height >= settings.above_noise_db
-        })
-        .collect();
+                .unwrap_or_else(|| above_surroundings(db, index));
+            if height >= settings.above_noise_db {
+                peaks.push(peak);
+            }
+        }
+    }
     peaks.sort_by(|a, b| b.prominence_db.total_cmp(&a.prominence_db));
     let width = (lines.resolution() / lines.spacing).ceil().max(1.0) as usize;
     let separation = settings.separation.saturating_mul(width);
@@ -147,23 +149,7 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
     kept
 }
 
-/// The least prominence of a peak. Noise s dB below a level makes it ripple by 8.7 10^(-s/20) dB;
-/// six times that is out of its reach on any line.
-fn needed_prominence(peak: &Peak, settings: &PeakSettings) -> f64 {
-    match peak.above_noise_db {
-        Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
-        None => settings.blind_prominence_db,
-    }
-}
-
-/// Interior local maxima; the first line of a plateau stands for it.
-fn local_maxima(level: &[f64]) -> Vec<usize> {
-    (1..level.len().saturating_sub(1))
-        .filter(|&i| level[i] > level[i - 1] && level[i] >= level[i + 1])
-        .collect()
-}
-
-/// Height over the higher of the two lowest points between the peak and the next higher ground. A
+/// Returns the height over the higher of the two lowest points between the peak and the next higher ground. A
 /// side that meets the end of the axis before higher ground says nothing: the band just ends there,
 /// perhaps on the flank. The highest peak of all stands over the lower of its two sides.
 fn prominence(level: &[f64], index: usize) -> f64 {
@@ -179,7 +165,7 @@ fn prominence(level: &[f64], index: usize) -> f64 {
         }
 }
 
-/// Lowest point before higher ground, and whether the axis ended before there was any.
+/// Returns the lowest point before higher ground, and true where the axis ended before there was any.
 fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
     let mut lowest = height;
     for &level in side {
@@ -191,18 +177,16 @@ fn valley<'a>(side: impl Iterator<Item = &'a f64>, height: f64) -> (f64, bool) {
     (lowest, true)
 }
 
-/// Height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the
+/// Returns the height over the median of the surroundings, where no noise is known: 25 lines or a tenth of the
 /// position to either side, whichever is more. A peak of noise stands at most some 12 dB above it.
 fn above_surroundings(level: &[f64], index: usize) -> f64 {
     let reach = (index / 10).max(25);
     let first = index.saturating_sub(reach);
     let last = (index + reach + 1).min(level.len());
-    let mut around = level[first..last].to_vec();
-    around.sort_by(f64::total_cmp);
-    level[index] - around[around.len() / 2]
+    level[index] - median(&mut level[first..last].to_vec())
 }
 
-/// What counts as a mains line.
+/// Settings of the recognition of mains lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MainsSettings {
     /// Largest distance from a multiple, relative: 0.2 %, the deviation large grids allow themselves.
@@ -234,11 +218,11 @@ pub struct LineAmplitudes {
     pub before: f64,
     /// In the tap record, as if steady.
     pub within: f64,
-    /// What noise alone has before the tap, root mean square over the frequencies beside the line.
+    /// Amplitude of noise alone before the tap, root mean square over the frequencies beside the line.
     pub noise: f64,
 }
 
-/// The multiple of 50 or 60 Hz (Hz) that a peak at `frequency` is, or `None`.
+/// Returns the multiple of 50 or 60 Hz (Hz) that a peak at `frequency` is, or `None`.
 ///
 /// `half_line` is the bound of the reading (Hz).
 pub fn mains_harmonic(
@@ -255,7 +239,7 @@ pub fn mains_harmonic(
     near_mains(frequency, half_line, settings)
 }
 
-/// The multiple of 50 or 60 Hz (Hz) near which `frequency` lies, hum or not.
+/// Returns the multiple of 50 or 60 Hz (Hz) near which `frequency` lies, hum or not.
 pub fn near_mains(frequency: f64, half_line: f64, settings: &MainsSettings) -> Option<f64> {
     [50.0, 60.0].into_iter().find_map(|mains| {
         let harmonic = mains * (frequency / mains).round();

@@ -1,6 +1,4 @@
-//! Reading each peak: on its line, and between the lines.
-//!
-//! Reading a resonance between the lines.
+//! Reading each resonance: on its line, between the lines, and by a fit; one list from several recordings.
 //!
 //! The discrete spectrum of one decaying oscillation, cut off anywhere, is exactly rational in the
 //! frequency on lines that are 1/T apart: the truncation factor 1 - e^{(p - j omega) T} is the same
@@ -9,14 +7,177 @@
 //! Near a resonance a single pole on a slowly varying background therefore reads the frequency far
 //! below the line spacing, truncated record or not.
 
+use serde::Serialize;
 use std::f64::consts::TAU;
+use std::fmt;
 
+use nalgebra::DMatrix;
 use num_complex::Complex64;
 
-use super::mode::{ModeReading, PeakLabel, ReadBy};
+use super::Subspace;
+use super::amplitude::AmplitudeCurve;
+use super::fit::{ModalConstant, ModeFit};
 use super::peaks::{CompositeLevel, Peak};
-use super::projection::Basis;
 use crate::spectral::{Lines, Window};
+
+/// One resonance as one recording reads it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeReading {
+    /// Best frequency (Hz).
+    pub frequency: f64,
+    /// Way in which it was read.
+    pub source: ReadBy,
+    /// Its interval (Hz): 95 % of a fit, the bounds of a reading between the lines or on one.
+    pub interval: (f64, f64),
+    /// Frequency of the peak's line, without a peak of the nearest one (Hz).
+    pub line_frequency: f64,
+    /// Bound of the line reading (Hz).
+    pub half_line: f64,
+    /// The reading between the lines, where there is one.
+    pub between: Option<Interpolation>,
+    /// Standard deviation of the best frequency (Hz).
+    pub std: Option<f64>,
+    /// Damping ratio.
+    pub damping_ratio: Option<f64>,
+    /// Its standard deviation.
+    pub damping_std: Option<f64>,
+    /// Prominence of the peak (dB); `None` of a mode that makes no peak.
+    pub prominence_db: Option<f64>,
+    /// Height above the noise (dB), where known.
+    pub above_noise_db: Option<f64>,
+    /// Kind of a peak that is no mode of the structure.
+    pub label: Option<PeakLabel>,
+    /// The fit of the mode, where it succeeded.
+    pub fit: Option<Box<FittedReading>>,
+}
+
+/// Way of reading a natural frequency, wanted or used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReadBy {
+    /// By a fit of decaying oscillations, with a standard deviation. Modes that cannot be fitted are read
+    /// between the lines or on their line.
+    #[default]
+    Fit,
+    /// Between the lines about the peak, or on its line where that fails.
+    Interpolated,
+    /// On the highest spectral line, as Ingole & Chatterjee read their frequencies.
+    Line,
+}
+
+impl ReadBy {
+    /// All ways, from the coarsest to the finest.
+    pub const ALL: [Self; 3] = [Self::Line, Self::Interpolated, Self::Fit];
+
+    /// Name in descriptions and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Line => "line",
+            Self::Interpolated => "interpolated",
+            Self::Fit => "fit",
+        }
+    }
+}
+
+impl ModeReading {
+    /// Returns a frequency read on a spectral line (Hz) and known to half a line (Hz), and nothing else.
+    pub fn on_line(frequency: f64, half_line: f64) -> Self {
+        let mut reading = ModeReading {
+            frequency,
+            source: ReadBy::Line,
+            interval: (frequency, frequency),
+            line_frequency: frequency,
+            half_line,
+            between: None,
+            std: None,
+            damping_ratio: None,
+            damping_std: None,
+            prominence_db: None,
+            above_noise_db: None,
+            label: None,
+            fit: None,
+        };
+        reading.select_estimate(ReadBy::Line);
+        reading
+    }
+
+    /// Takes the frequency that was read as `wanted`, or the next best that there is: by the fit, between
+    /// the lines, on the line. The damping is that of the fit, or of the reading between the lines.
+    pub fn select_estimate(&mut self, wanted: ReadBy) {
+        let fit = self.fit.as_deref().map(|fit| &fit.mode);
+        (self.damping_ratio, self.damping_std) = match (fit, self.between) {
+            (Some(fit), _) => (Some(fit.damping_ratio.value), Some(fit.damping_ratio.std)),
+            (None, Some(between)) => (
+                between.damping_ratio,
+                between.damping_ratio.map(|_| between.damping_std),
+            ),
+            (None, None) => (None, None),
+        };
+        if let Some(fit) = fit.filter(|_| wanted == ReadBy::Fit) {
+            let found = fit.frequency;
+            (self.frequency, self.source) = (found.value, ReadBy::Fit);
+            (self.std, self.interval) = (Some(found.std), (found.low, found.high));
+            return;
+        }
+        let (frequency, bound, std) = match self.between.filter(|_| wanted != ReadBy::Line) {
+            Some(between) => {
+                self.source = ReadBy::Interpolated;
+                (between.frequency, between.bound, between.std)
+            }
+            // On a line the truth lies anywhere within the half line.
+            None => {
+                self.source = ReadBy::Line;
+                let std = self.half_line / 3f64.sqrt();
+                (self.line_frequency, self.half_line, std)
+            }
+        };
+        (self.frequency, self.std) = (frequency, Some(std));
+        self.interval = (frequency - bound, frequency + bound);
+    }
+}
+
+/// Results of the fit of one mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedReading {
+    /// Frequency, damping, amplitudes, each with its standard deviation.
+    pub mode: ModeFit,
+    /// Modal constants of the sensors; empty without a hammer, or where a sensor's quantity is unknown.
+    pub constants: Vec<ModalConstant>,
+    /// Frequency and damping against amplitude; `None` where they were not followed.
+    pub amplitude: Option<AmplitudeCurve>,
+}
+
+impl FittedReading {
+    /// Takes a fit alone.
+    pub fn new(mode: ModeFit) -> Self {
+        FittedReading {
+            mode,
+            constants: Vec::new(),
+            amplitude: None,
+        }
+    }
+}
+
+/// A peak that is no mode of the structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PeakLabel {
+    /// Mains hum at this multiple (Hz) of 50 or 60 Hz.
+    Mains(f64),
+    /// The force has a gap there, and the quotient a peak.
+    ForceGap,
+    /// No decaying oscillation explains it: speckle of noise or reverberation.
+    NoResonance,
+}
+
+impl fmt::Display for PeakLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PeakLabel::Mains(harmonic) => write!(f, "mains {harmonic} Hz"),
+            PeakLabel::ForceGap => f.write_str("gap of the force"),
+            PeakLabel::NoResonance => f.write_str("no clear resonance"),
+        }
+    }
+}
 
 /// Reads all `peaks` of one recording.
 ///
@@ -32,65 +193,28 @@ pub fn read_peaks(
     peaks: &[Peak],
     window: Window,
 ) -> Vec<ModeReading> {
-    let places: Vec<usize> = peaks.iter().map(|peak| peak.index).collect();
-    let one = |peak: &Peak| match window {
-        Window::Hann => {
-            let between = interpolate_parabola(&level.lines, &level.level_db, peak.index);
-            reading(level, peak, between, None)
-        }
-        Window::Rectangular | Window::Exponential { .. } => {
-            let room = room_around(&places, peak.index);
+    let mut readings = Vec::with_capacity(peaks.len());
+    for peak in peaks {
+        let (mut between, mut label) = (None, None);
+        if window == Window::Hann {
+            between = interpolate_parabola(&level.lines, &level.level_db, peak.index);
+        } else {
+            // A third of the way to the nearest neighbour are the peak's own lines.
+            let others = peaks.iter().filter(|other| other.index != peak.index);
+            let nearest = others.map(|other| other.index.abs_diff(peak.index)).min();
+            let room = nearest.map_or(usize::MAX, |distance| distance / 3);
             let decay = window.added_decay();
             match interpolate_pole(&level.lines, spectra, peak.index, room, decay) {
-                Ok(found) if is_resonance(&found, peak, level.lines.half_line()) => {
-                    reading(level, peak, Some(found), None)
+                Ok(found) if found.is_resonance(peak, level.lines.half_line()) => {
+                    between = Some(found);
                 }
-                Err(Unfit::TooFewLines) => reading(level, peak, None, None),
-                Ok(_) | Err(Unfit::PoleElsewhere) => {
-                    reading(level, peak, None, Some(PeakLabel::NoResonance))
-                }
+                Err(Unfit::TooFewLines) => {}
+                Ok(_) | Err(Unfit::PoleElsewhere) => label = Some(PeakLabel::NoResonance),
             }
         }
-    };
-    peaks.iter().map(one).collect()
-}
-
-/// A peak that stands out by less than this (dB) must be read within its half line, or a quarter of its
-/// half-power width, to count.
-const CLEAR_PROMINENCE: f64 = 8.0;
-/// From this height over the noise on (dB), noise does not make peaks any more.
-const CLEAR_OF_NOISE: f64 = 30.0;
-/// Least prominence (dB) for the same where nothing is known of the noise.
-const CLEAR_WHEN_BLIND: f64 = 20.0;
-
-/// Least decay over the record (sigma T) of a peak that is not clear of the noise. 2: a peak of noise
-/// is as narrow as the record allows, and scatters about no decay at all.
-const LEAST_DECAY: f64 = 2.0;
-
-/// Whether the fitted oscillation decays beyond doubt: by two standard deviations where the peak is
-/// clear of the noise; by five, and visibly over the record, where it is not.
-fn is_resonance(found: &Interpolation, peak: &Peak, half_line: f64) -> bool {
-    let clear = match peak.above_noise_db {
-        Some(above) => above >= CLEAR_OF_NOISE,
-        None => peak.prominence_db >= CLEAR_WHEN_BLIND,
-    };
-    let decays_by = |deviations: f64| {
-        found
-            .damping_ratio
-            .is_some_and(|ratio| ratio > deviations * found.damping_std)
-    };
-    let decays = if clear {
-        decays_by(2.0)
-    } else {
-        decays_by(5.0) && found.decay_in_record >= LEAST_DECAY
-    };
-    let readable = found.bound < half_line.max(0.5 * half_width(found));
-    decays && (peak.prominence_db >= CLEAR_PROMINENCE || readable)
-}
-
-/// Half of the half-power width, zeta f (Hz); 0 without damping.
-fn half_width(found: &Interpolation) -> f64 {
-    found.damping_ratio.unwrap_or(0.0) * found.frequency
+        readings.push(reading(level, peak, between, label));
+    }
+    readings
 }
 
 /// Puts a reading together. The reading between the lines counts where its bound is below the half
@@ -104,31 +228,30 @@ fn reading(
 ) -> ModeReading {
     let lines = &level.lines;
     let half_line = lines.half_line();
-    let sharp = between.filter(|found| found.bound < half_line.max(half_width(found)));
+    let sharp = between.filter(|found| found.bound < half_line.max(found.half_width()));
     let line = sharp.map_or(peak.index, |found| lines.nearest(found.frequency));
     let mut reading = ModeReading {
-        interpolated: sharp.map(|found| found.frequency),
-        bound: sharp.map(|found| found.bound),
-        damping_ratio: sharp.and_then(|found| found.damping_ratio),
-        damping_std: sharp.and_then(|found| found.damping_ratio.map(|_| found.damping_std)),
+        between: sharp,
         prominence_db: Some(peak.prominence_db),
         above_noise_db: peak.above_noise_db,
         label,
         ..ModeReading::on_line(lines.frequency(line), half_line)
     };
-    reading.prefer(ReadBy::Interpolated);
+    reading.select_estimate(ReadBy::Interpolated);
     reading
 }
 
-/// Lines to either side of a peak that are its own: a third of the way to its neighbour.
-fn room_around(places: &[usize], place: usize) -> usize {
-    places
-        .iter()
-        .filter(|&&other| other != place)
-        .map(|&other| other.abs_diff(place) / 3)
-        .min()
-        .unwrap_or(usize::MAX)
-}
+/// A peak that stands out by less than this (dB) must be read within its half line, or a quarter of its
+/// half-power width, to count.
+const CLEAR_PROMINENCE: f64 = 8.0;
+/// From this height over the noise on (dB), noise does not make peaks any more.
+const CLEAR_OF_NOISE: f64 = 30.0;
+/// Least prominence (dB) for the same where nothing is known of the noise.
+const CLEAR_WHEN_BLIND: f64 = 20.0;
+
+/// Least decay over the record (sigma T) of a peak that is not clear of the noise. 2: a peak of noise
+/// is as narrow as the record allows, and scatters about no decay at all.
+const LEAST_DECAY: f64 = 2.0;
 
 /// A frequency read between the lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,10 +271,32 @@ pub struct Interpolation {
     pub decay_in_record: f64,
 }
 
-/// Why a peak could not be read between the lines.
+impl Interpolation {
+    /// Returns true where the fitted oscillation decays beyond doubt: by two standard deviations where the
+    /// peak is clear of the noise; by five, and visibly over the record, where it is not.
+    fn is_resonance(&self, peak: &Peak, half_line: f64) -> bool {
+        let clear = match peak.above_noise_db {
+            Some(above) => above >= CLEAR_OF_NOISE,
+            None => peak.prominence_db >= CLEAR_WHEN_BLIND,
+        };
+        let deviations = if clear { 2.0 } else { 5.0 };
+        let decays = (self.damping_ratio)
+            .is_some_and(|ratio| ratio > deviations * self.damping_std)
+            && (clear || self.decay_in_record >= LEAST_DECAY);
+        let readable = self.bound < half_line.max(0.5 * self.half_width());
+        decays && (peak.prominence_db >= CLEAR_PROMINENCE || readable)
+    }
+
+    /// Returns half of the half-power width, zeta f (Hz); 0 without damping.
+    fn half_width(&self) -> f64 {
+        self.damping_ratio.unwrap_or(0.0) * self.frequency
+    }
+}
+
+/// Reason why a peak could not be read between the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unfit {
-    /// Fewer lines than unknowns, or lines without any level: nothing is said about the peak.
+    /// Fewer lines than unknowns, or lines without any level: the peak remains undecided.
     TooFewLines,
     /// The pole lies elsewhere: the peak is not that of a resonance.
     PoleElsewhere,
@@ -164,7 +309,7 @@ const LEAST_REACH: usize = 2;
 const MOST_LINES: usize = 100;
 /// From this reach on the background may slope: nine complex values against four unknowns.
 const SLOPING_REACH: usize = 4;
-/// What a fit of one pole leaves even without noise (lines): the image at the negative frequency and
+/// Error of a fit of one pole even without noise (lines): the image at the negative frequency and
 /// the curvature of the background, as seen on noise-free virtual tests.
 const MODEL_ERROR: f64 = 1e-4;
 /// Iterations of the weights; they settle in two.
@@ -217,20 +362,25 @@ pub fn interpolate_pole(
     })
 }
 
-/// Lines from the peak to where the summed power has fallen by half, on the nearer side: on the
+/// Returns the lines from the peak to where the summed power has fallen by half, on the nearer side: on the
 /// farther one a neighbour may hold it up.
 fn half_power_reach(spectra: &[&[Complex64]], peak: usize) -> Option<usize> {
-    let power = |line: usize| -> Option<f64> {
-        spectra
-            .iter()
-            .map(|spectrum| spectrum.get(line).map(Complex64::norm_sqr))
-            .sum()
-    };
-    let half = 0.5 * power(peak)?;
-    let above = |line: Option<usize>| line.and_then(power).is_some_and(|p| p > half);
-    let right = (1..).find(|&k| !above(Some(peak + k)))?;
-    let left = (1..).find(|&k| !above(peak.checked_sub(k)))?;
-    Some(left.min(right))
+    let half = 0.5 * power(spectra, peak)?;
+    (1..).find(|reach| {
+        let sides = [Some(peak + reach), peak.checked_sub(*reach)];
+        !sides.iter().all(|line| {
+            line.and_then(|line| power(spectra, line))
+                .is_some_and(|p| p > half)
+        })
+    })
+}
+
+/// Returns the summed power of all spectra on a line; `None` beyond the end of one.
+fn power(spectra: &[&[Complex64]], line: usize) -> Option<f64> {
+    spectra
+        .iter()
+        .map(|spectrum| spectrum.get(line).map(Complex64::norm_sqr))
+        .sum()
 }
 
 #[derive(Clone, Copy)]
@@ -265,7 +415,7 @@ fn fit_pole(spectra: &[&[Complex64]], peak: usize, reach: usize) -> Option<PoleF
     fit
 }
 
-/// One weighted least-squares pass. Residue and background of each spectrum are projected out, which
+/// Solves one weighted least-squares pass. Residue and background of each spectrum are projected out, which
 /// leaves a single complex unknown: q = sum conj(H') (u H)' / sum |H'|^2.
 fn solve_pole(
     spectra: &[&[Complex64]],
@@ -273,44 +423,39 @@ fn solve_pole(
     offsets: &[f64],
     weights: &[f64],
 ) -> Option<PoleFit> {
-    let basis = polynomial_basis(offsets, weights);
-    let (mut numerator, mut denominator) = (Complex64::ZERO, 0.0);
-    let mut parts = Vec::with_capacity(spectra.len());
-    for spectrum in spectra {
-        let values: Vec<Complex64> = lines
-            .iter()
-            .zip(weights)
-            .map(|(&line, weight)| spectrum[line] * weight.sqrt())
-            .collect();
-        let sloped: Vec<Complex64> = values.iter().zip(offsets).map(|(h, u)| h * u).collect();
-        let (h, uh) = (basis.rest(values), basis.rest(sloped));
-        numerator += h
-            .iter()
-            .zip(&uh)
-            .map(|(h, uh)| h.conj() * uh)
-            .sum::<Complex64>();
-        denominator += h.iter().map(Complex64::norm_sqr).sum::<f64>();
-        parts.push((h, uh));
+    // The polynomials 1, u, and u^2 where there are lines enough.
+    let terms = if lines.len() > 2 * SLOPING_REACH {
+        3
+    } else {
+        2
+    };
+    let background = DMatrix::from_fn(lines.len(), terms, |row, degree| {
+        Complex64::from(weights[row].sqrt() * offsets[row].powi(degree as i32))
+    });
+    let background = Subspace::new(&background, 1e-9);
+    let values = DMatrix::from_fn(lines.len(), spectra.len(), |row, k| {
+        spectra[k][lines[row]] * weights[row].sqrt()
+    });
+    let mut sloped = values.clone();
+    for (mut row, offset) in sloped.row_iter_mut().zip(offsets) {
+        row *= Complex64::from(*offset);
     }
+    let (h, uh) = (background.complement(values), background.complement(sloped));
+    let denominator = h.norm_squared();
     if denominator.is_nan() || denominator <= 0.0 {
         return None;
     }
-    let pole = numerator / denominator;
-    let (mut squares, mut neighbours) = (0.0, 0.0);
-    for (h, uh) in &parts {
-        let rest: Vec<Complex64> = h.iter().zip(uh).map(|(h, uh)| uh - pole * h).collect();
-        squares += rest.iter().map(Complex64::norm_sqr).sum::<f64>();
-        neighbours += rest
-            .windows(2)
-            .map(|pair| (pair[0].conj() * pair[1]).re)
-            .sum::<f64>();
-    }
+    let pole = h.dotc(&uh) / denominator;
+    let rest = uh - h * pole;
+    let squares = rest.norm_squared();
     // What the model misses runs smoothly over the lines, and neighbours that agree are not
     // independent: their correlation r leaves (1 - r)/(1 + r) of the lines' information.
+    let pairs = lines.len() - 1;
+    let neighbours = rest.rows(0, pairs).dotc(&rest.rows(1, pairs)).re;
     let agreement = (neighbours / squares.max(f64::MIN_POSITIVE)).clamp(0.0, 0.98);
     let squares = squares * (1.0 + agreement) / (1.0 - agreement);
     // Complex values less the polynomial's unknowns per spectrum less the common pole.
-    let unknowns = basis.columns.len() * spectra.len() + 1;
+    let unknowns = background.rank() * spectra.len() + 1;
     let freedom = (offsets.len() * spectra.len()).saturating_sub(unknowns);
     let std = if freedom == 0 {
         0.0
@@ -318,21 +463,6 @@ fn solve_pole(
         (squares / (2.0 * freedom as f64) / denominator).sqrt()
     };
     Some(PoleFit { pole, std })
-}
-
-/// Orthonormal basis of the polynomials 1, u, and u^2 where there are lines enough, under the weights.
-fn polynomial_basis(offsets: &[f64], weights: &[f64]) -> Basis {
-    let sloping = offsets.len() > 2 * SLOPING_REACH;
-    let mut basis = Basis::new(1);
-    for degree in 0..if sloping { 3 } else { 2 } {
-        let pairs = offsets.iter().zip(weights);
-        basis.add(
-            pairs
-                .map(|(u, w)| Complex64::from(w.sqrt() * u.powi(degree)))
-                .collect(),
-        );
-    }
-    basis
 }
 
 /// Parabola through the three levels (dB) around the peak: for the Hann window, whose lines are not
@@ -358,4 +488,142 @@ pub fn interpolate_parabola(lines: &Lines, level_db: &[f64], peak: usize) -> Opt
         damping_std: 0.0,
         decay_in_record: 0.0,
     })
+}
+
+/// Readings of one recording in its band.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BandReadings {
+    /// Lower and upper end of the band (Hz).
+    pub band: (f64, f64),
+    /// The resonances.
+    pub readings: Vec<ModeReading>,
+}
+
+/// A resonance of the structure, from the recording that resolves it best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MergedMode {
+    /// Index of that recording.
+    pub recording: usize,
+    /// The reading.
+    pub reading: ModeReading,
+}
+
+/// A resonance, and the recordings that show it.
+struct Resonance {
+    best: MergedMode,
+    shown_by: Vec<usize>,
+}
+
+impl Resonance {
+    /// Takes another resonance over as the same one; the reading that resolves it better stays.
+    fn absorb(&mut self, other: Resonance) {
+        self.shown_by.extend(other.shown_by);
+        if resolves_better(&other.best.reading, &self.best.reading) {
+            self.best = other.best;
+        }
+    }
+
+    fn is_shown_with(&self, other: &Resonance) -> bool {
+        self.shown_by
+            .iter()
+            .any(|recording| other.shown_by.contains(recording))
+    }
+}
+
+/// Merges the readings of several recordings, ascending in frequency.
+///
+/// Readings are the same resonance when they differ by less than their half lines together plus
+/// 0.3 % (what re-mounting a sensor or a joint's drift moves a frequency as a rule), or by up to 1.5 % (a joint's
+/// drift of 3 %, where the mode lives in the joint) and no recording shows both, though the band of each reaches to
+/// where the other has its own; a fitted
+/// one stays before one that is not, of two fits the one with the smaller standard deviation, else the
+/// one with the smaller half line, and among equals the one that stands out most. Two readings of one recording are
+/// never merged.
+pub fn merge_modes(recordings: &[BandReadings]) -> Vec<MergedMode> {
+    let mut merged: Vec<Resonance> = Vec::new();
+    for (recording, shown) in recordings.iter().enumerate() {
+        for reading in &shown.readings {
+            let found = Resonance {
+                best: MergedMode {
+                    recording,
+                    reading: reading.clone(),
+                },
+                shown_by: vec![recording],
+            };
+            let mut nearest: Option<(f64, &mut Resonance)> = None;
+            for known in &mut merged {
+                let other = &known.best.reading;
+                let distance = (other.frequency - reading.frequency).abs();
+                let allowed = other.half_line
+                    + reading.half_line
+                    + 0.003 * other.frequency.max(reading.frequency);
+                let same = distance <= allowed && !known.is_shown_with(&found);
+                if same && nearest.as_ref().is_none_or(|(least, _)| distance < *least) {
+                    nearest = Some((distance, known));
+                }
+            }
+            match nearest {
+                Some((_, known)) => known.absorb(found),
+                None => merged.push(found),
+            }
+        }
+    }
+    while let Some((first, second)) = nearest_drifted(&merged, recordings) {
+        let other = merged.remove(second);
+        merged[first].absorb(other);
+    }
+    merged.sort_by(|a, b| {
+        a.best
+            .reading
+            .frequency
+            .total_cmp(&b.best.reading.frequency)
+    });
+    merged.into_iter().map(|resonance| resonance.best).collect()
+}
+
+/// Largest relative distance of two readings of a mode that drifted from one recording to another.
+const DRIFTED: f64 = 0.015;
+
+/// Returns the two nearest resonances within [`DRIFTED`] that were seen in different recordings. Each must have been
+/// missed by a recording that shows the other and would have shown it too: of two bands that only meet, neither could.
+fn nearest_drifted(merged: &[Resonance], recordings: &[BandReadings]) -> Option<(usize, usize)> {
+    let mut nearest = None;
+    let mut least = DRIFTED;
+    for (second, b) in merged.iter().enumerate() {
+        for (first, a) in merged[..second].iter().enumerate() {
+            let (one, other) = (&a.best.reading, &b.best.reading);
+            let distance =
+                (one.frequency - other.frequency).abs() / one.frequency.max(other.frequency);
+            let resonances = one.label.is_none() && other.label.is_none();
+            let missed = [(a, other), (b, one)].iter().all(|(shown, missing)| {
+                shown.shown_by.iter().any(|&recording| {
+                    let (low, high) = recordings[recording].band;
+                    (low..=high).contains(&missing.frequency)
+                })
+            });
+            let nearer = distance < least || distance <= least && nearest.is_none();
+            if nearer && resonances && missed && !a.is_shown_with(b) {
+                (nearest, least) = (Some((first, second)), distance);
+            }
+        }
+    }
+    nearest
+}
+
+/// Returns true where reading `a` knows its frequency better than `b`.
+fn resolves_better(a: &ModeReading, b: &ModeReading) -> bool {
+    if a.label.is_some() != b.label.is_some() {
+        return a.label.is_none();
+    }
+    match (a.source == ReadBy::Fit, b.source == ReadBy::Fit) {
+        (true, true) => return a.std < b.std,
+        (false, false) => {}
+        (a_is_fitted, _) => return a_is_fitted,
+    }
+    // Half lines that differ by less than 1 % come from blocks of nearly the same length.
+    if (a.half_line - b.half_line).abs() > 0.01 * a.half_line.max(b.half_line) {
+        a.half_line < b.half_line
+    } else {
+        a.prominence_db > b.prominence_db
+    }
 }

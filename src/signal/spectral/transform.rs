@@ -171,8 +171,14 @@ pub fn transform_block(samples: &[f64], sample_rate: f64, lines: &Lines) -> Vec<
 /// recorders once the decimated lines add up.
 const STOP_BAND_DB: f64 = 100.0;
 
+/// Kaiser's relation between attenuation (dB) and the shape parameter beta, above 50 dB
+/// (Oppenheim & Schafer).
+pub(crate) fn kaiser_beta(attenuation: f64) -> f64 {
+    0.1102 * (attenuation - 8.7)
+}
+
 /// Modified Bessel function I0, by its power series: converges for every argument used here.
-fn bessel_i0(x: f64) -> f64 {
+pub(crate) fn bessel_i0(x: f64) -> f64 {
     let quarter = x * x / 4.0;
     let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
     while term > sum * 1e-17 {
@@ -191,7 +197,7 @@ fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
     let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
     let cut_off = PI * (pass + stop) / sample_rate;
     // Kaiser's shape parameter for an attenuation above 50 dB (Oppenheim & Schafer).
-    let beta = 0.1102 * (STOP_BAND_DB - 8.7);
+    let beta = kaiser_beta(STOP_BAND_DB);
     let taps: Vec<f64> = (-half..=half)
         .map(|n| {
             let sinc = if n == 0 {

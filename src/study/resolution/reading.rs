@@ -61,7 +61,7 @@ pub(super) fn read_band(
             ReadBy::ALL.map(|name| {
                 let reading = readings.get(place?).filter(|_| wanted.contains(&name))?;
                 let mut reading = reading.clone();
-                reading.prefer(name);
+                reading.select_estimate(name);
                 Some(Read {
                     frequency: reading.frequency,
                     std: reading.std.unwrap_or(reading.half_line),

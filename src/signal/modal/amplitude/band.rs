@@ -8,6 +8,7 @@ use num_complex::Complex64;
 use tapjoint_numerics::stats::median;
 
 use super::{AmplitudeSettings, Decay, KnownMode};
+use crate::spectral::{bessel_i0, kaiser_beta};
 
 /// Attenuation of the stop band (dB): a neighbour a hundred times as strong is left at 3 %.
 const ATTENUATION: f64 = 70.0;
@@ -17,7 +18,7 @@ const PASS: f64 = 0.3;
 const PARTS: f64 = 4.0;
 /// Decay times that are followed: 104 dB.
 const REACH: f64 = 12.0;
-/// Least damping ratio taken for granted: no structure with a joint has less.
+/// Least damping ratio: no structure with a joint has less.
 const LEAST_DAMPING: f64 = 1e-6;
 /// Neighbours are kept this far beyond the stop edge.
 const MARGIN: f64 = 0.95;
@@ -53,39 +54,53 @@ pub(super) struct Band {
 }
 
 impl Band {
-    /// Gain of the filter at a pole relative to the band's middle:
+    /// Returns the gain of the filter at a pole relative to the band's middle:
     /// sum h(m) e^{p (m - (M-1)/2)/rate}.
     pub fn gain(&self, pole: Complex64) -> Complex64 {
         let middle = (self.taps.len() - 1) as f64 / 2.0;
-        let gain =
-            |(m, h): (usize, &f64)| (pole * ((m as f64 - middle) / self.sample_rate)).exp() * *h;
-        self.taps.iter().enumerate().map(gain).sum()
+        let mut sum = Complex64::ZERO;
+        for (m, h) in self.taps.iter().enumerate() {
+            sum += (pole * ((m as f64 - middle) / self.sample_rate)).exp() * *h;
+        }
+        sum
     }
 
-    /// Frequency (Hz) of a pole relative to the middle, undamped.
+    /// Returns the undamped frequency (Hz) of a pole relative to the middle.
     pub fn frequency(&self, pole: Complex64) -> f64 {
         Complex64::new(pole.re, self.omega + pole.im).norm() / TAU
     }
+
+    /// Number of values in the first decay time, at least six.
+    fn early(&self) -> usize {
+        ((self.scale / self.step) as usize).max(6)
+    }
+
+    /// Sum of squares of a sensor's early values.
+    fn energy(&self, sensor: usize) -> f64 {
+        let values = self.sensors[sensor].iter().take(self.early());
+        values.map(Complex64::norm_sqr).sum()
+    }
 }
 
-/// The band of mode `index` after every tap; decays that are too short are left out.
+/// Extracts the band of mode `index` after every tap; decays that are too short are left out.
 pub(super) fn extract_bands(
     decays: &[Decay],
     modes: &[KnownMode],
     index: usize,
     settings: &AmplitudeSettings,
 ) -> Vec<Band> {
-    decays
-        .iter()
-        .enumerate()
-        .filter_map(|(tap, decay)| extract_band(decay, tap, (modes, index), settings))
-        .collect()
+    let mut bands = Vec::new();
+    for (tap, decay) in decays.iter().enumerate() {
+        bands.extend(extract_band(decay, tap, modes, index, settings));
+    }
+    bands
 }
 
 fn extract_band(
     decay: &Decay,
     tap: usize,
-    (modes, index): (&[KnownMode], usize),
+    modes: &[KnownMode],
+    index: usize,
     settings: &AmplitudeSettings,
 ) -> Option<Band> {
     let mode = modes.get(index)?;
@@ -98,7 +113,7 @@ fn extract_band(
     if !usable || samples < 16 {
         return None;
     }
-    let stop = stop_edge(modes, index, (scale, rate), settings);
+    let stop = stop_edge(modes, index, scale, rate, settings);
     if filter_half(stop, rate) > samples as f64 {
         return None;
     }
@@ -108,12 +123,6 @@ fn extract_band(
     let wanted = ((REACH * scale + taps.len() as f64 / rate) * rate) as usize;
     let kept = samples.min(wanted);
     let count = kept.checked_sub(taps.len())? / stride + 1;
-    let carrier = modulated(&taps, omega / rate);
-    let sensors = decay
-        .responses
-        .iter()
-        .map(|x| filter(&x[..kept], &carrier, (stride, count), omega / rate))
-        .collect();
     let squares: f64 = taps.iter().map(|h| h * h).sum();
     Some(Band {
         tap,
@@ -126,55 +135,53 @@ fn extract_band(
         // White noise of variance s^2 leaves the filter with s^2 sum h^2; white noise that is as dense
         // as it is in the pass band would have s^2 |H(0)|^2/stride, and H(0) = 1.
         noise_ratio: 1.0 / (stride as f64 * squares),
+        sensors: mix_down(&decay.responses, &taps, omega / rate, stride, count),
         taps,
         sample_rate: rate,
-        sensors,
         neighbours: neighbours(modes, index, stop),
     })
 }
 
-/// Edge of the stop band (Hz): as wide as the wanted time resolution needs, narrower where that keeps
-/// a neighbour out, but not narrower than the longest filter allows.
+/// Returns the edge of the stop band (Hz): as wide as the wanted time resolution needs, narrower where that
+/// keeps a neighbour out, but not narrower than the longest filter allows.
 fn stop_edge(
     modes: &[KnownMode],
     index: usize,
-    (scale, rate): (f64, f64),
+    scale: f64,
+    rate: f64,
     settings: &AmplitudeSettings,
 ) -> f64 {
     let frequency = modes[index].frequency;
     let ends = FROM_ENDS * frequency.min(0.5 * rate - frequency);
     // Length of the filter times its stop edge (1), see `low_pass`.
-    let product = kaiser_length() / (1.0 - PASS);
+    let product = KAISER_LENGTH / (1.0 - PASS);
     let widest = (product / (settings.filter * scale)).min(ends);
     let narrowest = (product / (settings.longest_filter * scale)).min(widest);
-    let nearest = modes
-        .iter()
-        .enumerate()
-        .filter(|(other, _)| *other != index)
-        .map(|(_, mode)| MARGIN * (mode.frequency - frequency).abs())
-        .filter(|distance| *distance >= narrowest)
-        .fold(widest, f64::min);
-    nearest.min(widest)
+    let mut stop = widest;
+    for (other, mode) in modes.iter().enumerate() {
+        let distance = MARGIN * (mode.frequency - frequency).abs();
+        if other != index && distance >= narrowest {
+            stop = stop.min(distance);
+        }
+    }
+    stop
 }
 
 /// Length of a Kaiser window's filter times its transition band, (A - 7.95)/14.36 (Oppenheim &
 /// Schafer).
-fn kaiser_length() -> f64 {
-    (ATTENUATION - 7.95) / 14.36
-}
+const KAISER_LENGTH: f64 = (ATTENUATION - 7.95) / 14.36;
 
-/// Half the length of the filter (samples).
+/// Returns half the length of the filter (samples).
 fn filter_half(stop: f64, rate: f64) -> f64 {
     let transition = (1.0 - PASS) * stop;
-    (kaiser_length() * rate / transition / 2.0).ceil().max(2.0)
+    (KAISER_LENGTH * rate / transition / 2.0).ceil().max(2.0)
 }
 
-/// Low-pass filter with Kaiser's window, odd in length, gain 1 at 0 Hz.
+/// Returns a low-pass filter with Kaiser's window, odd in length, gain 1 at 0 Hz.
 fn low_pass(stop: f64, rate: f64) -> Vec<f64> {
     let half = filter_half(stop, rate);
     let cutoff = 0.5 * (1.0 + PASS) * stop / rate;
-    // beta = 0.1102 (A - 8.7) above 50 dB (Oppenheim & Schafer).
-    let beta = 0.1102 * (ATTENUATION - 8.7);
+    let beta = kaiser_beta(ATTENUATION);
     let taps: Vec<f64> = (0..=2 * half as usize)
         .map(|n| {
             let m = n as f64 - half;
@@ -190,47 +197,38 @@ fn low_pass(stop: f64, rate: f64) -> Vec<f64> {
     taps.into_iter().map(|h| h / sum).collect()
 }
 
-/// Modified Bessel function of order zero by its power series.
-fn bessel_i0(x: f64) -> f64 {
-    let (mut term, mut sum) = (1.0, 1.0);
-    for k in 1..60 {
-        term *= (x / 2.0 / f64::from(k)).powi(2);
-        sum += term;
-    }
-    sum
-}
-
-/// Filter taps that mix down as well: 2 h(m) e^{-j theta (m - (M-1)/2)}. The factor 2 makes a real
-/// oscillation's peak amplitude the modulus of the result.
-fn modulated(taps: &[f64], theta: f64) -> Vec<Complex64> {
-    let middle = (taps.len() - 1) as f64 / 2.0;
-    taps.iter()
-        .enumerate()
-        .map(|(m, h)| Complex64::from_polar(2.0 * h, -theta * (m as f64 - middle)))
-        .collect()
-}
-
-fn filter(
-    samples: &[f64],
-    carrier: &[Complex64],
-    (stride, count): (usize, usize),
+/// Mixes every response down by `theta` (rad a sample), filters it, and keeps one value in `stride`.
+fn mix_down(
+    responses: &[Vec<f64>],
+    taps: &[f64],
     theta: f64,
-) -> Vec<Complex64> {
-    (0..count)
-        .map(|n| {
-            let from = n * stride;
-            let piece = &samples[from..from + carrier.len()];
+    stride: usize,
+    count: usize,
+) -> Vec<Vec<Complex64>> {
+    // Filter taps that mix down as well: 2 h(m) e^{-j theta (m - (M-1)/2)}. The factor 2 makes a real
+    // oscillation's peak amplitude the modulus of the result.
+    let middle = (taps.len() - 1) as f64 / 2.0;
+    let mut carrier = Vec::with_capacity(taps.len());
+    for (m, h) in taps.iter().enumerate() {
+        carrier.push(Complex64::from_polar(2.0 * h, -theta * (m as f64 - middle)));
+    }
+    let mut sensors = Vec::with_capacity(responses.len());
+    for samples in responses {
+        let mut values = Vec::with_capacity(count);
+        for from in (0..count).map(|n| n * stride) {
             let (mut re, mut im) = (0.0, 0.0);
-            for (x, h) in piece.iter().zip(carrier) {
+            for (x, h) in samples[from..].iter().zip(&carrier) {
                 re += x * h.re;
                 im += x * h.im;
             }
-            Complex64::new(re, im) * Complex64::from_polar(1.0, -theta * from as f64)
-        })
-        .collect()
+            values.push(Complex64::new(re, im) * Complex64::from_polar(1.0, -theta * from as f64));
+        }
+        sensors.push(values);
+    }
+    sensors
 }
 
-/// Poles relative to mode `index` (rad/s) of the other modes nearer than `stop` (Hz).
+/// Returns the poles relative to mode `index` (rad/s) of the other modes nearer than `stop` (Hz).
 fn neighbours(modes: &[KnownMode], index: usize, stop: f64) -> Vec<Complex64> {
     let frequency = modes[index].frequency;
     modes
@@ -247,40 +245,30 @@ fn neighbours(modes: &[KnownMode], index: usize, stop: f64) -> Vec<Complex64> {
 /// Least noise variance over the mean power: 200 dB.
 const FLOOR: f64 = 1e-20;
 
-/// The sensor with the largest amplitude at the start of the decays; `None` without any.
+/// Returns the sensor with the largest amplitude at the start of the decays; `None` without any.
 pub(super) fn strongest(bands: &[Band]) -> Option<usize> {
     let count = bands.iter().map(|band| band.sensors.len()).min()?;
     (0..count)
-        .map(|sensor| (sensor, bands.iter().map(|b| energy(b, sensor)).sum::<f64>()))
+        .map(|sensor| (sensor, bands.iter().map(|b| b.energy(sensor)).sum::<f64>()))
         .filter(|(_, energy)| *energy > 0.0)
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(sensor, _)| sensor)
 }
 
-/// Values of the first decay time, six at least.
-fn early(band: &Band) -> usize {
-    ((band.scale / band.step) as usize).max(6)
-}
-
-fn energy(band: &Band, sensor: usize) -> f64 {
-    let values = band.sensors[sensor].iter().take(early(band));
-    values.map(Complex64::norm_sqr).sum()
-}
-
-/// The sensors' weighted sum, scaled so that it has the amplitude of the sensor `reference`.
+/// Returns the sensors' weighted sum, scaled so that it has the amplitude of the sensor `reference`.
 ///
 /// With the amplitude ratios c(s) to the reference and noise variances v(s), the best weights are
 /// conj(c)/v over sum |c|^2/v. They are fixed over the decay, so that an exponential stays one.
 pub(super) fn combine(band: &Band, reference: usize) -> Option<Vec<Complex64>> {
     let main = band.sensors.get(reference)?;
-    let main_energy = energy(band, reference);
+    let main_energy = band.energy(reference);
     if main.len() < 6 || main_energy.is_nan() || main_energy <= 0.0 {
         return None;
     }
     let mut sum = vec![Complex64::ZERO; main.len()];
     let mut total = 0.0;
     for values in &band.sensors {
-        let products = main.iter().zip(values).take(early(band));
+        let products = main.iter().zip(values).take(band.early());
         let ratio = products.map(|(m, y)| m.conj() * y).sum::<Complex64>() / main_energy;
         let noise = noise_variance(values, band);
         if noise.is_nan() || noise <= 0.0 {
@@ -294,7 +282,7 @@ pub(super) fn combine(band: &Band, reference: usize) -> Option<Vec<Complex64>> {
     (total > 0.0 && total.is_finite()).then(|| sum.into_iter().map(|y| y / total).collect())
 }
 
-/// Noise variance of a sensor's values, from what the neighbours in time do not predict:
+/// Returns the noise variance of a sensor's values, from what the neighbours in time do not predict:
 /// y(n) - (z y(n-1) + y(n+1)/z)/2 with z = e^{p step} has 1.5 times the variance of white noise, and
 /// the median of an exponentially distributed square is ln 2 of its mean. Not below what no converter
 /// undercuts, so that simulated signals without noise divide nothing by zero.

@@ -6,34 +6,34 @@
 //!    a finite filter of length M that is only ever laid over samples that exist. An exponential stays
 //!    an exponential that way, so the abrupt start of the decay leaves no transient; the price is that
 //!    the first value belongs to the time M/2 after the start.
-//! 2. *Sensors* (`sensors`): their bands are added with the weights of best signal to noise.
-//! 3. *Context* (`context`): whatever else lies in the band (neighbouring modes, hum, lines nobody
-//!    listed) is found by fits to the whole decay; the same fits say whether poles that do not change
-//!    explain the decay as well as one pole that does. Two close modes beat, and a beat is no
-//!    amplitude dependence.
-//! 4. *Segments* (`walk`): pieces that do not overlap, each fitted by the mode's pole with the
-//!    context held near what the whole decay says.
+//! 2. *Sensors* (`band`): their bands are added with the weights of best signal to noise.
+//! 3. *Whole decay* (`decay`): fits to it find everything else in the band (neighbouring modes, hum,
+//!    unlisted lines). The same fits say whether poles that do not change explain the decay as well as
+//!    one pole that does. Two close modes beat, and a beat is no amplitude dependence.
+//! 4. *Segments* (`decay`): pieces that do not overlap, each fitted by the mode's pole with everything
+//!    else held near the model of the whole decay.
 //! 5. *Trend* (`trend`): points of all segments and taps against log amplitude.
 //!
-//! What to know: a point is an average over its segment, attributed to the time at which a linear drift
-//! has the same value; how the drift bends within the segment is taken from the fit to the whole decay.
-//! What that fit misses within a segment (at most [`AmplitudeSettings::longest`] of the decay time)
+//! A point is an average over its segment, attributed to the time at which a linear drift
+//! has the same value. How the drift bends within the segment is taken from the fit to the whole decay.
+//! The error of that fit within a segment (at most [`AmplitudeSettings::longest`] of the decay time)
 //! remains as bias. Frequencies are undamped natural frequencies. Damping is the rate at which the
 //! measured quantity falls: for an acceleration that contains omega squared, whose own drift is a few
-//! thousandths of it and is left in. A neighbour that nobody listed nearer than about the half-power width
-//! cannot be told from a drift by one decay.
+//! thousandths of it and is left in. An unlisted neighbour nearer than about the half-power width
+//! cannot be distinguished from a drift by one decay.
 
-use super::from_one;
+mod band;
+mod decay;
+mod trend;
+
+use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
-mod band;
-mod decay_model;
-mod trend;
-mod walk;
 
 pub use trend::{AmplitudeReading, Trend};
 
-use rayon::prelude::*;
+use super::from_one;
+use decay::DecayModel;
 
 /// The ringing after one tap, force no longer acting.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,7 @@ pub struct KnownMode {
     pub damping_ratio: f64,
 }
 
-/// How decays are cut and judged. Times are shares of the decay time 1/sigma, or of a quarter of the
+/// Settings of the cut and the judgement of decays. Times are shares of the decay time 1/sigma, or of a quarter of the
 /// record where that is shorter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmplitudeSettings {
@@ -115,22 +115,22 @@ pub struct AmplitudePoint {
 /// A line in the mode's band that was fitted along with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Companion {
-    /// Which decay (0-based).
+    /// Number of the decay, from 0.
     pub tap: usize,
     /// Frequency (Hz).
     pub frequency: f64,
     /// Its amplitude over the mode's at the start of the decay.
     pub share: f64,
-    /// Where it comes from.
+    /// Its origin.
     pub origin: Origin,
 }
 
-/// Why a line was looked for.
+/// Origin of a companion line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// It is one of the modes given.
     Listed,
-    /// It was found in what the fit left: hum, or a mode nobody listed.
+    /// It was found in the residual of the fit: hum, or an unlisted mode.
     Found,
 }
 
@@ -178,7 +178,7 @@ pub struct AmplitudeCurve {
     pub points: Vec<AmplitudePoint>,
     /// Sensor (0-based) whose amplitude is given; `None` without points.
     pub sensor: Option<usize>,
-    /// Length of the band filter (s): nothing is said about the first half of it.
+    /// Length of the band filter (s). The first half of it has no points.
     pub filter_length: Option<f64>,
     /// Frequency (Hz) against log amplitude; `None` with too few points.
     pub frequency: Option<Trend>,
@@ -186,21 +186,8 @@ pub struct AmplitudeCurve {
     pub damping: Option<Trend>,
     /// Lines fitted along with the mode.
     pub companions: Vec<Companion>,
-    /// What it says.
+    /// Verdict on the curve.
     pub verdict: AmplitudeVerdict,
-}
-
-impl AmplitudeCurve {
-    /// Frequency and damping at an amplitude (unit of the strongest sensor); `None` outside the
-    /// points' range and a little beyond.
-    pub fn at_amplitude(&self, amplitude: f64) -> Option<AmplitudeReading> {
-        trend::reading_at(self, amplitude)
-    }
-
-    /// Frequency and damping at a time (s) after a tap; `None` outside its decay's usable time.
-    pub fn at_time(&self, tap: usize, time: f64) -> Option<AmplitudeReading> {
-        trend::reading_at_time(self, tap, time)
-    }
 }
 
 /// Farthest that a point may lie from its mode's frequency (1, relative). Joints that slip move a frequency by a few
@@ -210,7 +197,7 @@ const FARTHEST: f64 = 0.1;
 /// Least points of a trend: two of its own, and two more for its uncertainty.
 const LEAST_POINTS: usize = 4;
 
-/// Frequency and damping against amplitude of every mode.
+/// Follows frequency and damping against amplitude, for every mode.
 pub fn follow_amplitude(
     decays: &[Decay],
     modes: &[KnownMode],
@@ -250,39 +237,34 @@ fn follow_mode(
         let Some(series) = band::combine(band, sensor) else {
             continue;
         };
-        let context = decay_model::explain(&series, band);
-        let mut points = walk::walk_decay(&series, band, &context, settings);
+        let model = DecayModel::fit(&series, band);
+        let mut points = decay::follow_decay(&series, band, &model, settings);
         let found = !points.is_empty();
         points.retain(|point| (point.frequency / mode.frequency - 1.0).abs() <= FARTHEST);
         if found && points.is_empty() {
-            // What was followed is something else.
+            // The decay that was followed is not the mode's.
             continue;
         }
-        curve.companions.extend(context.companions(band));
+        curve.companions.extend(model.companions(band));
         curve.points.extend(points);
-        doubts.extend(context.doubt(band));
+        doubts.extend(model.doubt(band));
         followed += 1;
     }
-    // One decay without a doubt settles it for all.
-    doubts.truncate(if doubts.len() == followed { 1 } else { 0 });
-    judge(&mut curve, &doubts, settings);
-    curve
-}
-
-fn judge(curve: &mut AmplitudeCurve, doubts: &[AmplitudeVerdict], settings: &AmplitudeSettings) {
     if curve.points.len() < LEAST_POINTS {
-        return;
+        return curve;
     }
-    curve.frequency = trend::frequency_trend(&curve.points);
-    curve.damping = trend::damping_trend(&curve.points);
+    curve.frequency = Trend::fit(&curve.points, |p| (p.frequency, p.frequency_std));
+    curve.damping = Trend::fit(&curve.points, |p| (p.damping_ratio, p.damping_std));
     let changes = [&curve.frequency, &curve.damping]
         .into_iter()
         .flatten()
         // Two tests share the level (Bonferroni).
         .any(|trend| trend.p_value < 0.5 * settings.level);
-    curve.verdict = match (changes, doubts.first()) {
-        (false, _) => AmplitudeVerdict::Steady,
-        (true, None) => AmplitudeVerdict::Changes,
-        (true, Some(doubt)) => *doubt,
+    curve.verdict = match doubts.first() {
+        _ if !changes => AmplitudeVerdict::Steady,
+        // One decay without a doubt settles it for all.
+        Some(doubt) if doubts.len() == followed => *doubt,
+        _ => AmplitudeVerdict::Changes,
     };
+    curve
 }

@@ -1,6 +1,4 @@
-//! Frequency and damping against log amplitude.
-//!
-//! Weighted polynomials with covariance.
+//! Frequency and damping against log amplitude: weighted polynomials with covariance.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -23,11 +21,10 @@ const LEAST_SHARE: usize = 3;
 const LEAST_FREEDOM: usize = 2;
 /// Probability outside the stated bounds.
 const OUTSIDE: f64 = 0.05;
-/// How far beyond the outermost points the curve is read (log amplitude): as far as the shortest
+/// Reach of the curve beyond the outermost points (log amplitude): as far as the shortest
 /// segment reaches to either side of its point, and a little more.
 const BEYOND: f64 = 0.1;
-/// How far beyond the first and last point of a decay it is read in time (shares of the step): the half
-/// of a segment.
+/// Reach of a decay beyond its first and last point in time (shares of the step): the half of a segment.
 const BEYOND_TIME: f64 = 0.5;
 
 /// One quantity (frequency in Hz, or damping ratio) against log amplitude.
@@ -59,71 +56,114 @@ pub struct Trend {
     curve: Curve,
 }
 
-/// Polynomials in powers of the amplitude, over its logarithm, each with its weight: which of them
-/// holds is not known, and the uncertainty has to say so.
+/// One point of a trend.
+#[derive(Debug, Clone, Copy)]
+struct Point {
+    /// Log amplitude, or a power of the amplitude.
+    x: f64,
+    value: f64,
+    std: f64,
+}
+
+/// Returns the least and the largest abscissa.
+fn extent(points: &[Point]) -> (f64, f64) {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for point in points {
+        low = low.min(point.x);
+        high = high.max(point.x);
+    }
+    (low, high)
+}
+
+/// Polynomials in powers of the amplitude, over its logarithm, each with its weight. It is not known which
+/// of them holds, and the uncertainty says so.
 #[derive(Debug, Clone, PartialEq)]
 struct Curve {
-    /// Weight, power of the amplitude, polynomial; the best one first.
-    models: Vec<(f64, f64, Polynomial)>,
+    /// The best model first.
+    models: Vec<Model>,
     /// Range of the log amplitudes.
     low: f64,
     high: f64,
 }
 
+#[derive(Debug, Clone, PartialEq)]
+struct Model {
+    weight: f64,
+    /// Power of the amplitude.
+    power: f64,
+    polynomial: Polynomial,
+}
+
 impl Curve {
-    /// All powers and degrees, weighted with e^{-(A - A_least)/2} by Akaike's criterion A (Burnham &
+    /// Fits all powers and degrees, weighted with e^{-(A - A_least)/2} by Akaike's criterion A (Burnham &
     /// Anderson).
-    fn through(values: &[(f64, f64, f64)]) -> Option<Curve> {
-        let (low, high) = extent(values);
-        let most = (values.len() / LEAST_SHARE).min(values.len().checked_sub(1 + LEAST_FREEDOM)?);
-        let mut models: Vec<(f64, f64, Polynomial)> = Vec::new();
+    fn fit(points: &[Point]) -> Option<Curve> {
+        let (low, high) = extent(points);
+        let most = (points.len() / LEAST_SHARE).min(points.len().checked_sub(1 + LEAST_FREEDOM)?);
+        let mut models: Vec<Model> = Vec::new();
         for (power, highest) in POWERS {
-            let mapped: Vec<(f64, f64, f64)> = values
-                .iter()
-                .map(|(x, value, std)| (variable(*x, high, power), *value, *std))
-                .collect();
+            let mut mapped = points.to_vec();
+            for point in &mut mapped {
+                point.x = variable(point.x, high, power);
+            }
             let degrees = (1..=most.min(highest)).filter_map(|d| Polynomial::fit(&mapped, d));
-            models.extend(degrees.map(|fit| (0.0, power, fit)));
+            models.extend(degrees.map(|polynomial| Model {
+                weight: 0.0,
+                power,
+                polynomial,
+            }));
         }
-        weigh(&mut models);
-        models.retain(|model| model.0 > LEAST_WEIGHT);
-        let total: f64 = models.iter().map(|model| model.0).sum();
+        // Where even the best scatters more than its points say, chi^2 counts in units of that scatter
+        // (Burnham & Anderson, quasi-likelihood): otherwise bends would be fitted to it.
+        let inflation = (models.iter())
+            .map(|model| model.polynomial.chi_squared / model.polynomial.freedom)
+            .fold(f64::INFINITY, f64::min)
+            .max(1.0);
+        let least = (models.iter())
+            .map(|model| model.polynomial.criterion(inflation))
+            .fold(f64::INFINITY, f64::min);
         for model in &mut models {
-            model.0 /= total;
+            model.weight = (-0.5 * (model.polynomial.criterion(inflation) - least)).exp();
+        }
+        models.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        models.retain(|model| model.weight > LEAST_WEIGHT);
+        let total: f64 = models.iter().map(|model| model.weight).sum();
+        for model in &mut models {
+            model.weight /= total;
         }
         Some(Curve { models, low, high })
     }
 
-    /// Value and standard uncertainty.
+    /// Returns value and standard uncertainty.
     fn at(&self, x: f64) -> (f64, f64) {
-        self.averaged(|power, polynomial| polynomial.at(variable(x, self.high, power)))
+        self.averaged(|model| model.polynomial.at(variable(x, self.high, model.power)))
     }
 
-    /// Difference of the values at two places, and its standard uncertainty.
+    /// Returns the difference of the values at two places, and its standard uncertainty.
     fn between(&self, from: f64, to: f64) -> (f64, f64) {
-        self.averaged(|power, polynomial| {
-            let variable = |x| variable(x, self.high, power);
-            polynomial.between(variable(from), variable(to))
+        self.averaged(|model| {
+            let [from, to] = [from, to].map(|x| variable(x, self.high, model.power));
+            model.polynomial.between(from, to)
         })
     }
 
-    /// Mean over the models, and sqrt(sum w (s^2 + (v - mean)^2)): their own uncertainties and how far
-    /// they disagree (Burnham & Anderson).
-    fn averaged(&self, of: impl Fn(f64, &Polynomial) -> (f64, f64)) -> (f64, f64) {
-        let models = self.models.iter();
-        let values: Vec<(f64, (f64, f64))> = models.map(|(w, q, p)| (*w, of(*q, p))).collect();
-        let mean = values.iter().map(|(w, (v, _))| w * v).sum::<f64>();
-        let variance = values
-            .iter()
-            .map(|(w, (v, s))| w * (s * s + (v - mean).powi(2)))
-            .sum::<f64>();
+    /// Returns the mean over the models, and sqrt(sum w (s^2 + (v - mean)^2)): their own uncertainties and
+    /// how far they disagree (Burnham & Anderson).
+    fn averaged(&self, read: impl Fn(&Model) -> (f64, f64)) -> (f64, f64) {
+        let readings: Vec<(f64, f64)> = self.models.iter().map(read).collect();
+        let weights = self.models.iter().map(|model| model.weight);
+        let weighted = weights.zip(&readings);
+        let mean: f64 = weighted.clone().map(|(w, (value, _))| w * value).sum();
+        let variance: f64 = weighted
+            .map(|(w, (value, std))| w * (std * std + (value - mean).powi(2)))
+            .sum();
         (mean, variance.sqrt())
     }
 
     /// Degrees of freedom of the best model.
     fn freedom(&self) -> f64 {
         let best = self.models.first();
-        best.map_or(1.0, |(_, _, fit)| fit.freedom)
+        best.map_or(1.0, |model| model.polynomial.freedom)
     }
 
     /// 95 % quantile for the best model's degrees of freedom.
@@ -131,43 +171,13 @@ impl Curve {
         student::quantile(OUTSIDE, self.freedom())
     }
 
-    /// sqrt(chi^2/freedom) about the best model.
-    fn scatter(&self) -> f64 {
-        let best = self.models.first();
-        best.map_or(0.0, |(_, _, fit)| (fit.chi_squared / fit.freedom).sqrt())
-    }
-
-    /// Whether `x` lies in the range of the points, or a little beyond.
+    /// Returns true where `x` lies in the range of the points, or a little beyond.
     fn reaches(&self, x: f64) -> bool {
         (self.low - BEYOND..=self.high + BEYOND).contains(&x)
     }
 }
 
-/// Weights of models, not yet normalised, the best model first. Where even the best scatters more than
-/// its points say, chi^2 counts in units of that scatter (Burnham & Anderson, quasi-likelihood):
-/// otherwise bends would be fitted to it.
-fn weigh(models: &mut [(f64, f64, Polynomial)]) {
-    let scatter = |fit: &Polynomial| fit.chi_squared / fit.freedom;
-    let least = models.iter().map(|model| scatter(&model.2));
-    let inflation = least.fold(f64::INFINITY, f64::min).max(1.0);
-    let criteria = models.iter().map(|model| model.2.criterion(inflation));
-    let least = criteria.fold(f64::INFINITY, f64::min);
-    for model in models.iter_mut() {
-        model.0 = (-0.5 * (model.2.criterion(inflation) - least)).exp();
-    }
-    models.sort_by(|a, b| b.0.total_cmp(&a.0));
-}
-
-/// Least and largest log amplitude.
-fn extent(values: &[(f64, f64, f64)]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v.0), high.max(v.0))
-        })
-}
-
-/// (a/a0)^q over log amplitude x with a0 the largest; the logarithm itself for q = 0.
+/// Returns (a/a0)^q of the log amplitude x with a0 the largest; the logarithm itself for q = 0.
 fn variable(x: f64, high: f64, power: f64) -> f64 {
     if power == 0.0 {
         x
@@ -191,44 +201,38 @@ pub struct AmplitudeReading {
     pub damping_bound: f64,
 }
 
-/// Trend of the frequency (Hz).
-pub(super) fn frequency_trend(points: &[AmplitudePoint]) -> Option<Trend> {
-    trend(points, |p| (p.frequency, p.frequency_std))
-}
-
-/// Trend of the damping ratio.
-pub(super) fn damping_trend(points: &[AmplitudePoint]) -> Option<Trend> {
-    trend(points, |p| (p.damping_ratio, p.damping_std))
-}
-
-fn trend(points: &[AmplitudePoint], of: fn(&AmplitudePoint) -> (f64, f64)) -> Option<Trend> {
-    let values: Vec<(f64, f64, f64)> = points
-        .iter()
-        .map(|point| {
-            let (value, std) = of(point);
-            (point.amplitude.ln(), value, std)
-        })
-        .collect();
-    let (low, high) = extent(&values);
-    let line = Polynomial::fit(&values, 1)?;
-    let (slope, slope_std) = line.between(0.0, 1.0);
-    let curve = Curve::through(&values)?;
-    let (change, change_std) = curve.between(high, low);
-    Some(Trend {
-        slope,
-        slope_std,
-        p_value: student::two_sided(slope / slope_std, line.freedom),
-        scatter: curve.scatter(),
-        first: curve.at(high).0,
-        last: curve.at(low).0,
-        change,
-        change_bound: curve.quantile() * change_std,
-        curve,
-    })
-}
-
 impl Trend {
-    /// Value and 95 % bound at an amplitude; `None` outside the points' range and a little beyond.
+    /// Fits the quantity that `read` takes from a point, with its standard uncertainty.
+    pub(super) fn fit(
+        points: &[AmplitudePoint],
+        read: fn(&AmplitudePoint) -> (f64, f64),
+    ) -> Option<Trend> {
+        let mut values = Vec::with_capacity(points.len());
+        for point in points {
+            let (value, std) = read(point);
+            let x = point.amplitude.ln();
+            values.push(Point { x, value, std });
+        }
+        let (low, high) = extent(&values);
+        let line = Polynomial::fit(&values, 1)?;
+        let (slope, slope_std) = line.between(0.0, 1.0);
+        let curve = Curve::fit(&values)?;
+        let (change, change_std) = curve.between(high, low);
+        let best = curve.models.first().map(|model| &model.polynomial);
+        Some(Trend {
+            slope,
+            slope_std,
+            p_value: student::two_sided(slope / slope_std, line.freedom),
+            scatter: best.map_or(0.0, |fit| (fit.chi_squared / fit.freedom).sqrt()),
+            first: curve.at(high).0,
+            last: curve.at(low).0,
+            change,
+            change_bound: curve.quantile() * change_std,
+            curve,
+        })
+    }
+
+    /// Returns value and 95 % bound at an amplitude; `None` outside the points' range and a little beyond.
     pub fn at_amplitude(&self, amplitude: f64) -> Option<(f64, f64)> {
         let x = amplitude.ln();
         if !self.curve.reaches(x) {
@@ -238,8 +242,8 @@ impl Trend {
         Some((value, self.curve.quantile() * std))
     }
 
-    /// Value at the second amplitude less that at the first, and its standard uncertainty, in which the two
-    /// are not independent; `None` outside the points' range and a little beyond.
+    /// Returns the value at the second amplitude less that at the first, and its standard uncertainty, in
+    /// which the two are not independent; `None` outside the points' range and a little beyond.
     pub fn between(&self, from: f64, to: f64) -> Option<(f64, f64)> {
         let (from, to) = (from.ln(), to.ln());
         let reaches = self.curve.reaches(from) && self.curve.reaches(to);
@@ -252,76 +256,75 @@ impl Trend {
     }
 }
 
-pub(super) fn reading_at(curve: &AmplitudeCurve, amplitude: f64) -> Option<AmplitudeReading> {
-    let (frequency, frequency_bound) = curve.frequency.as_ref()?.at_amplitude(amplitude)?;
-    let (damping_ratio, damping_bound) = curve.damping.as_ref()?.at_amplitude(amplitude)?;
-    Some(AmplitudeReading {
-        amplitude,
-        frequency,
-        frequency_bound,
-        damping_ratio,
-        damping_bound,
-    })
-}
-
-/// The amplitude at a time is that of the cubic through the log amplitudes of the two points beside
-/// it, with their decays as its slopes (Hermite); beyond the ends of the two outermost.
-pub(super) fn reading_at_time(
-    curve: &AmplitudeCurve,
-    tap: usize,
-    time: f64,
-) -> Option<AmplitudeReading> {
-    let points: Vec<&AmplitudePoint> = curve.points.iter().filter(|p| p.tap == tap).collect();
-    let later = points.partition_point(|p| p.time < time);
-    let from = later.saturating_sub(1).min(points.len().checked_sub(2)?);
-    let (a, b) = (points[from], points[from + 1]);
-    let step = b.time - a.time;
-    let u = (time - a.time) / step;
-    if !(-BEYOND_TIME..=1.0 + BEYOND_TIME).contains(&u) {
-        return None;
+impl AmplitudeCurve {
+    /// Returns frequency and damping at an amplitude (unit of the strongest sensor); `None` outside the
+    /// points' range and a little beyond.
+    pub fn at_amplitude(&self, amplitude: f64) -> Option<AmplitudeReading> {
+        let (frequency, frequency_bound) = self.frequency.as_ref()?.at_amplitude(amplitude)?;
+        let (damping_ratio, damping_bound) = self.damping.as_ref()?.at_amplitude(amplitude)?;
+        Some(AmplitudeReading {
+            amplitude,
+            frequency,
+            frequency_bound,
+            damping_ratio,
+            damping_bound,
+        })
     }
-    // d ln a/dt = -zeta omega.
-    let slope = |p: &AmplitudePoint| -p.damping_ratio * TAU * p.frequency * step;
-    let log = a.amplitude.ln() * (1.0 + 2.0 * u) * (1.0 - u).powi(2)
-        + b.amplitude.ln() * (3.0 - 2.0 * u) * u * u
-        + slope(a) * u * (1.0 - u).powi(2)
-        - slope(b) * (1.0 - u) * u * u;
-    reading_at(curve, log.exp())
+
+    /// Returns frequency and damping at a time (s) after a tap; `None` outside its decay's usable time.
+    ///
+    /// The amplitude at that time is that of the cubic through the log amplitudes of the two points beside
+    /// it, with their decays as its slopes (Hermite); beyond the ends of the two outermost.
+    pub fn at_time(&self, tap: usize, time: f64) -> Option<AmplitudeReading> {
+        let points: Vec<&AmplitudePoint> = self.points.iter().filter(|p| p.tap == tap).collect();
+        let later = points.partition_point(|p| p.time < time);
+        let from = later.saturating_sub(1).min(points.len().checked_sub(2)?);
+        let (a, b) = (points[from], points[from + 1]);
+        let step = b.time - a.time;
+        let u = (time - a.time) / step;
+        if !(-BEYOND_TIME..=1.0 + BEYOND_TIME).contains(&u) {
+            return None;
+        }
+        // d ln a/dt = -zeta omega.
+        let [slope_a, slope_b] =
+            [a, b].map(|point| -point.damping_ratio * TAU * point.frequency * step);
+        let log = a.amplitude.ln() * (1.0 + 2.0 * u) * (1.0 - u).powi(2)
+            + b.amplitude.ln() * (3.0 - 2.0 * u) * u * u
+            + slope_a * u * (1.0 - u).powi(2)
+            - slope_b * (1.0 - u) * u * u;
+        self.at_amplitude(log.exp())
+    }
 }
 
 /// A polynomial in (x - middle)/half.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Polynomial {
+struct Polynomial {
     middle: f64,
     half: f64,
     coefficients: DVector<f64>,
     /// Covariance of the coefficients from the values' own uncertainties.
     covariance: DMatrix<f64>,
     /// Sum of squared residuals over the values' variances.
-    pub chi_squared: f64,
+    chi_squared: f64,
     /// Values less coefficients.
-    pub freedom: f64,
+    freedom: f64,
 }
 
 impl Polynomial {
-    /// Least squares of values with standard uncertainties; `None` for points that do not determine it.
-    pub fn fit(points: &[(f64, f64, f64)], degree: usize) -> Option<Polynomial> {
+    /// Fits values with standard uncertainties by least squares; `None` for points that do not determine it.
+    fn fit(points: &[Point], degree: usize) -> Option<Polynomial> {
         let freedom = points.len().checked_sub(degree + 1)?;
-        let (low, high) = points
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| {
-                (low.min(p.0), high.max(p.0))
-            });
+        let (low, high) = extent(points);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-        let usable = points.iter().all(|p| p.1.is_finite() && p.2 > 0.0);
+        let usable = points.iter().all(|p| p.value.is_finite() && p.std > 0.0);
         if !usable || half.is_nan() || half <= 0.0 {
             return None;
         }
         let rows = DMatrix::from_fn(points.len(), degree + 1, |row, power| {
-            let (x, _, std) = points[row];
-            ((x - middle) / half).powi(power as i32) / std
+            let point = points[row];
+            ((point.x - middle) / half).powi(power as i32) / point.std
         });
-        let right = DVector::from_fn(points.len(), |row, _| points[row].1 / points[row].2);
+        let right = DVector::from_fn(points.len(), |row, _| points[row].value / points[row].std);
         let covariance = (rows.transpose() * &rows).try_inverse()?;
         let coefficients = &covariance * rows.transpose() * &right;
         let chi_squared = (&right - &rows * &coefficients).norm_squared();
@@ -335,15 +338,9 @@ impl Polynomial {
         })
     }
 
-    /// chi^2/inflation + 2 x coefficients (Akaike), to choose among polynomials.
-    pub fn criterion(&self, inflation: f64) -> f64 {
+    /// Returns chi^2/inflation + 2 x coefficients (Akaike), to choose among polynomials.
+    fn criterion(&self, inflation: f64) -> f64 {
         self.chi_squared / inflation + 2.0 * self.coefficients.len() as f64
-    }
-
-    /// Factor on all uncertainties where the points scatter more than they say: sqrt(chi^2/freedom),
-    /// at least 1.
-    pub fn scatter(&self) -> f64 {
-        (self.chi_squared / self.freedom.max(1.0)).max(1.0).sqrt()
     }
 
     fn powers(&self, x: f64) -> DVector<f64> {
@@ -351,19 +348,21 @@ impl Polynomial {
         DVector::from_fn(self.coefficients.len(), |power, _| share.powi(power as i32))
     }
 
-    /// Value and standard uncertainty, scatter included.
-    pub fn at(&self, x: f64) -> (f64, f64) {
+    /// Returns value and standard uncertainty, scatter included.
+    fn at(&self, x: f64) -> (f64, f64) {
         self.weighted(&self.powers(x))
     }
 
-    /// Difference of the values at two places, and its standard uncertainty.
-    pub fn between(&self, from: f64, to: f64) -> (f64, f64) {
+    /// Returns the difference of the values at two places, and its standard uncertainty.
+    fn between(&self, from: f64, to: f64) -> (f64, f64) {
         self.weighted(&(self.powers(to) - self.powers(from)))
     }
 
     fn weighted(&self, weights: &DVector<f64>) -> (f64, f64) {
         let variance = (weights.transpose() * &self.covariance * weights)[(0, 0)];
         let value = weights.dot(&self.coefficients);
-        (value, variance.max(0.0).sqrt() * self.scatter())
+        // Where the points scatter more than they say, all uncertainties grow by that factor.
+        let scatter = (self.chi_squared / self.freedom.max(1.0)).max(1.0).sqrt();
+        (value, variance.max(0.0).sqrt() * scatter)
     }
 }

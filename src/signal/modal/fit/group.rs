@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::Unfit;
-use super::data::ModalData;
-use super::variable_projection::{Evaluation, Fixed, Lines, Problem, STEADY, Slopes, StopReason};
+use super::variable_projection::{DISTINCT, Evaluation, Lines, PoleProblem, STEADY, Slopes};
+use super::{ModalData, StopReason, Unfit};
+use crate::modal::Subspace;
 
 /// Half of a band in effective half widths. 10: the lines outside would improve the standard deviation
 /// by 3 % (computed from the information on the pole on all lines and on those of the band).
@@ -46,11 +46,8 @@ pub(super) fn half_band(pole: Complex64) -> f64 {
 pub(super) fn groups(poles: &[(usize, Complex64)]) -> Vec<Vec<usize>> {
     let mut sorted = poles.to_vec();
     sorted.sort_by(|a, b| a.1.im.total_cmp(&b.1.im));
-    let near = |a: &(usize, Complex64), b: &(usize, Complex64)| {
-        b.1.im - a.1.im < JOINT * (half_width(a.1) + half_width(b.1) + 1.0)
-    };
     sorted
-        .chunk_by(near)
+        .chunk_by(|(_, a), (_, b)| b.im - a.im < JOINT * (half_width(*a) + half_width(*b) + 1.0))
         .map(|group| group.iter().map(|&(index, _)| index).collect())
         .collect()
 }
@@ -125,53 +122,45 @@ impl<'a> BandData<'a> {
                 least,
             });
         }
-        let margin = 0.25 * (high - low);
-        let reach = low - margin..=high + margin;
-        let (near, far): (Vec<&Neighbour>, Vec<&Neighbour>) = neighbours
-            .iter()
-            .partition(|other| reach.contains(&other.pole.im));
-        let hum = steady.iter().filter(|&position| reach.contains(position));
-        let hum = hum.map(|&position| Complex64::new(-STEADY, position));
-        let mut band = BandData {
-            data,
-            lines: Lines::new(data, range, most.max(least)),
-            used: Vec::new(),
-            values: DMatrix::zeros(0, 0),
-            near: near.iter().map(|other| other.pole).chain(hum).collect(),
-        };
-        band.fill(&far);
-        if band.used.is_empty() {
+        let lines = Lines::new(data, range, most.max(least));
+        let (first, stride, count) = (lines.first, lines.stride, lines.count());
+        let mut used = Vec::new();
+        for (index, column) in data.columns().iter().enumerate() {
+            let mut values = column.values[first..].iter().step_by(stride).take(count);
+            if values.any(|value| value.norm_sqr() > 0.0) {
+                used.push(index);
+            }
+        }
+        if used.is_empty() {
             return Err(Unfit::NoSignal);
         }
-        Ok(band)
-    }
-
-    /// Stacks real over imaginary parts of every column that is not zero throughout, without `far` modes.
-    fn fill(&mut self, far: &[&Neighbour]) {
-        let (first, stride) = (self.lines.first, self.lines.stride);
-        let count = self.lines.count();
-        let columns = self.data.columns();
-        self.used = (0..columns.len())
-            .filter(|&index| {
-                let mut values = columns[index].values[first..]
-                    .iter()
-                    .step_by(stride)
-                    .take(count);
-                values.any(|value| value.norm_sqr() > 0.0)
-            })
-            .collect();
-        let used = &self.used;
-        self.values = DMatrix::from_fn(2 * count, used.len(), |row, place| {
-            let value = columns[used[place]].values[first + stride * (row % count)];
+        let mut values = DMatrix::from_fn(2 * count, used.len(), |row, place| {
+            let value = data.columns()[used[place]].values[first + stride * (row % count)];
             if row < count { value.re } else { value.im }
         });
-        let poles: Vec<Complex64> = far.iter().map(|other| other.pole).collect();
-        let amplitudes = DMatrix::from_fn(2 * far.len(), used.len(), |row, place| {
-            let known = far[row / 2].amplitudes.as_ref();
-            let value = known.map_or(Complex64::ZERO, |all| all[used[place]]);
-            if row % 2 == 0 { value.re } else { value.im }
-        });
-        self.values -= self.lines.model(&poles) * amplitudes;
+        let margin = 0.25 * (high - low);
+        let reach = low - margin..=high + margin;
+        let mut near = Vec::new();
+        for other in neighbours {
+            if reach.contains(&other.pole.im) {
+                near.push(other.pole);
+            } else if let Some(all) = &other.amplitudes {
+                let amplitudes = DMatrix::from_fn(2, used.len(), |row, place| {
+                    let value = all[used[place]];
+                    if row == 0 { value.re } else { value.im }
+                });
+                values -= lines.model(&[other.pole]) * amplitudes;
+            }
+        }
+        let hum = steady.iter().filter(|&position| reach.contains(position));
+        near.extend(hum.map(|&position| Complex64::new(-STEADY, position)));
+        Ok(BandData {
+            data,
+            lines,
+            used,
+            values,
+            near,
+        })
     }
 
     /// Root mean square of each sensor's columns: a first scale of the noise, for every column.
@@ -183,41 +172,37 @@ impl<'a> BandData<'a> {
     ///
     /// `freedom` are the degrees of freedom of one column.
     fn by_sensor(&self, columns: &DMatrix<f64>, freedom: f64) -> Vec<f64> {
-        let sensors: Vec<usize> = self
-            .used
-            .iter()
-            .map(|&column| self.data.columns()[column].sensor)
-            .collect();
-        let mut scales = Vec::with_capacity(sensors.len());
-        for own in &sensors {
+        let mut scales = Vec::with_capacity(self.used.len());
+        for &own in &self.used {
             let (mut sum, mut count) = (0.0, 0.0);
-            for (place, _) in sensors
-                .iter()
-                .enumerate()
-                .filter(|(_, other)| *other == own)
-            {
-                sum += columns.column(place).norm_squared();
-                count += 1.0;
+            for (place, &other) in self.used.iter().enumerate() {
+                if self.data.columns()[other].sensor == self.data.columns()[own].sensor {
+                    sum += columns.column(place).norm_squared();
+                    count += 1.0;
+                }
             }
             scales.push((sum / (count * freedom)).sqrt());
         }
         scales
     }
 
-    /// Returns the fixed part with `terms` terms of background, and the columns in units of `noise` without it.
-    fn prepare(&self, terms: usize, noise: &[f64]) -> (Fixed, DMatrix<f64>) {
+    /// Returns the problem with `terms` terms of background, its columns in units of `noise`.
+    fn problem(&self, terms: usize, noise: &[f64]) -> PoleProblem {
         let near = self.lines.model(&self.near);
         let split = near.ncols();
         let mut raw = near.resize_horizontally(split + 2 * terms, 0.0);
         raw.columns_mut(split, 2 * terms)
             .copy_from(&self.lines.polynomial(terms));
-        let fixed = Fixed::new(&raw);
+        let fixed = Subspace::new(&raw, DISTINCT);
         let mut columns = self.values.clone();
         for (mut column, noise) in columns.column_iter_mut().zip(noise) {
             column /= *noise;
         }
-        fixed.project(&mut columns);
-        (fixed, columns)
+        PoleProblem {
+            lines: self.lines.clone(),
+            columns: fixed.complement(columns),
+            fixed,
+        }
     }
 
     /// Looks for a better start of the pole at `place`: other dampings, other places, other dampings again.
@@ -238,73 +223,58 @@ impl<'a> BandData<'a> {
         };
         let line = self.data.resolution() / self.data.spacing();
         let offsets = [-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75].map(|share| share * line);
-        let (fixed, columns) = self.prepare(terms, noise);
-        let problem = Problem {
-            lines: &self.lines,
-            fixed: &fixed,
-            columns,
-        };
+        let problem = self.problem(terms, noise);
         for round in 0..3 {
             let pole = poles[place];
             let tries: Vec<Complex64> = if round == 1 {
-                let shifted = offsets
-                    .iter()
-                    .map(|&offset| pole + Complex64::new(0.0, offset));
-                shifted.collect()
+                offsets
+                    .map(|offset| pole + Complex64::new(0.0, offset))
+                    .into()
             } else {
                 let damped = factors.iter().map(|f| Complex64::new(pole.re * f, pole.im));
                 damped.collect()
             };
-            let mut best = (pole, f64::INFINITY);
+            let (mut best, mut least) = (pole, f64::INFINITY);
             for pole in tries {
                 poles[place] = pole;
-                if let Some(at) = problem.evaluate(poles)
-                    && at.square_sum < best.1
+                if let Some(at) = problem.amplitudes_at(poles)
+                    && at.square_sum < least
                 {
-                    best = (pole, at.square_sum);
+                    (best, least) = (pole, at.square_sum);
                 }
             }
-            poles[place] = best.0;
+            poles[place] = best;
         }
     }
 
     /// Sum of the squares without any pole.
     pub fn square_sum_without(&self, terms: usize, noise: &[f64]) -> f64 {
-        self.prepare(terms, noise).1.norm_squared()
+        self.problem(terms, noise).columns.norm_squared()
     }
 
     /// Fits from `start` with `terms` terms of background and given noise of the columns (any scale).
     pub fn fit(&self, start: &[Complex64], terms: usize, noise: &[f64]) -> Result<GroupFit, Unfit> {
         const MOST_STEPS: usize = 30;
-        let (fixed, columns) = self.prepare(terms, noise);
-        let freedom = self.freedom(&fixed, start.len())?;
-        let problem = Problem {
-            lines: &self.lines,
-            fixed: &fixed,
-            columns,
-        };
-        let (at, stop) = problem
+        let problem = self.problem(terms, noise);
+        let freedom = self.freedom(&problem.fixed, start.len())?;
+        let best = problem
             .search(start, freedom, MOST_STEPS)
             .ok_or(Unfit::NotIndependent)?;
-        let slopes = problem.slopes(&at);
-        let columns = problem.columns;
         Ok(GroupFit {
-            variance: at.square_sum / freedom,
-            at,
-            slopes,
-            stop,
+            variance: best.at.square_sum / freedom,
+            at: best.at,
+            slopes: best.slopes,
+            stop: best.stop,
             noise: noise.to_vec(),
             freedom,
             terms,
             used: self.used.clone(),
-            fixed,
-            lines: self.lines.clone(),
-            columns,
+            problem,
         })
     }
 
     /// Degrees of freedom of the residual: real values less amplitudes, fixed part and poles.
-    fn freedom(&self, fixed: &Fixed, poles: usize) -> Result<f64, Unfit> {
+    fn freedom(&self, fixed: &Subspace<f64>, poles: usize) -> Result<f64, Unfit> {
         let linear = fixed.rank() + 2 * poles;
         let rows = self.values.nrows();
         let lines = self.lines.count();
@@ -329,7 +299,7 @@ impl<'a> BandData<'a> {
 
     /// Noise of each column, from the residual of its sensor.
     pub fn noise_of(&self, fit: &GroupFit) -> Vec<f64> {
-        let linear = fit.fixed.rank() + fit.at.amplitudes.nrows();
+        let linear = fit.problem.fixed.rank() + fit.at.amplitudes.nrows();
         let freedom = (self.values.nrows() - linear) as f64;
         let mut noise = self.by_sensor(&fit.at.residual, freedom);
         for (place, (noise, scale)) in noise.iter_mut().zip(&fit.noise).enumerate() {
@@ -382,12 +352,8 @@ pub(super) struct GroupFit {
     pub terms: usize,
     /// Indices of the columns that were used.
     pub used: Vec<usize>,
-    /// Real columns of the fixed part.
-    pub fixed: Fixed,
-    /// Lines of the band.
-    pub lines: Lines,
-    /// Columns in units of noise, without the fixed part.
-    pub columns: DMatrix<f64>,
+    /// Problem that the poles solve.
+    pub problem: PoleProblem,
 }
 
 impl GroupFit {
@@ -434,24 +400,26 @@ impl GroupFit {
     fn needs(&self, more: &GroupFit) -> bool {
         let terms = self.freedom - more.freedom;
         let gain = (self.at.square_sum - more.at.square_sum) / terms / more.variance;
-        let by_residual = FisherSnedecor::new(terms, more.freedom)
-            .is_ok_and(|f| gain > 0.0 && f.sf(gain) < TERM_LEVEL);
-        by_residual || self.poles_differ(more).unwrap_or(false)
-    }
-
-    /// Hausman's test of the poles against those of a fit with more terms.
-    fn poles_differ(&self, more: &GroupFit) -> Option<bool> {
-        let efficient = self.slopes.information.clone().try_inverse()?;
-        let robust = more.slopes.information.clone().try_inverse()?;
-        let parameters = efficient.nrows();
-        let level = TERM_LEVEL / parameters as f64;
-        let chi_squared = ChiSquared::new(1.0).ok()?;
-        Some((0..parameters).any(|i| {
+        if FisherSnedecor::new(terms, more.freedom)
+            .is_ok_and(|f| gain > 0.0 && f.sf(gain) < TERM_LEVEL)
+        {
+            return true;
+        }
+        let (efficient, robust) = (&self.slopes.information, &more.slopes.information);
+        let (Some(efficient), Some(robust), Ok(chi_squared)) = (
+            efficient.clone().try_inverse(),
+            robust.clone().try_inverse(),
+            ChiSquared::new(1.0),
+        ) else {
+            return false;
+        };
+        let level = TERM_LEVEL / efficient.nrows() as f64;
+        (0..efficient.nrows()).any(|i| {
             let change = more.at.poles[i / 2] - self.at.poles[i / 2];
             let change = if i % 2 == 0 { change.im } else { change.re };
             let explained = (robust[(i, i)] - efficient[(i, i)]) * more.variance;
             explained > 0.0 && chi_squared.sf(change * change / explained) < level
-        }))
+        })
     }
 }
 

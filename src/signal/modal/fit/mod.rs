@@ -7,25 +7,25 @@
 //! from the tap before can bias it.
 //!
 //! [`fit_modes`] fits mode by mode over a band about each (modes near each other jointly). The standard
-//! deviation comes from the noise that remains, or from the scatter of the taps where that is larger. Columns come from a [`FreeDecayCollector`], or are frequency response functions.
+//! deviation comes from the noise that remains, or from the scatter of the taps where that is larger. Columns
+//! come from a [`FreeDecayCollector`], or are frequency response functions.
 
-mod data;
-mod extra_mode;
 mod group;
 mod modal_constant;
 mod mode_fit;
 mod sweep;
 mod variable_projection;
 
-pub use data::{Basis, Column, FreeDecayCollector, ModalData};
-pub use extra_mode::{Accepted, ExtraMode, ExtraVerdict};
 pub use group::bands_for;
 pub use modal_constant::{ModalConstant, TapForce, modal_constants, modal_constants_of_frf};
 pub use mode_fit::{
-    ColumnAmplitude, FittedValue, ModeFit, TapFit, UncertaintySource, fit_modes,
-    scatter_about_mean, weighted_mean,
+    Accepted, ColumnAmplitude, ExtraMode, ExtraVerdict, FittedValue, ModeFit, TapFit,
+    UncertaintySource, fit_modes, scatter_about_mean, weighted_mean,
 };
-pub use variable_projection::StopReason;
+pub use tapjoint_numerics::least_squares::StopReason;
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
 
 /// Start of the search for a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,7 +125,7 @@ pub enum Unfit {
     /// Every column is zero in the band.
     #[error("no column holds anything in its band")]
     NoSignal,
-    /// Poles or their neighbours cannot be told from each other.
+    /// Poles or their neighbours cannot be separated.
     #[error("it cannot be told from another mode")]
     NotIndependent,
     /// The pole went elsewhere.
@@ -157,4 +157,251 @@ pub enum Unfit {
         /// Its standard deviation.
         std: f64,
     },
+}
+
+/// Kind of the lines, which determines the function of one pole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Basis {
+    /// Discrete Fourier transforms of free decays that all have the same number of samples, without
+    /// any window, on lines that are multiples of sample_rate/samples.
+    FreeDecay {
+        /// Sample rate (Hz).
+        sample_rate: f64,
+        /// Samples of each decay.
+        samples: usize,
+    },
+    /// Frequency response functions.
+    FrequencyResponse {
+        /// Resolution 1/T of the records behind them (Hz). Denser lines are not independent of each
+        /// other.
+        resolution: f64,
+    },
+}
+
+/// Lines of one sensor for one tap.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Number of the tap (from 0). For frequency response functions it is that of the tap's place.
+    pub tap: usize,
+    /// Number of the sensor (from 0). Columns of one sensor share one noise level.
+    pub sensor: usize,
+    /// Values on all lines (any unit).
+    pub values: Vec<Complex64>,
+}
+
+/// Columns of complex lines on a common axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalData {
+    basis: Basis,
+    frequencies: Vec<f64>,
+    columns: Vec<Column>,
+    spacing: f64,
+}
+
+impl ModalData {
+    /// Checks and takes the data: `frequencies` (Hz) ascending and positive, one for each value of every
+    /// column. The axis may have gaps.
+    ///
+    /// # Errors
+    /// [`FitError`] where lines and values do not belong together, or a value is no number.
+    pub fn new(
+        basis: Basis,
+        frequencies: Vec<f64>,
+        columns: Vec<Column>,
+    ) -> Result<Self, FitError> {
+        if columns.is_empty() || frequencies.len() < 2 {
+            return Err(FitError::Empty {
+                columns: columns.len(),
+                lines: frequencies.len(),
+            });
+        }
+        for (index, column) in columns.iter().enumerate() {
+            if column.values.len() != frequencies.len() {
+                return Err(FitError::Length {
+                    column: index,
+                    values: column.values.len(),
+                    lines: frequencies.len(),
+                });
+            }
+            if let Some(line) = column.values.iter().position(|value| !value.is_finite()) {
+                return Err(FitError::NotFinite {
+                    column: index,
+                    line,
+                });
+            }
+        }
+        let ascending = frequencies.windows(2).all(|pair| pair[0] < pair[1]);
+        if !ascending || frequencies[0] <= 0.0 || frequencies.iter().any(|f| !f.is_finite()) {
+            return Err(FitError::Axis);
+        }
+        let spacing = line_spacing(basis, &frequencies)?;
+        Ok(ModalData {
+            basis,
+            frequencies,
+            columns,
+            spacing,
+        })
+    }
+
+    /// Kind of the lines.
+    pub fn basis(&self) -> Basis {
+        self.basis
+    }
+
+    /// Frequencies of the lines (Hz).
+    pub fn frequencies(&self) -> &[f64] {
+        &self.frequencies
+    }
+
+    /// Columns of all taps and sensors.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Distance of neighbouring lines (Hz).
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    /// Resolution (Hz): 1/T.
+    fn resolution(&self) -> f64 {
+        match self.basis {
+            Basis::FreeDecay { .. } => self.spacing,
+            Basis::FrequencyResponse { resolution } => resolution.max(self.spacing),
+        }
+    }
+
+    /// Highest frequency that a pole can have (Hz).
+    fn highest(&self) -> f64 {
+        match self.basis {
+            Basis::FreeDecay { sample_rate, .. } => 0.5 * sample_rate,
+            Basis::FrequencyResponse { .. } => f64::INFINITY,
+        }
+    }
+}
+
+/// Distance of neighbouring lines (Hz).
+///
+/// The lines of a decay must be multiples of it, or the truncation factor differs from line to line.
+fn line_spacing(basis: Basis, frequencies: &[f64]) -> Result<f64, FitError> {
+    match basis {
+        Basis::FreeDecay {
+            sample_rate,
+            samples,
+        } => {
+            let spacing = sample_rate / samples as f64;
+            if !(spacing > 0.0 && spacing.is_finite()) {
+                return Err(FitError::Axis);
+            }
+            for &frequency in frequencies {
+                let line = frequency / spacing;
+                // The largest transform has some 10^6 lines; rounding moves none by 10^-6.
+                if (line - line.round()).abs() > 1e-6 || frequency >= 0.5 * sample_rate {
+                    return Err(FitError::OffGrid { frequency, spacing });
+                }
+            }
+            Ok(spacing)
+        }
+        Basis::FrequencyResponse { resolution } => {
+            if !(resolution > 0.0 && resolution.is_finite()) {
+                return Err(FitError::Axis);
+            }
+            let steps = frequencies.windows(2).map(|pair| pair[1] - pair[0]);
+            Ok(steps.fold(f64::INFINITY, f64::min))
+        }
+    }
+}
+
+/// Collects the free decays after each tap, and keeps the lines of their transforms in given bands.
+///
+/// A decay begins after the force pulse has ended (without a hammer: where the response no longer
+/// shows the pulse) and must not be windowed. All decays have the same number of samples, at best one from
+/// [`largest_smooth_block`](crate::spectral::largest_smooth_block).
+#[derive(Debug, Clone)]
+pub struct FreeDecayCollector {
+    sample_rate: f64,
+    samples: usize,
+    lines: Vec<usize>,
+    columns: Vec<Column>,
+    taps: usize,
+}
+
+impl FreeDecayCollector {
+    /// Begins a collection: `samples` of each decay are used, and `bands` (Hz) may overlap.
+    ///
+    /// # Errors
+    /// [`FitError::Empty`] where no line lies within the bands.
+    pub fn new(sample_rate: f64, samples: usize, bands: &[(f64, f64)]) -> Result<Self, FitError> {
+        let spacing = sample_rate / samples as f64;
+        let sound = spacing.is_finite() && spacing > 0.0;
+        // Neither 0 Hz nor half the sample rate: their imaginary parts hold nothing.
+        let lines: Vec<usize> = (1..samples.div_ceil(2))
+            .filter(|&line| {
+                let frequency = line as f64 * spacing;
+                bands
+                    .iter()
+                    .any(|&(low, high)| (low..=high).contains(&frequency))
+            })
+            .collect();
+        if !sound || lines.len() < 2 {
+            return Err(FitError::Empty {
+                columns: 0,
+                lines: lines.len(),
+            });
+        }
+        Ok(FreeDecayCollector {
+            sample_rate,
+            samples,
+            lines,
+            columns: Vec::new(),
+            taps: 0,
+        })
+    }
+
+    /// Adds one tap with the responses of all sensors, of which the first `samples` samples are used.
+    ///
+    /// # Errors
+    /// [`FitError::Short`] where a response has fewer.
+    pub fn add_tap(&mut self, responses: &[Vec<f64>]) -> Result<(), FitError> {
+        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(self.samples);
+        let mut spectrum = transform.make_output_vec();
+        let mut input = transform.make_input_vec();
+        for (sensor, response) in responses.iter().enumerate() {
+            let short = FitError::Short {
+                tap: self.taps,
+                sensor,
+                samples: response.len(),
+                least: self.samples,
+            };
+            let decay = response.get(..self.samples).ok_or(short.clone())?;
+            input.copy_from_slice(decay);
+            transform
+                .process(&mut input, &mut spectrum)
+                .map_err(|_| short)?;
+            self.columns.push(Column {
+                tap: self.taps,
+                sensor,
+                // X(f) = (1/rate) sum x(n) e^{-j 2 pi f n/rate}.
+                values: (self.lines.iter())
+                    .map(|&line| spectrum[line] / self.sample_rate)
+                    .collect(),
+            });
+        }
+        self.taps += 1;
+        Ok(())
+    }
+
+    /// Returns the collected data.
+    ///
+    /// # Errors
+    /// [`FitError`] without any tap, or with a sample that is no number.
+    pub fn finish(self) -> Result<ModalData, FitError> {
+        let spacing = self.sample_rate / self.samples as f64;
+        let frequencies = self.lines.iter().map(|&line| line as f64 * spacing);
+        let basis = Basis::FreeDecay {
+            sample_rate: self.sample_rate,
+            samples: self.samples,
+        };
+        ModalData::new(basis, frequencies.collect(), self.columns)
+    }
 }

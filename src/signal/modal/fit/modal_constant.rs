@@ -65,14 +65,12 @@ pub fn modal_constants(
     let mut constants = Vec::new();
     for (sensor, kind) in kinds.iter().enumerate() {
         let Some(kind) = *kind else { continue };
-        let amplitudes = mode.amplitudes.iter();
-        let residues: Vec<TapEstimate> = amplitudes
-            .filter(|amplitude| amplitude.sensor == sensor)
-            .filter_map(|amplitude| {
-                let force = forces.iter().find(|force| force.tap == amplitude.tap)?;
-                TapEstimate::residue(amplitude, force, mode.pole)
-            })
-            .collect();
+        let mut residues = Vec::new();
+        for amplitude in mode.amplitudes.iter().filter(|own| own.sensor == sensor) {
+            if let Some(force) = forces.iter().find(|force| force.tap == amplitude.tap) {
+                residues.extend(TapEstimate::residue(amplitude, force, mode.pole));
+            }
+        }
         constants.extend(constant(mode, sensor, kind, residues));
     }
     constants
@@ -166,7 +164,18 @@ fn constant(
         slopes += Vector2::new(tap.slopes[0].re * share, tap.slopes[1].re * share);
     }
     let from_noise = variance + slopes.dot(&(Matrix2::from(mode.pole_covariance) * slopes));
-    let variance = from_noise.max(scatter(&taps, total, mean.re).unwrap_or(0.0));
+    // The scatter of the taps gives sum w_i^2 (x_i - mean)^2/(1 - sum w_i^2) with weights that add up to one.
+    let (mut squares, mut deviations) = (0.0, 0.0);
+    for tap in &taps {
+        let share = tap.weight / total;
+        squares += share.powi(2);
+        deviations += (share * (tap.value.re - mean.re)).powi(2);
+    }
+    let variance = if taps.len() > 1 {
+        from_noise.max(deviations / (1.0 - squares))
+    } else {
+        from_noise
+    };
     (mean.is_finite() && variance.is_finite()).then_some(ModalConstant {
         sensor,
         value: mean.re,
@@ -174,16 +183,4 @@ fn constant(
         phase_deviation: (mean.im / mean.re).atan().to_degrees(),
         taps: taps.len(),
     })
-}
-
-/// Variance of the weighted mean from the scatter of the taps; `None` for a single tap.
-///
-/// It is sum w_i^2 (x_i - mean)^2/(1 - sum w_i^2) with weights that add up to one.
-fn scatter(taps: &[TapEstimate], total: f64, mean: f64) -> Option<f64> {
-    let squares: f64 = taps.iter().map(|tap| (tap.weight / total).powi(2)).sum();
-    let sum: f64 = taps
-        .iter()
-        .map(|tap| (tap.weight / total * (tap.value.re - mean)).powi(2))
-        .sum();
-    (taps.len() > 1).then(|| sum / (1.0 - squares))
 }

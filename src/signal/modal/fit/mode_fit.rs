@@ -6,18 +6,17 @@
 use super::super::from_one;
 use schemars::JsonSchema;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, Matrix2};
 use num_complex::Complex64;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-use tapjoint_numerics::stats::student;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use tapjoint_numerics::stats::{root_mean_square, student};
 
-use super::data::{Basis, ModalData};
-use super::group::{GroupFit, complex_row};
+use super::group::{BandData, GroupFit, complex_row};
 use super::sweep::{Group, Sweeper};
-use super::variable_projection::{Problem, StopReason};
-use super::{FitSettings, PoleStart, Unfit};
+use super::{Basis, FitSettings, ModalData, PoleStart, StopReason, Unfit};
 
 /// A scatter of the taps less probable than this is more than noise.
 const SCATTER_LEVEL: f64 = 0.01;
@@ -74,38 +73,37 @@ pub struct TapFit {
 }
 
 impl FittedValue {
-    /// Value and interval from the joint fit, or from the taps where they scatter beyond their own
+    /// Takes value and interval from the joint fit, or from the taps where they scatter beyond their own
     /// standard deviations. `taps` are values with their standard deviations.
     fn new(value: f64, std: f64, freedom: f64, taps: &[(f64, f64)]) -> Self {
-        let scatter_probability = scatter_probability(taps);
-        let scattered = scatter_probability.is_some_and(|p| p < SCATTER_LEVEL);
-        let (value, std, freedom, source) = if scattered {
-            let (mean, scatter) = weighted_mean(taps);
-            // Scatter cannot make a value better than the noise permits.
-            let freedom = taps.len() as f64 - 1.0;
-            (
-                mean,
-                scatter.max(std),
-                freedom,
-                UncertaintySource::TapScatter,
-            )
-        } else {
-            (value, std, freedom, UncertaintySource::Residual)
-        };
-        let quantile = student::quantile(0.05, freedom.max(1.0));
-        FittedValue {
+        let mut fitted = FittedValue {
             value,
             std,
-            low: value - quantile * std,
-            high: value + quantile * std,
-            source,
+            low: value,
+            high: value,
+            source: UncertaintySource::Residual,
             freedom,
-            scatter_probability,
+            scatter_probability: scatter_probability(taps),
+        };
+        if fitted
+            .scatter_probability
+            .is_some_and(|p| p < SCATTER_LEVEL)
+        {
+            let (mean, scatter) = weighted_mean(taps);
+            fitted.value = mean;
+            // Scatter cannot make a value better than the noise permits.
+            fitted.std = scatter.max(std);
+            fitted.freedom = taps.len() as f64 - 1.0;
+            fitted.source = UncertaintySource::TapScatter;
         }
+        let half = student::quantile(0.05, fitted.freedom.max(1.0)) * fitted.std;
+        fitted.low = fitted.value - half;
+        fitted.high = fitted.value + half;
+        fitted
     }
 }
 
-/// Probability of the taps' scatter about their weighted mean by noise alone (chi-squared test).
+/// Returns the probability of the taps' scatter about their weighted mean by noise alone (chi-squared test).
 fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
     if taps.len() < 2 {
         return None;
@@ -115,13 +113,13 @@ fn scatter_probability(taps: &[(f64, f64)]) -> Option<f64> {
     scatter.is_finite().then(|| distribution.sf(scatter))
 }
 
-/// Chi-squared of values with their standard deviations about their weighted mean.
+/// Returns the chi-squared of values with their standard deviations about their weighted mean.
 pub fn scatter_about_mean(taps: &[(f64, f64)]) -> f64 {
-    let (_, _, scatter) = weighted_moments(taps, 0.0);
-    scatter
+    weighted_moments(taps, 0.0).2
 }
 
-/// Mean of values that scatter between taps beside their own standard deviations, and its standard deviation.
+/// Returns the mean of values that scatter between taps beside their own standard deviations, and its standard
+/// deviation.
 ///
 /// The weights are v_i = 1/(std_i^2 + tau^2) with the variance tau^2 between taps after DerSimonian & Laird
 /// 1986. The standard deviation sqrt(sum v_i (x_i - mean)^2/((n - 1) sum v_i)) goes with Student's t of
@@ -140,15 +138,16 @@ pub fn weighted_mean(taps: &[(f64, f64)]) -> (f64, f64) {
 
 /// Sum of the weights 1/(std^2 + `between`), weighted mean, and weighted sum of squares about it.
 fn weighted_moments(taps: &[(f64, f64)], between: f64) -> (f64, f64, f64) {
-    let weights: Vec<f64> = taps
+    let (mut total, mut sum) = (0.0, 0.0);
+    for (value, std) in taps {
+        let weight = 1.0 / (std * std + between);
+        total += weight;
+        sum += weight * value;
+    }
+    let mean = sum / total;
+    let scatter = taps
         .iter()
-        .map(|(_, std)| 1.0 / (std * std + between))
-        .collect();
-    let pairs = || weights.iter().zip(taps);
-    let total: f64 = weights.iter().sum();
-    let mean = pairs().map(|(weight, tap)| weight * tap.0).sum::<f64>() / total;
-    let scatter = pairs()
-        .map(|(weight, tap)| weight * (tap.0 - mean).powi(2))
+        .map(|(value, std)| (value - mean).powi(2) / (std * std + between))
         .sum();
     (total, mean, scatter)
 }
@@ -294,14 +293,12 @@ impl<'a> GroupReader<'a> {
         let stds = [covariance[(0, 0)].sqrt(), covariance[(1, 1)].sqrt()];
         let freedom = (fit.freedom / self.repetition).max(1.0);
         let taps = self.taps_of(place);
-        let frequencies: Vec<(f64, f64)> = taps
-            .iter()
-            .map(|tap| (tap.frequency, tap.frequency_std))
-            .collect();
-        let dampings: Vec<(f64, f64)> = taps
-            .iter()
-            .map(|tap| (tap.damping_ratio, tap.damping_std))
-            .collect();
+        let (frequencies, dampings): (Vec<_>, Vec<_>) = (taps.iter())
+            .map(|tap| {
+                let damping = (tap.damping_ratio, tap.damping_std);
+                ((tap.frequency, tap.frequency_std), damping)
+            })
+            .unzip();
         let damping_ratio = FittedValue::new(joint.damping_ratio, stds[1], freedom, &dampings);
         // Less than two standard deviations beside the window's decay are no damping.
         let hidden = damping_ratio.value <= 0.0 || damping_ratio.value < 2.0 * damping_ratio.std;
@@ -312,7 +309,7 @@ impl<'a> GroupReader<'a> {
             });
         }
         let to_rad = TAU * spacing;
-        let positions = &fit.lines.positions;
+        let positions = &fit.problem.lines.positions;
         Ok(ModeFit {
             frequency: FittedValue::new(joint.frequency, stds[0], freedom, &frequencies),
             damping_ratio,
@@ -426,34 +423,29 @@ impl PoleReading {
     }
 }
 
-/// Covariance of position and decay of the pole at `place`, from that of all poles.
+/// Returns the covariance of position and decay of the pole at `place`, from that of all poles.
 fn pole_block(covariance: &DMatrix<f64>, place: usize) -> Matrix2<f64> {
     let block = covariance.fixed_view::<2, 2>(2 * place, 2 * place);
     block.into_owned()
 }
 
-/// Correlation of the residual between neighbouring lines, and the factor on the standard deviations.
+/// Returns the correlation of the residual between neighbouring lines, and the factor on the standard deviations.
 ///
 /// r = Re sum e(m) conj(e(m+1)) / sum |e|^2 over neighbouring lines is 1 for a misfit that varies slowly.
 /// By chance its standard deviation is 1/sqrt(2 N) for N independent complex pairs. A residual correlated
 /// like r^k over k lines needs the factor sqrt((1 + r)/(1 - r)).
 fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
-    let count = fit.lines.count();
-    let positions = &fit.lines.positions;
+    let count = fit.problem.lines.count();
+    let positions = &fit.problem.lines.positions;
     let neighbours: Vec<usize> = (0..count - 1)
         .filter(|&line| positions[line + 1] - positions[line] < 1.5)
         .collect();
-    let product: f64 = fit
-        .at
-        .residual
-        .column_iter()
-        .map(|e| {
-            let pairs = neighbours.iter();
-            pairs
-                .map(|&m| e[m] * e[m + 1] + e[m + count] * e[m + 1 + count])
-                .sum::<f64>()
-        })
-        .sum();
+    let mut product = 0.0;
+    for e in fit.at.residual.column_iter() {
+        for &m in &neighbours {
+            product += e[m] * e[m + 1] + e[m + count] * e[m + 1 + count];
+        }
+    }
     let pairs = (neighbours.len() * fit.used.len()).max(1) as f64;
     let share = pairs / (count * fit.used.len()) as f64;
     let correlation = product / (fit.at.square_sum * share).max(f64::MIN_POSITIVE);
@@ -467,34 +459,236 @@ fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
 
 /// Fits the columns of each tap alone, from the joint poles. Taps that cannot be fitted are left out.
 fn fit_taps(data: &ModalData, fit: &GroupFit) -> Vec<TapPoles> {
-    let taps: Vec<usize> = fit
-        .used
-        .iter()
-        .map(|&column| data.columns()[column].tap)
-        .collect();
-    let mut numbers = taps.clone();
-    numbers.sort_unstable();
-    numbers.dedup();
+    // Places of each tap's columns.
+    let mut places: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (place, &column) in fit.used.iter().enumerate() {
+        let tap = data.columns()[column].tap;
+        places.entry(tap).or_default().push(place);
+    }
+    let mut problem = fit.problem.clone();
     let mut fitted = Vec::new();
-    for tap in numbers {
-        let places: Vec<usize> = (0..taps.len())
-            .filter(|&place| taps[place] == tap)
-            .collect();
-        let problem = Problem {
-            lines: &fit.lines,
-            fixed: &fit.fixed,
-            columns: fit.columns.select_columns(&places),
-        };
-        let Some((at, _)) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS) else {
-            continue;
-        };
-        if let Some(covariance) = problem.slopes(&at).covariance(fit.variance) {
+    for (tap, places) in places {
+        problem.columns = fit.problem.columns.select_columns(&places);
+        if let Some(best) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS)
+            && let Some(covariance) = best.slopes.covariance(fit.variance)
+        {
             fitted.push(TapPoles {
                 tap,
-                poles: at.poles,
+                poles: best.at.poles,
                 covariance,
             });
         }
     }
     fitted
+}
+
+/// Test result for one more mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtraMode {
+    /// Outcome of the test; every figure below must support the mode.
+    pub verdict: ExtraVerdict,
+    /// Fall of the residual per unknown over the residual per degree of freedom.
+    pub f_statistic: f64,
+    /// Probability of a larger fall by noise alone at one given place.
+    pub probability: f64,
+    /// Fall of Schwarz's criterion; a positive value supports the mode.
+    pub information_gain: f64,
+    /// Root mean square over the columns of amplitude over standard deviation.
+    pub amplitude_over_std: f64,
+    /// Modal assurance criterion between its shape and that of the nearest other mode of its group.
+    ///
+    /// For free decays it is taken over the sensors, as the mean of all taps weighted by their power; for
+    /// frequency response functions over all columns. `None` without such a mode, or with one sensor. Near 1
+    /// the second pole may only correct a decay that is not straight: one mode whose frequency changes while
+    /// it rings. The two poles' shares of a tap then depend on the tap's strength, which is no other shape.
+    pub likeness: Option<f64>,
+    /// Fit of the mode together with the others.
+    pub fit: Result<ModeFit, Unfit>,
+}
+
+/// Outcome of the test for one more mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExtraVerdict {
+    /// The data need the mode.
+    Needed,
+    /// Noise alone explains it as well.
+    NotSignificant,
+    /// It has no pole of its own near its start, or one that does not decay by two standard deviations.
+    NoMode,
+}
+
+/// Largest probability of the residual's fall by chance. 10^-4: the place of the pole was chosen to suit
+/// the data, out of some tens of lines.
+const LEVEL: f64 = 1e-4;
+/// Least amplitude in standard deviations.
+const LEAST_AMPLITUDE: f64 = 4.0;
+/// Lines of its band on which a mode is tried first. In a record much longer than its decay a mode has ten
+/// thousand of them, too many to fit for every chance proposal. On one line in s an amplitude has sqrt(s)
+/// times its standard deviation, so that a mode that only all lines together show is not found.
+const SCREENED: usize = 1000;
+
+/// Fitted modes, beside which other modes are tested.
+#[derive(Debug, Clone)]
+pub struct Accepted<'a> {
+    sweeper: Sweeper<'a>,
+    settings: FitSettings,
+}
+
+impl<'a> Accepted<'a> {
+    /// Fits the modes that begin at `starts`. Returns also for each start its mode or the reason why there is
+    /// none, as [`fit_modes`](super::fit_modes) does.
+    pub fn new(
+        data: &'a ModalData,
+        starts: &[PoleStart],
+        settings: &FitSettings,
+    ) -> (Self, Vec<Result<ModeFit, Unfit>>) {
+        let mut sweeper = Sweeper::new(data, starts, &settings.steady_lines, settings.added_decay);
+        let groups = sweeper.run();
+        let fits = mode_fits(&mut sweeper, &groups, settings);
+        let settings = settings.clone();
+        (Accepted { sweeper, settings }, fits)
+    }
+
+    /// Tests whether the data ask for a mode that begins at `extra`. Returns the test, and all modes together.
+    ///
+    /// The models with and without it are fitted to the same lines with the same background. The extra pole
+    /// must lower the residual by far more than its unknowns explain, decay, and exceed its own uncertainty.
+    /// Modes that are not fitted jointly with it do not change. A start that fails on thinned lines is not
+    /// tried on all lines.
+    pub fn test(&self, extra: &PoleStart) -> (ExtraMode, Self) {
+        let (test, mut together, stride) = self.test_on(extra, SCREENED);
+        if test.verdict == ExtraVerdict::Needed && stride > 1 {
+            let (test, together, _) = self.test_on(extra, usize::MAX);
+            return (test, together);
+        }
+        together.sweeper.most_lines = usize::MAX;
+        (test, together)
+    }
+
+    /// Tests on at most so many lines of the band. Returns also the step between the lines taken.
+    fn test_on(&self, extra: &PoleStart, most_lines: usize) -> (ExtraMode, Self, usize) {
+        let mut beside = self.clone();
+        beside.sweeper.most_lines = most_lines;
+        let Some(group) = beside.sweeper.add(extra) else {
+            let last = beside.sweeper.modes.last();
+            let failed = last.and_then(|mode| mode.failed.clone());
+            let reason = failed.unwrap_or(Unfit::NotIndependent);
+            return (ExtraMode::none(Err(reason)), beside, 1);
+        };
+        let test = beside.judge(&group);
+        (test, beside, group.fit.problem.lines.stride)
+    }
+
+    /// Judges the last mode, which belongs to this group.
+    fn judge(&mut self, group: &Group) -> ExtraMode {
+        let last = self.sweeper.modes.len() - 1;
+        let groups = std::slice::from_ref(group);
+        let fit = mode_fits(&mut self.sweeper, groups, &self.settings)
+            .pop()
+            .unwrap_or(Err(Unfit::NotIndependent));
+        let place = group.members.iter().position(|&index| index == last);
+        let (Some(place), Ok(mode)) = (place, &fit) else {
+            return ExtraMode::none(fit);
+        };
+        let mut test = ExtraMode::none(fit.clone());
+        let band = self.sweeper.band(&group.members).ok();
+        if band
+            .and_then(|band| test.compare(&band, &group.fit, place))
+            .is_none()
+        {
+            return test;
+        }
+        let amplitudes = mode.amplitudes.iter();
+        let ratios: Vec<f64> = amplitudes.map(|a| a.value.norm() / a.std).collect();
+        test.amplitude_over_std = root_mean_square(&ratios);
+        test.likeness = likeness(self.sweeper.data, &group.fit, place);
+        let decays = mode.damping_ratio.value > 2.0 * mode.damping_ratio.std;
+        let needed = test.probability < LEVEL
+            && test.information_gain > 0.0
+            && test.amplitude_over_std > LEAST_AMPLITUDE;
+        test.verdict = match (needed, decays) {
+            (true, true) => ExtraVerdict::Needed,
+            (true, false) => ExtraVerdict::NoMode,
+            (false, _) => ExtraVerdict::NotSignificant,
+        };
+        test
+    }
+}
+
+impl ExtraMode {
+    /// Returns the result where the start has no mode.
+    fn none(fit: Result<ModeFit, Unfit>) -> Self {
+        ExtraMode {
+            verdict: ExtraVerdict::NoMode,
+            f_statistic: 0.0,
+            probability: 1.0,
+            information_gain: f64::NEG_INFINITY,
+            amplitude_over_std: 0.0,
+            likeness: None,
+            fit,
+        }
+    }
+
+    /// Compares the fits with and without the pole at `place`; `None` where one of them fails.
+    ///
+    /// S0 and S1 are the residuals without and with it. It has k unknowns (two of the pole, two amplitudes
+    /// a column), and there are n real values. Then F = (S0 - S1)/k/(S1/freedom), and the criterion is
+    /// n ln S + k ln n.
+    fn compare(&mut self, band: &BandData, fit: &GroupFit, place: usize) -> Option<()> {
+        let mut fewer: Vec<Complex64> = fit.at.poles.clone();
+        fewer.remove(place);
+        let columns = fit.used.len() as f64;
+        let unknowns = 2.0 + 2.0 * columns;
+        let values = 2.0 * band.lines.count() as f64 * columns;
+        // Both fits are made anew on the same lines: the lines of the last sweep came from earlier poles.
+        let with = band.fit(&fit.at.poles, fit.terms, &fit.noise).ok()?;
+        let without = if fewer.is_empty() {
+            band.square_sum_without(fit.terms, &fit.noise)
+        } else {
+            band.fit(&fewer, fit.terms, &fit.noise).ok()?.at.square_sum
+        };
+        let chance = FisherSnedecor::new(unknowns, with.freedom).ok()?;
+        self.f_statistic = (without - with.at.square_sum) / unknowns / with.variance;
+        if self.f_statistic > 0.0 {
+            self.probability = chance.sf(self.f_statistic);
+        }
+        self.information_gain =
+            values * (without / with.at.square_sum).ln() - unknowns * values.ln();
+        Some(())
+    }
+}
+
+/// Returns the likeness of the shapes of a pole and of the nearest pole of its group, in units of noise.
+///
+/// It is sum_t |sum_s conj(b) c|^2/(sum_t sum_s |b|^2 sum_s |c|^2) over taps t and sensors s. Frequency
+/// response functions count together: the places of their taps are part of a shape.
+fn likeness(data: &ModalData, fit: &GroupFit, place: usize) -> Option<f64> {
+    let poles = &fit.at.poles;
+    let distances = poles.iter().map(|pole| (pole - poles[place]).norm());
+    let (nearest, _) = distances
+        .enumerate()
+        .filter(|(other, _)| *other != place)
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let one_shape = matches!(data.basis(), Basis::FrequencyResponse { .. });
+    let taps: Vec<usize> = (fit.used.iter())
+        .map(|&column| data.columns()[column].tap)
+        .collect();
+    let columns: Vec<usize> = (0..taps.len()).collect();
+    let (mut alike, mut whole) = (0.0, 0.0);
+    for shape in columns.chunk_by(|&a, &b| one_shape || taps[a] == taps[b]) {
+        if shape.len() < 2 {
+            continue;
+        }
+        let (mut product, mut own_power, mut other_power) = (Complex64::ZERO, 0.0, 0.0);
+        for &column in shape {
+            let own = fit.amplitude(place, column);
+            let other = fit.amplitude(nearest, column);
+            product += own.conj() * other;
+            own_power += own.norm_sqr();
+            other_power += other.norm_sqr();
+        }
+        alike += product.norm_sqr();
+        whole += own_power * other_power;
+    }
+    (whole > 0.0).then(|| alike / whole)
 }

@@ -6,9 +6,8 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::data::ModalData;
 use super::group::{BandData, GroupFit, Neighbour, groups, half_band, half_width, lines_between};
-use super::{PoleStart, Unfit};
+use super::{ModalData, PoleStart, Unfit};
 
 /// Most sweeps in which no start fails; two suffice for modes far apart.
 const MOST_SWEEPS: usize = 8;
@@ -17,7 +16,7 @@ const STILL: f64 = 0.02;
 /// Terms of the background while neighbours have not been fitted.
 const FIRST_TERMS: usize = 2;
 
-/// State of one mode between the sweeps.
+/// One mode between the sweeps.
 #[derive(Debug, Clone)]
 pub(super) struct ModeState {
     start: Complex64,
@@ -254,9 +253,15 @@ impl<'a> Sweeper<'a> {
     fn fit_group(&self, members: &[usize]) -> Result<GroupFit, Unfit> {
         let band = self.band(members)?;
         let mut poles = self.poles(members);
-        let new = |&index: &usize| self.modes[index].amplitudes.is_none();
-        if !members.iter().any(new) {
-            let noise = match self.noise_before(&band, members) {
+        let mut modes = members.iter().map(|&index| &self.modes[index]);
+        if modes.all(|mode| mode.amplitudes.is_some()) {
+            // The noise of the sweep before, where all columns had one.
+            let first = members.first();
+            let known = first.map_or(&[][..], |&index| &self.modes[index].noise);
+            let noise: Option<Vec<f64>> = (band.used.iter())
+                .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
+                .collect();
+            let noise = match noise {
                 Some(noise) => noise,
                 None => band.noise_of(&band.fit(&poles, 0, &band.scale())?),
             };
@@ -274,15 +279,6 @@ impl<'a> Sweeper<'a> {
         let fit = band.fit(&poles, terms, &scale)?;
         let noise = band.noise_of(&fit);
         band.fit(&fit.at.poles, terms, &noise)
-    }
-
-    /// Noise of the columns in the sweep before, where all of them had one.
-    fn noise_before(&self, band: &BandData, members: &[usize]) -> Option<Vec<f64>> {
-        let known = &self.modes[*members.first()?].noise;
-        band.used
-            .iter()
-            .map(|&column| known.get(column).copied().filter(|&noise| noise > 0.0))
-            .collect()
     }
 
     /// Present poles of these modes (lines).

@@ -25,8 +25,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, StopReason, minimise};
 
-use super::data::{Basis, ModalData};
+use super::{Basis, ModalData};
+use crate::modal::Subspace;
 
 /// Least decay (lines) of a steady line: on its own line it is a million times its neighbours.
 pub(super) const STEADY: f64 = 1e-6;
@@ -151,70 +153,15 @@ fn exp_less_one(u: Complex64) -> Complex64 {
     )
 }
 
-/// Reason why the search for the poles ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopReason {
-    /// The next step was a thousandth of a standard deviation or less.
-    Converged,
-    /// No step makes the residual smaller.
-    NoBetterStep,
-    /// The limit of steps was reached first.
-    StepLimit,
-}
-
-/// Orthonormal columns of the fixed part: neighbours and background.
-#[derive(Debug, Clone)]
-pub(super) struct Fixed {
-    columns: DMatrix<f64>,
-}
-
 /// Least remainder of a fixed column beside the columns before it, relative to its length. A column with
 /// less is left out: the others contain it already.
-const DISTINCT: f64 = 1e-5;
+pub(super) const DISTINCT: f64 = 1e-5;
 
-impl Fixed {
-    /// Orthonormalises the columns (Gram and Schmidt, twice) and leaves dependent ones out.
-    pub fn new(raw: &DMatrix<f64>) -> Self {
-        let mut kept: Vec<DVector<f64>> = Vec::new();
-        for column in raw.column_iter() {
-            let length = column.norm();
-            if length.is_nan() || length <= 0.0 {
-                continue;
-            }
-            let mut rest = column / length;
-            for _ in 0..2 {
-                for other in &kept {
-                    let share = other.dot(&rest);
-                    rest.axpy(-share, other, 1.0);
-                }
-            }
-            let remains = rest.norm();
-            if remains > DISTINCT && kept.len() + 1 < raw.nrows() {
-                kept.push(rest / remains);
-            }
-        }
-        let columns = DMatrix::from_fn(raw.nrows(), kept.len(), |row, column| kept[column][row]);
-        Fixed { columns }
-    }
-
-    /// Number of independent columns.
-    pub fn rank(&self) -> usize {
-        self.columns.ncols()
-    }
-
-    /// Takes the fixed part out of every column of `matrix`.
-    pub fn project(&self, matrix: &mut DMatrix<f64>) {
-        if self.rank() > 0 {
-            let shares = self.columns.tr_mul(matrix);
-            matrix.gemm(-1.0, &self.columns, &shares, 1.0);
-        }
-    }
-}
-
-/// Lines, fixed part, and the columns of the data without the fixed part.
-pub(super) struct Problem<'a> {
-    pub lines: &'a Lines,
-    pub fixed: &'a Fixed,
+/// Lines, fixed part (neighbours and background), and the columns of the data without the fixed part.
+#[derive(Debug, Clone)]
+pub(super) struct PoleProblem {
+    pub lines: Lines,
+    pub fixed: Subspace<f64>,
     pub columns: DMatrix<f64>,
 }
 
@@ -237,10 +184,10 @@ pub(super) struct Evaluation {
 /// Slopes of the residual, contracted to what the search and the covariance need.
 #[derive(Debug, Clone)]
 pub(super) struct Slopes {
-    /// Gauss-Newton matrix; the order is position, decay of each pole.
+    /// Gauss-Newton matrix J'J; the order is position, decay of each pole.
     pub information: DMatrix<f64>,
-    /// J' r.
-    pub gradient: DVector<f64>,
+    /// J'r.
+    gradient: DVector<f64>,
     /// Change of the amplitudes with each parameter (rows b1, b2 of each pole; columns of the data).
     pub amplitude_slopes: Vec<DMatrix<f64>>,
 }
@@ -255,11 +202,17 @@ impl Slopes {
     }
 }
 
-impl Problem<'_> {
+/// Poles of the least residual.
+pub(super) struct BestPoles {
+    pub at: Evaluation,
+    pub slopes: Slopes,
+    pub stop: StopReason,
+}
+
+impl PoleProblem {
     /// Solves for the amplitudes; `None` where the poles' columns are not independent.
-    pub fn evaluate(&self, poles: &[Complex64]) -> Option<Evaluation> {
-        let mut model = self.lines.model(poles);
-        self.fixed.project(&mut model);
+    pub fn amplitudes_at(&self, poles: &[Complex64]) -> Option<Evaluation> {
+        let model = self.fixed.complement(self.lines.model(poles));
         let lengths: Vec<f64> = model.column_iter().map(|column| column.norm()).collect();
         let (orthonormal, upper) = model.qr().unpack();
         let sound = lengths
@@ -286,9 +239,8 @@ impl Problem<'_> {
     }
 
     /// Returns the slopes of the residual at an evaluation.
-    pub fn slopes(&self, at: &Evaluation) -> Slopes {
-        let mut raw = self.lines.slopes(&at.poles);
-        self.fixed.project(&mut raw);
+    fn slopes(&self, at: &Evaluation) -> Slopes {
+        let mut raw = self.fixed.complement(self.lines.slopes(&at.poles));
         let along = at.orthonormal.tr_mul(&raw);
         raw.gemm(-1.0, &at.orthonormal, &along, 1.0);
         let products = raw.tr_mul(&raw);
@@ -299,7 +251,8 @@ impl Problem<'_> {
         let mut gradient = DVector::zeros(parameters);
         for (a, left) in mixes.iter().enumerate() {
             let rows = with_residual.rows(2 * (a / 2), 2);
-            gradient[a] = rows.component_mul(left).sum();
+            // The residual is data less model: its derivatives are those of the model, negative.
+            gradient[a] = -rows.component_mul(left).sum();
             for (b, right) in mixes.iter().enumerate().take(a + 1) {
                 let weights = left * right.transpose();
                 let block = products.view((2 * (a / 2), 2 * (b / 2)), (2, 2));
@@ -321,70 +274,69 @@ impl Problem<'_> {
         }
     }
 
-    /// Minimises the residual by Levenberg and Marquardt's method, from `start`, with `most` steps at most.
+    /// Minimises the residual from `start` with at most `steps` steps.
     ///
     /// `freedom` are the degrees of freedom of the residual. `None` where the poles' columns or their
     /// slopes are not independent.
-    pub fn search(
-        &self,
-        start: &[Complex64],
-        freedom: f64,
-        most: usize,
-    ) -> Option<(Evaluation, StopReason)> {
-        let mut at = self.evaluate(start)?;
-        let mut damping = 1e-4;
-        for _ in 0..most {
-            let slopes = self.slopes(&at);
-            // Standard deviations are sqrt(s^2 (J'J)^-1): this is the squared step in their unit.
-            let variance = at.square_sum / freedom.max(1.0);
-            let floor = 1e-24 * self.columns.norm_squared();
-            let full = slopes.information.clone().cholesky()?;
-            let decrease = slopes.gradient.dot(&full.solve(&slopes.gradient));
-            let near = decrease <= 1e-6 * variance || decrease <= floor;
-            match self.step(&at, &slopes, &mut damping) {
-                Some(next) => at = next,
-                None if near => return Some((at, StopReason::Converged)),
-                None => return Some((at, StopReason::NoBetterStep)),
-            }
-            if near {
-                return Some((at, StopReason::Converged));
-            }
-        }
-        Some((at, StopReason::StepLimit))
-    }
-
-    /// Takes the first step that makes the residual smaller, with more and more damping.
-    fn step(&self, at: &Evaluation, slopes: &Slopes, damping: &mut f64) -> Option<Evaluation> {
-        const TRIALS: usize = 12;
-        for _ in 0..TRIALS {
-            let mut matrix = slopes.information.clone();
-            for i in 0..matrix.nrows() {
-                matrix[(i, i)] *= 1.0 + *damping;
-            }
-            let step = matrix
-                .cholesky()
-                .map(|factor| factor.solve(&slopes.gradient));
-            let next = step.and_then(|step| self.evaluate(&moved(&at.poles, &step)?));
-            if let Some(next) = next.filter(|next| next.square_sum <= at.square_sum) {
-                *damping = (*damping * 0.1).max(1e-12);
-                return Some(next);
-            }
-            *damping *= 10.0;
-        }
-        None
+    pub fn search(&self, start: &[Complex64], freedom: f64, steps: usize) -> Option<BestPoles> {
+        // A step of x standard deviations, sqrt(s^2 (J'J)^-1) with s^2 = 2 cost/freedom, lowers the cost by
+        // x^2 cost/freedom. The last step is one of a thousandth.
+        let settings = Settings {
+            steps,
+            gain: 0.5e-24 * self.columns.norm_squared(),
+            relative_gain: 1e-6 / freedom.max(1.0),
+            // An undamped first step is too long where two poles begin at one resonance.
+            first_damping: 1e-4,
+            least_damping: 1e-12,
+            ..Settings::default()
+        };
+        let start: Vec<f64> = start.iter().flat_map(|pole| [pole.im, -pole.re]).collect();
+        let end = minimise(self, &start, &settings)?;
+        let (at, slopes) = end.state;
+        let slopes = slopes.filter(|slopes| slopes.covariance(1.0).is_some())?;
+        Some(BestPoles {
+            at,
+            slopes,
+            stop: end.stop,
+        })
     }
 }
 
-/// Returns the poles after a step; `None` where one would leave the upper half plane.
-fn moved(poles: &[Complex64], step: &DVector<f64>) -> Option<Vec<Complex64>> {
-    poles
-        .iter()
-        .enumerate()
-        .map(|(k, pole)| {
-            let next = pole + Complex64::new(-step[2 * k + 1], step[2 * k]);
-            (next.is_finite() && next.im > 0.0).then_some(next)
+impl Problem for PoleProblem {
+    type State = (Evaluation, Option<Slopes>);
+
+    fn evaluate(&self, parameters: &[f64], from: Option<&Self::State>) -> Option<Self::State> {
+        // From poles that cannot be separated a damped step would throw one of them away: the search ends.
+        let slopes = from.and_then(|(_, slopes)| slopes.as_ref());
+        if slopes.is_some_and(|slopes| slopes.covariance(1.0).is_none()) {
+            return None;
+        }
+        let poles: Vec<Complex64> = parameters
+            .chunks_exact(2)
+            .map(|pole| Complex64::new(-pole[1], pole[0]))
+            .collect();
+        Some((self.amplitudes_at(&poles)?, None))
+    }
+
+    fn cost(&self, state: &Self::State) -> f64 {
+        0.5 * state.0.square_sum
+    }
+
+    fn linearise(&self, _: &[f64], state: &mut Self::State) -> Option<Linearised> {
+        let slopes = state.1.insert(self.slopes(&state.0));
+        Some(Linearised::Normal {
+            curvature: slopes.information.clone(),
+            gradient: slopes.gradient.clone(),
         })
-        .collect()
+    }
+
+    /// Poles stay in the upper half plane.
+    fn moved(&self, parameters: &[f64], step: &DVector<f64>) -> Option<Vec<f64>> {
+        let moved: Vec<f64> = parameters.iter().zip(step).map(|(x, by)| x + by).collect();
+        let allowed = moved.iter().all(|x| x.is_finite())
+            && moved.iter().step_by(2).all(|position| *position > 0.0);
+        allowed.then_some(moved)
+    }
 }
 
 /// Weights by which a pole's slope columns u and v form the change of the model, for each parameter.

@@ -16,8 +16,14 @@
 //! M is close to a Toeplitz matrix. Of such a matrix the minimiser with the highest coefficient fixed
 //! is a linear predictor: all its roots lie within the unit circle, and surplus poles would look
 //! like damped modes. Fixed here is the lowest, A_0 = I: the minimiser is the reversed predictor,
-//! its surplus roots lie outside, |z| > 1, which is a growing oscillation, and are told by the sign
+//! its surplus roots lie outside, |z| > 1, which is a growing oscillation, and are recognised by the sign
 //! of their real part. Poles of the structure, which the data ask for, stay where they are.
+//!
+//! # Sub-bands
+//! The lag of the highest power, order times T_a, is the length of decay that a fit compares; over a
+//! band of width B it is about order/B. Two modes 0.4 Hz apart look like one for a second or two; over
+//! 800 Hz an order of 40 compares 0.05 s. In a band of 25 Hz it sees them part. Groups of peaks are
+//! therefore analysed in narrow bands of their own as well.
 //!
 //! # What it does not do
 //! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit,
@@ -25,15 +31,18 @@
 
 mod selection;
 mod stabilisation;
-mod sub_bands;
+
+use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
+use super::{CompositeLevel, PeakSettings, find_peaks};
+use crate::spectral::{DISPLAY_RATIO, Lines};
+
 pub use selection::{PolyreferenceMode, SelectionSettings, select_modes};
 pub use stabilisation::{PoleStability, StabilisationPole, stabilise_poles};
-pub use sub_bands::{BandSearch, SubBand, SubBandSettings, all_modes, find_modes, sub_bands};
 
-/// What makes a polyreference fit impossible.
+/// Reason why a polyreference fit is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PolyreferenceError {
     /// An output with another shape than the first one.
@@ -98,7 +107,7 @@ pub enum PolyreferenceError {
     },
 }
 
-/// From which change on a pole of the stabilisation diagram is not the same as one order before.
+/// Largest changes from one order to the next at which a pole of the stabilisation diagram is stable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StabilityTolerances {
     /// Relative change of the frequency. 1 %, as usual in the field.
@@ -123,7 +132,7 @@ impl Default for StabilityTolerances {
     }
 }
 
-/// How poles are sought.
+/// Settings of the search for poles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolyreferenceSettings {
     /// Highest order of the denominator; that times the inputs is the number of poles. 40: three to
@@ -140,7 +149,7 @@ pub struct PolyreferenceSettings {
     pub most_damping: f64,
     /// Tolerances of the stabilisation diagram.
     pub tolerances: StabilityTolerances,
-    /// What makes a pole a mode.
+    /// Limits from which on a pole is a mode.
     pub selection: SelectionSettings,
 }
 
@@ -173,19 +182,6 @@ impl PolyreferenceSettings {
             });
         }
         Ok(weights.clone())
-    }
-
-    /// Each column of unknowns meets outputs times lines equations.
-    fn check_lines(&self, matrix: &ResponseMatrix) -> Result<(), PolyreferenceError> {
-        let least = least_lines(matrix, self.order);
-        if matrix.points() < least || self.order == 0 {
-            return Err(PolyreferenceError::TooFewLines {
-                lines: matrix.points(),
-                order: self.order,
-                least,
-            });
-        }
-        Ok(())
     }
 }
 
@@ -239,7 +235,15 @@ impl<'a> ResponseMatrix<'a> {
             }
         }
         let entries: Vec<&[Complex64]> = values.iter().flatten().copied().collect();
-        check_finite(&entries, inputs, first, spacing)?;
+        for (index, entry) in entries.iter().enumerate() {
+            if let Some(line) = entry.iter().position(|value| !value.is_finite()) {
+                return Err(PolyreferenceError::NotFinite {
+                    output: index / inputs + 1,
+                    input: index % inputs + 1,
+                    frequency: first + line as f64 * spacing,
+                });
+            }
+        }
         Ok(ResponseMatrix {
             first,
             spacing,
@@ -249,13 +253,13 @@ impl<'a> ResponseMatrix<'a> {
         })
     }
 
-    /// The part between two frequencies (Hz), both ends included.
+    /// Returns the part between two frequencies (Hz), both ends included.
     #[must_use]
     pub fn band(&self, low: f64, high: f64) -> Self {
         // A millionth of a line more, so that an end that lies on a line is not lost by rounding.
-        let index = |frequency: f64| (frequency - self.first) / self.spacing;
-        let start = (index(low) - 1e-6).ceil().max(0.0) as usize;
-        let end = ((index(high) + 1e-6).floor().max(-1.0) + 1.0) as usize;
+        let [low, high] = [low, high].map(|frequency| (frequency - self.first) / self.spacing);
+        let start = (low - 1e-6).ceil().max(0.0) as usize;
+        let end = ((high + 1e-6).floor().max(-1.0) + 1.0) as usize;
         let end = end.min(self.points());
         let start = start.min(end);
         ResponseMatrix {
@@ -303,28 +307,246 @@ impl<'a> ResponseMatrix<'a> {
     pub fn entry(&self, output: usize, input: usize) -> &'a [Complex64] {
         self.entries[output * self.inputs + input]
     }
+}
 
-    /// Power of each entry, line by line.
-    pub(super) fn powers(&self) -> Vec<Vec<f64>> {
-        let power = |entry: &&[Complex64]| entry.iter().map(Complex64::norm_sqr).collect();
-        self.entries.iter().map(power).collect()
+/// Settings of the sub-bands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SubBandSettings {
+    /// Least width (lines). 120: enough for an order of some 25, and at resolution 1/T, a sub-band in
+    /// which modes a line and a half apart still part.
+    pub least_lines: usize,
+    /// Least width in half-power widths of the widest peak. 16: the flanks tell damping from
+    /// background.
+    pub half_power_widths: f64,
+    /// Settings of the peaks that get a band of their own.
+    pub peaks: PeakSettings,
+}
+
+impl Default for SubBandSettings {
+    fn default() -> Self {
+        SubBandSettings {
+            least_lines: 120,
+            half_power_widths: 16.0,
+            peaks: PeakSettings {
+                // Less than the 8 dB and 15 dB that count as a resonance unseen: a band without a
+                // mode costs time only.
+                blind_prominence_db: 6.0,
+                above_noise_db: 10.0,
+                ..PeakSettings::default()
+            },
+        }
     }
 }
 
-fn check_finite(
-    entries: &[&[Complex64]],
-    inputs: usize,
+/// A band of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SubBand {
+    /// Lower end (Hz) of what is fitted.
+    pub low: f64,
+    /// Upper end (Hz) of what is fitted.
+    pub high: f64,
+    /// Between these (Hz) modes are taken from this band; the rest belongs to its neighbours.
+    pub core: (f64, f64),
+}
+
+impl SubBand {
+    fn core_holds(&self, mode: &PolyreferenceMode) -> bool {
+        (self.core.0..=self.core.1).contains(&(mode.pole.im / TAU))
+    }
+}
+
+/// One band's analysis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BandSearch {
+    /// The band.
+    pub band: SubBand,
+    /// Highest order used.
+    pub order: usize,
+    /// Its stabilisation diagram.
+    pub diagram: Vec<StabilisationPole>,
+    /// Modes within its core, ascending.
+    pub modes: Vec<PolyreferenceMode>,
+}
+
+/// Peaks that share a band (Hz): the first, the last, and the reach to either side.
+struct PeakGroup {
     first: f64,
-    spacing: f64,
-) -> Result<(), PolyreferenceError> {
-    for (index, entry) in entries.iter().enumerate() {
-        if let Some(line) = entry.iter().position(|value| !value.is_finite()) {
-            return Err(PolyreferenceError::NotFinite {
-                output: index / inputs + 1,
-                input: index % inputs + 1,
-                frequency: first + line as f64 * spacing,
-            });
+    last: f64,
+    reach: f64,
+}
+
+/// Returns the bands around the groups of peaks of `matrix`, ascending; their cores do not overlap, and do
+/// not cover what lies far from every peak.
+pub fn sub_bands(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<SubBand> {
+    let (low_end, high_end) = matrix.ends();
+    let groups = peak_groups(matrix, settings);
+    let mut bands = Vec::with_capacity(groups.len());
+    for (index, group) in groups.iter().enumerate() {
+        let low = (group.first - group.reach).max(low_end);
+        let high = (group.last + group.reach).min(high_end);
+        // Near the ends of a band the background is worst known: a tenth is left to the others.
+        let margin = 0.1 * (high - low);
+        let mut core = (
+            if low > low_end { low + margin } else { low },
+            if high < high_end { high - margin } else { high },
+        );
+        if let Some(before) = index.checked_sub(1).map(|k| &groups[k]) {
+            core.0 = f64::max(core.0, 0.5 * (before.last + group.first));
+        }
+        if let Some(after) = groups.get(index + 1) {
+            core.1 = f64::min(core.1, 0.5 * (group.last + after.first));
+        }
+        bands.push(SubBand { low, high, core });
+    }
+    bands
+}
+
+fn peak_groups(matrix: &ResponseMatrix, settings: &SubBandSettings) -> Vec<PeakGroup> {
+    if matrix.points() < 3 {
+        return Vec::new();
+    }
+    let (low, high) = matrix.ends();
+    // A block that displays just the matrix's points, of signal as long as the spacing says.
+    let lines = Lines {
+        low,
+        high,
+        spacing: matrix.spacing,
+        block: ((matrix.points() - 1) as f64 * DISPLAY_RATIO).ceil() as usize,
+        duration: 1.0 / matrix.spacing,
+    };
+    let entries = matrix.entries.iter();
+    let powers: Vec<Vec<f64>> = entries
+        .map(|entry| entry.iter().map(Complex64::norm_sqr).collect())
+        .collect();
+    let level = CompositeLevel::new(lines, &powers, None);
+    let mut groups: Vec<PeakGroup> = Vec::new();
+    for peak in find_peaks(&level, &settings.peaks) {
+        let frequency = matrix.frequency(peak.index);
+        // Lines over which the level stays within 3 dB of the peak.
+        let (before, after) = level.level_db.split_at(peak.index);
+        let least = after[0] - 3.0;
+        let width = before
+            .iter()
+            .rev()
+            .take_while(|level| **level >= least)
+            .count()
+            + after.iter().take_while(|level| **level >= least).count();
+        let lines = (settings.half_power_widths * width as f64).max(settings.least_lines as f64);
+        let reach = 0.5 * lines * matrix.spacing;
+        match groups.last_mut() {
+            // A group is not longer than half a reach, so that its band stays narrow.
+            Some(group) if frequency - group.first < 0.5 * group.reach.min(reach) => {
+                group.last = frequency;
+                group.reach = group.reach.max(reach);
+            }
+            _ => groups.push(PeakGroup {
+                first: frequency,
+                last: frequency,
+                reach,
+            }),
         }
     }
-    Ok(())
+    groups
+}
+
+/// Finds the modes of the whole matrix, ascending: sub-bands for what a narrow band can hold, the whole band
+/// for what lies outside them or is too wide for them. The first of the searches is the whole band's.
+///
+/// A band with too few lines for the order is searched at the order that they allow.
+///
+/// # Errors
+/// As [`stabilise_poles`]; [`PolyreferenceError::TooFewLines`] only below some 16 lines.
+pub fn find_modes(
+    matrix: &ResponseMatrix,
+    settings: &PolyreferenceSettings,
+    bands: &SubBandSettings,
+) -> Result<Vec<BandSearch>, PolyreferenceError> {
+    let ends = matrix.ends();
+    let whole_band = SubBand {
+        low: ends.0,
+        high: ends.1,
+        core: ends,
+    };
+    let mut whole = search(matrix, whole_band, settings)?;
+    let mut parts = sub_bands(matrix, bands)
+        .into_iter()
+        .map(|band| search(matrix, band, settings))
+        .collect::<Result<Vec<BandSearch>, PolyreferenceError>>()?;
+    for part in &mut parts {
+        share_modes(&mut whole.modes, part);
+    }
+    Ok(std::iter::once(whole).chain(parts).collect())
+}
+
+/// Returns the modes of all searches, ascending.
+pub fn all_modes(searches: &[BandSearch]) -> Vec<PolyreferenceMode> {
+    let mut modes: Vec<PolyreferenceMode> = searches
+        .iter()
+        .flat_map(|search| search.modes.iter().cloned())
+        .collect();
+    modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
+    modes
+}
+
+/// Lines of a sub-band to each order at least. 5: over half the values are then left to average noise,
+/// with two outputs.
+const LINES_PER_ORDER: usize = 5;
+/// Widest mode that is left to a sub-band, in parts of the band's width.
+const WIDEST_SHARE: f64 = 0.125;
+
+/// Settles which search keeps a mode that lies in a sub-band's core.
+///
+/// A mode that both read as one goes to the one whose pole explains more: of a mode that decays within
+/// the lags of the whole band, a longer look only adds noise. Otherwise the sub-band decides, except
+/// on modes too wide for it.
+fn share_modes(whole: &mut Vec<PolyreferenceMode>, part: &mut BandSearch) {
+    let band = part.band;
+    let (rivals, mut kept): (Vec<_>, Vec<_>) =
+        (whole.drain(..)).partition(|mode| band.core_holds(mode));
+    for rival in rivals {
+        let width = 2.0 * rival.damping_ratio * rival.frequency;
+        let near: Vec<usize> = (0..part.modes.len())
+            .filter(|&k| (part.modes[k].frequency - rival.frequency).abs() < width)
+            .collect();
+        match near[..] {
+            [] if width > WIDEST_SHARE * (band.high - band.low) => kept.push(rival),
+            [one] if part.modes[one].above_noise_db < rival.above_noise_db => {
+                part.modes.remove(one);
+                kept.push(rival);
+            }
+            _ => {}
+        }
+    }
+    *whole = kept;
+}
+
+fn search(
+    matrix: &ResponseMatrix,
+    band: SubBand,
+    settings: &PolyreferenceSettings,
+) -> Result<BandSearch, PolyreferenceError> {
+    let part = matrix.band(band.low, band.high);
+    let is_whole = part.points() == matrix.points();
+    let most = if is_whole {
+        settings.order
+    } else {
+        settings.order.min(part.points() / LINES_PER_ORDER)
+    };
+    let order = (1..=most)
+        .rev()
+        .find(|&order| least_lines(&part, order) <= part.points())
+        .unwrap_or(settings.order);
+    let settings = PolyreferenceSettings {
+        order,
+        ..settings.clone()
+    };
+    let diagram = stabilise_poles(&part, &settings)?;
+    let mut modes = select_modes(&part, &diagram, &settings);
+    modes.retain(|mode| band.core_holds(mode));
+    Ok(BandSearch {
+        band,
+        order,
+        diagram,
+        modes,
+    })
 }

@@ -1,14 +1,17 @@
 //! Physical poles out of a stabilisation diagram.
 //!
-//! What each pole contributes to the responses: residues by least squares on the lines around it,
+//! The contribution of each pole to the responses is its residue by least squares on the lines around it,
 //! with a background in place of lower and upper residuals.
 
 use std::f64::consts::{PI, TAU};
 
+use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use statrs::statistics::Statistics;
+use tapjoint_numerics::stats::median;
 
 use super::{PolyreferenceSettings, ResponseMatrix, StabilisationPole};
-use crate::modal::projection::{Basis, conjugate_product, norm};
+use crate::modal::Subspace;
 
 /// A mode: a pole that returns over the orders and that the responses need.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +25,7 @@ pub struct PolyreferenceMode {
     /// Standard deviation over the orders of the frequency (Hz). A measure of stability: the orders
     /// share their data, so that it is no standard uncertainty.
     pub frequency_spread: f64,
-    /// The same of the damping ratio.
+    /// Standard deviation over the orders of the damping ratio.
     pub damping_spread: f64,
     /// Number of orders at which the pole was found.
     pub count: usize,
@@ -38,13 +41,13 @@ pub struct PolyreferenceMode {
     pub above_noise_db: f64,
 }
 
-/// What makes a pole a mode.
+/// Limits from which on a pole is a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SelectionSettings {
     /// Distance within which poles of different orders are one, in half-power half-widths (1 = the
     /// pole's own decay). 0.5: two modes a half-power width apart are 2 apart in this measure.
     pub radius: f64,
-    /// The same at least (lines), for poles narrower than a line. 0.1.
+    /// Least such distance (lines), for poles narrower than a line. 0.1.
     pub least_radius: f64,
     /// Least share of the orders at which the pole is found. 0.3: weak modes come in only where the
     /// order suffices for the strong ones; poles of noise scatter over the band.
@@ -74,8 +77,9 @@ impl Default for SelectionSettings {
     }
 }
 
-/// Poles of different orders that are one, at most one of each order.
+/// Poles of different orders that are one.
 struct Cluster {
+    /// Indices in the diagram, ascending in order, two or more and one of each order.
     members: Vec<usize>,
     pole: Complex64,
 }
@@ -100,23 +104,38 @@ pub fn select_modes(
     let least_decay = selection.least_decay * matrix.spacing();
     clusters.retain(|cluster| -cluster.pole.re >= least_decay);
     clusters.sort_by(|a, b| a.pole.im.total_cmp(&b.pole.im));
-    let seen: Vec<SeenPole> = clusters
-        .iter()
-        .map(|cluster| seen_pole(diagram, cluster, settings.added_decay))
-        .collect();
-    let kept = needed_poles(matrix, &seen, selection);
-    let mut modes: Vec<PolyreferenceMode> = kept
-        .into_iter()
-        .map(|(index, part)| {
-            let participation = seen[index].participation.clone();
-            mode_of(diagram, &clusters[index], (participation, part), orders)
-        })
-        .collect();
+    let mut observed = Vec::with_capacity(clusters.len());
+    for cluster in &clusters {
+        // The participation is that of the highest order: vectors of a repeated root are arbitrary within
+        // a plane, and only those of one order are independent of each other.
+        let last = cluster.members.last();
+        observed.push(ObservedPole {
+            pole: cluster.pole - settings.added_decay,
+            participation: last.map_or_else(Vec::new, |&k| diagram[k].participation.clone()),
+        });
+    }
+    let mut modes: Vec<PolyreferenceMode> = Vec::new();
+    for (index, part) in needed_poles(matrix, &observed, selection) {
+        let Cluster { members, pole } = &clusters[index];
+        let poles = members.iter().map(|&member| &diagram[member]);
+        modes.push(PolyreferenceMode {
+            pole: *pole,
+            frequency: pole.norm() / TAU,
+            damping_ratio: -pole.re / pole.norm(),
+            frequency_spread: poles.clone().map(|pole| pole.frequency).std_dev(),
+            damping_spread: poles.map(|pole| pole.damping_ratio).std_dev(),
+            count: members.len(),
+            share: members.len() as f64 / orders as f64,
+            participation: observed[index].participation.clone(),
+            shape: part.shape,
+            above_noise_db: 10.0 * part.above_noise.log10(),
+        });
+    }
     modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
     modes
 }
 
-/// Distance of two poles in units of the radius allowed between them.
+/// Returns the distance of two poles in units of the radius allowed between them.
 fn distance(a: Complex64, b: Complex64, settings: &PolyreferenceSettings, spacing: f64) -> f64 {
     let selection = &settings.selection;
     let decay = -0.5 * (a.re + b.re) + settings.added_decay;
@@ -159,13 +178,16 @@ fn cluster_poles(
         for &member in &members {
             free[member] = false;
         }
-        let pole = median_pole(diagram, &members);
+        let poles = members.iter().map(|&member| diagram[member].pole);
+        let (mut re, mut im): (Vec<f64>, Vec<f64>) = poles.map(|pole| (pole.re, pole.im)).unzip();
+        // A few stray members do not move the medians.
+        let pole = Complex64::new(median(&mut re), median(&mut im));
         clusters.push(Cluster { members, pole });
     }
     clusters
 }
 
-/// For every pole those of other orders within the radius, by order, with their distance.
+/// Returns for every pole those of other orders within the radius, by order, with their distance.
 fn neighbour_lists(
     diagram: &[StabilisationPole],
     settings: &PolyreferenceSettings,
@@ -185,7 +207,7 @@ fn neighbour_lists(
     lists
 }
 
-/// The founder and of every other order its nearest free neighbour.
+/// Returns the founder and its nearest free neighbour of every other order.
 fn members_of(
     diagram: &[StabilisationPole],
     founder: usize,
@@ -209,56 +231,33 @@ fn members_of(
     members
 }
 
-/// Median of real and imaginary parts: a few stray members do not move it.
-fn median_pole(diagram: &[StabilisationPole], members: &[usize]) -> Complex64 {
-    let part = |of: fn(&Complex64) -> f64| {
-        let mut values: Vec<f64> = members.iter().map(|&m| of(&diagram[m].pole)).collect();
-        tapjoint_numerics::stats::median(&mut values)
-    };
-    Complex64::new(part(|p| p.re), part(|p| p.im))
-}
-
-/// The cluster's pole as the responses show it. Its participation is that of the highest order:
-/// vectors of a repeated root are arbitrary within a plane, and only those of one order are
-/// independent of each other.
-fn seen_pole(diagram: &[StabilisationPole], cluster: &Cluster, added_decay: f64) -> SeenPole {
-    SeenPole {
-        pole: cluster.pole - added_decay,
-        participation: cluster
-            .members
-            .last()
-            .map_or_else(Vec::new, |&last| diagram[last].participation.clone()),
-    }
-}
-
-/// Drops the candidate that the responses need least, as long as one is below the limits; returns
-/// the places of those that stay.
+/// Drops the candidate that the responses need least, as long as one is below the limits. Returns
+/// the places and contributions of those that stay.
 fn needed_poles(
     matrix: &ResponseMatrix,
-    seen: &[SeenPole],
+    observed: &[ObservedPole],
     selection: &SelectionSettings,
 ) -> Vec<(usize, Contribution)> {
-    let least = 10f64.powf(0.1 * selection.above_noise_db);
-    let mut kept: Vec<usize> = (0..seen.len()).collect();
-    let mut parts: Vec<Option<Contribution>> = (0..seen.len())
-        .map(|index| contribution(matrix, seen, index))
+    let mut kept: Vec<usize> = (0..observed.len()).collect();
+    let mut poles = observed.to_vec();
+    let mut parts: Vec<Option<Contribution>> = (0..observed.len())
+        .map(|index| contribution(matrix, observed, index))
         .collect();
-    // Above 1 a candidate is needed: the smaller of both ratios counts.
-    let need = |part: &Option<Contribution>| {
-        part.as_ref().map_or(0.0, |part| {
-            (part.above_noise / least).min(part.share_of_peak / selection.least_level)
-        })
-    };
     loop {
-        let weakest = (0..kept.len()).min_by(|&a, &b| need(&parts[a]).total_cmp(&need(&parts[b])));
-        let Some(place) = weakest.filter(|&place| need(&parts[place]) < 1.0) else {
+        let needs = parts.iter().map(|part| match part {
+            Some(part) => part.need(selection),
+            None => 0.0,
+        });
+        let weakest = needs.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((place, _)) = weakest.filter(|(_, need)| *need < 1.0) else {
             break;
         };
-        let removed = kept.remove(place);
+        kept.remove(place);
         parts.remove(place);
-        let poles: Vec<SeenPole> = kept.iter().map(|&index| seen[index].clone()).collect();
+        let removed = poles.remove(place);
         for (index, part) in parts.iter_mut().enumerate() {
-            if near(matrix, &poles[index], &seen[removed]) {
+            let window = Window::around(matrix, poles[index].pole);
+            if window.is_some_and(|window| window.holds(removed.pole)) {
                 *part = contribution(matrix, &poles, index);
             }
         }
@@ -267,40 +266,6 @@ fn needed_poles(
         .zip(parts)
         .filter_map(|(index, part)| Some((index, part?)))
         .collect()
-}
-
-fn mode_of(
-    diagram: &[StabilisationPole],
-    cluster: &Cluster,
-    (participation, part): (Vec<Complex64>, Contribution),
-    orders: usize,
-) -> PolyreferenceMode {
-    let frequency = cluster.pole.norm() / TAU;
-    let damping_ratio = -cluster.pole.re / cluster.pole.norm();
-    let spread = |of: fn(&StabilisationPole) -> f64| {
-        let values = cluster.members.iter().map(|&member| of(&diagram[member]));
-        standard_deviation(&values.collect::<Vec<f64>>())
-    };
-    PolyreferenceMode {
-        pole: cluster.pole,
-        frequency,
-        damping_ratio,
-        frequency_spread: spread(|pole| pole.frequency),
-        damping_spread: spread(|pole| pole.damping_ratio),
-        count: cluster.members.len(),
-        share: cluster.members.len() as f64 / orders as f64,
-        participation,
-        shape: part.shape,
-        above_noise_db: 10.0 * part.above_noise.log10(),
-    }
-}
-
-/// Of two values or more; a cluster has at least two members.
-fn standard_deviation(values: &[f64]) -> f64 {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (squares / (count - 1.0).max(1.0)).sqrt()
 }
 
 /// Half-power widths to either side that take part: beyond, a mode is a background like the others.
@@ -314,23 +279,34 @@ const MOST_REACH: usize = 50;
 /// the upper residual, and for everything else that is smooth over the window.
 const BACKGROUND: usize = 3;
 
+/// Least part of a column that is its own beside the others', relative to its length.
+const INDEPENDENT: f64 = 1e-9;
+
 /// A pole as the responses show it, an exponential window's decay included.
 #[derive(Debug, Clone)]
-pub(super) struct SeenPole {
-    pub(super) pole: Complex64,
-    pub(super) participation: Vec<Complex64>,
+struct ObservedPole {
+    pole: Complex64,
+    participation: Vec<Complex64>,
 }
 
-/// What one pole contributes.
+/// Contribution of one pole to the responses.
 #[derive(Debug, Clone)]
-pub(super) struct Contribution {
+struct Contribution {
     /// Shape factor of each output: the residue is factor times participation (unit of the response
     /// times 1/s).
-    pub(super) shape: Vec<Complex64>,
+    shape: Vec<Complex64>,
     /// Sum of squares that the pole explains over the noise variance, mean over the outputs.
-    pub(super) above_noise: f64,
+    above_noise: f64,
     /// Level of the pole at its own peak over the highest level in the window.
-    pub(super) share_of_peak: f64,
+    share_of_peak: f64,
+}
+
+impl Contribution {
+    /// Returns the smaller of the ratios to both limits: above 1 the pole is needed.
+    fn need(&self, selection: &SelectionSettings) -> f64 {
+        let least = 10f64.powf(0.1 * selection.above_noise_db);
+        (self.above_noise / least).min(self.share_of_peak / selection.least_level)
+    }
 }
 
 /// The lines around a pole.
@@ -357,8 +333,8 @@ impl Window {
         Some(Window { omegas, lines })
     }
 
-    /// Whether a pole lies in the window or as near to it as half its length.
-    pub(super) fn holds(&self, pole: Complex64) -> bool {
+    /// Returns true where a pole lies in the window or as near to it as half its length.
+    fn holds(&self, pole: Complex64) -> bool {
         let (Some(first), Some(last)) = (self.omegas.first(), self.omegas.last()) else {
             return false;
         };
@@ -366,30 +342,23 @@ impl Window {
         (first - margin..=last + margin).contains(&pole.im)
     }
 
-    /// Column of `participation` 1/(j omega - p)^power, input by input.
-    fn pole_column(&self, seen: &SeenPole, power: i32) -> Vec<Complex64> {
-        let mut column = Vec::with_capacity(self.omegas.len() * seen.participation.len());
-        for factor in &seen.participation {
-            column.extend(
-                self.omegas
-                    .iter()
-                    .map(|&omega| factor * (Complex64::new(0.0, omega) - seen.pole).powi(-power)),
-            );
-        }
-        column
+    /// Returns the column of `participation` 1/(j omega - p)^power, input by input.
+    fn pole_column(&self, observed: &ObservedPole, power: i32) -> DVector<Complex64> {
+        let count = self.omegas.len();
+        DVector::from_fn(count * observed.participation.len(), |row, _| {
+            let distance = Complex64::new(0.0, self.omegas[row % count]) - observed.pole;
+            observed.participation[row / count] * distance.powi(-power)
+        })
     }
 
-    /// Columns of x^degree for one input each, x running from -1 to 1.
-    fn background(&self, inputs: usize) -> Vec<Vec<Complex64>> {
+    /// Returns the columns of x^degree for one input each, x running from -1 to 1.
+    fn background(&self, inputs: usize) -> Vec<DVector<Complex64>> {
         let count = self.omegas.len();
         let mut columns = Vec::new();
         for input in 0..inputs {
             for degree in 0..BACKGROUND {
-                let mut column = vec![Complex64::ZERO; count * inputs];
-                for (index, value) in column[input * count..(input + 1) * count]
-                    .iter_mut()
-                    .enumerate()
-                {
+                let mut column = DVector::zeros(count * inputs);
+                for (index, value) in column.rows_mut(input * count, count).iter_mut().enumerate() {
                     let x = 2.0 * index as f64 / (count.max(2) - 1) as f64 - 1.0;
                     *value = Complex64::from(x.powi(degree as i32));
                 }
@@ -398,66 +367,56 @@ impl Window {
         }
         columns
     }
-
-    fn values(&self, matrix: &ResponseMatrix, output: usize) -> Vec<Complex64> {
-        (0..matrix.inputs())
-            .flat_map(|input| {
-                let entry = matrix.entry(output, input);
-                self.lines.iter().map(|&line| entry[line])
-            })
-            .collect()
-    }
 }
 
-/// Contribution of pole `index` among `poles`.
+/// Returns the contribution of pole `index` among `poles`.
 ///
 /// Around the pole each output is fitted by
 /// H_oi = sum_r psi_or L_ri/(s - p_r) + delta_or L_ri/(s - p_r)^2 + background.
 /// The second term stands for the error of a neighbouring pole, and is left out for the pole itself:
 /// what another pole would explain as well, if it were a little elsewhere, is no mode of its own.
-pub(super) fn contribution(
+fn contribution(
     matrix: &ResponseMatrix,
-    poles: &[SeenPole],
+    poles: &[ObservedPole],
     index: usize,
 ) -> Option<Contribution> {
     let own = poles.get(index)?;
     let window = Window::around(matrix, own.pole)?;
-    let mut basis = Basis::new(2);
-    for column in window.background(matrix.inputs()) {
-        basis.add(column);
-    }
-    for (other, seen) in poles.iter().enumerate() {
-        if other != index && window.holds(seen.pole) {
-            basis.add(window.pole_column(seen, 1));
-            basis.add(window.pole_column(seen, 2));
+    let mut columns = window.background(matrix.inputs());
+    for (other, observed) in poles.iter().enumerate() {
+        if other != index && window.holds(observed.pole) {
+            columns.push(window.pole_column(observed, 1));
+            columns.push(window.pole_column(observed, 2));
         }
     }
-    // The pole's own column stands last: what it explains is what the others do not.
+    let others = Subspace::new(&DMatrix::from_columns(&columns), INDEPENDENT);
+    // The pole's own column stands last: it explains only what the others do not.
     let column = window.pole_column(own, 1);
-    let rest = basis.rest(column.clone());
-    let length = norm(&rest);
-    let degrees = column.len().checked_sub(basis.columns.len() + 1)?;
-    if degrees == 0 || length <= 1e-9 * norm(&column) {
+    // The second projection removes the rounding of the first.
+    let rest = others.complement(others.complement(column.clone()));
+    let square = rest.norm_squared();
+    let degrees = column.len().checked_sub(others.rank() + 1)?;
+    if degrees == 0 || square.sqrt() <= INDEPENDENT * column.norm() {
         return None;
     }
+    let count = window.lines.len();
+    let values = DMatrix::from_fn(column.len(), matrix.outputs(), |row, output| {
+        matrix.entry(output, row / count)[window.lines[row % count]]
+    });
+    let residuals = others.complement(others.complement(values.clone()));
+    let participations = own.participation.iter().map(|factor| factor.norm());
+    let strongest = participations.fold(0.0, f64::max);
     let (mut shape, mut above_noise, mut peak, mut own_peak) = (Vec::new(), 0.0, 0.0, 0.0);
-    for output in 0..matrix.outputs() {
-        let values = window.values(matrix, output);
+    for (values, residual) in values.column_iter().zip(residuals.column_iter()) {
         peak += values.iter().map(Complex64::norm_sqr).fold(0.0, f64::max);
         // Rounding stands for the noise where there is none.
-        let rounding = (f64::EPSILON * norm(&values)).powi(2) / values.len() as f64;
-        let left = basis.rest(values);
+        let rounding = (f64::EPSILON * values.norm()).powi(2) / values.len() as f64;
         // psi = r^H y/|r|^2, explained sum of squares |r^H y|^2/|r|^2.
-        let factor = conjugate_product(&rest, &left) / (length * length);
-        let explained = factor.norm_sqr() * length * length;
-        let unexplained = (norm(&left).powi(2) - explained).max(0.0);
+        let factor = rest.dotc(&residual) / square;
+        let explained = factor.norm_sqr() * square;
+        let unexplained = (residual.norm_squared() - explained).max(0.0);
         let variance = unexplained / degrees as f64;
         above_noise += explained / variance.max(rounding).max(f64::MIN_POSITIVE);
-        let strongest = own
-            .participation
-            .iter()
-            .map(|factor| factor.norm())
-            .fold(0.0, f64::max);
         own_peak += (factor.norm() * strongest / own.pole.re).powi(2);
         shape.push(factor);
     }
@@ -466,9 +425,4 @@ pub(super) fn contribution(
         above_noise: above_noise / matrix.outputs() as f64,
         share_of_peak: (own_peak / peak.max(f64::MIN_POSITIVE)).sqrt(),
     })
-}
-
-/// Whether removing `removed` can change the contribution of `kept`.
-pub(super) fn near(matrix: &ResponseMatrix, kept: &SeenPole, removed: &SeenPole) -> bool {
-    Window::around(matrix, kept.pole).is_some_and(|window| window.holds(removed.pole))
 }

@@ -81,6 +81,8 @@ pub struct Optimum {
 /// trade against each other) thirty. A search that hardly moves far from any agreement finds no explanation; it
 /// need not be exact.
 const SEARCH: Settings = Settings {
+    first_damping: 0.0,
+    least_damping: 1e-3,
     steps: 30,
     gain: 1e-4,
     relative_gain: 0.0,

@@ -16,6 +16,8 @@ pub(super) type Minimum = least_squares::Minimum<Evaluation>;
 /// Settings of a search to the last digits. Misfits are relative: without stated uncertainties they may
 /// be of any size.
 pub(super) const FULL: Settings = Settings {
+    first_damping: 0.0,
+    least_damping: 1e-3,
     steps: 200,
     gain: 0.0,
     relative_gain: 1e-15,

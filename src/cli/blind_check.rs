@@ -28,9 +28,9 @@ use tapjoint::study::blind_check::{
     parse_truths, render_rows, rows, score,
 };
 
-/// Measure how often the diagnosis is right, on virtual tests with an unknown effect.
+/// Measure how often the diagnosis is right, on virtual tests.
 ///
-/// Each test has five recordings: two sensors, three tap positions, one moved sensor, two levels. The
+/// The diagnosis does not know the effect of a test. Each test has five recordings: two sensors, three tap positions, one moved sensor, two levels. The
 /// SHA-256 of the true effects is printed before the diagnosis begins. The diagnosis gets recordings and
 /// descriptions only. With --folder, existing tests are diagnosed and scored.
 #[derive(Debug, Args)]

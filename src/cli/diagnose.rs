@@ -12,7 +12,7 @@ use tapjoint::gap::{Diagnosis, GapSettings, Verdict};
 use tapjoint::pipeline::{IdentifySettings, diagnose_test};
 use tapjoint::report::{document_of, gap_section, render_gap_text};
 
-/// Find the effect that causes the gap between model and measurement.
+/// Find the cause of the gap between model and measurement.
 ///
 /// Reports where the gap lies, which effect causes it, and how much of it this effect explains. The
 /// answer can also be that nothing is missing, that an unknown effect is missing, or that these data

@@ -24,7 +24,7 @@ use tapjoint::structure::joint::StiffnessUnits;
 use tapjoint::structure::{Assembly, Beam, JointStiffness};
 use tapjoint::study::updated_model::described_structure;
 
-/// Write the beam with its joint as input of a finite-element program.
+/// Write beam and joint as input of a finite-element program.
 ///
 /// The joint is estimated from the test's data, or taken from an earlier report. A joint that TEST gives
 /// is written as it is. Springs with cross coupling are the inverse of the joint's compliance. Of a

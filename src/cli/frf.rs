@@ -21,9 +21,9 @@ use tapjoint::report::{
 };
 use tapjoint::spectral::FrfEstimator;
 
-/// Compute frequency response functions (H1, H2, Hv) with coherence and random error.
+/// Compute frequency response functions with their coherence.
 ///
-/// For a bare recording, give the hammer's channel with --hammer. A test description says itself how
+/// The estimators are H1, H2 and Hv; each function has its random error. For a bare recording, give the hammer's channel with --hammer. A test description says itself how
 /// its recordings are read. The form follows from the sensor: an accelerometer gives accelerance.
 /// Results are in units of the file where no units or scales are given.
 #[derive(Debug, Args)]

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 use tapjoint::description::{Assembly, runnable_template, template_of};
 
-/// Print a commented test.toml with every key, its unit and its default.
+/// Print a commented test.toml with every key, unit and default.
 ///
 /// Each RECORDING gets its own table. Without recordings the file holds example frequencies, so that it
 /// runs unchanged.

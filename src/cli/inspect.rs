@@ -15,8 +15,9 @@ use tapjoint::report::{datasets_of, inspection_of, render_text};
 /// for a quick look, so they are only listed.
 const MOST_SAMPLES: u64 = 50_000_000;
 
-/// Show the contents and the quality of recordings: channels, sample rate, length, clipping, offset and
-/// taps.
+/// Show the contents and the quality of recordings.
+///
+/// Lists channels, sample rate, length, clipping, offsets and taps.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint inspect taps.wav --hammer 1")]
 pub(super) struct InspectArguments {

@@ -15,9 +15,9 @@ use tapjoint::structure::JointStiffness;
 use tapjoint::study::blind_check::{Conduct, score};
 use tapjoint::study::plan::{PlanSettings, judge_plan};
 
-/// Show which effects a planned test could distinguish, before anything is measured.
+/// Show which effects a planned test could distinguish.
 ///
-/// Recordings, sensors, taps and levels are those of the description. The recordings need not exist.
+/// Run it before anything is measured. Recordings, sensors, taps and levels are those of the description. The recordings need not exist.
 /// Virtual tests with effects of every kind are drawn, observed as planned, and diagnosed. The table
 /// counts the first answer of each diagnosis. --kx and --ky must be positive and finite here.
 #[derive(Debug, Args)]

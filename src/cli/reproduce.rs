@@ -7,9 +7,9 @@ use tapjoint::report::document::VERSION;
 use tapjoint::report::render_reproduction;
 use tapjoint::study::publication::reproduce;
 
-/// Print the tables of the paper (Ingole & Chatterjee) beside tapjoint's numbers.
+/// Print the tables of the paper beside tapjoint's numbers.
 ///
-/// Numbers that differ are marked, with the reason.
+/// The paper is that of Ingole & Chatterjee. Numbers that differ are marked, with the reason.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  tapjoint reproduce")]
 pub(super) struct ReproduceArguments {}

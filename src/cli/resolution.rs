@@ -19,7 +19,7 @@ use tapjoint::report::{
 use tapjoint::structure::{Assembly, JointStiffness};
 use tapjoint::study::resolution::{ResolutionSettings, StudiedTest, study_resolution};
 
-/// Show the errors of frequencies and joint stiffness for each block size, on virtual tests.
+/// Show how resolution limits frequencies and joint stiffness.
 ///
 /// For each block size, virtual taps are recorded and their frequencies read: on the spectral line,
 /// between the lines, and by a fit. The joint is estimated from each reading. Its true stiffness is

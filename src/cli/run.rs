@@ -19,7 +19,7 @@ use tapjoint::report::{
     MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
 };
 
-/// Analyse a test from its recordings to the joint, and write a report.
+/// Analyse a test, from recordings to joint, and write a report.
 ///
 /// Finds taps, spectra and modes, estimates the joint stiffness and its uncertainty, and diagnoses what
 /// the model misses. The report folder gets report.html, report.json, CSV files (parameters, modes,

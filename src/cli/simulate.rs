@@ -28,9 +28,9 @@ use tapjoint::simulate::{
 };
 use tapjoint::study::updated_model::described_effects;
 
-/// Make the recordings of a virtual test, as a laboratory would record the described structure.
+/// Make the recordings of a virtual test.
 ///
-/// TEST describes beam, joint (with kt and kr, or --kx and --ky), sensors and recordings. The output
+/// They are what a laboratory would record of the described structure. TEST describes beam, joint (with kt and kr, or --kx and --ky), sensors and recordings. The output
 /// folder gets the recordings, a test.toml and truth.json. The test.toml describes the test as an analyst
 /// knows it: effects of --with are left out, and the joint is to be fitted. A list of checksums lets the
 /// next `tapjoint simulate` replace these files.

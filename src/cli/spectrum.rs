@@ -13,9 +13,9 @@ use std::path::PathBuf;
 use tapjoint::description::ReadBy;
 use tapjoint::report::{document_of, render_spectrum_picture, render_text};
 
-/// Show the averaged spectrum of a recording and its peaks with their resolution bounds.
+/// Show the averaged spectrum of a recording and its peaks.
 ///
-/// A block of N samples gives N/2.56 lines over the band. The line spacing is the resolution. Zero
+/// Each peak has the bounds that follow from the resolution. A block of N samples gives N/2.56 lines over the band. The line spacing is the resolution. Zero
 /// padding and interpolation do not improve it.
 #[derive(Debug, Args)]
 #[command(

@@ -168,7 +168,7 @@ fn regress_bad_usage_is_explained() {
         ),
         (
             &["perturb", "test.toml", "--percent", "50"],
-            &["no small change"],
+            &["50 % is too large"],
         ),
         (
             &["spectrum", "a.wav", "--zoom", "200:0"],
@@ -303,7 +303,7 @@ fn regress_an_output_folder_that_cannot_be_made_is_found_out_first() {
     refused(
         &with_data,
         &arguments,
-        &["test.toml: is a file, a folder is wanted"],
+        &["test.toml: is a file, but a folder is needed"],
     );
 }
 

@@ -102,7 +102,7 @@ impl Default for Settings {
     }
 }
 
-/// Why a search ended.
+/// Reason for which a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopReason {
     /// The linear model promises no noticeable decrease of the cost.
@@ -133,7 +133,7 @@ pub struct Minimum<S> {
     pub parameters: Vec<f64>,
     /// The state at the parameters.
     pub state: S,
-    /// Why the search ended here.
+    /// Reason for which the search ended here.
     pub stop: StopReason,
 }
 
@@ -476,7 +476,7 @@ fn triangularise(matrix: &mut DMatrix<f64>) {
     }
 }
 
-/// How large misfits count.
+/// Weight of large misfits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Loss {
     /// By their square: right for normally distributed errors.

@@ -172,13 +172,13 @@ fn prediction(
     let used = if found.is_answered() { used } else { &[] };
     let numbers: Vec<usize> = used.iter().map(|mode| mode.mode).collect();
     let count = measured.iter().map(|mode| mode.mode).max().unwrap_or(0) + 1;
-    let beside = (measured, &numbers[..]);
     let detailed = found.method(structure, settings.method) == EstimateMethod::Consistent;
     let plain = StructureDetails::default();
     let details = if detailed { &settings.details } else { &plain };
     let rows = if detailed {
         let there = jointed(structure, details).with_beam(&beam);
-        compare(&beam, &frequencies_of(&there, &joint, count)?, beside)
+        let frequencies = frequencies_of(&there, &joint, count)?;
+        compare(&beam, &frequencies, measured, &numbers)
     } else {
         let (theory, assembly) = (structure.theory, structure.assembly);
         predict(theory, &beam, assembly, &joint, measured, &numbers, count)?

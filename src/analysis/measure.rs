@@ -444,8 +444,7 @@ impl<'a> Stage<'a> {
             if let Some(label) = quiet.mains_label(peak.index, averages, window, mains) {
                 // A mains line keeps its line reading and loses what only a resonance has.
                 reading.line_frequency = self.lines.frequency(peak.index);
-                reading.interpolated = None;
-                reading.bound = None;
+                reading.between = None;
                 reading.damping_ratio = None;
                 reading.damping_std = None;
                 reading.label = Some(label);

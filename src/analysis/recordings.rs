@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorDescription, SensorKind,
+    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorKind,
     TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
@@ -165,8 +165,8 @@ fn conditions(test: &TestDescription, description: &RecordingDescription) -> Con
     }
     Conditions {
         tap: description.tap,
-        sensor_positions: test.sensors.iter().filter_map(place).collect(),
-        sensor_masses: test.sensors.iter().filter_map(mass).collect(),
+        sensor_positions: positions,
+        sensor_masses: masses,
         masses: description.masses.clone(),
         torque: description.torque,
         temperature: description.temperature,

@@ -269,7 +269,7 @@ pub fn predict_described(
     joint.check()?;
     let there = jointed(structure, details).with_beam(&structure.beam);
     let frequencies = frequencies_of(&there, joint, count)?;
-    Ok(compare(&structure.beam, &frequencies, (&[], &[])))
+    Ok(compare(&structure.beam, &frequencies, &[], &[]))
 }
 
 /// The first natural frequencies (Hz) of a structure on this joint, non-dimensional by its beam.

@@ -124,7 +124,7 @@ impl Beam {
         lambda * lambda * self.unit_frequency()
     }
 
-    /// How slender the beam is for the given theory.
+    /// Returns how slender the beam is for the given theory.
     pub fn slenderness(&self, theory: BeamTheory) -> Slenderness {
         match theory {
             BeamTheory::Euler => Slenderness::EULER,
@@ -138,7 +138,7 @@ impl Beam {
     }
 }
 
-/// How much rotary inertia and shear matter: the two numbers in which a Timoshenko beam differs
+/// Shares of rotary inertia and shear: the two numbers in which a Timoshenko beam differs
 /// from an Euler beam. Both are zero for the latter, and neither depends on the modulus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slenderness {
@@ -155,7 +155,7 @@ impl Slenderness {
         shear: 0.0,
     };
 
-    /// Of a piece of the same beam, `fraction` (1) of its length long.
+    /// Returns the slenderness of a piece of the same beam, `fraction` (1) of its length long.
     pub fn of_piece(&self, fraction: f64) -> Self {
         let scale = fraction.powi(-2);
         Self {
@@ -164,7 +164,7 @@ impl Slenderness {
         }
     }
 
-    /// Whether the plain Euler functions apply.
+    /// Returns true where the plain Euler functions apply.
     pub fn is_euler(&self) -> bool {
         self.rotary == 0.0 && self.shear == 0.0
     }

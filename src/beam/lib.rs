@@ -38,13 +38,13 @@ pub use natural_modes::{
     natural_modes,
 };
 
-/// Why a question about a structure has no answer.
+/// Reason for which a question about a structure has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StructureError {
     /// A property that must be positive and finite is not.
     #[error("{quantity} is {value}, but must be positive and finite")]
     NotPositive {
-        /// Which property.
+        /// Name of the property.
         quantity: &'static str,
         /// Its value (SI).
         value: f64,
@@ -60,7 +60,7 @@ pub enum StructureError {
         "{quantity} is {value}, but a joint stiffness must be at least 0 (infinite means rigid)"
     )]
     Stiffness {
-        /// Which stiffness.
+        /// Name of the stiffness.
         quantity: &'static str,
         /// The value given (non-dimensional).
         value: f64,
@@ -73,7 +73,7 @@ pub enum StructureError {
     NotPhysical {
         /// The magnitude of the cross-coupling stiffness Kz (non-dimensional).
         kz: f64,
-        /// What it has to exceed.
+        /// Value that it has to exceed.
         limit: f64,
     },
     /// Cross coupling asked of an assembly that has none in this model.
@@ -89,31 +89,31 @@ pub enum StructureError {
     OffBeam {
         /// The position given (m).
         position: f64,
-        /// Where the structure ends (m).
+        /// End of the structure (m).
         length: f64,
     },
     /// More modes than a beam theory says anything about.
     #[error("{count} modes were asked for; at most {limit} are computed")]
     TooManyModes {
-        /// How many were asked for.
+        /// Number asked for.
         count: usize,
-        /// How many are allowed.
+        /// Number allowed.
         limit: usize,
     },
     /// A part of a specimen that cannot exist.
     #[error("{quantity} is {value}: {remedy}")]
     Unphysical {
-        /// Which quantity.
+        /// Name of the quantity.
         quantity: &'static str,
         /// The value given (SI).
         value: f64,
-        /// What it has to be.
+        /// Condition that it has to meet.
         remedy: &'static str,
     },
     /// A finite-element model that cannot be solved.
     #[error("the finite-element model cannot be solved: {reason}")]
     FiniteElements {
-        /// What went wrong and what helps.
+        /// Cause and advice.
         reason: String,
     },
 }

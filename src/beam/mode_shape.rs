@@ -22,7 +22,7 @@ pub struct ModeShape {
     piece: Piece,
 }
 
-/// The first `count` mode shapes of an Euler beam, ascending in frequency. Rigid-body modes are
+/// Returns the first `count` mode shapes of an Euler beam, ascending in frequency. Rigid-body modes are
 /// left out. The free end (of a lap joint or free beam the right end) moves to the positive side.
 ///
 /// # Errors
@@ -35,19 +35,19 @@ pub fn mode_shapes(
 ) -> Result<Vec<ModeShape>, StructureError> {
     beam.check()?;
     let modes = natural_modes(assembly, joint, &Slenderness::EULER, count)?;
-    let shape = |mode: &NaturalMode| ModeShape {
+    let shapes = modes.iter().map(|mode| ModeShape {
         frequency: beam.frequency_of(mode.lambda),
         lambda: mode.lambda,
         symmetry: mode.symmetry,
         length: beam.length,
         // Both halves of a lap joint move alike, so that the whole beam's mass counts either way.
         piece: Piece::of_mode(assembly, joint, mode).scaled(beam.mass().powf(-0.5)),
-    };
-    Ok(modes.iter().map(shape).collect())
+    });
+    Ok(shapes.collect())
 }
 
 impl ModeShape {
-    /// Displacement (kg^-1/2) at `position` (m) from the joint, of a lap joint or a free beam from
+    /// Returns the displacement (kg^-1/2) at `position` (m) from the joint, of a lap joint or a free beam from
     /// the left end. Exactly at a lap joint the right half's end is meant. Off the beam the number
     /// has no meaning.
     pub fn displacement(&self, position: f64) -> f64 {
@@ -55,7 +55,7 @@ impl ModeShape {
         side * self.piece.derivative(0, x)
     }
 
-    /// Slope dw/dx (kg^-1/2 / m) at `position` (m), measured as in [`Self::displacement`].
+    /// Returns the slope dw/dx (kg^-1/2 / m) at `position` (m), measured as in [`Self::displacement`].
     pub fn slope(&self, position: f64) -> f64 {
         let (side, x) = self.place(position);
         // On the left half of a lap joint x runs towards the left.
@@ -67,7 +67,7 @@ impl ModeShape {
         side * direction * scale * self.piece.derivative(1, x)
     }
 
-    /// Sign of the piece's motion at a position, and the place on the piece (0 joint, 1 free end).
+    /// Returns the sign of the piece's motion at a position, and the place on the piece (0 joint, 1 free end).
     fn place(&self, position: f64) -> (f64, f64) {
         let x = position / self.length;
         match self.symmetry {
@@ -92,7 +92,7 @@ struct Piece {
 }
 
 impl Piece {
-    /// The shape of unit mean square, positive at the free end.
+    /// Returns the shape of unit mean square, positive at the free end.
     fn of_mode(assembly: Assembly, joint: &JointStiffness, mode: &NaturalMode) -> Self {
         let (lambda, joint) = match (assembly, mode.symmetry) {
             (Assembly::Free, _) => (mode.lambda, JointStiffness::FREE),
@@ -140,41 +140,32 @@ impl Piece {
         from_joint.mixed(second[row], &from_tip, -first[row])
     }
 
-    /// What is left of the joint's two conditions, each scaled by its largest coefficient:
+    /// Returns the rests of the joint's two conditions, each scaled by its largest coefficient:
     /// w + a W''' + c W'' = 0 and W' - b W'' - c W''' = 0 with a, b, c the joint's compliances.
     fn joint_residuals(&self, joint: &JointStiffness) -> [f64; 2] {
-        let [w0, w1, w2, w3] = [0, 1, 2, 3].map(|order| self.derivative(order, 0.0));
-        let cross = joint.cross_compliance;
-        let condition = |stiffness: f64, terms: [(f64, f64); 3]| {
+        let derivatives = [0, 1, 2, 3].map(|order| self.derivative(order, 0.0));
+        let conditions = [
+            (joint.kx, [(0, 1.0), (3, 1.0), (2, 1.0)]),
+            (joint.ky, [(1, 1.0), (2, -1.0), (3, -1.0)]),
+        ];
+        conditions.map(|(stiffness, terms)| {
             let (spring, give) = if stiffness > 1.0 {
                 (1.0, 1.0 / stiffness)
             } else {
                 (stiffness, 1.0)
             };
-            let [held, direct, crossed] = terms;
-            let weights = [spring, give, spring * cross];
-            // Derivatives grow with powers of lambda; without this a row would hide the other.
-            let size: f64 = weights
-                .iter()
-                .zip([held.1, direct.1, crossed.1])
-                .map(|(weight, power)| (weight * power).abs())
-                .sum();
-            (weights[0] * held.0 + weights[1] * direct.0 + weights[2] * crossed.0) / size
-        };
-        let powers = [1.0, self.lambda, self.lambda.powi(2), self.lambda.powi(3)];
-        [
-            condition(
-                joint.kx,
-                [(w0, powers[0]), (w3, powers[3]), (w2, powers[2])],
-            ),
-            condition(
-                joint.ky,
-                [(w1, powers[1]), (-w2, powers[2]), (-w3, powers[3])],
-            ),
-        ]
+            let weights = [spring, give, spring * joint.cross_compliance];
+            let (mut rest, mut size) = (0.0, 0.0);
+            for (weight, (order, sign)) in weights.into_iter().zip(terms) {
+                rest += weight * sign * derivatives[order];
+                // Derivatives grow with powers of lambda; without this a row would hide the other.
+                size += (weight * self.lambda.powi(order as i32)).abs();
+            }
+            rest / size
+        })
     }
 
-    /// Derivative of the given order at x, from 0 at the joint to 1 at the tip.
+    /// Returns the derivative of the given order at x, from 0 at the joint to 1 at the tip.
     fn derivative(&self, order: u8, x: f64) -> f64 {
         let (sine, cosine) = (self.lambda * x).sin_cos();
         let circular = match order % 4 {
@@ -189,7 +180,7 @@ impl Piece {
         self.lambda.powi(i32::from(order)) * (circular + falling + rising)
     }
 
-    /// Integral of the square over the piece, from the values at its ends alone:
+    /// Returns the integral of the square over the piece, from the values at its ends alone:
     /// 4 integral = W(1)^2 - (3 W W''' - W' W'')(0) / lambda^4 where the far end is free.
     fn mean_square(&self) -> f64 {
         let [w0, w1, w2, w3] = [0, 1, 2, 3].map(|order| self.derivative(order, 0.0));
@@ -201,15 +192,14 @@ impl Piece {
         self.mixed(factor, self, 0.0)
     }
 
-    /// The combination `weight` self + `other_weight` other.
+    /// Returns the combination `weight` self + `other_weight` other.
     fn mixed(&self, weight: f64, other: &Self, other_weight: f64) -> Self {
-        let mix = |a: f64, b: f64| weight * a + other_weight * b;
         Self {
             lambda: self.lambda,
-            cosine: mix(self.cosine, other.cosine),
-            sine: mix(self.sine, other.sine),
-            from_joint: mix(self.from_joint, other.from_joint),
-            from_tip: mix(self.from_tip, other.from_tip),
+            cosine: weight * self.cosine + other_weight * other.cosine,
+            sine: weight * self.sine + other_weight * other.sine,
+            from_joint: weight * self.from_joint + other_weight * other.from_joint,
+            from_tip: weight * self.from_tip + other_weight * other.from_tip,
         }
     }
 }

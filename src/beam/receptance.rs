@@ -30,7 +30,7 @@ pub struct EndFunctions {
     pub f5: f64,
     /// F6 / lambda (1): guided (no rotation) at the other end.
     pub f6: f64,
-    /// How many natural frequencies of the beam pinned at both ends lie below lambda.
+    /// Number of natural frequencies below lambda of the beam pinned at both ends.
     pub pinned_pinned_count: usize,
 }
 
@@ -45,7 +45,7 @@ impl EndFunctions {
         }
     }
 
-    /// Of an Euler beam.
+    /// Returns the end functions of an Euler beam.
     pub fn euler(lambda: f64) -> Self {
         Self::new(lambda, &Slenderness::EULER)
     }
@@ -142,20 +142,20 @@ fn sparse_series(q: f64, first: u32) -> f64 {
 /// functions themselves, whose own change with lambda is left out: it takes part in no ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EndSlopes {
-    /// Of F1/lambda^2 (1).
+    /// Derivative of F1/lambda^2 (1).
     pub f1: f64,
-    /// Of F3/lambda^4 (1).
+    /// Derivative of F3/lambda^4 (1).
     pub f3: f64,
-    /// Of F4 (1).
+    /// Derivative of F4 (1).
     pub f4: f64,
-    /// Of F5/lambda^3 (1).
+    /// Derivative of F5/lambda^3 (1).
     pub f5: f64,
-    /// Of F6/lambda (1).
+    /// Derivative of F6/lambda (1).
     pub f6: f64,
 }
 
 impl EndSlopes {
-    /// Of these end functions, which belong to a beam of this slenderness.
+    /// Returns the derivatives of these end functions, which belong to a beam of this slenderness.
     pub fn of(ends: &EndFunctions, slenderness: &Slenderness) -> Self {
         if slenderness.is_euler() {
             euler(ends)

@@ -1,4 +1,4 @@
-//! Where measurement and theory meet: joint stiffness from natural frequencies.
+//! Joint stiffness from natural frequencies: here measurement and theory meet.
 //!
 //! ```text
 //! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
@@ -9,8 +9,8 @@
 //!                      -> perturbation  how far errors in the frequencies move the estimate
 //! ```
 //!
-//! What the measurement saw, as a diagnosis compares it with predictions, is [`observation`]; which peak
-//! is which mode says [`pairing`].
+//! [`observation`] holds what the measurement saw, for a diagnosis to compare with predictions. [`pairing`]
+//! numbers the peaks.
 //!
 //! An estimate that no joint can have (negative, infinite, not positive definite) is a result with
 //! a [`Doubt`], not an error; an error means that no number exists.
@@ -38,7 +38,7 @@ pub use predict::{
 
 use tapjoint_beam::StructureError;
 
-/// Why an estimate does not exist.
+/// Reason for which an estimate does not exist.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum IdentifyError {
     /// Fewer modes than the model has unknowns and one more.
@@ -49,11 +49,11 @@ pub enum IdentifyError {
     TooFewModes {
         /// The model, in words.
         model: &'static str,
-        /// How many unknown stiffnesses it has.
+        /// Number of its unknown stiffnesses.
         unknowns: usize,
-        /// How many modes it needs.
+        /// Number of modes that it needs.
         needed: usize,
-        /// How many were given.
+        /// Number given.
         found: usize,
         /// A model that needs fewer, as the end of the sentence; empty where there is none.
         simpler: &'static str,
@@ -65,11 +65,11 @@ pub enum IdentifyError {
     Undetermined {
         /// The model, in words.
         model: &'static str,
-        /// How many unknowns it has.
+        /// Number of its unknowns.
         unknowns: usize,
         /// Rank of the regression.
         rank: usize,
-        /// What helps.
+        /// Advice.
         remedy: &'static str,
     },
     /// Fewer frequencies than unknowns.
@@ -78,9 +78,9 @@ pub enum IdentifyError {
          fewer parameters", if *.found == 1 { "frequency" } else { "frequencies" }
     )]
     TooFewFrequencies {
-        /// How many parameters are to be estimated.
+        /// Number of parameters to be estimated.
         unknowns: usize,
-        /// How many frequencies were given.
+        /// Number of frequencies given.
         found: usize,
     },
     /// Measured weights without an uncertainty to weigh by.
@@ -112,9 +112,9 @@ pub enum IdentifyError {
          take the first {limit} or less"
     )]
     TooManyPatterns {
-        /// How many modes were given.
+        /// Number of modes given.
         modes: usize,
-        /// How many are allowed.
+        /// Number allowed.
         limit: usize,
     },
     /// Two lists that belong together differ in length.

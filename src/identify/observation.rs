@@ -1,4 +1,4 @@
-//! What a test observed, as plain data: what a diagnosis compares with predictions.
+//! Observations of a test, as plain data that a diagnosis compares with predictions.
 //!
 //! One [`Configuration`] for each recording and tap level: where sensors and hammer were, how hard the
 //! taps were, and what each natural frequency, damping ratio and shape was, with the uncertainty that
@@ -14,7 +14,7 @@ pub struct Observations {
     pub configurations: Vec<Configuration>,
 }
 
-/// What was observed with sensors and tap in one place, at one tap level.
+/// Observations with sensors and tap in one place, at one tap level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
     /// File of the recording; `None` of frequencies read elsewhere.
@@ -25,7 +25,7 @@ pub struct Configuration {
     pub sensors: Vec<ObservedSensor>,
     /// Known masses that were fastened to the beam; sensors are no part of them.
     pub masses: Vec<PointMass>,
-    /// Where the hammer struck (m); `None` where nobody said.
+    /// Position of the taps (m); `None` where it is not given.
     pub tap: Option<f64>,
     /// Median peak force of the taps (N); `None` without a hammer.
     pub peak_force: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Configuration {
     pub taps: usize,
     /// Length of the decays that were fitted (s); `None` where nothing was recorded.
     pub decay_seconds: Option<f64>,
-    /// Frequencies at which resonances were looked for (Hz); `None` where nobody said.
+    /// Frequencies at which resonances were looked for (Hz); `None` where they are not given.
     pub band: Option<(f64, f64)>,
     /// The modes with a number, ascending.
     pub modes: Vec<ObservedMode>,
@@ -54,7 +54,7 @@ pub struct Configuration {
 pub struct ObservedSensor {
     /// Its name.
     pub name: String,
-    /// Where it sits in this configuration (m); `None` where nobody said.
+    /// Position in this configuration (m); `None` where it is not given.
     pub position: Option<f64>,
 }
 
@@ -81,7 +81,7 @@ pub struct ObservedMode {
     /// known of it.
     pub std: Option<f64>,
     /// Degrees of freedom of that uncertainty, for Student's t; `None` where it counts as known, was
-    /// stated, or rests on a single tap, whose scatter nobody knows (see `repeats`).
+    /// stated, or rests on a single tap, whose scatter is unknown (see `repeats`).
     pub freedom: Option<f64>,
     /// Taps whose frequencies were compared; below 3 the scatter between taps is no estimate, and the
     /// uncertainty is that of the noise alone.
@@ -98,7 +98,7 @@ pub struct ObservedMode {
     /// Displacement amplitude at the strongest sensor when the fitted decay begins (m), median of the taps;
     /// `None` without a calibrated sensor.
     pub amplitude: Option<f64>,
-    /// How frequency and damping change along the decay; `None` where they could not be followed.
+    /// Frequency and damping along the decay; `None` where they could not be followed.
     pub decay: Option<AlongDecay>,
 }
 
@@ -127,7 +127,7 @@ pub struct AlongDecay {
     pub early: DecayEnd,
     /// At the smallest amplitude, or at a tenth of the largest.
     pub late: DecayEnd,
-    /// Whether the change is one of the mode itself.
+    /// Verdict on the change.
     pub verdict: DecayVerdict,
 }
 
@@ -143,7 +143,7 @@ pub struct DecayEnd {
     pub damping: Observed,
 }
 
-/// What a change along the decay may be taken for.
+/// Verdict on a change along the decay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DecayVerdict {
     /// Frequency or damping changes with amplitude.
@@ -171,7 +171,7 @@ pub struct ExtraPeak {
     /// Modal constant at its strongest sensor (1/kg), as that of a mode; `None` without a calibrated hammer
     /// and sensor.
     pub constant: Option<f64>,
-    /// What it is ("mains 50 Hz", [`UNPAIRED`]).
+    /// Description ("mains 50 Hz", [`UNPAIRED`]).
     pub label: String,
 }
 
@@ -200,7 +200,7 @@ impl Configuration {
         self.modes.iter().find(|mode| mode.mode == number)
     }
 
-    /// Whether a resonance at this frequency (Hz) was looked for; where nobody said which were, all.
+    /// Returns true where a resonance at this frequency (Hz) was looked for: anywhere without a band.
     pub fn reaches(&self, frequency: f64) -> bool {
         self.band
             .is_none_or(|(low, high)| low <= frequency && frequency <= high)

@@ -25,7 +25,7 @@ use tapjoint_numerics::stats::NORMAL_95;
 /// known to ten digits, so that nothing measurable is lost.
 const RANK_THRESHOLD: f64 = 1e-10;
 
-/// From this closure on (1) an estimate is said not to satisfy its own frequency equation: 5 %
+/// From this closure on (1) an estimate does not satisfy its own frequency equation: 5 %
 /// in the product is about what a whole line of 800 does to the first mode.
 const CLOSURE_LIMIT: f64 = 0.05;
 
@@ -153,7 +153,7 @@ pub struct PairsEstimate {
     pub closure: Option<f64>,
     /// Largest over smallest singular value of the regression, its columns scaled to 1.
     pub condition: f64,
-    /// What speaks against the estimate.
+    /// Doubts about the estimate.
     pub doubts: Vec<Doubt>,
 }
 
@@ -368,19 +368,19 @@ pub fn single_mode_stiffness(modes: &[ModeLambda]) -> Result<Vec<SingleMode>, Id
     modes.collect()
 }
 
-/// What speaks against an estimate that exists.
+/// A doubt about an estimate that exists.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Doubt {
     /// A stiffness came out negative: no spring does that.
     Negative {
-        /// Which one ("kx" or "ky").
+        /// Name of the stiffness ("kx" or "ky").
         parameter: &'static str,
         /// Its value (1).
         value: f64,
     },
     /// A stiffness came out infinite or not a number.
     NotFinite {
-        /// Which one.
+        /// Name of the stiffness.
         parameter: &'static str,
     },
     /// The three stiffnesses belong to no joint: Kz^2 <= Kx Ky.
@@ -540,7 +540,7 @@ pub struct JointEstimate {
     pub pairs: PairsEstimate,
     /// For a lap joint: what each mode says alone; else empty.
     pub single_modes: Vec<SingleMode>,
-    /// What speaks against it.
+    /// Doubts about it.
     pub doubts: Vec<Doubt>,
 }
 
@@ -567,13 +567,8 @@ pub fn estimate_joint(
         let std = nearby.as_ref().and_then(|nearby| nearby.std_of(pick));
         pick(&pairs).map(|value| Uncertain::symmetric(value, std))
     });
-    let kz = kz.map(|kz| {
-        let of_compliance = |pairs: &PairsEstimate| pairs.kz.map(f64::recip);
-        let std = nearby
-            .as_ref()
-            .and_then(|nearby| nearby.std_of(of_compliance));
-        through_reciprocal(&kz, std)
-    });
+    let compliance_std = nearby.and_then(|nearby| nearby.std_of(|pairs| pairs.kz.map(f64::recip)));
+    let kz = kz.map(|kz| through_reciprocal(&kz, compliance_std));
     let mut doubts = pairs.doubts.clone();
     if kz.is_some_and(|kz| kz.std.is_some() && kz.low.is_none()) {
         doubts.push(Doubt::CouplingNotEstablished);
@@ -656,15 +651,14 @@ impl Nearby {
         const STEP: f64 = 1e-6;
         let mut regressions = Vec::with_capacity(modes.len());
         for (index, mode) in modes.iter().enumerate() {
-            let step = STEP * mode.frequency;
-            let mut shifted = |step: f64| {
+            let (std, step) = (mode.std?, STEP * mode.frequency);
+            let [above, below] = [step, -step].map(|step| {
                 frequencies[index] = mode.frequency + step;
                 let numbers = modes.iter().map(|mode| mode.mode);
                 estimate_pairs(model, &lambdas_of(beam, numbers, &frequencies)).ok()
-            };
-            let pair = [shifted(step)?, shifted(-step)?];
+            });
             frequencies[index] = mode.frequency;
-            regressions.push((pair, mode.std? / (2.0 * step)));
+            regressions.push(([above?, below?], std / (2.0 * step)));
         }
         Some(Self { regressions })
     }

@@ -1,4 +1,4 @@
-//! How far errors in the frequencies move an estimate.
+//! Effect of errors in the frequencies on an estimate.
 //!
 //! Generic over the estimator, a function from frequencies (Hz) to stiffnesses that may have no
 //! answer; what is asked of it: all frequencies off by one percentage, one mode off by its own
@@ -106,7 +106,7 @@ pub fn average_errors(nominal: &Stiffnesses, rows: &[UniformPerturbation]) -> Ve
         .collect()
 }
 
-/// How one mode alone moves the estimate.
+/// Effect of one mode alone on the estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModeSensitivity {
     /// Position of the mode in the list of frequencies, from 0.
@@ -117,7 +117,7 @@ pub struct ModeSensitivity {
     pub percent_per_percent: Option<Stiffnesses>,
 }
 
-/// Which mode drives which parameter, one mode at a time under its own bound (Hz).
+/// Returns the effect of each mode alone under its own bound (Hz).
 ///
 /// # Errors
 /// [`IdentifyError::Bounds`] unless there is one bound for each frequency.
@@ -182,9 +182,9 @@ pub struct SignPatternSpans {
     pub ky: Option<Span>,
     /// Span of Kz; `None` as well where its sign changes, for then it passes through infinity.
     pub kz: Option<Span>,
-    /// How many patterns were tried.
+    /// Number of patterns tried.
     pub patterns: usize,
-    /// How many of them had no estimate.
+    /// Number of those without an estimate.
     pub failed: usize,
 }
 
@@ -319,7 +319,7 @@ pub const KEPT: usize = 1000;
 pub struct MonteCarlo {
     /// Repetitions.
     pub samples: usize,
-    /// How many of them had no estimate.
+    /// Number of those without an estimate.
     pub failed: usize,
     /// Kx; `None` where no repetition has an estimate.
     pub kx: Option<Spread>,

@@ -18,7 +18,7 @@ pub struct PredictedMode {
     pub lambda: f64,
     /// 100 (predicted - measured)/measured (%).
     pub error_percent: Option<f64>,
-    /// Whether the measured frequency entered the estimate of the joint.
+    /// True where the measured frequency entered the estimate of the joint.
     pub used: bool,
 }
 
@@ -85,7 +85,7 @@ pub fn predict_lambdas(
 
 // A free beam has no joint: its natural frequencies check modulus and density.
 
-/// What the natural frequencies of a free beam say about its material.
+/// Material of a free beam by its natural frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeBeamEstimate {
     /// Numbers of the modes used.
@@ -95,7 +95,7 @@ pub struct FreeBeamEstimate {
     /// Modulus (Pa) by least squares of the relative frequency errors, at the stated density.
     pub modulus: Uncertain,
     /// Density (kg/m3) that explains the same frequencies at the stated modulus instead: only
-    /// the ratio of both can be told from frequencies.
+    /// the ratio of both follows from frequencies.
     pub density: Uncertain,
 }
 

@@ -109,7 +109,7 @@ impl Default for Settings {
     }
 }
 
-/// Why a search ended.
+/// Reason for which a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopReason {
     /// The linear model promises no noticeable decrease of the cost.
@@ -140,7 +140,7 @@ pub struct Minimum<S> {
     pub parameters: Vec<f64>,
     /// The state at the parameters.
     pub state: S,
-    /// Why the search ended here.
+    /// Reason for which the search ended here.
     pub stop: StopReason,
 }
 
@@ -482,7 +482,7 @@ fn triangularise(matrix: &mut DMatrix<f64>) {
     }
 }
 
-/// How large misfits count.
+/// Weight of large misfits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Loss {
     /// By their square: right for normally distributed errors.

@@ -162,7 +162,7 @@ impl EffectId {
             })
     }
 
-    /// Where it sits.
+    /// Returns the place where it sits.
     pub fn place(self) -> Place {
         match self {
             Self::SensorMass | Self::SensorCable => Place::Sensor,
@@ -182,7 +182,7 @@ impl EffectId {
         }
     }
 
-    /// Its group.
+    /// Returns its group.
     pub fn group(self) -> Group {
         match self {
             Self::Modulus | Self::Length | Self::Timebase => Group::Scale,
@@ -191,7 +191,7 @@ impl EffectId {
         }
     }
 
-    /// What it is, in half a sentence.
+    /// Describes it in half a sentence.
     pub fn meaning(self) -> &'static str {
         match self {
             Self::SensorMass => "the accelerometers load the beam with their mass",
@@ -216,7 +216,7 @@ impl EffectId {
 
 // Parameters of the effects: their ranges and typical sizes.
 
-/// How the size of a parameter is best divided.
+/// Division of a parameter's range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterScale {
     /// Both signs, or a place: in equal steps.
@@ -245,7 +245,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Its SI unit; empty for a pure number.
+    /// Returns its SI unit; empty for a pure number.
     pub fn unit(self) -> &'static str {
         match self {
             Self::None => "",
@@ -266,13 +266,13 @@ pub struct ParameterInfo {
     pub name: &'static str,
     /// Its dimension.
     pub dimension: Dimension,
-    /// What it is.
+    /// Description.
     pub meaning: &'static str,
     /// Lowest possible value (SI).
     pub lowest: f64,
     /// Highest possible value (SI); of a position the end of the beam limits it further.
     pub highest: f64,
-    /// How to divide its range.
+    /// Division of its range.
     pub scale: ParameterScale,
     /// Value where none is given (SI): typical in size. `None` = it must be given.
     pub typical: Option<f64>,
@@ -473,7 +473,7 @@ const RESOLUTION: &[ParameterInfo] = &[signed(
 )];
 
 impl EffectId {
-    /// Its parameters, the one that measures its size first.
+    /// Returns its parameters, the one that measures its size first.
     pub fn parameters(self) -> &'static [ParameterInfo] {
         match self {
             Self::SensorMass => SENSOR_MASS,

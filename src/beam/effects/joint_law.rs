@@ -13,7 +13,7 @@
 use statrs::function::gamma::gamma;
 use std::f64::consts::PI;
 
-/// How a joint's rotational stiffness depends on the amplitude of its rotation.
+/// Dependence of a joint's rotational stiffness on the amplitude of its rotation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLaw {
     /// Relative change of the secant stiffness at the hardest tap's amplitude (1).
@@ -59,12 +59,12 @@ impl JointLaw {
         1.0 + self.ratio * relative_amplitude.powf(self.exponent)
     }
 
-    /// Relative change of the stiffness that one mode feels while others move the joint too.
+    /// Returns the relative change of the stiffness that one mode feels while others move the joint too.
     ///
     /// Elastic: (A^2 + 2 sum B^2)^{p/2}, exact for the cubic spring, where another motion counts twice
     /// (R = (p + 2)/2 of a small motion beside a large one); within 6 % for powers from 1/2 on.
     /// Micro-slip: (A + (sum (w B)^{3/2})^{2/3})^p. Several others seldom reach their crests together, and
-    /// nobody reaches less than the root of the squares; the power 3/2 lies between. Against sliders in
+    /// none reaches less than the root of the squares; the power 3/2 lies between. Against sliders in
     /// parallel the change comes out within 13 % for two motions, and with a scatter of 13 % for three and four.
     pub fn change_among(&self, own: ModeMotion, others: impl Iterator<Item = ModeMotion>) -> f64 {
         let p = self.exponent;
@@ -75,15 +75,15 @@ impl JointLaw {
             }
             JointLawKind::MicroSlip => {
                 let limits = self.slip_limits();
-                let part = |other: ModeMotion| other.amplitude * slip_weight(limits, own, other);
-                let sum: f64 = others.map(|other| part(other).powf(1.5)).sum();
+                let parts = others.map(|other| other.amplitude * slip_weight(limits, own, other));
+                let sum: f64 = parts.map(|part| part.powf(1.5)).sum();
                 own.amplitude + sum.powf(2.0 / 3.0)
             }
         };
         self.ratio * size.powf(p)
     }
 
-    /// Weights of a slower and a faster motion that is much larger than the own one.
+    /// Returns the weights of a slower and a faster motion that is much larger than the own one.
     ///
     /// With D the describing function, one motion alone changes the stiffness by c D A^p. A faster one of
     /// amplitude B lets every slider slip that is weaker than B, and the slow motion finds c (p + 1) B^p. On
@@ -93,11 +93,11 @@ impl JointLaw {
     fn slip_limits(&self) -> [f64; 2] {
         let p = self.exponent;
         let alone = self.describing_function();
-        let mean = gamma(p + 0.5) / (PI.sqrt() * gamma(p + 1.0));
+        let mean = gamma_ratio(p) / PI.sqrt();
         [mean, 1.0].map(|share| ((p + 1.0) * share / alone).powf(p.recip()))
     }
 
-    /// Loss factor over the change of the stiffness (1): 4 p/(pi (p + 2) D), D being the describing function;
+    /// Returns the loss factor over the change of the stiffness (1): 4 p/(pi (p + 2) D), D being the describing function;
     /// 0 for a conservative spring. Of one mode by itself exact for small changes; others share in the
     /// sliders' slip.
     pub fn loss_over_change(&self) -> f64 {
@@ -124,8 +124,7 @@ impl JointLaw {
             }
             // With s = sin^2(t/2): (4/pi) integral of s^(p+1) (2 s - 1) from 0 to pi.
             JointLawKind::MicroSlip => {
-                let mean = |q: f64| gamma(q + 0.5) / gamma(q + 1.0);
-                4.0 / PI.sqrt() * (2.0 * mean(p + 2.0) - mean(p + 1.0))
+                4.0 / PI.sqrt() * (2.0 * gamma_ratio(p + 2.0) - gamma_ratio(p + 1.0))
             }
         }
     }
@@ -170,10 +169,16 @@ impl JointLaw {
     }
 }
 
-/// Weight of another motion's amplitude in what a mode feels of sliders, between 0 and its limit: what
-/// counts is which of the two velocities turns about. Steepness and place of the transition follow sliders
+/// Returns Gamma(q + 1/2)/Gamma(q + 1): sqrt(pi) times the mean of sin^{2q} over a cycle.
+fn gamma_ratio(q: f64) -> f64 {
+    gamma(q + 0.5) / gamma(q + 1.0)
+}
+
+/// Returns the weight of another motion's amplitude among what a mode feels of sliders, between 0 and its
+/// limit. It depends on which of the two velocities turns about. Steepness and place of the transition follow sliders
 /// in parallel under two motions (velocities 0.01 to 100 to one).
-fn slip_weight([slower, faster]: [f64; 2], own: ModeMotion, other: ModeMotion) -> f64 {
+fn slip_weight(limits: [f64; 2], own: ModeMotion, other: ModeMotion) -> f64 {
+    let [slower, faster] = limits;
     let velocities = own.amplitude * own.omega / (other.amplitude * other.omega).max(1e-300);
     if other.omega > own.omega {
         faster / (1.0 + 1.9 * velocities)

@@ -1,4 +1,4 @@
-//! What a model may be missing: the catalogue of effects, and what each does to a specimen.
+//! Effects that a model may be missing: their catalogue, and what each does to a specimen.
 //!
 //! Each effect's physics is defined here once; whoever simulates and whoever diagnoses use the same.
 //!
@@ -13,7 +13,7 @@ use crate::specimen::{Base, Hinge, PointMass, PointSpring, Specimen};
 pub use catalogue::{Dimension, EffectId, Group, ParameterInfo, ParameterScale, Place};
 pub use joint_law::{JointLaw, JointLawKind, ModeMotion};
 
-/// Why an effect cannot be had.
+/// Reason for which an effect cannot be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EffectError {
     /// No effect of that name.
@@ -53,7 +53,7 @@ pub enum EffectError {
         effect: &'static str,
         /// The parameter.
         name: &'static str,
-        /// What it is.
+        /// Description of the parameter.
         meaning: &'static str,
     },
     /// A value outside its range.
@@ -96,7 +96,7 @@ fn nearest_name(given: &str, known: &[&'static str]) -> Option<&'static str> {
 /// An effect of a certain size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// Which.
+    /// The effect.
     pub id: EffectId,
     /// In the order of [`EffectId::parameters`].
     values: Vec<f64>,
@@ -143,7 +143,7 @@ impl Effect {
         Self::from_pairs(id, &pairs)
     }
 
-    /// The same effect with another value (SI) of one parameter.
+    /// Returns the effect with another value (SI) of one parameter.
     ///
     /// # Errors
     /// [`EffectError`] for an unknown name or a value outside its range.
@@ -161,19 +161,14 @@ impl Effect {
             .map(|(_, value)| value)
     }
 
-    /// Its parameters with their values (SI).
+    /// Returns its parameters with their values (SI).
     pub fn values(&self) -> impl Iterator<Item = (&'static ParameterInfo, f64)> + '_ {
         self.id.parameters().iter().zip(self.values.iter().copied())
-    }
-
-    /// Returns first and second value; every effect has one, 0 stands for a second that does not exist.
-    fn sizes(&self) -> [f64; 2] {
-        [self.values[0], self.values.get(1).copied().unwrap_or(0.0)]
     }
 }
 
 impl EffectId {
-    /// Its parameter of that name.
+    /// Returns its parameter of that name.
     ///
     /// # Errors
     /// [`EffectError::UnknownParameter`], with the name that comes nearest.
@@ -235,7 +230,7 @@ impl Default for Circumstances<'_> {
     }
 }
 
-/// What is seen of a specimen.
+/// A specimen as it is seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// The specimen with all effects.
@@ -247,7 +242,7 @@ pub struct Seen {
     /// Loss factor of the joint beyond the nominal (1); half of it times the joint's share of a
     /// mode's strain energy is added to the mode's damping ratio.
     pub joint_loss_factor: f64,
-    /// How the joint's rotational stiffness depends on amplitude; the specimen's is the secant at
+    /// Dependence of the joint's rotational stiffness on amplitude; the specimen's is the secant at
     /// the circumstances' level.
     pub joint_law: Option<JointLaw>,
 }
@@ -259,7 +254,7 @@ impl Seen {
     }
 }
 
-/// What effects make of a nominal specimen.
+/// Applies effects to a nominal specimen.
 ///
 /// Effects add up: the order matters only where one refers to what another changes. Factors on
 /// the joint's stiffness leave the base under it as it is, since its spring is another one.
@@ -287,7 +282,8 @@ pub fn apply(effects: &[Effect], nominal: &Specimen, circumstances: &Circumstanc
 
 /// Adds one effect.
 fn add(effect: &Effect, nominal: &Specimen, circumstances: &Circumstances<'_>, seen: &mut Seen) {
-    let [first, second] = effect.sizes();
+    let first = effect.values[0];
+    let second = effect.values.get(1).copied().unwrap_or(0.0);
     let specimen = &mut seen.specimen;
     match effect.id {
         EffectId::SensorMass => {

@@ -11,7 +11,7 @@ use crate::StructureError;
 use crate::banded::BandedMatrix;
 use std::f64::consts::PI;
 
-/// Equation of a motion that does not exist.
+/// Equation of a motion that does not exist; larger than the number of any that does.
 const HELD: usize = usize::MAX;
 
 /// Equations of a specimen's motions.
@@ -551,11 +551,13 @@ impl Model {
 
     /// A vector of the equations as motions of the nodes.
     pub(crate) fn motion(&self, vector: &[f64]) -> Motion {
-        let at = |row: usize| if row == HELD { 0.0 } else { vector[row] };
+        // The equation of a motion that does not exist is behind the last one.
         let nodes = self.numbering.nodes.iter();
         Motion {
-            nodes: nodes.map(|node| node.map(at)).collect(),
-            base: self.numbering.base.map(at),
+            nodes: nodes
+                .map(|node| node.map(|row| vector.get(row).copied().unwrap_or(0.0)))
+                .collect(),
+            base: self.numbering.base.map(|row| vector[row]),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The modes of a specimen, what they say of changes to it, and of what else holds it.
+//! The modes of a specimen, of specimens that differ little from it, and of one on a suspension.
 
 use super::model::{Energies, Model, Motion};
 use super::{Mesh, Specimen};
@@ -92,7 +92,7 @@ impl SpecimenModes {
         })
     }
 
-    /// These modes, without any motions that are nearly rigid.
+    /// Returns these modes, without any motions that are nearly rigid.
     fn elastic(model: Model, mesh: Mesh, modes: Vec<Mode>) -> Self {
         let frequencies = modes.iter().map(|mode| model.frequency(mode.square));
         Self {
@@ -105,20 +105,20 @@ impl SpecimenModes {
         }
     }
 
-    /// Natural frequencies (Hz), ascending; of [`SpecimenModes::perturbed`] in the order of the modes they
+    /// Returns natural frequencies (Hz), ascending; of [`SpecimenModes::perturbed`] in the order of the modes they
     /// came from.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
     }
 
-    /// Frequencies (Hz) of the motions that only springs to the ground or the axial force keep from
+    /// Returns frequencies (Hz) of the motions that only springs to the ground or the axial force keep from
     /// being rigid: a free beam's suspension. Empty where there are none, and after
     /// [`SpecimenModes::on_suspension`], which counts them among the modes.
     pub fn suspension_frequencies(&self) -> &[f64] {
         &self.suspension
     }
 
-    /// Number of modes.
+    /// Returns the number of modes.
     pub fn len(&self) -> usize {
         self.frequencies.len()
     }
@@ -128,7 +128,7 @@ impl SpecimenModes {
         self.frequencies.is_empty()
     }
 
-    /// Displacement (1/sqrt(kg)) at a position (m).
+    /// Returns the displacement (1/sqrt(kg)) at a position (m).
     pub fn displacement(&self, mode: usize, position: f64) -> f64 {
         let place = self.model.place(position);
         let Mode { square, motion, .. } = &self.modes[mode];
@@ -137,7 +137,7 @@ impl SpecimenModes {
         (place.displacement(&ends) + square * inner) / self.model.units.mass.sqrt()
     }
 
-    /// Rotation of the cross-section (rad/m per sqrt(kg)) at a position (m): dw/dx without shear.
+    /// Returns the rotation of the cross-section (rad/m per sqrt(kg)) at a position (m): dw/dx without shear.
     pub fn slope(&self, mode: usize, position: f64) -> f64 {
         let place = self.model.place(position);
         place.rotation(&self.modes[mode].motion.ends(place.node)) / self.rotation_unit()
@@ -147,7 +147,7 @@ impl SpecimenModes {
         self.model.units.mass.sqrt() * self.model.units.length
     }
 
-    /// Deformation of the joint's springs: displacement (1/sqrt(kg)) and rotation (1/(m sqrt(kg))).
+    /// Returns the deformation of the joint's springs: displacement (1/sqrt(kg)) and rotation (1/(m sqrt(kg))).
     /// Of a lap joint right minus left; with a base, against the base.
     pub fn joint_motion(&self, mode: usize) -> [f64; 2] {
         let [w, theta] = self.model.joint_motion(&self.modes[mode].motion);
@@ -157,20 +157,20 @@ impl SpecimenModes {
         ]
     }
 
-    /// Share of the joint's springs in the strain energy (1).
+    /// Returns the share of the joint's springs in the strain energy (1).
     pub fn joint_energy_share(&self, mode: usize) -> f64 {
         // Of unit modal mass, omega^2 is twice the whole strain energy.
         self.model.joint_energy(&self.modes[mode].motion) / self.modes[mode].square
     }
 
-    /// Share of the base in the kinetic energy (1): near 1 where the mode is the base's own.
+    /// Returns the share of the base in the kinetic energy (1): near 1 where the mode is the base's own.
     pub fn base_participation(&self, mode: usize) -> f64 {
         let turn = self.modes[mode].motion.base.unwrap_or(0.0);
         let inertia = self.model.base.map_or(0.0, |base| base.inertia);
         inertia * turn * turn / self.modes[mode].energies.kinetic
     }
 
-    /// Frequencies (Hz) that Rayleigh's quotient gives for another specimen with these modes' shapes.
+    /// Returns frequencies (Hz) that Rayleigh's quotient gives for another specimen with these modes' shapes.
     ///
     /// The quotient is stationary at a mode: of another specimen that differs by a small d it is the
     /// other's frequency up to d^2, and its derivative with any parameter is the frequency's.
@@ -213,7 +213,7 @@ impl SpecimenModes {
         Model::new(other, &self.mesh.divide(&other.body))
     }
 
-    /// The modes of another specimen that differs little, in the order of these: one step of Rayleigh
+    /// Returns the modes of another specimen that differs little, in the order of these: one step of Rayleigh
     /// quotient iteration from each. A shape that is off by a small e is off by about e^3 afterwards
     /// (Parlett 1998, 4.7), so that differences over small steps are those of exact modes, for less
     /// than their price.
@@ -307,7 +307,7 @@ impl SpecimenModes {
         Ok((modes, self.loose.len() - free))
     }
 
-    /// Stiffness of specimen and suspension in the coordinates of its motions.
+    /// Returns the stiffness of specimen and suspension in the coordinates of its motions.
     fn stiffness_among(&self, basis: &[&Mode], suspension: Option<[f64; 2]>) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(basis.len(), basis.len());
         for (index, mode) in basis.iter().enumerate() {
@@ -339,7 +339,7 @@ impl SpecimenModes {
         matrix
     }
 
-    /// Rotation of the joint's spring per moment on both its ends (rad/(N m)) by all modes beyond
+    /// Returns the rotation of the joint's spring per moment on both its ends (rad/(N m)) by all modes beyond
     /// these: the sum of psi^2/omega^2, which falls too slowly to be added up. It is the static
     /// compliance less that of the modes here. A suspension does not change it, but the modes after
     /// [`Self::on_suspension`] no longer say which motions are loose: ask the modes before.
@@ -380,7 +380,7 @@ pub struct BeamModes {
 }
 
 impl BeamModes {
-    /// The lowest `count` modes of a specimen's beam. On a fixture that gives, the mode in which it
+    /// Returns the lowest `count` modes of a specimen's beam. On a fixture that gives, the mode in which it
     /// moves most is its own.
     pub(super) fn new(
         specimen: &Specimen,
@@ -390,9 +390,9 @@ impl BeamModes {
         let gives = specimen.base.is_some_and(|base| base.ratio > 0.0);
         let modes = SpecimenModes::new(specimen, count + usize::from(gives), mesh)?;
         let all = 0..modes.len();
-        let moving = |mode: &usize| modes.base_participation(*mode);
-        let fixture =
-            (all.clone().filter(|_| gives)).max_by(|a, b| moving(a).total_cmp(&moving(b)));
+        let shares = all.clone().map(|mode| modes.base_participation(mode));
+        let most = all.clone().zip(shares).max_by(|a, b| a.1.total_cmp(&b.1));
+        let fixture = most.filter(|_| gives).map(|(mode, _)| mode);
         Ok(Self {
             numbers: all.filter(|mode| Some(*mode) != fixture).collect(),
             modes,
@@ -400,7 +400,7 @@ impl BeamModes {
         })
     }
 
-    /// Modes of another specimen that differs little, by [`SpecimenModes::perturbed`]. Every mode keeps
+    /// Returns the modes of another specimen that differs little, by [`SpecimenModes::perturbed`]. Every mode keeps
     /// its number.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::problem::{
 };
 use super::result::{
     ConsistentEstimate, Correlation, EstimatedQuantity, ExtraMode, FittedMode, FlatDirection,
-    Goodness, Identifiability, Limit, NeededAccuracy, OtherMinimum, Quantity, joint_at, limit_of,
+    Goodness, Identifiability, NeededAccuracy, OtherMinimum, Quantity, joint_at, limit_of,
 };
 use super::{ConsistentSettings, Intervals, ResidualWeights};
 use crate::{IdentifyError, MeasuredMode};
@@ -103,17 +103,6 @@ impl ConsistentEstimator {
 }
 
 impl Finished<'_> {
-    /// Parameters at the end of their range.
-    fn limits(&self) -> Vec<(Parameter, Limit)> {
-        let point = &self.best.state.point;
-        let fit = self.estimator.settings.fit.iter();
-        fit.filter_map(|&parameter| {
-            let quantity = Quantity::of(parameter).first()?;
-            Some((parameter, limit_of(*quantity, point)?))
-        })
-        .collect()
-    }
-
     fn measured(&self) -> bool {
         self.estimator.settings.weights == ResidualWeights::Measured
     }
@@ -295,7 +284,7 @@ impl Finished<'_> {
         }
     }
 
-    /// Of ln Kx and ln Ky, where both are estimated and neither is at its limit.
+    /// Returns the covariance of ln Kx and ln Ky, where both are estimated and neither is at its limit.
     fn stiffness_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let both = [Quantity::Kx, Quantity::Ky];
         let fit = &self.estimator.settings.fit;
@@ -536,6 +525,10 @@ impl Finished<'_> {
             let squares: f64 = jacobian.iter().map(|row| row[column].powi(2)).sum();
             squares.sqrt() * DEAD < 1.0
         });
+        let at_limit = fit.iter().filter_map(|&parameter| {
+            let quantity = Quantity::of(parameter).first()?;
+            Some((parameter, limit_of(*quantity, &self.best.state.point)?))
+        });
         Identifiability {
             condition: largest
                 .zip(smallest)
@@ -543,7 +536,7 @@ impl Finished<'_> {
                 .filter(|condition| condition.is_finite()),
             dead: dead.copied().collect(),
             flat: flat(&singular_values, &directions, fit),
-            at_limit: self.limits(),
+            at_limit: at_limit.collect(),
             extra_modes: self.extra_modes(&jacobian, unit),
             needed: self.needed(),
             singular_values,

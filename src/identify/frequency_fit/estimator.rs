@@ -35,7 +35,7 @@ pub struct ConsistentEstimator {
 /// A fit without its intervals: what the repetitions of a Monte Carlo need.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointFit {
-    /// Where the misfit is least.
+    /// Point of least misfit.
     pub point: Point,
     /// Sum of the loss over all residuals there.
     pub misfit: f64,
@@ -44,12 +44,12 @@ pub struct PointFit {
     pub stds: Vec<Option<f64>>,
     /// Predicted frequencies (Hz).
     pub frequencies: Vec<f64>,
-    /// Why it stopped.
+    /// Reason for which the search ended.
     pub stop: StopReason,
 }
 
-/// Where repetitions of an estimate start: the minima of a first one, and the body as it belongs to
-/// the deepest of them.
+/// Start of repetitions of an estimate: the minima of a first one, and the body as it belongs to the
+/// deepest of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Neighbourhood {
     pub(super) model: Option<FrequencyModel>,
@@ -533,7 +533,7 @@ const CHUNK: usize = 256;
 /// Distribution of one quantity over the repetitions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QuantitySpread {
-    /// Which.
+    /// The quantity.
     pub quantity: Quantity,
     /// Median, in the quantity's unit.
     pub median: f64,
@@ -548,7 +548,7 @@ pub struct QuantitySpread {
 pub struct ConsistentMonteCarlo {
     /// Repetitions.
     pub samples: usize,
-    /// How many did not converge.
+    /// Number of repetitions that did not converge.
     pub failed: usize,
     /// Every estimated quantity but Kz and Ktr, which a coupling near zero makes infinite.
     pub spreads: Vec<QuantitySpread>,

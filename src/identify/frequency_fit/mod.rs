@@ -40,7 +40,7 @@ use tapjoint_beam::Joint;
 
 // What is to be estimated, and how.
 
-/// What the residuals are divided by.
+/// Divisor of the residuals.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum ResidualWeights {
     /// Each frequency's standard uncertainty.
@@ -53,15 +53,15 @@ pub enum ResidualWeights {
 /// Standard uncertainties of the beam's properties, all relative (1); `None` = taken as exact.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BeamTolerances {
-    /// Of the length.
+    /// Standard uncertainty of the length.
     pub length: Option<f64>,
-    /// Of the width.
+    /// Standard uncertainty of the width.
     pub width: Option<f64>,
-    /// Of the thickness.
+    /// Standard uncertainty of the thickness.
     pub thickness: Option<f64>,
-    /// Of the modulus.
+    /// Standard uncertainty of the modulus.
     pub modulus: Option<f64>,
-    /// Of the density.
+    /// Standard uncertainty of the density.
     pub density: Option<f64>,
 }
 
@@ -89,17 +89,17 @@ pub enum Intervals {
     Linear,
 }
 
-/// How a joint is estimated from frequencies.
+/// Settings of an estimate from frequencies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConsistentSettings {
-    /// What is estimated.
+    /// Estimated parameters.
     pub fit: Vec<Parameter>,
     /// The joint of which everything is held that is not estimated: rigid and without coupling unless
     /// known otherwise.
     pub held: Joint,
     /// Weights of the residuals.
     pub weights: ResidualWeights,
-    /// How large misfits count.
+    /// Weight of large misfits.
     pub loss: Loss,
     /// Uncertain properties of the beam: with measured weights they are estimated along with the
     /// joint, each held near its stated value. A property in `fit` has no such hold.
@@ -107,7 +107,7 @@ pub struct ConsistentSettings {
     /// The beam weighed, of a lap joint both halves together without what the overlap adds: its mass
     /// and the standard uncertainty of that (kg). With it modulus and density can be told apart.
     pub weighed_mass: Option<(f64, f64)>,
-    /// How intervals are found.
+    /// Way to the 95 % intervals.
     pub intervals: Intervals,
 }
 

@@ -220,7 +220,7 @@ pub struct ModeResponse {
 pub struct FrequencyModel {
     structure: JointedStructure,
     pub(super) body: JointedBody,
-    /// Of a free beam: lambda of each mode.
+    /// lambda of each mode of a free beam.
     free: Option<Vec<f64>>,
     /// ln of modulus, density, length, width, thickness for which the body was built.
     built_at: Point,

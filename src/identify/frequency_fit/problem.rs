@@ -10,7 +10,7 @@ use super::model::{
 use nalgebra::{DMatrix, DVector};
 use tapjoint_numerics::least_squares::{self, Linearised, Loss, Settings, minimise};
 
-/// Where a search ended.
+/// End of a search.
 pub(super) type Minimum = least_squares::Minimum<Evaluation>;
 
 /// Settings of a search to the last digits. Misfits are relative: without stated uncertainties they may

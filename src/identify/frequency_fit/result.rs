@@ -1,4 +1,4 @@
-//! What an estimate says, as plain data.
+//! The result of a frequency fit, as plain data.
 
 use super::model::{PARAMETERS, Parameter, Point, log_nondimensional};
 use super::problem::LOG_STIFFNESS;
@@ -22,14 +22,14 @@ pub enum Limit {
 /// One estimated number with all that is known of its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimatedQuantity {
-    /// Which.
+    /// The quantity.
     pub quantity: Quantity,
     /// Best value, in the quantity's unit; `None` where it is infinite.
     pub value: Option<f64>,
     /// Standard uncertainty to first order; `None` without stated uncertainties or where nothing
     /// is known.
     pub std: Option<f64>,
-    /// The same scaled by the misfit: where the misfit is larger than the stated uncertainties
+    /// Standard uncertainty scaled by the misfit: where the misfit is larger than the stated uncertainties
     /// allow, and wherever none are stated.
     pub std_scaled: Option<f64>,
     /// Lower end of the 95 % interval; `None` = unknown or unbounded.
@@ -39,11 +39,11 @@ pub struct EstimatedQuantity {
     /// The 95 % interval with the misfit for uncertainty, where `std_scaled` exists; not of Kz and Ktr,
     /// which have it by way of the coupling.
     pub scaled: Option<(f64, f64)>,
-    /// Where the interval has no upper end: "at least", which is its lower end.
+    /// Lower end of an interval without upper end: "at least".
     pub at_least: Option<f64>,
-    /// Where the interval has no lower end: "at most", likewise.
+    /// Upper end of an interval without lower end: "at most".
     pub at_most: Option<f64>,
-    /// Where the best value is at the end of the range.
+    /// End of the range that the best value has reached.
     pub limit: Option<Limit>,
 }
 
@@ -71,7 +71,7 @@ pub struct FittedMode {
     pub error_percent: f64,
     /// (predicted - measured)/standard uncertainty (1), where that is stated.
     pub standardised: Option<f64>,
-    /// How much of this mode's freedom the fit takes (1), between 0 and 1: near 1 the estimate
+    /// Share of this mode's freedom that the fit takes (1), between 0 and 1: near 1 the estimate
     /// follows this mode wherever it goes.
     pub leverage: f64,
 }
@@ -79,9 +79,9 @@ pub struct FittedMode {
 /// A minimum that is not the deepest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherMinimum {
-    /// Its values.
+    /// Values of the quantities.
     pub values: Vec<(Quantity, f64)>,
-    /// Its misfit: chi-squared, or the sum of squared relative errors.
+    /// Misfit: chi-squared, or the sum of squared relative errors.
     pub misfit: f64,
     /// Root-mean-square error of its frequencies (%).
     pub rms_percent: f64,
@@ -92,7 +92,7 @@ pub struct OtherMinimum {
 pub struct ConsistentEstimate {
     /// Numbers of the modes used.
     pub modes_used: Vec<usize>,
-    /// What was estimated.
+    /// Estimated parameters.
     pub fit: Vec<Parameter>,
     /// The numbers asked for, and after them the beam's uncertain properties.
     pub quantities: Vec<EstimatedQuantity>,
@@ -110,9 +110,9 @@ pub struct ConsistentEstimate {
     pub modes: Vec<FittedMode>,
     /// Other minima, the deepest first.
     pub other_minima: Vec<OtherMinimum>,
-    /// Why the search ended.
+    /// Reason for which the search ended.
     pub stop: StopReason,
-    /// What these frequencies can and cannot tell.
+    /// Report on what these frequencies determine.
     pub identifiability: Identifiability,
     /// The joint, non-dimensional.
     pub joint: JointStiffness,
@@ -278,7 +278,7 @@ pub const DOUBTFUL: f64 = 0.01;
 /// Chi-squared from which only its power of ten is of interest.
 const MOST_IN_FULL: f64 = 1e4;
 
-/// A smaller probability is told as "below" this: so far out a distribution's tail is no measurement, and the
+/// A smaller probability is written as "below" this: so far out a distribution's tail is no measurement, and the
 /// smallest of all are written as 0.
 const LEAST_PROBABILITY: f64 = 1e-12;
 
@@ -288,10 +288,10 @@ pub const HOPELESS: f64 = 1e-6;
 /// Root-mean-square misfit (1, relative, per degree of freedom) beyond which a model is in doubt
 /// where no uncertainty is stated: a beam's dimensions usually leave 1 % open.
 pub const NOTABLE_MISFIT: f64 = 0.01;
-/// The same beyond which it explains nothing: twice that, and ten times what tap tests repeat to.
+/// Misfit beyond which a model explains nothing: twice that, and ten times what tap tests repeat to.
 pub const LARGE_MISFIT: f64 = 0.02;
 
-/// What the misfit says of the model.
+/// Verdict of the misfit on the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The misfit is no larger than the uncertainties allow.
@@ -317,9 +317,9 @@ pub struct Goodness {
     pub probability: Option<f64>,
     /// Root-mean-square relative misfit of the frequencies (1).
     pub relative_misfit: f64,
-    /// The same per degree of freedom instead of per frequency; `None` without any.
+    /// Root-mean-square relative misfit per degree of freedom instead of per frequency; `None` without any.
     pub misfit_per_freedom: Option<f64>,
-    /// What follows.
+    /// Verdict that follows.
     pub verdict: Verdict,
 }
 
@@ -436,12 +436,12 @@ pub struct FlatDirection {
     pub words: String,
 }
 
-/// What one more mode would bring.
+/// Gain from one more mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExtraMode {
-    /// Its number.
+    /// Number of the mode.
     pub mode: usize,
-    /// Where it is predicted (Hz).
+    /// Predicted frequency (Hz).
     pub frequency: f64,
     /// Relative standard uncertainty (1) assumed for it: the median of the measured ones.
     pub relative_std: f64,
@@ -453,7 +453,7 @@ pub struct ExtraMode {
 /// From what accuracy of all frequencies on a parameter is measurable to 10 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeededAccuracy {
-    /// Which parameter; the coupling is measurable when its standard uncertainty is 0.1.
+    /// The parameter; the coupling is measurable when its standard uncertainty is 0.1.
     pub parameter: Parameter,
     /// Relative standard uncertainty (1) of every frequency that does; `None` where none does.
     pub relative_std: Option<f64>,
@@ -473,8 +473,8 @@ pub struct Identifiability {
     pub flat: Vec<FlatDirection>,
     /// Parameters at the end of their range.
     pub at_limit: Vec<(Parameter, Limit)>,
-    /// What the missing modes below the highest and the next above it would bring.
+    /// Gains from the missing modes below the highest and from the next above it.
     pub extra_modes: Vec<ExtraMode>,
-    /// What accuracy each parameter asks for.
+    /// Accuracy that each parameter needs.
     pub needed: Vec<NeededAccuracy>,
 }

@@ -140,7 +140,7 @@ fn align(
 // to nothing. All lie within the model's discrepancy of the mode, so that frequencies do not tell them
 // apart, and the shape of a weak pole is as good as any direction.
 
-/// How strongly one recording saw a peak.
+/// Strength of a peak in one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PeakStrength {
     /// Energy of its fitted oscillation (a unit that all peaks of the recording share); `None` without

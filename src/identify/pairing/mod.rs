@@ -1,4 +1,4 @@
-//! Which measured frequency is which mode.
+//! From measured frequencies to numbers of modes.
 //!
 //! A structure without a joint is known but for a common factor, and its peaks are paired by frequency
 //! ([`crate::predict::pair_by_ratio`]). With a joint the natural frequencies themselves are unknown, so that pairing and
@@ -33,9 +33,9 @@ pub struct MeasuredPeak {
     pub frequency: f64,
     /// Its standard uncertainty (Hz), where known.
     pub std: Option<f64>,
-    /// What sensors saw of its shape; empty where places or amplitudes are unknown.
+    /// Values of its shape at the sensors; empty where places or amplitudes are unknown.
     pub shape: Vec<ShapeAt>,
-    /// How strongly each recording saw it, in the same order for all peaks, `None` where it did not;
+    /// Strength in each recording, in the same order for all peaks, `None` where it did not;
     /// empty where that is unknown.
     pub strengths: Vec<Option<PeakStrength>>,
 }
@@ -56,7 +56,7 @@ pub struct ShapeAt {
     pub group: usize,
 }
 
-/// What pairing knows of the test.
+/// Knowledge of the test that pairing uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairingSettings {
     /// Stiffnesses of the joint that are estimated: two by default; those not named are held.
@@ -66,7 +66,7 @@ pub struct PairingSettings {
     pub held: [Option<f64>; 3],
     /// Bands (Hz) in which peaks were looked for: everywhere from 0 on.
     pub bands: Vec<(f64, f64)>,
-    /// What the model misses of a frequency, relative: 1.5 %, what a beam's stated dimensions, its
+    /// Error of the model in a frequency, relative: 1.5 %, what a beam's stated dimensions, its
     /// sensor's place and two springs for a joint usually leave (1 % and less in published tests). The
     /// tails are those of Student's t with 4 degrees of freedom: one mode may be off by 5 %.
     pub discrepancy: f64,
@@ -93,22 +93,22 @@ pub struct Numbering {
     pub numbers: Vec<Option<usize>>,
     /// Modes below the highest numbered one that no peak is, and whether each could have been seen.
     pub missing: Vec<MissingMode>,
-    /// How much less probable it is than the best (1 for that).
+    /// Probability of the best over its own (1 for the best).
     pub odds: f64,
 }
 
 /// A mode without a peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MissingMode {
-    /// Its number.
+    /// Number of the mode.
     pub mode: usize,
-    /// Its frequency with the best joint (Hz).
+    /// Frequency with the best joint (Hz).
     pub frequency: f64,
-    /// Why it has no peak, if that is known.
+    /// Reason for which it has no peak, if that is known.
     pub cause: MissingCause,
 }
 
-/// Why a mode may have no peak.
+/// Reason for which a mode may have no peak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MissingCause {
     /// It lies outside the bands.

@@ -8,7 +8,7 @@ mod units;
 
 /// Standard acceleration of free fall (m/s2), the "g" of accelerometers (exact by definition).
 pub const STANDARD_GRAVITY: f64 = 9.80665;
-/// What kind of quantity a text is read as.
+/// Kind of quantity that a text is read as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dimension {
     /// Length or displacement (m).
@@ -78,7 +78,7 @@ impl Dimension {
         Self::ForceSensitivity,
     ];
 
-    /// The quantity in words, with its article: "a length".
+    /// Returns the quantity in words, with its article: "a length".
     pub fn in_words(self) -> &'static str {
         match self {
             Self::Length => "a length",
@@ -104,7 +104,7 @@ impl Dimension {
         }
     }
 
-    /// The SI unit as messages write it; empty for a ratio.
+    /// Returns the SI unit as messages write it; empty for a ratio.
     pub fn si_unit(self) -> &'static str {
         match self {
             Self::Ratio => "",
@@ -116,12 +116,12 @@ impl Dimension {
         }
     }
 
-    /// The symbols this dimension accepts, SI unit first (a ratio has none).
+    /// Returns the symbols this dimension accepts, SI unit first (a ratio has none).
     pub fn allowed_units(self) -> impl Iterator<Item = &'static str> {
         units::units_of(self).iter().map(|unit| unit.symbol)
     }
 
-    /// How many SI units one of `symbol` is, or `None` when it is no unit of this dimension or a
+    /// Returns how many SI units one of `symbol` is, or `None` when it is no unit of this dimension or a
     /// temperature scale with another zero.
     pub fn factor(self, symbol: &str) -> Option<f64> {
         self.find(&normalise(symbol))
@@ -134,23 +134,17 @@ impl Dimension {
             .iter()
             .find(|unit| unit.symbol == normalised)
     }
-
-    fn of_unit(normalised: &str) -> Option<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|dimension| dimension.find(normalised).is_some())
-    }
 }
 
-/// Why a text is not the quantity asked for.
+/// Reason for which a text is not the quantity asked for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum QuantityError {
     /// It does not begin with a number.
-    #[error("\"{text}\" does not begin with a number; {} is wanted, such as \"1.5 {}\"", expected.in_words(), example_unit(*expected))]
+    #[error("\"{text}\" does not begin with a number; {} is wanted, such as \"1.5 {}\"", expected.in_words(), expected.allowed_units().next().unwrap_or_default())]
     NoNumber {
         /// The text.
         text: String,
-        /// What was wanted.
+        /// Dimension that was wanted.
         expected: Dimension,
     },
     /// A decimal comma.
@@ -158,7 +152,7 @@ pub enum QuantityError {
     DecimalComma {
         /// The text.
         text: String,
-        /// The same with a point.
+        /// The text with a point.
         corrected: String,
     },
     /// A number too large for 64-bit floating point.
@@ -172,31 +166,25 @@ pub enum QuantityError {
     WrongDimension {
         /// The text.
         text: String,
-        /// What the unit measures.
+        /// Dimension of the unit.
         found: Dimension,
-        /// What was wanted.
+        /// Dimension that was wanted.
         expected: Dimension,
     },
-    /// Nobody knows this unit.
+    /// The unit is unknown.
     #[error("\"{text}\" has the unknown unit \"{unit}\"; units allowed for {}: {}", expected.in_words(), unit_list(*expected))]
     UnknownUnit {
         /// The text.
         text: String,
-        /// Its unit.
+        /// The unknown unit.
         unit: String,
-        /// What was wanted.
+        /// Dimension that was wanted.
         expected: Dimension,
     },
 }
 
 fn unit_list(dimension: Dimension) -> String {
     dimension.allowed_units().collect::<Vec<_>>().join(", ")
-}
-
-fn example_unit(dimension: Dimension) -> &'static str {
-    units::units_of(dimension)
-        .first()
-        .map_or("", |unit| unit.symbol)
 }
 
 /// Reads a number with an optional unit as the SI value of `dimension`; without a unit the number
@@ -226,10 +214,22 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     let si = if symbol.is_empty() {
         value
     } else {
-        let unit = dimension
-            .find(&symbol)
-            .ok_or_else(|| wrong_unit(trimmed, unit, dimension))?;
-        value * unit.factor + unit.offset
+        let Some(known) = dimension.find(&symbol) else {
+            let mut others = Dimension::ALL.into_iter();
+            return Err(match others.find(|other| other.find(&symbol).is_some()) {
+                Some(found) => QuantityError::WrongDimension {
+                    text: trimmed.into(),
+                    found,
+                    expected: dimension,
+                },
+                None => QuantityError::UnknownUnit {
+                    text: trimmed.into(),
+                    unit: unit.trim().into(),
+                    expected: dimension,
+                },
+            });
+        };
+        value * known.factor + known.offset
     };
     if si.is_finite() {
         Ok(si)
@@ -240,48 +240,36 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     }
 }
 
-fn wrong_unit(text: &str, unit: &str, expected: Dimension) -> QuantityError {
-    let text = text.into();
-    match Dimension::of_unit(&normalise(unit)) {
-        Some(found) => QuantityError::WrongDimension {
-            text,
-            found,
-            expected,
-        },
-        None => QuantityError::UnknownUnit {
-            text,
-            unit: unit.trim().into(),
-            expected,
-        },
-    }
-}
-
 /// Splits "-1.5e3 mm" into its number and what follows. An "e" belongs to the number only when
 /// digits follow it. "inf" and "nan" are no numbers here.
 fn split_number(text: &str) -> (&str, &str) {
     let bytes = text.as_bytes();
-    let digits = |mut at: usize| {
-        while bytes
-            .get(at)
-            .is_some_and(|b| b.is_ascii_digit() || *b == b'_')
-        {
-            at += 1;
-        }
-        at
-    };
-    let sign = |at: usize| at + usize::from(matches!(bytes.get(at), Some(b'+' | b'-')));
-    let mut end = digits(sign(0));
+    let mut end = after_digits(bytes, after_sign(bytes, 0));
     if bytes.get(end) == Some(&b'.') {
-        end = digits(end + 1);
+        end = after_digits(bytes, end + 1);
     }
     if matches!(bytes.get(end), Some(b'e' | b'E')) {
-        let exponent = sign(end + 1);
-        if digits(exponent) > exponent {
-            end = digits(exponent);
+        let exponent = after_sign(bytes, end + 1);
+        let last = after_digits(bytes, exponent);
+        if last > exponent {
+            end = last;
         }
     }
     // Only ASCII bytes were passed over, so `end` lies between characters.
     text.split_at_checked(end).unwrap_or((text, ""))
+}
+
+/// Returns the place behind a sign, if there is one.
+fn after_sign(bytes: &[u8], at: usize) -> usize {
+    at + usize::from(matches!(bytes.get(at), Some(b'+' | b'-')))
+}
+
+/// Returns the place behind digits, if there are any.
+fn after_digits(bytes: &[u8], at: usize) -> usize {
+    let rest = bytes.get(at..).unwrap_or_default().iter();
+    at + rest
+        .take_while(|b| b.is_ascii_digit() || **b == b'_')
+        .count()
 }
 
 /// Brings a unit into the spelling of the tables: "N·m / rad" and "N*m/rad" become "Nm/rad",

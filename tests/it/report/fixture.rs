@@ -419,6 +419,7 @@ fn band_search(band: [f64; 2]) -> BandSearch {
                 share: 0.5,
                 participation: Vec::new(),
                 shape: Vec::new(),
+                above_noise_db: 40.0,
             })
             .collect(),
     }

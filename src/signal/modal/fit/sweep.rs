@@ -243,7 +243,14 @@ impl<'a> Sweeper<'a> {
             }
         }
         if let Some((index, reason)) = refused {
-            self.give_up(members, index, reason);
+            // Two starts within a line are one resonance, of which the later one goes.
+            let line = self.data.resolution() / self.data.spacing();
+            let start = self.modes[index].start.im;
+            let later = members.iter().copied().filter(|&other| {
+                other >= index && (self.modes[other].start.im - start).abs() < line
+            });
+            let last = later.max().unwrap_or(index);
+            self.give_up(members, last, reason);
             return f64::INFINITY;
         }
         if most.is_nan() { f64::INFINITY } else { most }

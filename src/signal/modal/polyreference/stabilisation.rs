@@ -360,8 +360,18 @@ fn reduced_matrix(
         numerator
             .solve_lower_triangular_mut(&mut mixed)
             .then_some(())?;
-        // Y^H Y with Y = L^{-1} S is S^H R^{-1} S.
-        reduced -= mixed.ad_mul(&mixed);
+        // Y^H Y with Y = L^{-1} S is S^H R^{-1} S; one side of the diagonal gives the other.
+        let left: Vec<&[Complex64]> = mixed.as_slice().chunks_exact(powers).collect();
+        for q in 0..columns {
+            for p in 0..=q {
+                let pairs = left[p].iter().zip(left[q]);
+                let product: Complex64 = pairs.map(|(a, b)| a.conj() * b).sum();
+                reduced[(p, q)] -= product;
+                if p != q {
+                    reduced[(q, p)] -= product.conj();
+                }
+            }
+        }
     }
     Some(reduced)
 }

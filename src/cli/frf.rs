@@ -295,7 +295,7 @@ fn analyse_recording(arguments: &FrfArguments, hammer: &ChannelRef) -> anyhow::R
         responses.push((channel, response));
     }
     let wiring = Wiring {
-        hammer,
+        hammer: Some(hammer),
         hammer_unit,
         responses,
     };

@@ -14,7 +14,7 @@ use tapjoint::pipeline::{
 };
 use tapjoint::recording::{Channel, Recording};
 use tapjoint::simulate::{TapTestSettings, observed_modes, simulate_tap_test};
-use tapjoint::structure::specimen::PointMass;
+use tapjoint::structure::specimen::{LapOverlap, PointMass};
 use tapjoint::structure::{Assembly, Beam, BeamTheory, JointStiffness, mode_shapes};
 
 const KX: f64 = 1400.0;

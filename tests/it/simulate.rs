@@ -330,8 +330,8 @@ fn recover_the_frequency_response_from_a_quiet_test() {
         assert!(
             (reading.frequency - mode.frequency).abs() < 1e-3 * lines.spacing
                 || reading
-                    .bound
-                    .is_some_and(|bound| (reading.frequency - mode.frequency).abs() < bound),
+                    .between
+                    .is_some_and(|read| (reading.frequency - mode.frequency).abs() < read.bound),
             "{} for {} Hz",
             reading.frequency,
             mode.frequency

@@ -3,7 +3,6 @@
 use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
 use tapjoint::description::{JointModel, SensorKind};
 use tapjoint::modal::polyreference::{
     BandSearch, PoleStability, PolyreferenceMode, StabilisationPole, SubBand,
@@ -361,20 +360,9 @@ fn measured(file: &str, band: [f64; 2], modes: std::ops::Range<usize>) -> Record
 /// A resonance that stands on its line.
 pub fn mode_reading(frequency: f64, half_line: f64, prominence_db: f64) -> ModeReading {
     ModeReading {
-        frequency,
         source: modal::ReadBy::Interpolated,
-        interval: (frequency, frequency),
-        line_frequency: frequency,
-        half_line,
-        interpolated: Some(frequency),
-        bound: None,
-        std: None,
-        damping_ratio: None,
-        damping_std: None,
         prominence_db: Some(prominence_db),
-        above_noise_db: None,
-        label: None,
-        fit: None,
+        ..ModeReading::on_line(frequency, half_line)
     }
 }
 

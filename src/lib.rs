@@ -58,12 +58,13 @@
 //! let kr = joint.kr.ok_or("the frequencies do not determine the rotational stiffness")?;
 //! println!("Kr = {:.0} N m/rad", kr.value);
 //! # assert_eq!(modes.len(), 5);
-//! # assert!(kr.value > 1000.0 && kr.value < 1400.0, "{}", kr.value);
+//! # assert!((kr.value - 954.4).abs() < 5.0, "{}", kr.value);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`run_test`] does all of this for a test that a `test.toml` describes, and with the uncertainties of
-//! the estimate. [`diagnose_test`] then finds what the model lacks.
+//! The true value is 1223 N m/rad. An accelerometer of 24 g, which the model lacks, lowers the frequencies.
+//! [`run_test`] analyses a test that a `test.toml` describes, with the uncertainties of the estimate.
+//! [`diagnose_test`] then finds such a missing mass.
 
 pub mod notation;
 pub mod references;

@@ -16,8 +16,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 use tapjoint_description::{
-    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorKind,
-    TestDescription,
+    ChannelPlace, ChannelRef, ReadBy, RecordingDescription, Scale, SensorKind, TestDescription,
 };
 use tapjoint_signal::modal::fit::{Basis, Column, ModalData, modal_constants_of_frf};
 use tapjoint_signal::modal::{CompositeLevel, PeakSettings, find_peaks, read_peaks};

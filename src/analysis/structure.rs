@@ -76,10 +76,7 @@ pub fn tested_structure(test: &TestDescription) -> TestedStructure {
         known: KnownJoint {
             kx: test.joint.kt.map(|kt| kt / units.kt),
             ky: test.joint.kr.map(|kr| kr / units.kr),
-            cross_compliance: test
-                .joint
-                .ktr
-                .map(|ktr| units.ktr / ktr),
+            cross_compliance: test.joint.ktr.map(|ktr| units.ktr / ktr),
         },
     }
 }

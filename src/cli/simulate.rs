@@ -23,8 +23,8 @@ use tapjoint::recording::{WavFormat, WavLayout, WavStream};
 use tapjoint::report::format::with_minus_signs;
 use tapjoint::report::text::wrapped;
 use tapjoint::simulate::{
-    AntiAlias, Damping, JointTruth, Laboratory, RecordingTruth, TestPlan, Truth,
-    VirtualRecording, VirtualTest, nominal_description, plan_test, truth_of, wav_name,
+    AntiAlias, Damping, JointTruth, Laboratory, RecordingTruth, TestPlan, Truth, VirtualRecording,
+    VirtualTest, nominal_description, plan_test, truth_of, wav_name,
 };
 use tapjoint::study::updated_model::described_effects;
 

@@ -68,8 +68,8 @@ pub fn modes(document: &Document) -> String {
     let note = if fitted {
         // The numbered modes without a fit: " (mode 3: interpolated; mode 4: line)".
         let others = modes.iter().filter(|mode| mode.method != Some(ReadBy::Fit));
-        let others =
-            others.filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, method_name(mode.method))));
+        let others = others
+            .filter_map(|mode| Some(format!("mode {}: {}", mode.mode?, method_name(mode.method))));
         let others: Vec<String> = others.collect();
         let others = match others.is_empty() {
             true => String::new(),

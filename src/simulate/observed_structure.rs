@@ -7,9 +7,7 @@ use std::sync::Arc;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Joint, Mesh, PointMass, Specimen, SpecimenModes};
 use tapjoint_beam::{JointStiffness, StructureError};
-use tapjoint_description::described::{
-    coupling, described_beam, described_specimen,
-};
+use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after

@@ -24,7 +24,7 @@ fn val_published_frequencies_with_a_sensor_that_sat_nobody_knows_where() {
     fs::write(folder.path().join("test.toml"), text).unwrap();
     let said = flowing(&tapjoint(folder.path(), &["diagnose", "test.toml"], 0));
     for part in [
-        "There is a gap: without the 24 g of A",
+        "There is a gap: without A (24 g), whose position is not given",
         "cannot say what causes it",
         "A cross-coupling of the joint is not established",
         "To decide: ",

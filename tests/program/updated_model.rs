@@ -144,7 +144,10 @@ fn regress_effects_are_checked_where_they_are_described() {
         &["identify", "test.toml", "--frequencies", "17,118,335"],
         2,
     );
-    assert!(error.contains(":11: [[effect]]"), "{error}");
+    assert!(
+        error.contains(":11: this command does not take a description with [[effect]]"),
+        "{error}"
+    );
     let (_, error) = told(
         folder.path(),
         &["predict", "test.toml", "--kx", "1", "--ky", "1"],

@@ -1,6 +1,8 @@
 //! Tables of resonances: as read, on frequency response functions, and beside their predictions.
 
-use super::super::document::{Document, FrfSection, ModeSection, PredictionSection, ReadBy, method_name};
+use super::super::document::{
+    Document, FrfSection, ModeSection, PredictionSection, ReadBy, method_name,
+};
 use super::super::format::{
     MISSING, Rounded, bound_percent, frequency_reading, last_place, line_reading, optional,
     or_missing, rounded_digits, rounded_to, signed_percent, significant, trimmed, unit_words,

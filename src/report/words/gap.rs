@@ -79,7 +79,11 @@ fn sensors_at(document: &Document, gap: &GapSection) -> String {
     let mut sensors: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for one in recordings {
         for (name, position) in &one.conditions.sensor_positions {
-            let weighed = one.conditions.sensor_masses.get(name).is_some_and(|mass| *mass > 0.0);
+            let weighed = one
+                .conditions
+                .sensor_masses
+                .get(name)
+                .is_some_and(|mass| *mass > 0.0);
             if !(by_mass && weighed) {
                 sensors.entry(name).or_default().push(*position);
             }

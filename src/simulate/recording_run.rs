@@ -314,9 +314,9 @@ pub fn simulate_tap_test(
         let rate = settings.sample_rate;
         let first = (time * rate).ceil() as usize;
         let last = ((time + pulse) * rate) as usize;
-        for index in first..=last.min(samples.saturating_sub(1)) {
+        for (index, force) in force.iter_mut().enumerate().take(last + 1).skip(first) {
             let phase = PI * (index as f64 / rate - time) / pulse;
-            force[index] += peak * phase.sin().powi(2);
+            *force += peak * phase.sin().powi(2);
         }
         tap_times.push(time);
     }

@@ -145,9 +145,7 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 fn joint_of(specimen: &Specimen, units: &StiffnessUnits) -> Option<JointTruth> {
-    let Some(Joint { kt, kr, coupling }) = specimen.joint else {
-        return None;
-    };
+    let Joint { kt, kr, coupling } = specimen.joint?;
     // 1/Ktr = coupling/sqrt(Kt Kr).
     let ktr = kt.sqrt() * kr.sqrt() / coupling;
     Some(JointTruth {

@@ -202,6 +202,8 @@ def rate(figure):
 
 
 def figure(name, found):
+    if found["value"] is None:
+        return ""
     if name == "set_size":
         return f"{found['value']:.1f}"
     if name == "calibration_error":

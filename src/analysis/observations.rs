@@ -195,8 +195,8 @@ const USUAL_SHARE: f64 = 0.001;
 const USUAL_JOINT: [f64; 2] = [1400.0, 4.8];
 /// Stiffnesses beyond this (1) hold a beam like a wall; a search that begins further out does not move.
 const STIFFEST_START: f64 = 1e5;
-/// Start of the coupling (1) where a usual stiffness would make it, with the described Ktr, stronger than a joint can have: the
-/// search begins here (1): the end of what the diagnosis searches.
+/// Start of the coupling (1) where a usual stiffness with the described Ktr would make it stronger than a joint can
+/// have: the end of the range that the diagnosis searches.
 const STRONGEST_START: f64 = 0.95;
 
 /// Diagnoses the gap of an analysed test.

@@ -59,7 +59,8 @@ pub struct NominalSensor {
 }
 
 impl Nominal {
-    /// Returns the stated mass of a sensor (kg); 0 for one that does not touch the structure.
+    /// Returns the stated mass of a sensor (kg): 0 for one that does not touch the structure, `None` where no
+    /// mass is stated or no sensor has this name.
     fn stated_mass(&self, name: &str) -> Option<f64> {
         self.sensors.iter().find(|one| one.name == name)?.mass
     }

@@ -4,8 +4,8 @@
 //! cost + g.d + d'A d/2 with the gradient g = J'r and the Gauss-Newton curvature A = J'J, both possibly
 //! weighted for a robust loss and extended by priors. Each step solves (A + mu D) d = -g on the parameters
 //! that are not pressed against a bound. D holds the largest diagonal of A so far (Moré 1978), so that the
-//! units of the parameters do not matter. The first trial has mu = 0, which is Gauss-Newton's step; a step
-//! that does not lower the cost is tried again with ten times the damping (Levenberg 1944, Marquardt 1963),
+//! units of the parameters do not matter. The first trial has the damping of the settings, by default
+//! mu = 0, which is Gauss-Newton's step. A step that does not lower the cost is tried again with ten times the damping (Levenberg 1944, Marquardt 1963),
 //! and the damping follows how much of its promise each step keeps.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -118,7 +118,7 @@ pub enum StopReason {
     SmallStep,
     /// The last steps hardly lowered the cost.
     Idle,
-    /// No step lowers the cost, however damped.
+    /// No step lowers the cost up to the largest damping, or none that moves a parameter noticeably.
     NoBetterStep,
     /// The limit of steps was reached.
     StepLimit,

@@ -196,7 +196,6 @@ fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
     // Kaiser's length: (A - 7.95)/(2.285 transition).
     let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
     let cut_off = PI * (pass + stop) / sample_rate;
-    // Kaiser's shape parameter for an attenuation above 50 dB (Oppenheim & Schafer).
     let beta = kaiser_beta(STOP_BAND_DB);
     let taps: Vec<f64> = (-half..=half)
         .map(|n| {

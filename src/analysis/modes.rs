@@ -521,9 +521,8 @@ fn pair_mass_loaded(
             let mut moved = modes.to_vec();
             for mode in &mut moved {
                 let place = mode.mode.and_then(|number| number.checked_sub(1));
-                if let Some(place) = place.filter(|place| *place < before.len()) {
-                    mode.frequency *= after[place] / before[place];
-                }
+                let ratio = place.and_then(|place| Some(after.get(place)? / before.get(place)?));
+                mode.frequency *= ratio.unwrap_or(1.0);
             }
             recording.mode_numbers = own_numbers(&moved, recording.readings());
         } else {

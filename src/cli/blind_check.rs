@@ -278,8 +278,7 @@ fn diagnose_recorded(
         path: shown.to_owned(),
         cause,
     })?;
-    let description = recorded.description.as_bytes().to_vec();
-    let mut files = vec![("test.toml", description)];
+    write_file(folder, shown, "test.toml", recorded.description.as_bytes())?;
     for recording in &recorded.recordings {
         let mut bytes = Vec::new();
         encode_wav(
@@ -289,16 +288,18 @@ fn diagnose_recorded(
             &recording.channels,
             WavFormat::Pcm24,
         )?;
-        files.push((&recording.file, bytes));
-    }
-    for (name, bytes) in files {
-        fs::write(folder.join(name), bytes).map_err(|cause| OutputError::Failed {
-            path: shown.join(name),
-            cause,
-        })?;
+        write_file(folder, shown, &recording.file, &bytes)?;
     }
     let test = TestDescription::parse(&recorded.description, "test.toml")?;
     Ok(case_of(&test, folder, truth))
+}
+
+/// Writes a file of a test; `shown` is its folder in messages.
+fn write_file(folder: &Path, shown: &Path, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
+    fs::write(folder.join(name), bytes).map_err(|cause| OutputError::Failed {
+        path: shown.join(name),
+        cause,
+    })
 }
 
 /// Diagnoses a test. A test that cannot be analysed has no answer, which is counted separately.

@@ -358,6 +358,7 @@ impl Dataset {
             // Share of the scatter that the configuration has in common; none for held-out modes.
             let shares = &self.arrangements[configuration].scatter;
             let share = shares.get(&mode).filter(|_| mode <= self.fitted_modes);
+            let share = share.filter(|share| **share != 0.0);
             if let Some(&share) = share {
                 // The common part is a nuisance parameter of its own.
                 let moved = share * datum.std;

@@ -82,7 +82,6 @@ pub struct Optimum {
 /// need not be exact.
 const SEARCH: Settings = Settings {
     first_damping: 0.0,
-    least_damping: 1e-3,
     steps: 30,
     gain: 1e-4,
     relative_gain: 0.0,

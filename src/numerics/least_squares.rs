@@ -5,8 +5,9 @@
 //! weighted for a robust loss and extended by priors. Each step solves (A + mu D) d = -g on the parameters
 //! that are not pressed against a bound. D holds the largest diagonal of A so far (Moré 1978), so that the
 //! units of the parameters do not matter. The first trial has the damping of the settings, by default
-//! mu = 0, which is Gauss-Newton's step. A step that does not lower the cost is tried again with ten times the damping (Levenberg 1944, Marquardt 1963),
-//! and the damping follows how much of its promise each step keeps.
+//! mu = 0, which is Gauss-Newton's step. A step that does not lower the cost is tried again with ten times
+//! the damping (Levenberg 1944, Marquardt 1963), and the damping follows how much of its promise each step
+//! keeps.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -83,8 +84,6 @@ pub struct Settings {
     /// Damping of the first trial, as a share of the curvature's diagonal. Above 0 the first steps stay short
     /// where parameters are nearly dependent.
     pub first_damping: f64,
-    /// Weakest damping that is not none.
-    pub least_damping: f64,
     /// Largest damping, as a share of the curvature's diagonal.
     pub damping: f64,
     /// One more step is taken after the promise has become small: for digits beyond the tolerance.
@@ -102,7 +101,6 @@ impl Default for Settings {
             idle_steps: usize::MAX,
             idle: 0.0,
             first_damping: 0.0,
-            least_damping: 1e-3,
             damping: 1e9,
             polish: true,
         }
@@ -144,8 +142,11 @@ pub struct Minimum<S> {
     pub stop: StopReason,
 }
 
-/// Factor from one damping to the next.
+/// Factor from one damping to the next. A rejected step raises the damping by it and an accepted one lowers
+/// it at most by it, so that a search has at most two trials for each step and some 14 more.
 const FACTOR: f64 = 10.0;
+/// Weakest damping that is not none.
+const WEAKEST: f64 = 1e-3;
 /// Share of the promised decrease from which on the next step is damped less.
 const KEPT: f64 = 0.75;
 /// Share of the promised decrease below which the next step is damped more: with large residuals the curvature
@@ -189,7 +190,13 @@ pub fn minimise<P: Problem>(
             return Some(last.unwrap_or(at).ended(StopReason::Minimum));
         }
         if damping > 0.0 {
-            step = at.step(problem.bounds(), &scales, damping);
+            let damped = at.step(problem.bounds(), &scales, damping);
+            // A promise that only the damping makes small is no minimum.
+            if damped.promises_at_most(tolerance) {
+                damping = 0.0;
+            } else {
+                step = damped;
+            }
         }
         let next = loop {
             if step.promises_at_most(tolerance) {
@@ -201,7 +208,7 @@ pub fn minimise<P: Problem>(
             if damping >= settings.damping || step.is_within(settings.step) {
                 return Some(at.ended(StopReason::NoBetterStep));
             }
-            damping = f64::max(settings.least_damping, FACTOR * damping);
+            damping = f64::max(WEAKEST, FACTOR * damping);
             step = at.step(problem.bounds(), &scales, damping);
         };
         let gain = at.cost - next.cost;
@@ -221,13 +228,13 @@ pub fn minimise<P: Problem>(
             return Some(at.ended(StopReason::Idle));
         }
         if step.promises_at_most(gain / KEPT) {
-            damping = if damping > settings.least_damping {
+            damping = if damping > WEAKEST {
                 damping / FACTOR
             } else {
                 0.0
             };
         } else if !step.promises_at_most(gain / POOR) {
-            damping = f64::max(FIRM, FACTOR * damping);
+            damping = f64::max(FIRM, FACTOR * damping).min(settings.damping);
         }
     }
     Some(at.ended(StopReason::StepLimit))

@@ -17,7 +17,6 @@ pub(super) type Minimum = least_squares::Minimum<Evaluation>;
 /// be of any size.
 pub(super) const FULL: Settings = Settings {
     first_damping: 0.0,
-    least_damping: 1e-3,
     steps: 200,
     gain: 0.0,
     relative_gain: 1e-15,

@@ -191,6 +191,7 @@ impl<'a> JointSearch<'a> {
             }),
         };
         let settings = Settings {
+            steps: 40,
             gain: 1e-9,
             ..Settings::default()
         };

@@ -307,7 +307,7 @@ impl Deck {
             format!("joint: {}", self.origin),
         ];
         let doubts = self.doubts.iter();
-        let doubts = doubts.flat_map(|doubt| lines_of(doubt, LONGEST, 0));
+        let doubts = doubts.flat_map(|doubt| lines_of(&doubt.replace('\u{a0}', " "), LONGEST, 0));
         lines.extend(doubts.map(|line| ascii(&line)));
         lines.push(
             "units: m, kg, s, N, rad; the beam lies along x, w is along y, theta about z"

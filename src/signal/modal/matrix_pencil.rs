@@ -265,9 +265,11 @@ impl Demodulated {
         let columns = self.oscillations(&neighbours);
         let loose = Subspace::new(&columns, INDEPENDENT);
         let fixed = columns.columns(0, neighbours.len()).into_owned();
-        let rest = Subspace::new(&fixed, INDEPENDENT).complement(own.clone());
-        let alone = loose.complement(own);
-        let residuals = loose.complement(self.records.clone());
+        let fixed = Subspace::new(&fixed, INDEPENDENT);
+        // Twice: poles that are nearly equal leave rounding behind.
+        let rest = fixed.complement(fixed.complement(own.clone()));
+        let alone = loose.complement(loose.complement(own));
+        let residuals = loose.complement(loose.complement(self.records.clone()));
         let degrees = self.times.len().checked_sub(loose.rank() + 1)?;
         let (mut amplitudes, mut ratio) = (Vec::new(), 0.0);
         for (record, residual) in self.records.column_iter().zip(residuals.column_iter()) {

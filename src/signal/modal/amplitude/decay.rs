@@ -442,7 +442,7 @@ fn fit_exponentials(
         gain: 0.0,
         relative_gain: SETTLED,
         first_damping: 1e-3,
-        least_damping: 1e-12,
+        damping: 1e6,
         ..Settings::default()
     };
     Some(minimise(&problem, &parameters, &settings)?.state)

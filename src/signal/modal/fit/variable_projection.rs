@@ -287,7 +287,6 @@ impl PoleProblem {
             relative_gain: 1e-6 / freedom.max(1.0),
             // An undamped first step is too long where two poles begin at one resonance.
             first_damping: 1e-4,
-            least_damping: 1e-12,
             ..Settings::default()
         };
         let start: Vec<f64> = start.iter().flat_map(|pole| [pole.im, -pole.re]).collect();

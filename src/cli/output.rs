@@ -374,11 +374,13 @@ fn builder(mode: u32) -> Builder<'static, 'static> {
     builder
 }
 
-/// Returns the system's error without the temporary name, which tells the user nothing.
+/// Returns the system's error without the temporary name that `tempfile` adds, which tells the user nothing.
 fn without_path(error: io::Error) -> io::Error {
-    let inner = error.get_ref().and_then(std::error::Error::source);
-    let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()?.raw_os_error());
-    code.map_or(error, io::Error::from_raw_os_error)
+    let text = error.to_string();
+    match text.split_once(" at path ") {
+        Some((cause, _)) => io::Error::new(error.kind(), cause),
+        None => error,
+    }
 }
 
 fn listed(paths: &[PathBuf]) -> String {

@@ -1,6 +1,6 @@
 //! Tests of what is said about bad input: the file, the line, the key, what is allowed, what to do.
 
-use crate::shared::strip_table;
+use crate::shared::{assert_snapshot, strip_table};
 use std::fs;
 use std::path::Path;
 
@@ -76,148 +76,51 @@ half_line = [0.1, 0.1, 0.5]
 scatter = "0.3 %"
 "#;
 
-/// What one change must lead to.
-struct Case {
-    /// What is replaced, and by what.
-    change: (&'static str, &'static str),
-    /// The line that must be named.
-    line: usize,
-    /// The key that must be named; empty for none.
-    key: &'static str,
-    /// What the message must contain: what is allowed, what is suggested.
-    says: &'static [&'static str],
-}
-
-const fn case(
-    change: (&'static str, &'static str),
-    line: usize,
-    key: &'static str,
-    says: &'static [&'static str],
-) -> Case {
-    Case {
-        change,
-        line,
-        key,
-        says,
-    }
-}
-
-fn check(base: &str, cases: &[Case]) {
+/// Makes one change at a time to a valid text, and compares all messages with the snapshot of this name.
+fn check(name: &str, base: &str, changes: &[(&str, &str)]) {
     assert!(
         TestDescription::parse(base, "t.toml").is_ok(),
         "the unchanged text must be valid"
     );
-    for Case {
-        change: (from, to),
-        line,
-        key,
-        says,
-    } in cases
-    {
+    let mut messages = String::new();
+    for (from, to) in changes {
         assert_eq!(
             base.matches(from).count(),
             1,
             "{from:?} must stand once in the text"
         );
-        let text = base.replace(from, to);
-        let Err(error) = TestDescription::parse(&text, "t.toml") else {
+        let Err(error) = TestDescription::parse(&base.replace(from, to), "t.toml") else {
             panic!("{to:?} was accepted");
         };
-        assert_eq!(
-            (error.line, error.key.as_str()),
-            (*line, *key),
-            "{to:?}: {error}"
-        );
-        let shown = error.to_string();
-        let place = if key.is_empty() {
-            format!("t.toml:{line}: ")
+        let place = if error.key.is_empty() {
+            format!("t.toml:{}: ", error.line)
         } else {
-            format!("t.toml:{line}: `{key}`: ")
+            format!("t.toml:{}: `{}`: ", error.line, error.key)
         };
+        let shown = error.to_string();
         assert!(shown.starts_with(&place), "{to:?}: {shown}");
-        for part in *says {
-            assert!(
-                shown.contains(part),
-                "{to:?}: {shown:?} does not say {part:?}"
-            );
-        }
+        messages.push_str(&format!("{from:?} -> {to:?}\n    {shown}\n"));
     }
+    assert_snapshot(&format!("errors_{name}"), &messages);
 }
 
 #[test]
 fn regress_unknown_keys_suggest_the_nearest_known_one() {
     check(
+        "unknown_keys_suggest_the_nearest_known_one",
         VALID,
         &[
-            case(
-                ("length = \"423", "lenght = \"423"),
-                3,
-                "beam.lenght",
-                &[
-                    "did you mean `length`?",
-                    "known keys of [beam]: length, width",
-                ],
-            ),
-            case(
-                ("width = 0.05", "Width = 0.05"),
-                4,
-                "beam.Width",
-                &["did you mean `width`?"],
-            ),
-            case(
-                ("density = 7850", "rho = 7850"),
-                7,
-                "beam.rho",
-                &["did you mean `density`?"],
-            ),
-            case(
-                ("modulus = \"2 %\"", "moduls = \"2 %\""),
-                9,
-                "beam.tolerance.moduls",
-                &["did you mean `modulus`?"],
-            ),
-            case(
-                ("width = 0.05", "width = 0.05\nkt = 3"),
-                5,
-                "beam.kt",
-                &["`kt` belongs into [joint]"],
-            ),
-            case(
-                ("scale = 500.0", "position = 0.1"),
-                19,
-                "hammer.position",
-                &["belongs into [joint] or [[sensor]]"],
-            ),
-            case(
-                ("torque = 12", "temprature = 12"),
-                36,
-                "recording[1].temprature",
-                &["did you mean `temperature`?"],
-            ),
-            case(
-                ("torque = 12", "fit_mode = 12"),
-                36,
-                "recording[1].fit_mode",
-                &["`fit_modes` belongs into [analysis]"],
-            ),
-            case(
-                ("[analysis]", "[analysys]"),
-                41,
-                "analysys",
-                &["did you mean `analysis`?"],
-            ),
-            case(
-                ("[analysis]", "[zzz]"),
-                41,
-                "zzz",
-                &["unknown key; known keys of the top level: name, beam"],
-            ),
-            case(
-                ("name = \"Clamp\"", "kind = \"lap\""),
-                1,
-                "kind",
-                &["`kind` belongs into [joint] or [[sensor]]"],
-            ),
+            ("length = \"423", "lenght = \"423"),
+            ("width = 0.05", "Width = 0.05"),
+            ("density = 7850", "rho = 7850"),
+            ("modulus = \"2 %\"", "moduls = \"2 %\""),
+            ("width = 0.05", "width = 0.05\nkt = 3"),
+            ("scale = 500.0", "position = 0.1"),
+            ("torque = 12", "temprature = 12"),
+            ("torque = 12", "fit_mode = 12"),
+            ("[analysis]", "[analysys]"),
+            ("[analysis]", "[zzz]"),
+            ("name = \"Clamp\"", "kind = \"lap\""),
         ],
     );
 }
@@ -225,96 +128,23 @@ fn regress_unknown_keys_suggest_the_nearest_known_one() {
 #[test]
 fn regress_impossible_beams() {
     check(
+        "impossible_beams",
         VALID,
         &[
-            case(
-                ("length = \"423 mm\"", "length = -0.423"),
-                3,
-                "beam.length",
-                &[
-                    "-0.423 m is impossible",
-                    "allowed: more than 0 m",
-                    "\"423 mm\"",
-                ],
-            ),
-            case(
-                ("length = \"423 mm\"", "length = 0"),
-                3,
-                "beam.length",
-                &["0 m is impossible"],
-            ),
-            case(
-                ("length = \"423 mm\"", "length = 1e5"),
-                3,
-                "beam.length",
-                &["up to 10000 m"],
-            ),
-            case(
-                ("length = \"423 mm\"", "length = nan"),
-                3,
-                "beam.length",
-                &["not a finite number"],
-            ),
-            case(
-                ("length = \"423 mm\"", "length = 99999999999999999999"),
-                3,
-                "beam.length",
-                &["not a finite number"],
-            ),
-            case(
-                ("length = \"423 mm\"\n", ""),
-                2,
-                "beam.length",
-                &["missing; a length (m) is needed, such as `length = \"423 mm\"`"],
-            ),
-            case(
-                ("length = \"423 mm\"", "length = [1]"),
-                3,
-                "beam.length",
-                &["a list stands here", "a length as a number (m)"],
-            ),
-            case(
-                ("modulus = \"207 GPa\"", "modulus = -207e9"),
-                6,
-                "beam.modulus",
-                &["-2.07e11 Pa is impossible", "up to 1e13 Pa"],
-            ),
-            case(
-                ("density = 7850", "density = 0"),
-                7,
-                "beam.density",
-                &["allowed: more than 0 kg/m3"],
-            ),
-            case(
-                ("poisson = 0.29", "poisson = 0.6"),
-                8,
-                "beam.poisson",
-                &["more than -1, up to 0.5"],
-            ),
-            case(
-                ("poisson = 0.29", "poisson = -1"),
-                8,
-                "beam.poisson",
-                &["more than -1, up to 0.5"],
-            ),
-            case(
-                ("modulus = \"2 %\"", "modulus = \"200 %\""),
-                9,
-                "beam.tolerance.modulus",
-                &["less than 1", "relative (\"2 %\")"],
-            ),
-            case(
-                ("length = 0.001", "length = -0.001"),
-                9,
-                "beam.tolerance.length",
-                &["more than 0 m, less than 0.423 m"],
-            ),
-            case(
-                ("density = 7850", "density = 7850\nright = { width = 1 }"),
-                8,
-                "beam.right",
-                &["only a lap joint", "set `kind = \"lap\"`"],
-            ),
+            ("length = \"423 mm\"", "length = -0.423"),
+            ("length = \"423 mm\"", "length = 0"),
+            ("length = \"423 mm\"", "length = 1e5"),
+            ("length = \"423 mm\"", "length = nan"),
+            ("length = \"423 mm\"", "length = 99999999999999999999"),
+            ("length = \"423 mm\"\n", ""),
+            ("length = \"423 mm\"", "length = [1]"),
+            ("modulus = \"207 GPa\"", "modulus = -207e9"),
+            ("density = 7850", "density = 0"),
+            ("poisson = 0.29", "poisson = 0.6"),
+            ("poisson = 0.29", "poisson = -1"),
+            ("modulus = \"2 %\"", "modulus = \"200 %\""),
+            ("length = 0.001", "length = -0.001"),
+            ("density = 7850", "density = 7850\nright = { width = 1 }"),
         ],
     );
 }
@@ -322,62 +152,17 @@ fn regress_impossible_beams() {
 #[test]
 fn regress_units_that_do_not_fit() {
     check(
+        "units_that_do_not_fit",
         VALID,
         &[
-            case(
-                ("\"423 mm\"", "\"423 kg\""),
-                3,
-                "beam.length",
-                &[
-                    "\"423 kg\" is a mass, not a length",
-                    "units allowed: m, mm, cm",
-                ],
-            ),
-            case(
-                ("\"423 mm\"", "\"423 furlong\""),
-                3,
-                "beam.length",
-                &["unknown unit \"furlong\"", "m, mm, cm"],
-            ),
-            case(
-                ("\"423 mm\"", "\"0,423 m\""),
-                3,
-                "beam.length",
-                &["decimal comma; write a point: \"0.423 m\""],
-            ),
-            case(
-                ("\"423 mm\"", "\"long\""),
-                3,
-                "beam.length",
-                &["does not begin with a number"],
-            ),
-            case(
-                ("\"423 mm\"", "423 mm"),
-                3,
-                "",
-                &["not valid TOML", "into quotes: \"423 mm\""],
-            ),
-            case(
-                ("\"1.4 MN/m\"", "\"1.4 MN\""),
-                13,
-                "joint.kt",
-                &["is a force, not a translational stiffness"],
-            ),
-            case(
-                ("\"100 mV/g\"", "\"100 mV/N\""),
-                23,
-                "sensor[1].sensitivity",
-                &[
-                    "sensitivity of a force sensor, not the sensitivity of an accelerometer",
-                    "mV/g",
-                ],
-            ),
-            case(
-                ("torque = 12", "torque = \"12 N\""),
-                36,
-                "recording[1].torque",
-                &["a force, not a torque"],
-            ),
+            ("\"423 mm\"", "\"423 kg\""),
+            ("\"423 mm\"", "\"423 furlong\""),
+            ("\"423 mm\"", "\"0,423 m\""),
+            ("\"423 mm\"", "\"long\""),
+            ("\"423 mm\"", "423 mm"),
+            ("\"1.4 MN/m\"", "\"1.4 MN\""),
+            ("\"100 mV/g\"", "\"100 mV/N\""),
+            ("torque = 12", "torque = \"12 N\""),
         ],
     );
 }
@@ -385,77 +170,20 @@ fn regress_units_that_do_not_fit() {
 #[test]
 fn regress_joints_that_cannot_be() {
     check(
+        "joints_that_cannot_be",
         VALID,
         &[
-            case(
-                ("\"cantilever\"", "\"cantelever\""),
-                11,
-                "joint.kind",
-                &[
-                    "allowed: \"cantilever\", \"lap\", \"free\"",
-                    "did you mean \"cantilever\"?",
-                ],
-            ),
-            case(
-                ("\"cantilever\"", "\"lap\""),
-                12,
-                "joint.model",
-                &["a lap joint has two stiffnesses", "write `model = \"2p\"`"],
-            ),
-            case(
-                ("\"cantilever\"", "\"free\""),
-                13,
-                "joint.kt",
-                &["a free beam has no joint"],
-            ),
-            case(
-                ("model = \"3p\"", "model = \"2p\""),
-                15,
-                "joint.ktr",
-                &["two-parameter model has no coupling", "`model = \"3p\"`"],
-            ),
-            case(
-                ("model = \"3p\"", "model = \"none\""),
-                12,
-                "joint.model",
-                &["only a free beam has no joint model"],
-            ),
-            case(
-                ("kr = 320", "kr = -320"),
-                14,
-                "joint.kr",
-                &["-320 N m/rad is impossible", "\"rigid\""],
-            ),
-            case(
-                ("ktr = 1e5", "ktr = 100"),
-                15,
-                "joint.ktr",
-                &["ktr^2 > kt kr", "21166.01049 N/rad"],
-            ),
-            case(
-                ("ktr = 1e5", "ktr = 0"),
-                15,
-                "joint.ktr",
-                &["infinite compliance", "\"rigid\""],
-            ),
-            case(
-                ("kr = 320", "kr = \"rigid\""),
-                15,
-                "joint.ktr",
-                &["cannot be coupled"],
-            ),
-            case(
-                ("beam = \"euler\"", "position = 0.2"),
-                16,
-                "joint.position",
-                &["only a lap joint", "`kind = \"lap\"`"],
-            ),
-            case(
-                ("kind = \"cantilever\"\n", ""),
-                10,
-                "joint.kind",
-                &["missing", "`kind = \"cantilever\"`"],
-            ),
+            ("\"cantilever\"", "\"cantelever\""),
+            ("\"cantilever\"", "\"lap\""),
+            ("\"cantilever\"", "\"free\""),
+            ("model = \"3p\"", "model = \"2p\""),
+            ("model = \"3p\"", "model = \"none\""),
+            ("kr = 320", "kr = -320"),
+            ("ktr = 1e5", "ktr = 100"),
+            ("ktr = 1e5", "ktr = 0"),
+            ("kr = 320", "kr = \"rigid\""),
+            ("beam = \"euler\"", "position = 0.2"),
+            ("kind = \"cantilever\"\n", ""),
         ],
     );
 }
@@ -463,84 +191,21 @@ fn regress_joints_that_cannot_be() {
 #[test]
 fn regress_sensors_and_hammers_that_cannot_be() {
     check(
+        "sensors_and_hammers_that_cannot_be",
         VALID,
         &[
-            case(
-                ("position = 0.338", "position = 0.5"),
-                24,
-                "sensor[1].position",
-                &[
-                    "0.5 m is impossible",
-                    "allowed: 0 to 0.423 m",
-                    "outside the beam",
-                ],
-            ),
-            case(
-                ("position = 0.338", "position = -0.1"),
-                24,
-                "sensor[1].position",
-                &["allowed: 0 to 0.423 m"],
-            ),
-            case(
-                ("mass = \"24 g\"", "mass = -1"),
-                25,
-                "sensor[1].mass",
-                &["-1 kg is impossible"],
-            ),
-            case(
-                ("channel = 2", "channel = 1"),
-                22,
-                "sensor[1].channel",
-                &["channel 1 is already taken in line 18", "the hammer"],
-            ),
-            case(
-                ("channel = 2", "channel = 0"),
-                22,
-                "sensor[1].channel",
-                &["allowed: 1 to 4096", "count from 1"],
-            ),
-            case(
-                ("channel = 2", "channel = 2.5"),
-                22,
-                "sensor[1].channel",
-                &["wanted: a whole number"],
-            ),
-            case(
-                ("name = \"mic\"", "name = \"tip\""),
-                27,
-                "sensor[2].name",
-                &["\"tip\" is already taken in line 21"],
-            ),
-            case(
-                ("name = \"mic\"", "name = \"\""),
-                27,
-                "sensor[2].name",
-                &["an empty string"],
-            ),
-            case(
-                ("\"100 mV/g\"", "0"),
-                23,
-                "sensor[1].sensitivity",
-                &["any number but zero"],
-            ),
-            case(
-                ("mass = \"24 g\"", "scale = 3"),
-                23,
-                "sensor[1].sensitivity",
-                &["keep `scale`"],
-            ),
-            case(
-                ("channel = 1\n", ""),
-                17,
-                "hammer.channel",
-                &["missing", "`channel = 1`"],
-            ),
-            case(
-                ("kind = \"sound\"", "kind = \"speed\""),
-                29,
-                "sensor[2].kind",
-                &["\"velocity\", \"displacement\", \"sound\""],
-            ),
+            ("position = 0.338", "position = 0.5"),
+            ("position = 0.338", "position = -0.1"),
+            ("mass = \"24 g\"", "mass = -1"),
+            ("channel = 2", "channel = 1"),
+            ("channel = 2", "channel = 0"),
+            ("channel = 2", "channel = 2.5"),
+            ("name = \"mic\"", "name = \"tip\""),
+            ("name = \"mic\"", "name = \"\""),
+            ("\"100 mV/g\"", "0"),
+            ("mass = \"24 g\"", "scale = 3"),
+            ("channel = 1\n", ""),
+            ("kind = \"sound\"", "kind = \"speed\""),
         ],
     );
 }
@@ -548,114 +213,26 @@ fn regress_sensors_and_hammers_that_cannot_be() {
 #[test]
 fn regress_recordings_and_settings_that_cannot_be() {
     check(
+        "recordings_and_settings_that_cannot_be",
         VALID,
         &[
-            case(
-                ("tap = \"40 mm\"", "tap = 0.43"),
-                32,
-                "recording[1].tap",
-                &["allowed: 0 to 0.423 m"],
-            ),
-            case(
-                ("band = [0, 200]", "band = [200, 100]"),
-                33,
-                "recording[1].band[2]",
-                &["more than 200 Hz", "lower edge first"],
-            ),
-            case(
-                ("band = [0, 200]", "band = [-1, 100]"),
-                33,
-                "recording[1].band[1]",
-                &["-1 Hz is impossible"],
-            ),
-            case(
-                ("band = [0, 200]", "band = [1]"),
-                33,
-                "recording[1].band",
-                &["1 values stand here; allowed: 2"],
-            ),
-            case(
-                ("block = 2048", "block = 15"),
-                34,
-                "recording[1].block",
-                &["15 is impossible; allowed: 16 to 4e6"],
-            ),
-            case(
-                ("block = 2048", "block = -2048"),
-                34,
-                "recording[1].block",
-                &["allowed: 16 to 4e6"],
-            ),
-            case(
-                ("block = 2048", "block = 2048.5"),
-                34,
-                "recording[1].block",
-                &["wanted: a whole number"],
-            ),
-            case(
-                ("at = { tip = 0.20 }", "at = { tpi = 0.20 }"),
-                35,
-                "recording[1].at.tpi",
-                &[
-                    "no sensor is called \"tpi\"",
-                    "\"tip\", \"mic\"",
-                    "did you mean \"tip\"?",
-                ],
-            ),
-            case(
-                ("at = { tip = 0.20 }", "at = { tip = 2 }"),
-                35,
-                "recording[1].at.tip",
-                &["allowed: 0 to 0.423 m"],
-            ),
-            case(
-                ("file = \"low.wav\"\n", ""),
-                30,
-                "recording[1].file",
-                &["missing", "`file = \"taps.wav\"`"],
-            ),
-            case(
-                ("form = \"mobility\"\n", ""),
-                39,
-                "recording[2].sensor",
-                &["`form` is missing"],
-            ),
-            case(
-                ("sensor = \"tip\"\n", ""),
-                39,
-                "recording[2].form",
-                &["add `sensor = \"A\"`"],
-            ),
-            case(
-                ("fit_modes = 4", "fit_modes = 0"),
-                43,
-                "analysis.fit_modes",
-                &["allowed: 1 to 1000"],
-            ),
-            case(
-                ("sensor_mass = false", "sensor_mass = 0"),
-                44,
-                "analysis.sensor_mass",
-                &["wanted: true or false"],
-            ),
-            case(
-                ("[\"modulus\"]", "[\"kt\"]"),
-                45,
-                "analysis.fit[1]",
-                &["stated as known in [joint]"],
-            ),
-            case(
-                ("[\"modulus\"]", "[\"modulus\", \"modulus\"]"),
-                45,
-                "analysis.fit[2]",
-                &["already taken"],
-            ),
-            case(
-                ("[analysis]", "[measured]\nfrequencies = [17]\n[analysis]"),
-                41,
-                "measured",
-                &["not from both", "line 31", "remove one"],
-            ),
+            ("tap = \"40 mm\"", "tap = 0.43"),
+            ("band = [0, 200]", "band = [200, 100]"),
+            ("band = [0, 200]", "band = [-1, 100]"),
+            ("band = [0, 200]", "band = [1]"),
+            ("block = 2048", "block = 15"),
+            ("block = 2048", "block = -2048"),
+            ("block = 2048", "block = 2048.5"),
+            ("at = { tip = 0.20 }", "at = { tpi = 0.20 }"),
+            ("at = { tip = 0.20 }", "at = { tip = 2 }"),
+            ("file = \"low.wav\"\n", ""),
+            ("form = \"mobility\"\n", ""),
+            ("sensor = \"tip\"\n", ""),
+            ("fit_modes = 4", "fit_modes = 0"),
+            ("sensor_mass = false", "sensor_mass = 0"),
+            ("[\"modulus\"]", "[\"kt\"]"),
+            ("[\"modulus\"]", "[\"modulus\", \"modulus\"]"),
+            ("[analysis]", "[measured]\nfrequencies = [17]\n[analysis]"),
         ],
     );
 }
@@ -663,80 +240,21 @@ fn regress_recordings_and_settings_that_cannot_be() {
 #[test]
 fn regress_frequencies_that_cannot_be() {
     check(
+        "frequencies_that_cannot_be",
         MEASURED,
         &[
-            case(
-                ("[17, 118, 335.5]", "[17, -118, 335.5]"),
-                10,
-                "measured.frequencies[2]",
-                &["-118 Hz is impossible"],
-            ),
-            case(
-                ("[17, 118, 335.5]", "[17, 118, 118]"),
-                10,
-                "measured.frequencies[3]",
-                &["value 3 is 118 and follows 118", "ascending"],
-            ),
-            case(
-                ("[17, 118, 335.5]", "[17,\n118,\n20]"),
-                12,
-                "measured.frequencies[3]",
-                &["value 3 is 20 and follows 118"],
-            ),
-            case(
-                ("[17, 118, 335.5]", "[]"),
-                10,
-                "measured.frequencies",
-                &["0 values stand here; allowed: at least 1"],
-            ),
-            case(
-                ("[17, 118, 335.5]", "17"),
-                10,
-                "measured.frequencies",
-                &["wanted: a list of frequencies such as [17, 118]"],
-            ),
-            case(
-                ("[1, 2, 4]", "[1, 2]"),
-                11,
-                "measured.modes",
-                &["2 values stand here; allowed: 3, one for each frequency"],
-            ),
-            case(
-                ("[1, 2, 4]", "[0, 2, 4]"),
-                11,
-                "measured.modes[1]",
-                &["allowed: 1 to 1000", "count from 1"],
-            ),
-            case(
-                ("[1, 2, 4]", "[1, 4, 2]"),
-                11,
-                "measured.modes[3]",
-                &["ascending"],
-            ),
-            case(
-                ("[0.1, 0.1, 0.5]", "[0.1]"),
-                12,
-                "measured.half_line",
-                &["one for each frequency"],
-            ),
-            case(
-                ("[0.1, 0.1, 0.5]", "0"),
-                12,
-                "measured.half_line",
-                &["more than 0 Hz"],
-            ),
-            case(
-                ("scatter", "std = 0.1\nscatter"),
-                13,
-                "measured.std",
-                &["keep the one you know"],
-            ),
-            case(
-                ("\"0.3 %\"", "\"300 %\""),
-                13,
-                "measured.scatter",
-                &["less than 1"],
-            ),
+            ("[17, 118, 335.5]", "[17, -118, 335.5]"),
+            ("[17, 118, 335.5]", "[17, 118, 118]"),
+            ("[17, 118, 335.5]", "[17,\n118,\n20]"),
+            ("[17, 118, 335.5]", "[]"),
+            ("[17, 118, 335.5]", "17"),
+            ("[1, 2, 4]", "[1, 2]"),
+            ("[1, 2, 4]", "[0, 2, 4]"),
+            ("[1, 2, 4]", "[1, 4, 2]"),
+            ("[0.1, 0.1, 0.5]", "[0.1]"),
+            ("[0.1, 0.1, 0.5]", "0"),
+            ("scatter", "std = 0.1\nscatter"),
+            ("\"0.3 %\"", "\"300 %\""),
         ],
     );
 }
@@ -962,28 +480,29 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Runs a described test on a recording: exit code 2, one line on standard error that begins so
-/// and holds `says`, nothing on standard output, no file left.
-fn assert_refused(description: &str, csv: &[u8], arguments: &[&str], begins: &str, says: &[&str]) {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("test.toml"), description).unwrap();
-    fs::write(folder.path().join("taps.csv"), csv).unwrap();
-    let run = tapjoint_in(folder.path())
-        .args(arguments)
-        .assert()
-        .code(2)
-        .stdout("");
-    let said = String::from_utf8(run.get_output().stderr.clone()).unwrap();
-    assert!(
-        said.starts_with(&format!("error: {begins}")),
-        "{said:?} should begin with {begins:?}"
-    );
-    for part in says {
-        assert!(said.contains(part), "{said:?} should hold {part:?}");
+/// Runs each command on a described test and its recording. Each must end with exit code 2, one line on standard
+/// error, nothing on standard output and no file more or less. Returns the lines that differ, below their title.
+fn refused(title: &str, description: &str, csv: &[u8], commands: &[&[&str]]) -> String {
+    let mut lines = vec![title.to_owned()];
+    for arguments in commands {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("test.toml"), description).unwrap();
+        fs::write(folder.path().join("taps.csv"), csv).unwrap();
+        let run = tapjoint_in(folder.path())
+            .args(*arguments)
+            .assert()
+            .code(2)
+            .stdout("");
+        let said = String::from_utf8(run.get_output().stderr.clone()).unwrap();
+        assert_eq!(said.trim_end().lines().count(), 1, "{said:?}");
+        assert_eq!(names_in(folder.path()), ["taps.csv", "test.toml"], "{said}");
+        assert_eq!(fs::read(folder.path().join("taps.csv")).unwrap(), csv);
+        let line = format!("    {}", said.trim_end());
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
     }
-    assert_eq!(said.trim_end().lines().count(), 1, "{said:?}");
-    assert_eq!(names_in(folder.path()), ["taps.csv", "test.toml"], "{said}");
-    assert_eq!(fs::read(folder.path().join("taps.csv")).unwrap(), csv);
+    lines.join("\n") + "\n"
 }
 
 #[test]
@@ -1008,90 +527,40 @@ fn regress_bad_recordings_each_have_their_own_message() {
         lines.remove(line - 1);
         lines.join("\n")
     };
-    let surplus = with_cell(400, 2, "0.1,0.2");
-    let missing = with_cell(500, 2, "");
-    let cases: [(String, &str, &[&str]); 9] = [
+    let cases = [
+        ("empty", String::new()),
+        ("a word", with_cell(102, 1, "abc")),
+        ("NaN", with_cell(300, 2, "NaN")),
+        ("infinite", with_cell(301, 1, "-inf")),
+        ("beyond single precision", with_cell(302, 1, "1e200")),
+        // The line after the one lost is where the step is twice as long.
+        ("a lost row", without(700)),
         (
-            String::new(),
-            "taps.csv: the file is empty",
-            &["record or export it again"],
-        ),
-        (
-            with_cell(102, 1, "abc"),
-            "taps.csv:102: column 2 (\"force\") holds \"abc\", which is not a number",
-            &["correct or remove this line"],
-        ),
-        (
-            with_cell(300, 2, "NaN"),
-            "taps.csv:300: column 3 (\"tip\") holds \"NaN\"; allowed: finite numbers",
-            &[],
-        ),
-        (
-            with_cell(301, 1, "-inf"),
-            "taps.csv:301: column 2 (\"force\") holds \"-inf\"; allowed: finite numbers",
-            &[],
-        ),
-        (
-            with_cell(302, 1, "1e200"),
-            "taps.csv:302: column 2 (\"force\") holds \"1e200\"; allowed: finite numbers",
-            &[],
-        ),
-        (
-            // The line after the one lost is where the step is twice as long.
-            without(700),
-            "taps.csv:700: uneven sampling",
-            &["0.0015625 s after the row before", "0.1 % of the step"],
-        ),
-        (
-            // 0.3 ms late where the step is 0.78 ms.
+            "0.3 ms late at a step of 0.78 ms",
             with_cell(602, 0, "0.469050000"),
-            "taps.csv:602: uneven sampling",
-            &["resample evenly"],
         ),
-        (
-            surplus,
-            "taps.csv:400: 4 cells where the rows have 3",
-            &["\"0.2\""],
-        ),
-        (
-            missing,
-            "taps.csv:500: column 3 (\"tip\") is missing",
-            &["3 numbers"],
-        ),
+        ("a cell too many", with_cell(400, 2, "0.1,0.2")),
+        ("a missing cell", with_cell(500, 2, "")),
     ];
-    for (csv, begins, says) in &cases {
-        for arguments in [
+    let mut messages = String::new();
+    for (title, csv) in &cases {
+        let commands = [
             &["run", "test.toml"][..],
             &["run", "test.toml", "--out", "deep/report"],
             &["identify", "test.toml", "--json", "result.json"],
             &["inspect", "taps.csv", "--json", "-"],
             &["spectrum", "taps.csv", "--png", "spectrum.png"],
-        ] {
-            assert_refused(SPOILED, csv.as_bytes(), arguments, begins, says);
-        }
+        ];
+        messages += &refused(title, SPOILED, csv.as_bytes(), &commands);
     }
-    let only_header = "time (s),force (N),tip (m/s2)\n";
-    assert_refused(
-        SPOILED,
-        only_header.as_bytes(),
-        &["run", "test.toml"],
-        "taps.csv",
-        &["number"],
-    );
-    assert_refused(
-        SPOILED,
-        b"RIFF\x24\0\0\0WAVE",
-        &["run", "test.toml"],
-        "taps.csv: no \"fmt \" chunk",
-        &[],
-    );
-    assert_refused(
-        SPOILED,
-        b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0",
-        &["run", "test.toml"],
-        "taps.csv: neither a WAV file, a universal file nor text",
-        &["export as WAV, CSV or UFF58"],
-    );
+    for (title, bytes) in [
+        ("header only", &b"time (s),force (N),tip (m/s2)\n"[..]),
+        ("WAV without a body", b"RIFF\x24\0\0\0WAVE"),
+        ("picture", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0"),
+    ] {
+        messages += &refused(title, SPOILED, bytes, &[&["run", "test.toml"]]);
+    }
+    assert_snapshot("errors_bad_recordings", &messages);
 }
 
 #[test]
@@ -1118,98 +587,58 @@ fn regress_a_float_recording_with_nan_names_channel_and_sample() {
     file.extend((data.len() as u32).to_le_bytes());
     file.extend(data);
     let numbered = SPOILED.replace("\"force\"", "1").replace("\"tip\"", "2");
-    assert_refused(
-        &numbered,
-        &file,
-        &["run", "test.toml"],
-        "taps.csv: channel 2, sample 1234 (",
-        &["NaN", "finite numbers"],
-    );
+    let said = refused("NaN", &numbered, &file, &[&["run", "test.toml"]]);
+    assert_snapshot("errors_float_recording_with_nan", &said);
 }
 
 #[test]
 fn regress_channels_and_places_that_do_not_exist() {
     let csv = good_csv().join("\n");
-    let cases: [(String, &str, &[&str]); 6] = [
-        (
-            SPOILED.replace("channel = \"tip\"\n", ""),
-            "test.toml:13: `sensor[1].name`: taps.csv: no channel named \"A\"",
-            &["\"tip\""],
-        ),
-        (
-            SPOILED.replace("\"tip\"", "\"tpi\""),
-            "test.toml:14: `sensor[1].channel`: taps.csv: no channel named \"tpi\"",
-            &["\"tip\"", "\"force\"", "name one of these"],
-        ),
-        (
-            SPOILED.replace("\"force\"", "7"),
-            "test.toml:11: `hammer.channel`: taps.csv: no channel 7",
-            &["there are: 1 (\"force\"), 2 (\"tip\"); name one of these"],
-        ),
-        (
-            SPOILED.replace("0.338", "0.5"),
-            "test.toml:15: `sensor[1].position`",
-            &["0.423"],
-        ),
-        (
-            SPOILED.replace("0.338", "-1e-3"),
-            "test.toml:15: `sensor[1].position`",
-            &["0.423"],
-        ),
-        (
-            SPOILED.replace("taps.csv\"", "taps.csv\"\nband = [0, 900]"),
-            "test.toml:17: taps.csv: the band 0 to 900 Hz does not fit",
-            &["640"],
-        ),
+    let changes = [
+        ("channel = \"tip\"\n", ""),
+        ("\"tip\"", "\"tpi\""),
+        ("\"force\"", "7"),
+        ("0.338", "0.5"),
+        ("0.338", "-1e-3"),
+        ("taps.csv\"", "taps.csv\"\nband = [0, 900]"),
     ];
-    for (description, begins, says) in &cases {
-        for arguments in [
+    let mut messages = String::new();
+    for (from, to) in changes {
+        let commands = [
             &["run", "test.toml"][..],
             &["run", "test.toml", "--out", "report"],
             &["identify", "test.toml"],
-        ] {
-            assert_refused(description, csv.as_bytes(), arguments, begins, says);
-        }
+        ];
+        let title = format!("{from:?} -> {to:?}");
+        let description = SPOILED.replace(from, to);
+        messages += &refused(&title, &description, csv.as_bytes(), &commands);
     }
-    assert_refused(
-        SPOILED,
-        csv.as_bytes(),
-        &["spectrum", "taps.csv", "--hammer", "hammer"],
-        "taps.csv: no channel named \"hammer\"",
-        &["\"force\""],
-    );
+    let command = ["spectrum", "taps.csv", "--hammer", "hammer"];
+    messages += &refused("--hammer hammer", SPOILED, csv.as_bytes(), &[&command]);
+    assert_snapshot("errors_channels_and_places", &messages);
 }
 
 #[test]
 fn regress_outputs_that_cannot_be_written_are_found_out_before_any_work() {
     let csv = good_csv().join("\n");
-    for (arguments, begins) in [
-        (
-            &["run", "test.toml", "--out", "taps.csv"][..],
-            "taps.csv: is a file",
-        ),
-        (
-            &["run", "test.toml", "--out", "taps.csv/report"],
-            "taps.csv: is a file",
-        ),
-        (&["run", "test.toml", "--json", "no/where.json"], ""),
-        (&["run", "test.toml", "--json", "taps.csv/x.json"], ""),
-        (&["identify", "test.toml", "--json", "no/where.json"], ""),
-        (&["spectrum", "taps.csv", "--png", "no/where.png"], ""),
+    let mut messages = String::new();
+    for arguments in [
+        &["run", "test.toml", "--out", "taps.csv"][..],
+        &["run", "test.toml", "--out", "taps.csv/report"],
+        &["run", "test.toml", "--json", "no/where.json"],
+        &["run", "test.toml", "--json", "taps.csv/x.json"],
+        &["identify", "test.toml", "--json", "no/where.json"],
+        &["spectrum", "taps.csv", "--png", "no/where.png"],
     ] {
-        assert_refused(
-            SPOILED,
-            csv.as_bytes(),
-            arguments,
-            begins,
-            &["choose another"],
-        );
+        let title = arguments.join(" ");
+        messages += &refused(&title, SPOILED, csv.as_bytes(), &[arguments]);
     }
+    assert_snapshot("errors_outputs", &messages);
     // Where even the system's owner may make nothing.
     if cfg!(target_os = "linux") {
         let arguments = ["run", "test.toml", "--out", "/proc/tapjoint-report"];
-        let begins = "/proc/tapjoint-report: cannot be written";
-        assert_refused(SPOILED, csv.as_bytes(), &arguments, begins, &[]);
+        let said = refused("/proc", SPOILED, csv.as_bytes(), &[&arguments]);
+        assert_snapshot("errors_outputs_without_permission", &said);
     }
     // A file that has the report folder's name keeps its content.
     let folder = tempfile::tempdir().unwrap();

@@ -18,6 +18,15 @@ pub fn steel_strip() -> Beam {
     }
 }
 
+/// Compares a text with the snapshot of this name in `tests/golden`.
+pub fn assert_snapshot(name: &str, text: &str) {
+    let mut settings = insta::Settings::clone_current();
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    settings.set_snapshot_path("../golden");
+    settings.bind(|| insta::assert_snapshot!(name, text));
+}
+
 /// The strip's table in a description.
 macro_rules! strip_table {
     () => {

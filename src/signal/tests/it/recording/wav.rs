@@ -213,6 +213,12 @@ fn every_coding_is_read_exactly() {
     }
 }
 
+/// Returns `true` where a doubt of this kind says `words`.
+fn has(warnings: &[RecordingWarning], code: &str, words: &str) -> bool {
+    let mut all = warnings.iter();
+    all.any(|warning| warning.code() == code && warning.to_string().contains(words))
+}
+
 #[test]
 fn integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
     let mut parts = Parts::new(1, 32, integers(4, 0));
@@ -223,11 +229,8 @@ fn integers_at_the_low_end_of_their_container_are_read_with_a_warning() {
     );
     let (_file, recording) = open(parts.bytes());
     let warnings = recording.unwrap().warnings();
-    let expected = RecordingWarning::RightAligned {
-        bits: 24,
-        container: 32,
-    };
-    assert!(warnings.contains(&expected), "{warnings:?}");
+    let expected = "24-bit samples sit at the low end of their 32-bit containers";
+    assert!(has(&warnings, "right-aligned", expected), "{warnings:?}");
 }
 
 #[test]
@@ -288,11 +291,10 @@ fn a_size_left_open_by_a_crash_is_read_to_the_end_with_a_warning() {
         assert_eq!(read_all(parts.bytes(), "crashed"), expected(32768.0));
         let (_file, recording) = open(parts.bytes());
         let warnings = recording.unwrap().warnings();
-        let expected = RecordingWarning::UnknownLength {
-            size: u64::from(size),
-            present: 4,
-        };
-        assert!(warnings.contains(&expected), "{size}: {warnings:?}");
+        let expected = format!("(data size {size}); the recorder probably stopped");
+        assert!(has(&warnings, "unknown-length", &expected), "{warnings:?}");
+        let expected = "read to the end of the file, 4 samples per channel";
+        assert!(has(&warnings, "unknown-length", expected), "{warnings:?}");
     }
 }
 
@@ -306,16 +308,8 @@ fn a_truncated_file_is_read_as_far_as_it_goes_with_a_warning() {
     assert_eq!(read_all(cut, "truncated"), first_two);
     let (_file, recording) = open(cut);
     let warnings = recording.unwrap().warnings();
-    let expected = RecordingWarning::Truncated {
-        present: 2,
-        promised: 4,
-    };
-    assert!(warnings.contains(&expected), "{warnings:?}");
-    let text = expected.to_string();
-    assert!(
-        text.contains("2 of the promised 4") && text.contains("truncated"),
-        "{text}"
-    );
+    let expected = "the file is truncated: 2 of the promised 4 samples per channel";
+    assert!(has(&warnings, "truncated", expected), "{warnings:?}");
 }
 
 #[test]
@@ -624,11 +618,9 @@ fn a_given_rate_that_differs_is_ignored_with_a_warning() {
     };
     let recording = Recording::open(&file.path, &settings(5120.0)).unwrap();
     assert_eq!(recording.sample_rate(), 12_800.0);
-    let expected = RecordingWarning::SampleRateIgnored {
-        given: 5120.0,
-        used: 12_800.0,
-    };
-    assert!(recording.warnings().contains(&expected));
+    let expected = "given (5120 Hz) differs from the file's own (12800 Hz)";
+    let warnings = recording.warnings();
+    assert!(has(&warnings, "sample-rate-ignored", expected));
     let same = Recording::open(&file.path, &settings(12_800.0)).unwrap();
     let codes: Vec<_> = same.warnings().iter().map(RecordingWarning::code).collect();
     assert!(!codes.contains(&"sample-rate-ignored"), "{codes:?}");

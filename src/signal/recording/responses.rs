@@ -122,8 +122,7 @@ fn open_text(path: &Path, file: String) -> Result<FrequencyResponses, RecordingE
         return Err(RecordingError::no_samples(&file));
     };
     let (first_frequency, spacing) = even_lines(&source, frequencies)?;
-    let factor = frequency_factor(&header);
-    let unit = unit_in(&header);
+    let (factor, unit) = units_in(&header);
     let scale = unit.as_ref().map_or(1.0, |(_, scale, _)| *scale);
     let parts = real.iter().zip(imaginary);
     // A line such as "Ref Chan:Resp Chan", "1+Z:3+Z".
@@ -204,36 +203,32 @@ fn check_columns(
     Err(wrong_columns(source, &problem))
 }
 
-/// Returns the factor from the frequency column's unit to Hz: kHz and rad/s where the header says so.
-fn frequency_factor(header: &[Vec<String>]) -> f64 {
-    for cell in header.iter().filter_map(|cells| cells.first()) {
+/// Returns the factor from the frequency column's unit to Hz, and the unit of the values as written, its factor and its
+/// form.
+fn units_in(header: &[Vec<String>]) -> (f64, Option<(String, f64, ResponseForm)>) {
+    let mut first_cells = header.iter().filter_map(|cells| cells.first());
+    let factor = first_cells.find_map(|cell| {
         let cell = cell.to_lowercase();
         let cell = cell.trim_end_matches([')', ']']);
         match cell.rsplit(['(', '[', ' ']).next() {
-            Some("hz") => return 1.0,
-            Some("khz") => return 1e3,
+            Some("hz") => Some(1.0),
+            Some("khz") => Some(1e3),
             // 2 pi rad are one cycle.
-            Some("rad/s") => return 0.5 / std::f64::consts::PI,
-            _ => {}
+            Some("rad/s") => Some(0.5 / std::f64::consts::PI),
+            _ => None,
         }
-    }
-    1.0
-}
-
-/// Returns the unit as written, its factor and form: the cell nearest above the numbers that is one, or
-/// that has one in its last brackets.
-fn unit_in(header: &[Vec<String>]) -> Option<(String, f64, ResponseForm)> {
-    for cell in header.iter().flatten() {
+    });
+    // The cell nearest above the numbers that is a unit, or that has one in its last brackets.
+    let unit = header.iter().flatten().find_map(|cell| {
         let inner = cell.split_once(['(', '[']).map(|(_, rest)| rest);
         let inner = inner.and_then(|rest| rest.strip_suffix([')', ']']));
-        for text in [Some(cell.as_str()), inner].into_iter().flatten() {
-            let text = text.trim();
-            if let Some((factor, form)) = response_unit(text) {
-                return Some((text.to_owned(), factor, form));
-            }
-        }
-    }
-    None
+        [Some(cell.as_str()), inner].into_iter().find_map(|text| {
+            let text = text?.trim();
+            let (factor, form) = response_unit(text)?;
+            Some((text.to_owned(), factor, form))
+        })
+    });
+    (factor.unwrap_or(1.0), unit)
 }
 
 /// Returns first frequency and spacing (the column's unit).

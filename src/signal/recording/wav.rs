@@ -236,7 +236,7 @@ impl Cursor for WavCursor<'_> {
 }
 
 impl WavCursor<'_> {
-    /// The next frames, at most `limit` and at most one block, channel after channel.
+    /// The next frames, at most `limit` and at most one block, channel after channel; integers with full scale 1.
     fn next_interleaved(&mut self, limit: u64) -> Result<&[f64], RecordingError> {
         let source = self.source;
         let per_block = (BLOCK_BYTES / source.frame_bytes).max(1);
@@ -249,7 +249,31 @@ impl WavCursor<'_> {
             let lost = self.at + got as u64 / source.frame_bytes;
             return Err(RecordingError::changed(&source.file, lost));
         }
-        source.coding.decode(&self.bytes, &mut self.values);
+        let values = &mut self.values;
+        match source.coding {
+            Coding::Float { bits: 32 } => {
+                let (samples, _) = self.bytes.as_chunks::<4>();
+                values.extend(samples.iter().map(|x| f64::from(f32::from_le_bytes(*x))));
+            }
+            Coding::Float { .. } => {
+                let (samples, _) = self.bytes.as_chunks::<8>();
+                values.extend(samples.iter().map(|x| f64::from_le_bytes(*x)));
+            }
+            Coding::Integer { bits: 8, .. } => {
+                values.extend(self.bytes.iter().map(|x| (f64::from(*x) - 128.0) / 128.0));
+            }
+            Coding::Integer { bits, full, .. } => {
+                let full_scale = 2_f64.powi(i32::from(full) - 1);
+                let width = usize::from(bits / 8);
+                for sample in self.bytes.chunks_exact(width) {
+                    // Filled from the high end and shifted down again, so that the sign extends itself.
+                    let mut padded = [0_u8; 4];
+                    padded[4 - width..].copy_from_slice(sample);
+                    let value = i32::from_le_bytes(padded) >> (32 - bits);
+                    values.push(f64::from(value) / full_scale);
+                }
+            }
+        }
         self.at += frames;
         Ok(&self.values)
     }
@@ -337,13 +361,14 @@ impl ChunkWalker<'_> {
             }
             bytes = frame_bytes / channels;
         }
-        let coding =
-            Coding::new(tag, bits, valid, bytes).ok_or_else(|| {
-                let known = CODINGS.iter().find(|(known, _)| *known == tag);
-                let name = known.map_or("of an unknown kind", |(_, name)| *name);
-                let problem = format!("WAV coding {name} (format tag 0x{tag:04x}, {bits} bits) is not read; allowed: integer of 8 to 32 bits, float of 32 or 64 bits; export as PCM or float");
-                RecordingError::new(self.file, problem)
-            })?;
+        let Some(coding) = Coding::new(tag, bits, valid, bytes) else {
+            let known = CODINGS.iter().find(|(known, _)| *known == tag);
+            let name = known.map_or("of an unknown kind", |(_, name)| *name);
+            let problem = format!(
+                "WAV coding {name} (format tag 0x{tag:04x}, {bits} bits) is not read; allowed: integer of 8 to 32 bits, float of 32 or 64 bits; export as PCM or float"
+            );
+            return Err(RecordingError::new(self.file, problem));
+        };
         Ok(WaveFormat {
             channels,
             sample_rate,
@@ -361,9 +386,18 @@ impl ChunkWalker<'_> {
         let available = self.length.saturating_sub(start);
         // Sizes that writers put in before they know the size.
         let unset = promised == 0 || promised == u64::from(u32::MAX) || promised == u64::MAX;
-        let closed_and_empty = promised == 0 && self.only_chunks_follow(start)?;
+        // 0 is the truth, and not the mark of a crash, where well-formed, known chunks fill the rest of the file.
+        let mut at = start;
+        for _ in 0..MAX_CHUNKS {
+            match self.chunk_header(at)? {
+                Some((name, size)) if promised == 0 && KNOWN_CHUNKS.contains(&&name) => {
+                    at = self.after_chunk(at + 8, u64::from(size))?;
+                }
+                _ => break,
+            }
+        }
         let bytes = match unset {
-            _ if closed_and_empty => 0,
+            _ if promised == 0 && at >= self.length => 0,
             true => available,
             false => promised.min(available),
         };
@@ -380,23 +414,6 @@ impl ChunkWalker<'_> {
             RecordingWarning::truncated(frames, promised / frame_bytes)
         };
         Ok((frames, doubt))
-    }
-
-    /// Returns `true` where well-formed, known chunks fill the file from `at` to its end: then a data size of 0
-    /// is the truth and not the mark of a crash.
-    fn only_chunks_follow(&mut self, mut at: u64) -> Result<bool, RecordingError> {
-        for _ in 0..MAX_CHUNKS {
-            if at >= self.length {
-                return Ok(true);
-            }
-            match self.chunk_header(at)? {
-                Some((name, size)) if KNOWN_CHUNKS.contains(&&name) => {
-                    at = self.after_chunk(at + 8, u64::from(size))?;
-                }
-                _ => return Ok(false),
-            }
-        }
-        Ok(false)
     }
 
     /// Reads as much of `into` as the file has at `at`.
@@ -468,34 +485,6 @@ impl Coding {
             // The largest positive integer is 2^(bits-1) - 1.
             Self::Integer { valid, .. } => Some(1.0 - 0.5_f64.powi(i32::from(valid) - 1)),
             Self::Float { .. } => None,
-        }
-    }
-
-    /// Decodes whole samples; integers with full scale 1.
-    fn decode(self, bytes: &[u8], into: &mut Vec<f64>) {
-        match self {
-            Self::Float { bits: 32 } => {
-                let (samples, _) = bytes.as_chunks::<4>();
-                into.extend(samples.iter().map(|x| f64::from(f32::from_le_bytes(*x))));
-            }
-            Self::Float { .. } => {
-                let (samples, _) = bytes.as_chunks::<8>();
-                into.extend(samples.iter().map(|x| f64::from_le_bytes(*x)));
-            }
-            Self::Integer { bits: 8, .. } => {
-                into.extend(bytes.iter().map(|x| (f64::from(*x) - 128.0) / 128.0));
-            }
-            Self::Integer { bits, full, .. } => {
-                let full_scale = 2_f64.powi(i32::from(full) - 1);
-                let width = usize::from(bits / 8);
-                for sample in bytes.chunks_exact(width) {
-                    // Filled from the high end and shifted down again, so that the sign extends itself.
-                    let mut padded = [0_u8; 4];
-                    padded[4 - width..].copy_from_slice(sample);
-                    let value = i32::from_le_bytes(padded) >> (32 - bits);
-                    into.push(f64::from(value) / full_scale);
-                }
-            }
         }
     }
 }

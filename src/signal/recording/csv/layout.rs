@@ -50,6 +50,33 @@ impl CsvLayout {
         let name = self.columns.get(column).and_then(|c| c.name.as_deref());
         name.map_or(String::new(), |name| format!(" (\"{name}\")"))
     }
+
+    /// Returns the factor from the time column's unit to seconds.
+    ///
+    /// The unit stands in brackets, or at the end of the name ("t_ms"); without one it is seconds.
+    pub(super) fn time_factor(&self, file: &str) -> Result<f64, RecordingError> {
+        let column = self.time.map(|at| &self.columns[at]);
+        let Some(column) = column else {
+            return Ok(1.0);
+        };
+        let name = column.name.as_deref().unwrap_or_default();
+        let suffix = name.rsplit('_').next().unwrap_or_default();
+        let unit = channel_unit(column.unit.as_deref().unwrap_or(suffix));
+        match (unit, &column.unit) {
+            (Some((factor, "s")), _) => Ok(factor),
+            (_, None) => Ok(1.0),
+            (_, Some(unit)) => {
+                let problem = format!(
+                    "the time column's unit \"{unit}\" is not one of time; allowed: s, ms, us, ns, min, h"
+                );
+                Err(RecordingError::at_line(
+                    file,
+                    self.lines_before + 1,
+                    problem,
+                ))
+            }
+        }
+    }
 }
 
 /// One column as the header has it.
@@ -62,16 +89,6 @@ pub(in crate::recording) struct Column {
 }
 
 impl Column {
-    /// Reads a header cell. Brackets that hold no known unit stay in the name as well,
-    /// since "sensor (1)" and "sensor (2)" are two names.
-    fn from_cell(cell: &str) -> Self {
-        let (name, unit) = split_unit(cell);
-        match unit {
-            Some(unit) if channel_unit(unit).is_none() => Self::new(cell, unit),
-            unit => Self::new(name, unit.unwrap_or_default()),
-        }
-    }
-
     fn new(name: &str, unit: &str) -> Self {
         let [name, unit] = [name, unit].map(|text| Some(text.trim().to_owned()));
         Self {
@@ -346,7 +363,20 @@ impl<'a> Candidate<'a> {
 
     /// The layout under this separator, where there is a row.
     fn layout(&self, file: &str) -> Result<CsvLayout, RecordingError> {
-        let first = self.first_row();
+        // A line that mixes numbers and text right below a header, or that starts with a number, is a damaged row and
+        // not a title: it becomes the first row, so that reading it names what is wrong. The same holds for a row of
+        // another length right below a header.
+        let mut first = self.first;
+        while let Some(at) = self.line_above(first) {
+            let next = self.line_above(at);
+            let below_header = next.is_some_and(|n| self.kinds[n] == LineKind::Text(self.cells));
+            match self.kinds[at] {
+                LineKind::MixedNumberFirst(_) => {}
+                LineKind::Mixed(_) | LineKind::Row(_) if below_header => {}
+                _ => break,
+            }
+            first = at;
+        }
         let mut columns = self.header_above(first, file)?.unwrap_or_default();
         columns.resize(self.cells, Column::default());
         // Columns at the end that are empty in every row and in the header do not count.
@@ -378,26 +408,6 @@ impl<'a> Candidate<'a> {
             lines_before: first as u64,
             line_end: self.head.line_end,
         })
-    }
-
-    /// Index of the first row.
-    ///
-    /// A line that mixes numbers and text right below a header, or that starts with a number, is a
-    /// damaged row and not a title: it becomes the first row, so that reading it names what is
-    /// wrong. The same holds for a row of another length right below a header.
-    fn first_row(&self) -> usize {
-        let mut first = self.first;
-        while let Some(at) = self.line_above(first) {
-            let next = self.line_above(at);
-            let below_header = next.is_some_and(|n| self.kinds[n] == LineKind::Text(self.cells));
-            match self.kinds[at] {
-                LineKind::MixedNumberFirst(_) => {}
-                LineKind::Mixed(_) | LineKind::Row(_) if below_header => {}
-                _ => break,
-            }
-            first = at;
-        }
-        first
     }
 
     /// Reads the header above the first row; `None` where there is none.
@@ -463,8 +473,12 @@ impl<'a> Candidate<'a> {
 
     /// Columns of header cells, where they are as many as those of the rows.
     fn columns_of(&self, names: Vec<String>) -> Option<Vec<Column>> {
-        let fits = names.len() == self.cells;
-        fits.then(|| names.iter().map(|name| Column::from_cell(name)).collect())
+        let columns = names.iter().map(|cell| match split_unit(cell) {
+            // Brackets that hold no known unit stay in the name as well, since "sensor (1)" and "sensor (2)" are two.
+            (_, Some(unit)) if channel_unit(unit).is_none() => Column::new(cell, unit),
+            (name, unit) => Column::new(name, unit.unwrap_or_default()),
+        });
+        (names.len() == self.cells).then(|| columns.collect())
     }
 
     fn texts(&self, at: usize) -> Vec<String> {

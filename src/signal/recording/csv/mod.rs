@@ -125,7 +125,7 @@ impl CsvSource {
             );
             return Err(source.error(problem));
         }
-        let factor = source.time_factor()?;
+        let factor = layout.time_factor(file)?;
         let mut time = layout.time.map(|column| {
             let numbers = head.numbers(layout, column);
             TimeCheck::new(numbers.iter().map(|number| (number.value, number.text)))
@@ -200,26 +200,6 @@ impl CsvSource {
         }
         let head = read_head(&self.path, file, HEAD_BYTES)?;
         Err(Head::new(&head).no_sample_rate(layout, file))
-    }
-
-    /// Returns the factor from the time column's unit to seconds.
-    ///
-    /// The unit stands in brackets, or at the end of the name ("t_ms"); without one it is seconds.
-    fn time_factor(&self) -> Result<f64, RecordingError> {
-        let column = self.layout.time.and_then(|at| self.layout.columns.get(at));
-        let Some(column) = column else {
-            return Ok(1.0);
-        };
-        let name = column.name.as_deref().unwrap_or_default();
-        let suffix = name.rsplit('_').next().unwrap_or_default();
-        let unit = channel_unit(column.unit.as_deref().unwrap_or(suffix));
-        match (unit, &column.unit) {
-            (Some((factor, "s")), _) => Ok(factor),
-            (_, None) => Ok(1.0),
-            (_, Some(unit)) => Err(self.error(format!(
-                "the time column's unit \"{unit}\" is not one of time; allowed: s, ms, us, ns, min, h"
-            ))),
-        }
     }
 
     fn first_row(&self) -> RowPlace {

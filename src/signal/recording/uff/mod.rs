@@ -318,16 +318,6 @@ impl Function {
         usize::from(self.abscissa == Abscissa::Uneven)
     }
 
-    /// Widths of the columns of a line: 6E13.5, 4E20.12, 2(E13.5,E20.12) or E13.5,2E20.12.
-    fn column_widths(&self) -> &'static [usize] {
-        match (self.precision, self.abscissa, self.ordinate) {
-            (Precision::Single, _, _) => &[13; 6],
-            (Precision::Double, Abscissa::Even { .. }, _) => &[20; 4],
-            (Precision::Double, Abscissa::Uneven, Ordinate::Real) => &[13, 20, 13, 20],
-            (Precision::Double, Abscissa::Uneven, Ordinate::Complex) => &[13, 20, 20],
-        }
-    }
-
     /// Bytes of one number of the ordinate in binary data.
     fn ordinate_bytes(&self) -> usize {
         match self.precision {
@@ -387,7 +377,9 @@ fn parse_header(
     lines: &[Vec<u8>; HEADER_LINES],
     coding: UffCoding,
 ) -> Result<Function, (usize, String)> {
-    let records = lines.each_ref().map(|line| Record::new(line));
+    let records = lines.each_ref().map(|line| Record {
+        characters: decode_text(line).trim_end().chars().collect(),
+    });
     let [
         id @ ..,
         degrees,
@@ -432,12 +424,6 @@ struct Record {
 }
 
 impl Record {
-    fn new(line: &[u8]) -> Self {
-        Self {
-            characters: decode_text(line).trim_end().chars().collect(),
-        }
-    }
-
     fn slice(&self, at: usize, width: usize) -> String {
         self.characters.iter().skip(at).take(width).collect()
     }

@@ -529,7 +529,18 @@ pub(in crate::recording) fn even_points(
                     let near = (1.0 / whole - step).abs() <= digit * (1.0 + 1e-9);
                     (near && digit <= 1e-4 * step).then_some(1.0 / whole)
                 }
-                AbscissaUnit::Hertz => dyadic(step, digit),
+                AbscissaUnit::Hertz => {
+                    // The coarsest multiple of a power of 1/2 that was printed as `step`, where all six digits show
+                    // that it was rounded. Sample rate over a block of 2^n samples is such a number.
+                    let rounded =
+                        digit <= 1e-4 * step && (step / digit / 10.0).fract().abs() >= 1e-6;
+                    let scales = (0..=12).map(|power| 2_f64.powi(power));
+                    let mut multiples = scales.map(|scale| (step * scale).round() / scale);
+                    multiples.find(|multiple| {
+                        let near = (multiple - step).abs() <= 0.5 * digit * (1.0 + 1e-6);
+                        rounded && near && *multiple > 0.0
+                    })
+                }
             };
             (start * factor, simple.unwrap_or(step))
         }
@@ -546,20 +557,6 @@ pub(in crate::recording) fn even_points(
         step,
         points: function.points,
     }))
-}
-
-/// The coarsest multiple of a power of 1/2 that was printed as `step`, where all six digits show
-/// that it was rounded. Sample rate over a block of 2^n samples is such a number.
-fn dyadic(step: f64, digit: f64) -> Option<f64> {
-    let digits = step / digit;
-    if digit > 1e-4 * step || (digits / 10.0).fract().abs() < 1e-6 {
-        return None;
-    }
-    (0..=12).map(|power| 2_f64.powi(power)).find_map(|scale| {
-        let multiple = (step * scale).round() / scale;
-        let near = (multiple - step).abs() <= 0.5 * digit * (1.0 + 1e-6);
-        (near && multiple > 0.0).then_some(multiple)
-    })
 }
 
 /// Returns start and step of an abscissa that is stored with every point (file units); `None` for fewer than two points.

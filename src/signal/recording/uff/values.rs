@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use memchr::memchr;
 
 use super::list::{DataPlace, Entry, MAX_LINE_BYTES, UniversalFile, line_number};
-use super::{Function, Ordinate, UffCoding};
+use super::{Abscissa, Function, Ordinate, Precision, UffCoding};
 use crate::recording::error::{RecordingError, unreadable};
 use crate::recording::read_fully;
 use crate::recording::text::{parse_line, shown, without_last_number};
@@ -272,7 +272,14 @@ impl ValueReader<'_> {
     /// Decodes whole lines, and the last one at the end. Returns how many bytes were used.
     fn decode_lines(&mut self, at_end: bool) -> Result<usize, RecordingError> {
         let values = self.values;
-        let widths = values.function.column_widths();
+        let function = &values.function;
+        // Columns of a line: 6E13.5, 4E20.12, 2(E13.5,E20.12) or E13.5,2E20.12.
+        let widths: &[usize] = match (function.precision, function.abscissa, function.ordinate) {
+            (Precision::Single, _, _) => &[13; 6],
+            (Precision::Double, Abscissa::Even { .. }, _) => &[20; 4],
+            (Precision::Double, Abscissa::Uneven, Ordinate::Real) => &[13, 20, 13, 20],
+            (Precision::Double, Abscissa::Uneven, Ordinate::Complex) => &[13, 20, 20],
+        };
         let mut room = usize::try_from(self.missing()).unwrap_or(usize::MAX);
         let mut done = 0;
         while room > 0 && done < self.bytes.len() {

@@ -18,7 +18,7 @@ use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 mod csv;
@@ -173,7 +173,6 @@ pub struct Block {
 #[derive(Debug, Clone)]
 pub struct Recording {
     name: String,
-    path: Option<PathBuf>,
     format: Format,
     sample_rate: f64,
     frames: u64,
@@ -214,21 +213,19 @@ impl Recording {
         check_rate(&name, sample_rate)?;
         let slices = channels.iter().map(|channel| channel.samples.as_slice());
         let frames = check_samples(&name, sample_rate, slices)? as u64;
-        let mut infos = Vec::with_capacity(channels.len());
-        let mut samples = Vec::with_capacity(channels.len());
-        for channel in channels {
+        let channels = channels.into_iter().map(|channel| {
             let mut meter = HealthMeter::new(None);
             meter.add(&channel.samples);
-            infos.push(ChannelInfo::unscaled(channel.name, channel.unit, meter));
-            samples.push(channel.samples);
-        }
+            let info = ChannelInfo::unscaled(channel.name, channel.unit, meter);
+            (info, channel.samples)
+        });
+        let (channels, samples): (_, Vec<Vec<f64>>) = channels.unzip();
         Ok(Self {
             name,
-            path: None,
             format: Format::Memory,
             sample_rate,
             frames,
-            channels: infos,
+            channels,
             warnings: Vec::new(),
             source: Arc::new(samples),
         })
@@ -237,11 +234,6 @@ impl Recording {
     /// The file as the caller named it, or the name of a recording in memory.
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// The file; `None` for a recording in memory.
-    pub fn path(&self) -> Option<&Path> {
-        self.path.as_deref()
     }
 
     /// Format of the file.
@@ -362,9 +354,7 @@ impl Recording {
             );
             return Err(RecordingError::new(&self.name, problem));
         }
-        let Some(info) = self.channels.get_mut(channel) else {
-            return Ok(());
-        };
+        let info = &mut self.channels[channel];
         let of_unit = ["scale-over-unit", "unknown-unit", "units-disagree"];
         self.warnings.retain(|warning| {
             warning.channel != Some(channel + 1) || !of_unit.contains(&warning.code())
@@ -392,15 +382,6 @@ impl Recording {
         Ok(())
     }
 
-    /// [`set_scale`](Self::set_scale) by value.
-    ///
-    /// # Errors
-    /// Those of [`set_scale`](Self::set_scale).
-    pub fn with_scale(mut self, channel: usize, scale: f64) -> Result<Self, RecordingError> {
-        self.set_scale(channel, scale)?;
-        Ok(self)
-    }
-
     fn check_channels(&self, channels: &[usize]) -> Result<(), RecordingError> {
         channels
             .iter()
@@ -410,7 +391,7 @@ impl Recording {
     /// Turns file units of these channels into their units.
     fn scale(&self, channels: &[usize], samples: &mut [Vec<f64>]) {
         for (channel, samples) in channels.iter().zip(samples) {
-            let scale = self.channels.get(*channel).map_or(1.0, |info| info.scale);
+            let scale = self.channels[*channel].scale;
             if scale != 1.0 {
                 samples.iter_mut().for_each(|sample| *sample *= scale);
             }

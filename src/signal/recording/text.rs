@@ -45,9 +45,7 @@ pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cel
     let last = line
         .iter()
         .rposition(|byte| !matches!(byte, b'\r' | b'\n' | b' ' | 0x1a | 0x0c));
-    let line = line
-        .get(..last.map_or(0, |last| last + 1))
-        .unwrap_or_default();
+    let line = &line[..last.map_or(0, |last| last + 1)];
     let bytes = separator.bytes();
     let (mut start, mut quoted) = (0, false);
     for (at, byte) in line.iter().enumerate() {
@@ -68,14 +66,14 @@ pub(super) fn split_cells(line: &[u8], separator: Separator, cells: &mut Vec<Cel
 /// Returns the cell without surrounding blanks and without one pair of quotes.
 fn trimmed(line: &[u8], cell: Cell) -> Cell {
     let cell = without_blanks(line, cell);
-    match line.get(cell.clone()) {
-        Some([b'"', .., b'"']) => without_blanks(line, cell.start + 1..cell.end - 1),
+    match &line[cell.clone()] {
+        [b'"', .., b'"'] => without_blanks(line, cell.start + 1..cell.end - 1),
         _ => cell,
     }
 }
 
 fn without_blanks(line: &[u8], cell: Cell) -> Cell {
-    let bytes = line.get(cell.clone()).unwrap_or_default();
+    let bytes = &line[cell.clone()];
     let start = cell.start + bytes.len() - bytes.trim_ascii_start().len();
     start..start + bytes.trim_ascii().len()
 }
@@ -209,12 +207,12 @@ pub(super) fn without_last_number<'a>(line: &'a [u8], widths: &[usize]) -> &'a [
         }
         end += width;
     }
-    let columns = line.get(..end).unwrap_or_default();
+    let columns = &line[..end];
     if parse_columns(columns, widths, usize::MAX, &mut Vec::new()).is_some() {
         return columns;
     }
     let blank = line.iter().rposition(u8::is_ascii_whitespace);
-    line.get(..blank.unwrap_or(0)).unwrap_or_default()
+    &line[..blank.unwrap_or(0)]
 }
 
 /// Reads fixed columns; `None` where the line does not keep to them.
@@ -277,9 +275,9 @@ pub(super) struct UnevenStep {
     /// Time there (the column's unit).
     time: f64,
     /// The step (the column's unit).
-    pub step: f64,
+    step: f64,
     /// The step elsewhere (the column's unit).
-    pub expected: f64,
+    expected: f64,
 }
 
 impl UnevenStep {
@@ -291,6 +289,19 @@ impl UnevenStep {
         format!(
             "{time} {unit} comes {step} {unit} after the {before} before, the step elsewhere is {expected} {unit}"
         )
+    }
+
+    /// Says how many rows may be lost: " (as if 2 rows were missing)"; nothing where the gap is no whole number of
+    /// steps.
+    pub(super) fn lost_rows(&self) -> String {
+        let steps = self.step / self.expected;
+        let whole = steps.round();
+        // Within a tenth.
+        if !(2.0..1e9).contains(&whole) || (steps - whole).abs() > 0.1 {
+            return String::new();
+        }
+        let plural = if whole > 2.0 { "s" } else { "" };
+        format!(" (as if {} row{plural} were missing)", whole - 1.0)
     }
 }
 

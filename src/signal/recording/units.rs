@@ -198,21 +198,7 @@ pub(super) fn response_unit(text: &str) -> Option<(f64, ResponseForm)> {
     if let Some((_, form)) = WHOLE.iter().find(|(whole, _)| *whole == plain) {
         return Some((1.0, *form));
     }
-    let (motion, force) = split_quotient(&text)?;
-    quotient(motion, force)
-}
-
-/// Factor and form of a motion over a force, each with a unit of its own.
-pub(super) fn quotient(motion: &str, force: &str) -> Option<(f64, ResponseForm)> {
-    let (motion, motion_si) = label_unit(motion)?;
-    let (force, force_si) = label_unit(force)?;
-    let mut forms = ResponseForm::ALL.into_iter();
-    let form = forms.find(|form| form.response_unit() == motion_si && force_si == "N")?;
-    Some((motion / force, form))
-}
-
-/// Numerator and denominator of a quotient.
-fn split_quotient(text: &str) -> Option<(&str, &str)> {
+    // Characters outside of brackets.
     let mut outside = Vec::new();
     let mut depth = 0_i32;
     for (place, character) in text.char_indices() {
@@ -223,21 +209,32 @@ fn split_quotient(text: &str) -> Option<(&str, &str)> {
             _ => {}
         }
     }
-    // "(1/N)*(m/s2)": a product with a reciprocal, in either order.
-    if let Some((place, mark)) = outside.iter().rfind(|(_, c)| ['*', '\u{b7}'].contains(c)) {
-        let (first, second) = (text.get(..*place)?, text.get(place + mark.len_utf8()..)?);
-        return match (reciprocal(first), reciprocal(second)) {
-            (Some(force), None) => Some((second, force)),
-            (None, Some(force)) => Some((first, force)),
-            _ => None,
-        };
-    }
-    if let Some((place, _)) = outside.iter().rfind(|(_, c)| *c == '/') {
-        return Some((text.get(..*place)?, text.get(place + 1..)?));
-    }
-    // "(m/s2)(N)": two brackets side by side.
-    let place = text.find(")(")?;
-    Some((text.get(..=place)?, text.get(place + 1..)?))
+    let product = outside.iter().rfind(|(_, c)| "*\u{b7}".contains(*c));
+    let (motion, force) = if let Some((place, mark)) = product {
+        // "(1/N)*(m/s2)": a product with a reciprocal, in either order.
+        let (first, second) = (&text[..*place], &text[place + mark.len_utf8()..]);
+        match (reciprocal(first), reciprocal(second)) {
+            (Some(force), None) => (second, force),
+            (None, Some(force)) => (first, force),
+            _ => return None,
+        }
+    } else if let Some((place, _)) = outside.iter().rfind(|(_, c)| *c == '/') {
+        (&text[..*place], &text[place + 1..])
+    } else {
+        // "(m/s2)(N)": two brackets side by side.
+        let place = text.find(")(")?;
+        (&text[..=place], &text[place + 1..])
+    };
+    quotient(motion, force)
+}
+
+/// Factor and form of a motion over a force, each with a unit of its own.
+pub(super) fn quotient(motion: &str, force: &str) -> Option<(f64, ResponseForm)> {
+    let (motion, motion_si) = label_unit(motion)?;
+    let (force, force_si) = label_unit(force)?;
+    let mut forms = ResponseForm::ALL.into_iter();
+    let form = forms.find(|form| form.response_unit() == motion_si && force_si == "N")?;
+    Some((motion / force, form))
 }
 
 /// Returns the "N" of "1/N" or "(1/N)".

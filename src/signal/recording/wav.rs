@@ -60,7 +60,6 @@ pub(super) fn open_wav(
     let channels = meters.into_iter();
     Ok(Recording {
         name: file,
-        path: Some(path.to_owned()),
         format,
         sample_rate,
         frames,

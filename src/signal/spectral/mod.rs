@@ -88,23 +88,8 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Lines of a block without a zoom band: 0 to rate/2.56, spacing rate/block.
-    ///
-    /// `available` is the length of signal at hand (s).
-    ///
-    /// # Errors
-    /// [`SpectralError::Block`] for a block outside [`LEAST_BLOCK`] to [`MOST_BLOCK`] samples,
-    /// [`SpectralError::TooNarrow`] where the signal resolves fewer than six lines of the band.
-    pub fn baseband(
-        sample_rate: f64,
-        block: usize,
-        available: f64,
-    ) -> Result<Lines, SpectralError> {
-        let band = (0.0, sample_rate / DISPLAY_RATIO);
-        Self::zoom(band, sample_rate, block, available)
-    }
-
-    /// Lines of a zoom band, low and high end (Hz), with `block` real samples at the zoomed rate.
+    /// Lines of a zoom band, low and high end (Hz), with `block` real samples at the zoomed rate. Without zoom the band
+    /// is 0 to rate/2.56. `available` is the length of signal at hand (s).
     ///
     /// # Errors
     /// [`SpectralError::Band`] where the band is empty or passes half the sample rate,

@@ -333,22 +333,6 @@ struct PulseCopy {
 }
 
 impl Pulse<'_> {
-    /// The pulse at `offset` samples from its crest, by the cubic through the four samples about it (Catmull and
-    /// Rom); 0 beyond its reach.
-    fn at(&self, offset: f64) -> f64 {
-        if offset.abs() > self.reach as f64 {
-            return 0.0;
-        }
-        let place = self.crest as f64 + offset;
-        let index = place.floor();
-        let u = place - index;
-        let [a, b, c, d] = [-1, 0, 1, 2].map(|step| clamped(self.samples, index as i64 + step));
-        let slope = c - a;
-        let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
-        let third = 3.0 * (b - c) + d - a;
-        b + 0.5 * u * (slope + u * (second + u * third))
-    }
-
     /// The copy near `place`; `None` where the force there has another shape or width.
     fn fit(&self, place: usize) -> Option<PulseCopy> {
         // The first search runs over all widths with a coarse delay, the second over the best alone.
@@ -395,7 +379,21 @@ impl Pulse<'_> {
         let (mut pp, mut py, mut yy) = (0.0, 0.0, 0.0);
         for step in -reach..=reach {
             let t = step as f64;
-            let p = self.at((t - offset) / width);
+            // The pulse about its crest, by the cubic through four samples (Catmull and Rom); 0 beyond its reach.
+            let from_crest = (t - offset) / width;
+            let p = if from_crest.abs() > self.reach as f64 {
+                0.0
+            } else {
+                let at = self.crest as f64 + from_crest;
+                let index = at.floor();
+                let u = at - index;
+                let [a, b, c, d] =
+                    [-1, 0, 1, 2].map(|step| clamped(self.samples, index as i64 + step));
+                let slope = c - a;
+                let second = 2.0 * a - 5.0 * b + 4.0 * c - d;
+                let third = 3.0 * (b - c) + d - a;
+                b + 0.5 * u * (slope + u * (second + u * third))
+            };
             let y = clamped(self.samples, place as i64 + step);
             p_sum += p;
             p_slope += p * t;

@@ -7,9 +7,7 @@ use std::sync::Arc;
 
 use super::error::{RecordingError, RecordingWarning, check_channel_count, unreadable};
 use super::health::{HealthMeter, check_rate};
-use super::text::{
-    Cell, CellProblem, TimeCheck, UnevenStep, is_comment, parse_number, shown, split_cells,
-};
+use super::text::{Cell, CellProblem, TimeCheck, is_comment, parse_number, shown, split_cells};
 use super::units::channel_unit;
 use super::{ChannelInfo, Cursor, Format, ReadSettings, Recording, Source, Timing, read_head};
 
@@ -66,7 +64,6 @@ pub(super) fn open_csv(
     }
     Ok(Recording {
         name: file,
-        path: Some(path.to_owned()),
         format: Format::Csv {
             separator: layout.separator,
             decimal: char::from(layout.decimal.unwrap_or(b'.')),
@@ -116,9 +113,9 @@ impl CsvSource {
             rate: None,
         };
         let layout = &source.layout;
-        let mut block = vec![Vec::new(); layout.channel_columns().len()];
-        check_channel_count(file, block.len())?;
-        if let Some(time) = layout.time.filter(|_| block.is_empty()) {
+        let channels = layout.channel_columns();
+        check_channel_count(file, channels.len())?;
+        if let Some(time) = layout.time.filter(|_| channels.is_empty()) {
             let problem = format!(
                 "column {} is time and there is no other; allowed: at least one channel beside the time",
                 time + 1
@@ -130,25 +127,30 @@ impl CsvSource {
             let numbers = head.numbers(layout, column);
             TimeCheck::new(numbers.iter().map(|number| (number.value, number.text)))
         });
-        let (mut index, mut frames) = (Vec::new(), 0);
+        let (mut index, mut frames) = (Vec::new(), 0_u64);
+        let mut block = vec![Vec::new(); channels.len()];
         let mut rows = source.rows(source.first_row())?;
         let columns: Vec<usize> = (0..layout.columns.len()).collect();
         while rows.next_row(&columns)? {
-            if frames % INDEX_ROWS == 0 {
+            if frames.is_multiple_of(INDEX_ROWS) {
                 index.push(rows.place);
                 sink(&block);
                 block.iter_mut().for_each(Vec::clear);
             }
             frames += 1;
-            let mut channels = block.iter_mut();
-            for (column, value) in rows.values.iter().enumerate() {
-                if let Some(check) = time.as_mut().filter(|_| Some(column) == layout.time) {
-                    check
-                        .add(*value, rows.cell(column), rows.line_number())
-                        .map_err(|step| uneven_error(file, step, factor))?;
-                } else if let Some(channel) = channels.next() {
-                    channel.push(*value);
-                }
+            if let (Some(check), Some(column)) = (&mut time, layout.time) {
+                let (cell, line) = (rows.cell(column), rows.line_number());
+                check.add(rows.values[column], cell, line).map_err(|uneven| {
+                    let problem = format!(
+                        "uneven sampling: time {}{}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly",
+                        uneven.words(factor, "s", "row"),
+                        uneven.lost_rows()
+                    );
+                    RecordingError::at_line(file, uneven.line, problem)
+                })?;
+            }
+            for (channel, column) in block.iter_mut().zip(&channels) {
+                channel.push(rows.values[*column]);
             }
         }
         sink(&block);
@@ -242,23 +244,6 @@ impl Source for CsvSource {
         }
         Ok(Box::new(rows))
     }
-}
-
-/// Returns the error of a step of time that is not the step elsewhere.
-fn uneven_error(file: &str, uneven: UnevenStep, factor: f64) -> RecordingError {
-    let steps = uneven.step / uneven.expected;
-    let whole = steps.round();
-    let mut lost = String::new();
-    // A gap within a tenth of a whole number of steps is one of lost rows.
-    if (2.0..1e9).contains(&whole) && (steps - whole).abs() <= 0.1 {
-        let plural = if whole > 2.0 { "s" } else { "" };
-        lost = format!(" (as if {} row{plural} were missing)", whole - 1.0);
-    }
-    let problem = format!(
-        "uneven sampling: time {}{lost}; allowed: 0.1 % of the step, or what rounding of the printed time explains; export without gaps or resample evenly",
-        uneven.words(factor, "s", "row")
-    );
-    RecordingError::at_line(file, uneven.line, problem)
 }
 
 /// Place of a row.

@@ -305,7 +305,7 @@ impl Function {
     }
 
     /// Numbers stored for each point: the abscissa where it is uneven, then the ordinate.
-    fn numbers(&self) -> usize {
+    fn numbers_per_point(&self) -> usize {
         let ordinate = match self.ordinate {
             Ordinate::Real => 1,
             Ordinate::Complex => 2,
@@ -328,7 +328,7 @@ impl Function {
 
     /// Bytes of one point of binary data.
     fn point_bytes(&self, abscissa_bytes: u64) -> u64 {
-        let ordinates = (self.numbers() - self.abscissa_numbers()) as u64;
+        let ordinates = (self.numbers_per_point() - self.abscissa_numbers()) as u64;
         ordinates * self.ordinate_bytes() as u64 + self.abscissa_numbers() as u64 * abscissa_bytes
     }
 }

@@ -97,7 +97,6 @@ pub(in crate::recording) fn open_uff(
     warnings.extend(repeated_place(&values, &channels));
     Ok(Recording {
         name: file,
-        path: Some(path.to_owned()),
         format: Format::Uff58 {
             coding: values[0].function.coding,
         },
@@ -579,7 +578,11 @@ fn stored_abscissa(
             if points.is_empty() {
                 break;
             }
-            for x in points.iter().step_by(values.function.numbers()).copied() {
+            for x in points
+                .iter()
+                .step_by(values.function.numbers_per_point())
+                .copied()
+            {
                 // As it may have been printed: with the digits of single precision, which is what the format gives
                 // it, text or binary.
                 let single = x as f32;

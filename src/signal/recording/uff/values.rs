@@ -59,7 +59,7 @@ pub fn read_function(
         if points.is_empty() {
             return Ok(read);
         }
-        for point in points.chunks_exact(values.function.numbers()) {
+        for point in points.chunks_exact(values.function.numbers_per_point()) {
             if let Some(abscissa) = &mut read.abscissa {
                 abscissa.push(point[0]);
             }
@@ -138,7 +138,7 @@ impl Values {
         point: u64,
         file: &mut File,
     ) -> Result<ValueReader<'_>, RecordingError> {
-        let width = self.function.numbers() as u64;
+        let width = self.function.numbers_per_point() as u64;
         let wanted = point.min(self.function.points).saturating_mul(width);
         let block = match self.function.coding {
             UffCoding::Binary { .. } => {
@@ -197,7 +197,7 @@ pub(super) struct ValueReader<'a> {
 impl ValueReader<'_> {
     /// Reads the numbers of up to `limit` points, whole points only; none at the end.
     pub(super) fn next(&mut self, file: &mut File, limit: u64) -> Result<&[f64], RecordingError> {
-        let width = self.values.function.numbers();
+        let width = self.values.function.numbers_per_point();
         while self.parsed.len() - self.given < width {
             if !self.decode_block(file)? {
                 return Ok(&[]);
@@ -219,7 +219,7 @@ impl ValueReader<'_> {
         into: &mut Vec<f64>,
     ) -> Result<u64, RecordingError> {
         let function = &self.values.function;
-        let (width, ordinate) = (function.numbers(), function.abscissa_numbers());
+        let (width, ordinate) = (function.numbers_per_point(), function.abscissa_numbers());
         let points = self.next(file, limit)?;
         match width {
             1 => into.extend_from_slice(points),
@@ -231,7 +231,9 @@ impl ValueReader<'_> {
     /// Numbers that the header promises and that are not decoded.
     fn missing(&self) -> u64 {
         let function = &self.values.function;
-        let promised = function.points.saturating_mul(function.numbers() as u64);
+        let promised = function
+            .points
+            .saturating_mul(function.numbers_per_point() as u64);
         promised.saturating_sub(self.decoded)
     }
 
@@ -324,7 +326,8 @@ impl ValueReader<'_> {
         let abscissa_bytes = values.place.abscissa_bytes as usize;
         let ordinate_bytes = values.function.ordinate_bytes();
         let room = usize::try_from(self.missing()).unwrap_or(usize::MAX);
-        let points = (self.bytes.len() / point_bytes).min(room / values.function.numbers());
+        let points =
+            (self.bytes.len() / point_bytes).min(room / values.function.numbers_per_point());
         let used = points * point_bytes;
         let bytes = &self.bytes[..used];
         if values.function.abscissa_numbers() == 0 || abscissa_bytes == ordinate_bytes {

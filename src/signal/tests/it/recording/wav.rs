@@ -633,7 +633,8 @@ fn a_scale_multiplies_samples_and_health() {
     let (_file, recording) = open(pcm16().bytes());
     let recording = recording.unwrap();
     let before = recording.channels()[1].health.clone();
-    let scaled = recording.with_scale(1, -65_536.0).unwrap();
+    let mut scaled = recording;
+    scaled.set_scale(1, -65_536.0).unwrap();
     // Channel 2: -3, 11, -19, 31 over 32768, times -65536.
     assert_eq!(scaled.read(1, 0..9).unwrap(), [6.0, -22.0, 38.0, -62.0]);
     let block = scaled.blocks(&[1], 100).next().unwrap().unwrap();
@@ -643,12 +644,13 @@ fn a_scale_multiplies_samples_and_health() {
     assert_eq!((health.minimum, health.maximum), (-62.0, 38.0));
     assert_eq!(health.mean, before.mean * -65_536.0);
     for bad in [0.0, f64::NAN, f64::INFINITY] {
-        let error = scaled.clone().with_scale(1, bad).expect_err("no scale");
+        let error = scaled.set_scale(1, bad).expect_err("no scale");
         assert!(error.to_string().contains("channel 2: scale"), "{error}");
     }
-    assert!(scaled.clone().with_scale(3, 1.0).is_err());
+    assert!(scaled.set_scale(3, 1.0).is_err());
     // Set again it replaces, and does not multiply.
-    let again = scaled.with_scale(1, 32_768.0).unwrap();
+    let mut again = scaled;
+    again.set_scale(1, 32_768.0).unwrap();
     assert_eq!(again.read(1, 0..1).unwrap(), [-3.0]);
     assert_eq!(again.channels()[1].health.peak, 31.0);
 }

@@ -6,7 +6,7 @@ use anyhow::bail;
 use std::path::Path;
 use tapjoint::description::ReadBy;
 use tapjoint::pipeline::{Analysis, FunctionSettings, run_functions, run_recording};
-use tapjoint::recording::{RecordingError, ResponseError, UffError, open_frequency_responses};
+use tapjoint::recording::{RecordingError, open_frequency_responses};
 
 /// Analyses a recording, or the frequency response functions of a file without samples in time.
 ///
@@ -35,7 +35,7 @@ pub(super) fn analyse(
     let mut functions = match (problem, open_frequency_responses(path)) {
         (_, Ok(functions)) => functions,
         // A universal file without samples may hold neither.
-        (problem @ RecordingError::Uff(_), Err(_)) => return Err(problem.into()),
+        (problem @ RecordingError::NoTimeSeries { .. }, Err(_)) => return Err(problem.into()),
         (_, Err(problem)) => return Err(problem.into()),
     };
     let time_options = [
@@ -70,8 +70,7 @@ pub(super) fn holds_functions(path: &Path, arguments: &RecordingArguments) -> an
 fn is_no_time_series(problem: &RecordingError) -> bool {
     matches!(
         problem,
-        RecordingError::Responses(ResponseError::NotTimeSeries { .. })
-            | RecordingError::Uff(UffError::NoTimeSeries { .. })
+        RecordingError::FrequencyColumn { .. } | RecordingError::NoTimeSeries { .. }
     )
 }
 

@@ -7,7 +7,7 @@ use super::tables::estimated;
 use num_complex::Complex64;
 use tapjoint_analysis::Frf;
 use tapjoint_signal::recording::{
-    FrequencyResponse, FrequencyResponses, Point, UffError, UffFormat,
+    FrequencyResponse, FrequencyResponses, Point, RecordingError, UffFormat,
     encode_frequency_responses_uff,
 };
 
@@ -333,7 +333,7 @@ pub(super) fn write(header: &[&str], rows: Vec<Vec<String>>) -> Result<String, R
 ///
 /// # Errors
 /// Values that are not finite.
-pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, UffError> {
+pub fn render_frf_uff(frfs: &[Frf], format: UffFormat) -> Result<Vec<u8>, RecordingError> {
     let mut bytes = Vec::new();
     for (number, group) in (1..).zip(frfs.chunk_by(|a, b| a.recording == b.recording)) {
         let Some(first) = group.first() else { continue };

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::shared::baseband;
 use num_complex::Complex64;
 use tapjoint_signal::quality::*;
 use tapjoint_signal::recording::ResponseForm;
@@ -17,7 +18,7 @@ fn settings() -> QualitySettings {
 
 fn lines() -> Lines {
     // 2048 samples at 640 Hz: 800 lines of 0.3125 Hz up to 250 Hz.
-    Lines::baseband(640.0, 2048, 3.2).expect("fits")
+    baseband(640.0, 2048, 3.2).expect("fits")
 }
 
 /// Accelerance of three modes with these residues phi_a phi_b.

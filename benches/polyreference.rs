@@ -12,8 +12,7 @@ use num_complex::Complex64;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tapjoint::modal::polyreference::{
-    PolyreferenceSettings, ResponseMatrix, SubBandSettings, find_modes, select_modes,
-    stabilise_poles,
+    PolyreferenceSettings, ResponseMatrix, find_modes, select_modes, stabilise_poles,
 };
 
 const MODES: [(f64, f64); 5] = [
@@ -62,9 +61,8 @@ fn whole_band(criterion: &mut Criterion) {
     group.bench_function("tapjoint: selection", |b| {
         b.iter(|| select_modes(black_box(&matrix), &diagram, &settings));
     });
-    let bands = SubBandSettings::default();
     group.bench_function("tapjoint: all, with sub-bands", |b| {
-        b.iter(|| find_modes(black_box(&matrix), &settings, &bands).unwrap());
+        b.iter(|| find_modes(black_box(&matrix), &settings).unwrap());
     });
     group.bench_function("nalgebra: eigenvalues of companions of 2 to 40", |b| {
         let companions: Vec<DMatrix<Complex64>> = (2..=40).map(companion).collect();

@@ -14,7 +14,7 @@ use rustfft::FftPlanner;
 use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, minimise};
 
 use super::band::{Band, noise_variance};
-use super::{AmplitudePoint, AmplitudeSettings, AmplitudeVerdict, Companion, Origin};
+use super::{AIM, AmplitudePoint, AmplitudeVerdict, Companion, END, LONGEST, SHORTEST};
 
 /// Numbers of exponents tried for the mode: one is a pole that does not change.
 const DEGREES: [usize; 5] = [1, 2, 3, 5, 7];
@@ -54,8 +54,6 @@ pub(super) struct DecayModel {
     exponentials: Exponentials,
     /// Noise variance of the values.
     noise: f64,
-    /// Number of listed neighbours; they stand before the lines that were found.
-    listed: usize,
 }
 
 struct Candidate {
@@ -106,18 +104,16 @@ impl DecayModel {
             models.extend(with_line);
             models = best_of_each_kind(models);
         }
-        let (exponentials, noise) = match models.into_iter().min_by(by_criterion) {
+        match models.into_iter().min_by(by_criterion) {
             // What a model of the whole decay misses is no noise.
-            Some(best) => (
-                best.fit.model,
-                noise.min(best.fit.squares / whole.series.len() as f64),
-            ),
-            None => (start, noise),
-        };
-        DecayModel {
-            exponentials,
-            noise,
-            listed: band.neighbours.len(),
+            Some(best) => DecayModel {
+                noise: noise.min(best.fit.squares / whole.series.len() as f64),
+                exponentials: best.fit.model,
+            },
+            None => DecayModel {
+                exponentials: start,
+                noise,
+            },
         }
     }
 
@@ -126,27 +122,20 @@ impl DecayModel {
     fn bend(&self, t: f64, s: f64) -> Complex64 {
         let model = &self.exponentials;
         let bend = model.exponent(t + s) - model.exponent(t) - model.pole(t) * s;
-        if bend.norm() < LARGEST_BEND {
-            bend
-        } else {
-            Complex64::ZERO
+        match bend.norm() < LARGEST_BEND {
+            true => bend,
+            false => Complex64::ZERO,
         }
     }
 
     /// Returns the lines fitted along with the mode that matter.
     pub fn companions(&self, band: &Band) -> Vec<Companion> {
         let mode = self.exponentials.amplitude.norm();
-        let others = self.exponentials.others.iter().enumerate();
+        let others = self.exponentials.others.iter();
         others
-            .map(|(k, (amplitude, pole))| Companion {
-                tap: band.tap,
+            .map(|(amplitude, pole)| Companion {
                 frequency: band.frequency(*pole),
                 share: amplitude.norm() / mode,
-                origin: if k < self.listed {
-                    Origin::Listed
-                } else {
-                    Origin::Found
-                },
             })
             .filter(|companion| companion.share > LEAST_SHARE)
             .collect()
@@ -163,11 +152,9 @@ impl DecayModel {
             return None;
         }
         let mode = band.frequency(self.exponentials.pole(0.0));
-        let near = self
-            .companions(band)
-            .into_iter()
-            .filter(|companion| TAU * (companion.frequency - mode).abs() < -NEAR * band.decay);
-        let strongest = near.max_by(|a, b| a.share.total_cmp(&b.share))?;
+        let mut near = self.companions(band);
+        near.retain(|companion| TAU * (companion.frequency - mode).abs() < -NEAR * band.decay);
+        let strongest = near.iter().max_by(|a, b| a.share.total_cmp(&b.share))?;
         Some(AmplitudeVerdict::Beating {
             frequency: strongest.frequency,
         })
@@ -249,7 +236,23 @@ impl WholeDecay<'_> {
     /// one that stays, whichever takes more out.
     fn with_strongest_line(&self, candidate: &Candidate) -> Option<Candidate> {
         let residuals = &candidate.fit.residuals;
-        let offset = self.strongest_line(&candidate.fit)?;
+        let mut model = candidate.fit.model.clone();
+        let size = (4 * residuals.len()).next_power_of_two();
+        let mut lines = residuals.clone();
+        lines.resize(size, Complex64::ZERO);
+        FftPlanner::new().plan_fft_forward(size).process(&mut lines);
+        let spacing = TAU / (size as f64 * self.band.step);
+        let mode = model.pole(self.band.scale).im;
+        let sigma = -self.band.decay;
+        let offsets = lines.iter().enumerate().map(|(k, value)| {
+            // The upper half of the lines are those of negative frequencies.
+            let turn = if k < size / 2 { 0.0 } else { size as f64 };
+            ((k as f64 - turn) * spacing, value.norm_sqr())
+        });
+        // Outside what a drift makes.
+        let (offset, _) = offsets
+            .filter(|(offset, _)| (NEAREST * sigma..FAR * sigma).contains(&(offset - mode).abs()))
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
         let (mut line, mut most) = (None, f64::NEG_INFINITY);
         for decay in [self.band.decay, 0.0] {
             let pole = Complex64::new(decay, offset);
@@ -265,36 +268,8 @@ impl WholeDecay<'_> {
                 (line, most) = (Some((product / energy, pole)), explained);
             }
         }
-        let mut model = candidate.fit.model.clone();
         model.others.push(line?);
         self.fit(model).filter(|grown| self.is_plausible(grown))
-    }
-
-    /// Returns the angular frequency (rad/s, relative to the band's middle) of the largest line in the
-    /// residuals, outside what a drift makes.
-    fn strongest_line(&self, fit: &Fit) -> Option<f64> {
-        let size = (4 * fit.residuals.len()).next_power_of_two();
-        let mut lines = fit.residuals.clone();
-        lines.resize(size, Complex64::ZERO);
-        FftPlanner::new().plan_fft_forward(size).process(&mut lines);
-        let spacing = TAU / (size as f64 * self.band.step);
-        let mode = fit.model.pole(self.band.scale).im;
-        let sigma = -self.band.decay;
-        lines
-            .iter()
-            .enumerate()
-            .map(|(k, value)| {
-                // The upper half of the lines are those of negative frequencies.
-                let signed = if k < size / 2 {
-                    k as f64
-                } else {
-                    k as f64 - size as f64
-                };
-                (signed * spacing, value.norm_sqr())
-            })
-            .filter(|(offset, _)| (NEAREST * sigma..FAR * sigma).contains(&(offset - mode).abs()))
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(offset, _)| offset)
     }
 
     /// Returns true where unlisted lines neither grow nor lie where a drift makes terms of its own.
@@ -594,20 +569,18 @@ pub(super) fn follow_decay(
     series: &[Complex64],
     band: &Band,
     model: &DecayModel,
-    settings: &AmplitudeSettings,
 ) -> Vec<AmplitudePoint> {
     let mut segments: Vec<Segment> = Vec::new();
     let mut pole = model.exponentials.pole(0.0);
     pole.re = pole.re.min(0.3 * band.decay);
     let mut amplitude = model.exponentials.amplitude.norm();
     let mut from = 0;
-    while let Some(length) = segment_length(amplitude, pole.re, model.noise, band, settings) {
+    while let Some(length) = segment_length(amplitude, pole.re, model.noise, band) {
         let Some(values) = series.get(from..from + length) else {
             break;
         };
-        let times: Vec<f64> = (from..from + length)
-            .map(|n| n as f64 * band.step)
-            .collect();
+        let indices = from..from + length;
+        let times: Vec<f64> = indices.map(|n| n as f64 * band.step).collect();
         let Some(segment) = fit_segment(&times, values, pole, model) else {
             break;
         };
@@ -643,22 +616,16 @@ pub(super) fn follow_decay(
 ///
 /// Bound of Cramer and Rao for one exponential of amplitude A in noise of variance v:
 /// var(sigma) = 6 v/(A^2 N^3 step^2) with A that of the segment's middle.
-fn segment_length(
-    amplitude: f64,
-    decay: f64,
-    noise: f64,
-    band: &Band,
-    settings: &AmplitudeSettings,
-) -> Option<usize> {
-    let [least, most] = [settings.shortest, settings.longest]
+fn segment_length(amplitude: f64, decay: f64, noise: f64, band: &Band) -> Option<usize> {
+    let [least, most] = [SHORTEST, LONGEST]
         .map(|share| ((share * band.scale / band.step) as usize).max(LEAST_IN_SEGMENT));
     let mut length = least.min(most);
     loop {
         let n = length as f64;
         let middle = amplitude * (0.5 * decay * n * band.step).exp();
         let uncertainty = (6.0 * noise / n.powi(3)).sqrt() / (middle * band.step) / decay.abs();
-        if uncertainty <= settings.aim || length >= most {
-            return (uncertainty <= settings.end).then_some(length);
+        if uncertainty <= AIM || length >= most {
+            return (uncertainty <= END).then_some(length);
         }
         length += 1;
     }

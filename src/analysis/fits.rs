@@ -7,7 +7,7 @@
 use num_complex::Complex64;
 
 use tapjoint_signal::modal::fit::{
-    Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
+    Accepted, ExtraMode, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
 };
 use tapjoint_signal::modal::polyreference::{
     BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes,
@@ -190,7 +190,7 @@ impl Candidates<'_> {
 
     /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.
     fn is_mode(&self, test: &ExtraMode, accepted: &[PoleStart]) -> bool {
-        let (ExtraVerdict::Needed, Ok(fit)) = (test.verdict, &test.fit) else {
+        let (true, Ok(fit)) = (test.needed, &test.fit) else {
             return false;
         };
         let own = fit.frequency.value * fit.damping_ratio.value;

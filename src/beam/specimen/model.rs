@@ -8,7 +8,7 @@ use super::element::{
 };
 use super::{Body, Joint, Specimen};
 use crate::StructureError;
-use crate::banded::BandedMatrix;
+use crate::eigen::BandedMatrix;
 use std::f64::consts::PI;
 
 /// Equation of a motion that does not exist; larger than the number of any that does.

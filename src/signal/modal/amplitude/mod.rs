@@ -254,8 +254,9 @@ pub struct Trend {
     /// than noise (between taps: the structure changed).
     #[serde(skip)]
     pub scatter: f64,
-    /// Value at the smallest amplitude less that at the largest: from the first usable time of the hardest tap to
-    /// the last of some tap.
+    // First is the value at the largest amplitude, the first usable time of the hardest tap. Last is that at the
+    // smallest, the last usable time of some tap.
+    /// Last less first.
     pub change: f64,
     /// 95 % bound of the change.
     pub change_bound: f64,

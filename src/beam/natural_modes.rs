@@ -98,22 +98,35 @@ pub fn natural_modes(
     if assembly != Assembly::Free {
         joint.check()?;
     }
-    let lambdas = match assembly {
-        Assembly::Free => lowest_roots(&JointStiffness::FREE, *slenderness, count),
-        Assembly::Cantilever => lowest_roots(joint, *slenderness, count),
+    // The families of modes: their symmetry, the joint of one piece, its share of the length, and their number.
+    // The n-th modes of both families of a lap joint lie below the (n+1)-th of either, a family without its spring
+    // starting one later; hence half of the modes from each, and two to spare.
+    let families = match assembly {
+        Assembly::Free => vec![(None, JointStiffness::FREE, 1.0, count)],
+        Assembly::Cantilever => vec![(None, *joint, 1.0, count)],
         Assembly::Lap if joint.cross_compliance != 0.0 => {
             return Err(StructureError::NoCoupling {
                 assembly: "lap joint",
                 cross_compliance: joint.cross_compliance,
             });
         }
-        Assembly::Lap => return Ok(lap_modes(joint, slenderness, count)),
+        Assembly::Lap => [Symmetry::Symmetric, Symmetry::Antisymmetric]
+            .map(|family| (Some(family), family.half_joint(joint), 0.5, count / 2 + 2))
+            .to_vec(),
     };
-    let modes = lambdas.into_iter().map(|lambda| NaturalMode {
-        lambda,
-        symmetry: None,
-    });
-    Ok(modes.collect())
+    let mut modes = Vec::with_capacity(count + 4);
+    for (symmetry, joint, part, number) in families {
+        let lambdas = lowest_roots(&joint, slenderness.of_piece(part), number).into_iter();
+        modes.extend(lambdas.map(|lambda| NaturalMode {
+            lambda: lambda / part,
+            symmetry,
+        }));
+    }
+    if assembly == Assembly::Lap {
+        modes.sort_by(|a, b| a.lambda.total_cmp(&b.lambda));
+        modes.truncate(count);
+    }
+    Ok(modes)
 }
 
 /// The first `count` lambda (1) of an Euler cantilever on any joint, physical or not.
@@ -142,25 +155,6 @@ fn check_count(count: usize) -> Result<(), StructureError> {
         true => Ok(()),
         false => Err(StructureError::TooManyModes { count }),
     }
-}
-
-/// The modes of both families of a lap joint.
-fn lap_modes(joint: &JointStiffness, slenderness: &Slenderness, count: usize) -> Vec<NaturalMode> {
-    // The n-th modes of both families lie below the (n+1)-th of either, a family without its
-    // spring starting one later; hence half of the modes from each, and two to spare.
-    let half_count = count / 2 + 2;
-    let mut modes = Vec::with_capacity(2 * half_count);
-    for symmetry in [Symmetry::Symmetric, Symmetry::Antisymmetric] {
-        let half = symmetry.half_joint(joint);
-        let lambdas = lowest_roots(&half, slenderness.of_piece(0.5), half_count);
-        modes.extend(lambdas.into_iter().map(|lambda| NaturalMode {
-            lambda: 2.0 * lambda,
-            symmetry: Some(symmetry),
-        }));
-    }
-    modes.sort_by(|a, b| a.lambda.total_cmp(&b.lambda));
-    modes.truncate(count);
-    modes
 }
 
 /// The lowest `count` roots, rigid-body motions and growing ones left out.
@@ -206,13 +200,22 @@ pub fn mode_shapes(
 ) -> Result<Vec<ModeShape>, StructureError> {
     beam.check()?;
     let modes = natural_modes(assembly, joint, &Slenderness::EULER, count)?;
-    let shapes = modes.iter().map(|mode| ModeShape {
-        frequency: beam.frequency_of(mode.lambda),
-        lambda: mode.lambda,
-        symmetry: mode.symmetry,
-        length: beam.length,
-        // Both halves of a lap joint move alike, so that the whole beam's mass counts either way.
-        piece: Piece::of_mode(assembly, joint, mode).scaled(beam.mass().powf(-0.5)),
+    let shapes = modes.iter().map(|mode| {
+        let (part, joint) = match (assembly, mode.symmetry) {
+            (Assembly::Free, _) => (1.0, JointStiffness::FREE),
+            (_, None) => (1.0, *joint),
+            (_, Some(symmetry)) => (0.5, symmetry.half_joint(joint)),
+        };
+        ModeShape {
+            frequency: beam.frequency_of(mode.lambda),
+            lambda: mode.lambda,
+            symmetry: mode.symmetry,
+            length: beam.length,
+            // Both halves of a lap joint move alike, so that the whole beam's mass counts either way.
+            piece: Piece::with_free_tip(part * mode.lambda, &joint)
+                .normalised()
+                .scaled(beam.mass().powf(-0.5)),
+        }
     });
     Ok(shapes.collect())
 }
@@ -264,19 +267,13 @@ struct Piece {
 
 impl Piece {
     /// Returns the shape of unit mean square, positive at the free end.
-    fn of_mode(assembly: Assembly, joint: &JointStiffness, mode: &NaturalMode) -> Self {
-        let (part, joint) = match (assembly, mode.symmetry) {
-            (Assembly::Free, _) => (1.0, JointStiffness::FREE),
-            (_, None) => (1.0, *joint),
-            (_, Some(symmetry)) => (0.5, symmetry.half_joint(joint)),
-        };
-        let piece = Self::with_free_tip(part * mode.lambda, &joint);
+    fn normalised(&self) -> Self {
         // The integral of the square over the piece follows from the values at its ends alone:
         // 4 integral = W(1)^2 - (3 W W''' - W' W'')(0) / lambda^4 where the far end is free.
-        let [w0, w1, w2, w3] = [0, 1, 2, 3].map(|order| piece.derivative(order, 0.0));
-        let tip = piece.derivative(0, 1.0);
-        let mean_square = 0.25 * (tip * tip - (3.0 * w0 * w3 - w1 * w2) / piece.lambda.powi(4));
-        piece.scaled(1f64.copysign(tip) / mean_square.sqrt())
+        let [w0, w1, w2, w3] = [0, 1, 2, 3].map(|order| self.derivative(order, 0.0));
+        let tip = self.derivative(0, 1.0);
+        let mean_square = 0.25 * (tip * tip - (3.0 * w0 * w3 - w1 * w2) / self.lambda.powi(4));
+        self.scaled(1f64.copysign(tip) / mean_square.sqrt())
     }
 
     /// Two solutions leave the tip free, one decaying from the joint and one from the tip:

@@ -80,11 +80,22 @@ fn compare_swapped(
     let (h1, h2) = (a.frf.as_ref()?, b.frf.as_ref()?);
     let (mut cross, mut power1, mut power2) = (Complex64::ZERO, 0.0, 0.0);
     for (line, x) in h1.iter().enumerate() {
-        if let Some(y) = at_frequency(second, h2, first.lines.frequency(line)) {
-            cross += x * y.conj();
-            power1 += x.norm_sqr();
-            power2 += y.norm_sqr();
-        }
+        // The other FRF at that frequency, linear between its lines; none outside its band.
+        let place = (first.lines.frequency(line) - second.lines.low) / second.lines.spacing;
+        let index = (place + 1e-9).floor();
+        let share = (place - index).max(0.0);
+        let Some([one, next]) = (index >= 0.0).then(|| [0, 1].map(|k| h2.get(index as usize + k)))
+        else {
+            continue;
+        };
+        let y = match (one, next) {
+            (Some(one), Some(next)) => one * (1.0 - share) + next * share,
+            (Some(one), None) if share < 1e-6 => *one,
+            _ => continue,
+        };
+        cross += x * y.conj();
+        power1 += x.norm_sqr();
+        power2 += y.norm_sqr();
     }
     if power1 <= 0.0 || power2 <= 0.0 {
         return None;
@@ -113,25 +124,6 @@ fn compare_swapped(
     );
     let verdict = first.sensor_verdict(Check::Reciprocity, a, limits::RECIPROCITY);
     Some(verdict.found(agreement, outcome, happened))
-}
-
-/// An FRF at a frequency, linear between its lines; `None` outside its band.
-fn at_frequency(
-    recording: &RecordingEvidence,
-    frf: &[Complex64],
-    frequency: f64,
-) -> Option<Complex64> {
-    let place = (frequency - recording.lines.low) / recording.lines.spacing;
-    let index = (place + 1e-9).floor();
-    if index < 0.0 {
-        return None;
-    }
-    let share = (place - index).max(0.0);
-    let one = frf.get(index as usize)?;
-    match frf.get(index as usize + 1) {
-        Some(next) => Some(one * (1.0 - share) + next * share),
-        None => (share < 1e-6).then_some(*one),
-    }
 }
 
 /// Frequencies at two tap levels in one arrangement agree within their uncertainty.

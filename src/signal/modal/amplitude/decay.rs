@@ -86,13 +86,26 @@ impl DecayModel {
             amplitude: series.first().copied().unwrap_or(Complex64::ONE),
             exponents: vec![Complex64::from(band.decay)],
             rate: -RATE * band.decay,
-            others: band
-                .neighbours
-                .iter()
+            others: (band.neighbours.iter())
                 .map(|p| (Complex64::ZERO, *p))
                 .collect(),
         };
-        let mut models = best_of_each_kind(whole.with_listed_lines(&start));
+        // The mode and its listed neighbours, with more and more exponents.
+        let mut models: Vec<Candidate> = Vec::new();
+        for degree in DEGREES {
+            let mut model = models
+                .last()
+                .map_or(&start, |lower| &lower.fit.model)
+                .clone();
+            model.exponents.resize(degree, Complex64::ZERO);
+            models.extend(whole.fit(model));
+            // Twice worse in a row: more exponents only follow the noise.
+            let criteria: Vec<f64> = models.iter().map(|model| model.criterion).collect();
+            if matches!(criteria[..], [.., a, b, c] if a < b && b < c) {
+                break;
+            }
+        }
+        models = best_of_each_kind(models);
         for _ in 0..MOST_FOUND {
             let with_line: Vec<Candidate> = models
                 .iter()
@@ -186,25 +199,6 @@ struct WholeDecay<'a> {
 }
 
 impl WholeDecay<'_> {
-    /// Fits the mode and its listed neighbours, with more and more exponents.
-    fn with_listed_lines(&self, start: &Exponentials) -> Vec<Candidate> {
-        let mut models: Vec<Candidate> = Vec::new();
-        for degree in DEGREES {
-            let mut model = match models.last() {
-                Some(lower) => lower.fit.model.clone(),
-                None => start.clone(),
-            };
-            model.exponents.resize(degree, Complex64::ZERO);
-            models.extend(self.fit(model));
-            // Twice worse in a row: more exponents only follow the noise.
-            let criteria: Vec<f64> = models.iter().map(|model| model.criterion).collect();
-            if matches!(criteria[..], [.., a, b, c] if a < b && b < c) {
-                break;
-            }
-        }
-        models
-    }
-
     fn fit(&self, model: Exponentials) -> Option<Candidate> {
         let degree = model.exponents.len();
         let count = self.series.len();
@@ -269,25 +263,26 @@ impl WholeDecay<'_> {
             }
         }
         model.others.push(line?);
-        self.fit(model).filter(|grown| self.is_plausible(grown))
-    }
-
-    /// Returns true where unlisted lines neither grow nor lie where a drift makes terms of its own.
-    fn is_plausible(&self, candidate: &Candidate) -> bool {
-        let model = &candidate.fit.model;
-        let sigma = -self.band.decay;
-        let mode = model.pole(self.band.scale);
+        let grown = self.fit(model)?;
+        // Unlisted lines may neither grow nor lie where a drift makes terms of its own.
+        let mode = grown.fit.model.pole(self.band.scale);
         let mut near = 0;
-        for (_, pole) in model.others.iter().skip(self.band.neighbours.len()) {
+        for (_, pole) in grown
+            .fit
+            .model
+            .others
+            .iter()
+            .skip(self.band.neighbours.len())
+        {
             let distance = (pole.im - mode.im).abs() / sigma;
             let hum = pole.re.abs() < HUM * sigma;
             near += usize::from(distance < NEAR && !hum);
             if distance < NEAREST || pole.re > HUM * sigma {
-                return false;
+                return None;
             }
         }
         // A pair beats. Several lines about a mode are what a drift looks like.
-        near == 0 || (near == 1 && !candidate.drifts())
+        (near == 0 || (near == 1 && !grown.drifts())).then_some(grown)
     }
 }
 
@@ -315,21 +310,6 @@ impl Exponentials {
         all.extend(&self.exponents);
         all.extend(self.others.iter().flat_map(|(c, p)| [*c, *p]));
         all
-    }
-
-    /// Returns a sum of as many terms with other parameters, real and imaginary parts in turn.
-    fn with_parameters(&self, parts: &[f64]) -> Self {
-        let all: Vec<Complex64> = parts
-            .chunks_exact(2)
-            .map(|part| Complex64::new(part[0], part[1]))
-            .collect();
-        let (mode, others) = all.split_at(1 + self.exponents.len());
-        Exponentials {
-            amplitude: mode[0],
-            exponents: mode[1..].to_vec(),
-            rate: self.rate,
-            others: others.chunks_exact(2).map(|x| (x[0], x[1])).collect(),
-        }
     }
 
     /// Returns the pole at a time: the derivative of the mode's exponent.
@@ -465,8 +445,16 @@ impl Problem for ExponentialFit<'_> {
     type State = Fit;
 
     fn evaluate(&self, parameters: &[f64], _: Option<&Self::State>) -> Option<Self::State> {
-        let model = self.terms.with_parameters(parameters);
-        let size = parameters.len() / 2;
+        let parts = parameters.chunks_exact(2);
+        let all: Vec<Complex64> = parts.map(|part| Complex64::new(part[0], part[1])).collect();
+        let (mode, others) = all.split_at(1 + self.terms.exponents.len());
+        let model = Exponentials {
+            amplitude: mode[0],
+            exponents: mode[1..].to_vec(),
+            rate: self.terms.rate,
+            others: others.chunks_exact(2).map(|x| (x[0], x[1])).collect(),
+        };
+        let size = all.len();
         let mut products = vec![Complex64::ZERO; size * size];
         let mut right = DVector::zeros(size);
         let (mut squares, mut prior_squares) = (0.0, 0.0);
@@ -595,8 +583,20 @@ pub(super) fn follow_decay(
     }
     let mut points = Vec::with_capacity(segments.len());
     for (index, segment) in segments.iter().enumerate() {
-        let near = &segments[index.saturating_sub(1)..(index + 2).min(segments.len())];
-        let std = (0.5 * noise_of(near) * band.noise_ratio * segment.inverse).sqrt();
+        // The noise variance comes from the residuals of neighbouring segments: one alone has too few values.
+        let (mut squares, mut products, mut freedom) = (0.0, 0.0, 0.0);
+        for near in &segments[index.saturating_sub(1)..(index + 2).min(segments.len())] {
+            squares += near.squares;
+            products += near.products;
+            freedom += near.freedom;
+        }
+        // Residuals that agree with their neighbours (correlation r) are what the model misses. They leave
+        // (1 - r)/(1 + r) of the values' information. One standard deviation of a correlation by chance is
+        // 1/sqrt(2n) with n complex values.
+        let agreement = products / f64::max(squares, f64::MIN_POSITIVE);
+        let agreement = (agreement - 1.0 / f64::sqrt(2.0 * freedom)).clamp(0.0, 0.9);
+        let noise = squares / freedom * (1.0 + agreement) / (1.0 - agreement);
+        let std = (0.5 * noise * band.noise_ratio * segment.inverse).sqrt();
         let pole = Complex64::new(segment.pole.re, segment.pole.im + band.omega);
         points.push(AmplitudePoint {
             tap: band.tap,
@@ -629,24 +629,6 @@ fn segment_length(amplitude: f64, decay: f64, noise: f64, band: &Band) -> Option
         }
         length += 1;
     }
-}
-
-/// Returns the noise variance from the residuals of neighbouring segments: one alone has too few values.
-///
-/// Residuals that agree with their neighbours (correlation r) are what the model misses. They leave
-/// (1 - r)/(1 + r) of the values' information.
-fn noise_of(segments: &[Segment]) -> f64 {
-    let (mut squares, mut products, mut freedom) = (0.0, 0.0, 0.0);
-    for segment in segments {
-        squares += segment.squares;
-        products += segment.products;
-        freedom += segment.freedom;
-    }
-    let agreement = products / f64::max(squares, f64::MIN_POSITIVE);
-    // One standard deviation of a correlation by chance: 1/sqrt(2n) with n complex values.
-    let chance = 1.0 / f64::sqrt(2.0 * freedom);
-    let agreement = (agreement - chance).clamp(0.0, 0.9);
-    squares / freedom * (1.0 + agreement) / (1.0 - agreement)
 }
 
 /// Fits the mode to values at `times` (s after the band's first value), starting at `pole`.

@@ -166,62 +166,60 @@ const LEAST_POINTS: usize = 4;
 /// Follows frequency and damping against amplitude, for every mode.
 pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeCurve> {
     let indices = (0..modes.len()).into_par_iter();
-    indices
-        .map(|index| follow_mode(decays, modes, index))
-        .collect()
-}
-
-fn follow_mode(decays: &[Decay], modes: &[KnownMode], index: usize) -> AmplitudeCurve {
-    let taps = decays.iter().enumerate();
-    let bands: Vec<_> = taps
-        .filter_map(|(tap, decay)| band::extract_band(decay, tap, modes, index))
-        .collect();
-    let mut curve = AmplitudeCurve {
-        points: Vec::new(),
-        sensor: band::strongest(&bands),
-        filter_length: None,
-        frequency: None,
-        damping: None,
-        companions: Vec::new(),
-        verdict: AmplitudeVerdict::TooFewPoints,
-    };
-    let Some(sensor) = curve.sensor else {
-        return curve;
-    };
-    curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
-    let (mut doubts, mut followed) = (Vec::new(), 0);
-    for band in &bands {
-        let Some(series) = band::combine(band, sensor) else {
-            continue;
+    let curves = indices.map(|index| {
+        let taps = decays.iter().enumerate();
+        let bands: Vec<_> = taps
+            .filter_map(|(tap, decay)| band::extract_band(decay, tap, modes, index))
+            .collect();
+        let mut curve = AmplitudeCurve {
+            points: Vec::new(),
+            sensor: band::strongest(&bands),
+            filter_length: None,
+            frequency: None,
+            damping: None,
+            companions: Vec::new(),
+            verdict: AmplitudeVerdict::TooFewPoints,
         };
-        let model = DecayModel::fit(&series, band);
-        let mut points = decay::follow_decay(&series, band, &model);
-        let found = !points.is_empty();
-        points.retain(|point| (point.frequency / modes[index].frequency - 1.0).abs() <= FARTHEST);
-        if found && points.is_empty() {
-            // The decay that was followed is not the mode's.
-            continue;
+        let Some(sensor) = curve.sensor else {
+            return curve;
+        };
+        curve.filter_length = bands.iter().map(|band| band.filter).max_by(f64::total_cmp);
+        let (mut doubts, mut followed) = (Vec::new(), 0);
+        for band in &bands {
+            let Some(series) = band::combine(band, sensor) else {
+                continue;
+            };
+            let model = DecayModel::fit(&series, band);
+            let mut points = decay::follow_decay(&series, band, &model);
+            let found = !points.is_empty();
+            points
+                .retain(|point| (point.frequency / modes[index].frequency - 1.0).abs() <= FARTHEST);
+            if found && points.is_empty() {
+                // The decay that was followed is not the mode's.
+                continue;
+            }
+            curve.companions.extend(model.companions(band));
+            curve.points.extend(points);
+            doubts.extend(model.doubt(band));
+            followed += 1;
         }
-        curve.companions.extend(model.companions(band));
-        curve.points.extend(points);
-        doubts.extend(model.doubt(band));
-        followed += 1;
-    }
-    if curve.points.len() < LEAST_POINTS {
-        return curve;
-    }
-    curve.frequency = Trend::fit(&curve.points, |p| (p.frequency, p.frequency_std));
-    curve.damping = Trend::fit(&curve.points, |p| (p.damping_ratio, p.damping_std));
-    // Two tests share the level (Bonferroni).
-    let trends = [&curve.frequency, &curve.damping];
-    let changes = (trends.into_iter().flatten()).any(|trend| trend.p_value < 0.5 * LEVEL);
-    curve.verdict = match doubts.first() {
-        _ if !changes => AmplitudeVerdict::Steady,
-        // One decay without a doubt settles it for all.
-        Some(doubt) if doubts.len() == followed => *doubt,
-        _ => AmplitudeVerdict::Changes,
-    };
-    curve
+        if curve.points.len() < LEAST_POINTS {
+            return curve;
+        }
+        curve.frequency = Trend::fit(&curve.points, |p| (p.frequency, p.frequency_std));
+        curve.damping = Trend::fit(&curve.points, |p| (p.damping_ratio, p.damping_std));
+        // Two tests share the level (Bonferroni).
+        let trends = [&curve.frequency, &curve.damping];
+        let changes = (trends.into_iter().flatten()).any(|trend| trend.p_value < 0.5 * LEVEL);
+        curve.verdict = match doubts.first() {
+            _ if !changes => AmplitudeVerdict::Steady,
+            // One decay without a doubt settles it for all.
+            Some(doubt) if doubts.len() == followed => *doubt,
+            _ => AmplitudeVerdict::Changes,
+        };
+        curve
+    });
+    curves.collect()
 }
 
 // Frequency and damping against log amplitude: weighted polynomials with covariance.

@@ -228,7 +228,28 @@ struct GroupReader<'a> {
 
 impl<'a> GroupReader<'a> {
     fn new(data: &'a ModalData, settings: &FitSettings, group: &'a Group) -> Self {
-        let (correlation, inflation) = residual_correlation(&group.fit);
+        let fit = &group.fit;
+        let (correlation, inflation) = residual_correlation(fit);
+        // The columns of each tap are fitted alone, from the joint poles. Taps that cannot be fitted are left out.
+        let mut places: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, &column) in fit.used.iter().enumerate() {
+            let tap = data.columns()[column].tap;
+            places.entry(tap).or_default().push(place);
+        }
+        let mut problem = fit.problem.clone();
+        let mut taps = Vec::new();
+        for (tap, places) in places {
+            problem.columns = fit.problem.columns.select_columns(&places);
+            if let Some(best) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS)
+                && let Some(covariance) = best.slopes.covariance(fit.variance)
+            {
+                taps.push(TapPoles {
+                    tap,
+                    poles: best.at.poles,
+                    covariance,
+                });
+            }
+        }
         GroupReader {
             data,
             group,
@@ -236,7 +257,7 @@ impl<'a> GroupReader<'a> {
             repetition: data.resolution() / data.spacing(),
             correlation,
             inflation,
-            taps: fit_taps(data, &group.fit),
+            taps,
         }
     }
 
@@ -416,31 +437,6 @@ fn residual_correlation(fit: &GroupFit) -> (f64, f64) {
     } else {
         (correlation, 1.0)
     }
-}
-
-/// Fits the columns of each tap alone, from the joint poles. Taps that cannot be fitted are left out.
-fn fit_taps(data: &ModalData, fit: &GroupFit) -> Vec<TapPoles> {
-    // Places of each tap's columns.
-    let mut places: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (place, &column) in fit.used.iter().enumerate() {
-        let tap = data.columns()[column].tap;
-        places.entry(tap).or_default().push(place);
-    }
-    let mut problem = fit.problem.clone();
-    let mut fitted = Vec::new();
-    for (tap, places) in places {
-        problem.columns = fit.problem.columns.select_columns(&places);
-        if let Some(best) = problem.search(&fit.at.poles, fit.freedom, TAP_STEPS)
-            && let Some(covariance) = best.slopes.covariance(fit.variance)
-        {
-            fitted.push(TapPoles {
-                tap,
-                poles: best.at.poles,
-                covariance,
-            });
-        }
-    }
-    fitted
 }
 
 /// Test result for one more mode.

@@ -372,7 +372,27 @@ pub fn find_modes(
     let mut searches = vec![search(matrix, whole_band, settings)?];
     for band in sub_bands(matrix) {
         let mut part = search(matrix, band, settings)?;
-        share_modes(&mut searches[0].modes, &mut part);
+        // A mode of the whole band that lies in the core and that both searches read as one goes to the one whose
+        // pole explains more: of a mode that decays within the lags of the whole band, a longer look only adds
+        // noise. Otherwise the sub-band decides, except on modes too wide for it.
+        let whole = &mut searches[0].modes;
+        let (rivals, mut kept): (Vec<_>, Vec<_>) =
+            (whole.drain(..)).partition(|mode| band.core_holds(mode));
+        for rival in rivals {
+            let width = 2.0 * rival.damping_ratio * rival.frequency;
+            let near: Vec<usize> = (0..part.modes.len())
+                .filter(|&k| (part.modes[k].frequency - rival.frequency).abs() < width)
+                .collect();
+            match near[..] {
+                [] if width > WIDEST_SHARE * (band.high - band.low) => kept.push(rival),
+                [one] if part.modes[one].above_noise_db < rival.above_noise_db => {
+                    part.modes.remove(one);
+                    kept.push(rival);
+                }
+                _ => {}
+            }
+        }
+        *whole = kept;
         searches.push(part);
     }
     Ok(searches)
@@ -393,32 +413,6 @@ pub fn all_modes(searches: &[BandSearch]) -> Vec<PolyreferenceMode> {
 const LINES_PER_ORDER: usize = 5;
 /// Widest mode that is left to a sub-band, in parts of the band's width.
 const WIDEST_SHARE: f64 = 0.125;
-
-/// Settles which search keeps a mode that lies in a sub-band's core.
-///
-/// A mode that both read as one goes to the one whose pole explains more: of a mode that decays within
-/// the lags of the whole band, a longer look only adds noise. Otherwise the sub-band decides, except
-/// on modes too wide for it.
-fn share_modes(whole: &mut Vec<PolyreferenceMode>, part: &mut BandSearch) {
-    let band = part.band;
-    let (rivals, mut kept): (Vec<_>, Vec<_>) =
-        (whole.drain(..)).partition(|mode| band.core_holds(mode));
-    for rival in rivals {
-        let width = 2.0 * rival.damping_ratio * rival.frequency;
-        let near: Vec<usize> = (0..part.modes.len())
-            .filter(|&k| (part.modes[k].frequency - rival.frequency).abs() < width)
-            .collect();
-        match near[..] {
-            [] if width > WIDEST_SHARE * (band.high - band.low) => kept.push(rival),
-            [one] if part.modes[one].above_noise_db < rival.above_noise_db => {
-                part.modes.remove(one);
-                kept.push(rival);
-            }
-            _ => {}
-        }
-    }
-    *whole = kept;
-}
 
 fn search(
     matrix: &ResponseMatrix,

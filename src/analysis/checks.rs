@@ -11,15 +11,15 @@ use std::mem::{discriminant, swap};
 use tapjoint_numerics::stats::median;
 use tapjoint_signal::modal::ModeReading;
 use tapjoint_signal::quality::{
-    Check, DampingSource, ForceEvidence, Outcome, QualitySettings, RecordingEvidence,
-    ResonanceEvidence, SensorEvidence, Subject, TapEvidence, Verdict, judge_test,
+    Check, DampingSource, ForceEvidence, Outcome, RecordingEvidence, ResonanceEvidence,
+    SensorEvidence, Subject, TapEvidence, Verdict, judge_test, limits,
 };
 use tapjoint_signal::recording::Format;
 
 /// The verdicts on all recordings of a test, and the warnings that follow from them.
 pub(super) fn judge(recordings: &[RecordingResult]) -> (Vec<Verdict>, Vec<Warning>) {
     let evidence: Vec<RecordingEvidence> = recordings.iter().filter_map(evidence).collect();
-    let verdicts = judge_test(&evidence, &QualitySettings::default());
+    let verdicts = judge_test(&evidence);
     let warnings = of_quality(&verdicts);
     (verdicts, warnings)
 }
@@ -185,10 +185,9 @@ fn places(doubts: &[&Verdict], worst: &Verdict) -> Vec<String> {
             continue;
         };
         // Two peaks of one recording are two, however near.
-        let same_mode = QualitySettings::default().same_mode;
         let same = modes.iter_mut().find(|place| {
             place.is_mode == *is_mode
-                && (frequency / place.frequencies[0] - 1.0).abs() <= same_mode
+                && (frequency / place.frequencies[0] - 1.0).abs() <= limits::SAME_MODE
                 && !place.files.contains(&file.as_str())
         });
         match same {

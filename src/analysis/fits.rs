@@ -7,11 +7,11 @@
 use num_complex::Complex64;
 
 use tapjoint_signal::modal::fit::{
-    Accepted, ExtraMode, ExtraVerdict, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
+    Accepted, ExtraMode, FitSettings, ModalData, ModeFit, PoleStart, Unfit, fit_modes,
 };
 use tapjoint_signal::modal::polyreference::{
-    BandSearch, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, SubBandSettings,
-    all_modes, find_modes,
+    BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes,
+    find_modes,
 };
 use tapjoint_signal::modal::{FittedReading, ModeReading, PeakLabel, ReadBy};
 use tapjoint_signal::spectral::Lines;
@@ -46,7 +46,7 @@ pub(super) fn stabilisation(first: f64, spacing: f64, columns: &[&[Complex64]]) 
             order: (matrix.points() / 5).clamp(2, default.order),
             ..default
         };
-        find_modes(&matrix, &settings, &SubBandSettings::default())
+        find_modes(&matrix, &settings)
     });
     Stabilisation {
         searches: found.unwrap_or_default(),
@@ -178,7 +178,6 @@ impl Candidates<'_> {
     /// Returns true if a fit without a peak may be a mode at all: well within the band, and no more damped than the
     /// search for modes lets pass. At the ends of a band poles stand for what lies beyond it.
     fn may_be_added(&self, fit: &ModeFit) -> bool {
-        let most_damping = PolyreferenceSettings::default().most_damping;
         let lines = self.data.frequencies();
         let Some((first, last)) = lines.first().zip(lines.last()) else {
             return false;
@@ -186,12 +185,12 @@ impl Candidates<'_> {
         let margin = NEAR_ENDS.0 * self.data.spacing();
         let low = first + margin.max(NEAR_ENDS.1 * first);
         let high = last - margin.max(NEAR_ENDS.1 * last);
-        (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < most_damping
+        (low..high).contains(&fit.frequency.value) && fit.damping_ratio.value < MOST_DAMPING
     }
 
     /// Returns true if the data ask for a proposed mode, and it does not merely mend a neighbour's line.
     fn is_mode(&self, test: &ExtraMode, accepted: &[PoleStart]) -> bool {
-        let (ExtraVerdict::Needed, Ok(fit)) = (test.verdict, &test.fit) else {
+        let (true, Ok(fit)) = (test.needed, &test.fit) else {
             return false;
         };
         let own = fit.frequency.value * fit.damping_ratio.value;

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tapjoint_description::WindowKind;
 use tapjoint_numerics::stats::root_mean_square;
-use tapjoint_signal::modal::amplitude::{AmplitudeSettings, Decay, KnownMode, follow_amplitude};
+use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
     Column, FitError, FreeDecayCollector, ModalData, TapForce, modal_constants,
 };
@@ -647,7 +647,7 @@ fn complete(readings: &mut [ModeReading], decays: &FreeDecays, kinds: &[Option<R
             damping_ratio: fit.mode.damping_ratio.value,
         })
         .collect();
-    let curves = follow_amplitude(&decays.decays, &known, &AmplitudeSettings::default());
+    let curves = follow_amplitude(&decays.decays, &known);
     for (fit, curve) in fitted.into_iter().zip(curves) {
         fit.amplitude = Some(curve);
         fit.constants = modal_constants(&fit.mode, &decays.forces, kinds);

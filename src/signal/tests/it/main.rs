@@ -8,6 +8,7 @@
     reason = "tests write the files that they read"
 )]
 
+mod matrix_pencil;
 mod modal;
 mod modal_fit;
 mod modal_matrix_pencil;

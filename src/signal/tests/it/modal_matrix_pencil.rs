@@ -5,10 +5,9 @@ use std::f64::consts::TAU;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use tapjoint_signal::modal::matrix_pencil::{
-    MatrixPencilError, MatrixPencilSettings, PencilPole, pencil_poles,
-};
 use tapjoint_signal::spectral::Window;
+
+use crate::matrix_pencil::{MatrixPencilError, MatrixPencilSettings, PencilPole, pencil_poles};
 
 const RATE: f64 = 1024.0;
 const BAND: (f64, f64) = (115.0, 135.0);

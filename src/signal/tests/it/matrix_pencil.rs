@@ -5,14 +5,13 @@
 //! decaying oscillation with the same decaying oscillation wherever it lies wholly within the record;
 //! only those samples are used, so that no transient enters. The rest of the record's start is lost:
 //! two over the bandwidth, in seconds.
+//!
+//! This is a route of its own to the modes of free decays, for tests: it shares no code with the crate.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use num_complex::Complex64;
-
-use super::Subspace;
-use crate::spectral::Decimator;
 
 /// Reason why a matrix pencil is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -81,8 +80,6 @@ impl Default for MatrixPencilSettings {
 /// A decaying oscillation common to all records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PencilPole {
-    /// The pole (1/s), imaginary part positive, decay of an exponential window taken out.
-    pub pole: Complex64,
     /// Natural frequency (Hz), |p|/(2 pi).
     pub frequency: f64,
     /// Damping ratio, -Re p/|p|.
@@ -93,8 +90,6 @@ pub struct PencilPole {
     pub damping_std: f64,
     /// A of each record, which is Re(A e^{pt}) with t from its start (unit of the records).
     pub amplitudes: Vec<Complex64>,
-    /// Sum of squares that the pole explains over the noise variance (dB), mean over the records.
-    pub above_noise_db: f64,
 }
 
 /// Least samples at the band's own rate: a pencil a third as long still holds several poles.
@@ -163,14 +158,12 @@ pub fn pencil_poles(
         };
         let std = variance.sqrt();
         found.push(PencilPole {
-            pole,
             frequency: pole.norm() / TAU,
             damping_ratio: -pole.re / pole.norm(),
             frequency_std: std / TAU,
             damping_std: std / pole.norm(),
             // Mixing down leaves half of a real oscillation.
             amplitudes: part.amplitudes.iter().map(|a| 2.0 * a).collect(),
-            above_noise_db: 10.0 * part.above_noise.log10(),
         });
     }
     let levels: Vec<f64> = found.iter().map(PencilPole::level).collect();
@@ -216,7 +209,7 @@ impl Demodulated {
         let samples = columns.iter().map(|column| column.len()).min().unwrap_or(0);
         let (centre, width) = (0.5 * (low + high), high - low);
         let factor = ((sample_rate / (OVERSAMPLING * width)) as usize).max(1);
-        let decimator = Decimator::new(sample_rate, centre, width, factor, samples);
+        let decimator = Decimator::new(sample_rate, centre, width, factor);
         let delay = decimator.delay();
         // Output m is centred on sample m factor - delay; the filter reaches `delay` to either side.
         let whole = (2 * delay).div_ceil(factor)..samples.div_ceil(factor);
@@ -259,18 +252,18 @@ impl Demodulated {
     /// as in the polyreference fit.
     fn explained(&self, shifts: &[Complex64], index: usize) -> Option<Explained> {
         let own = self.oscillations(shifts.get(index..=index)?);
-        let own = own.column(0).into_owned();
+        let own = own.columns(0, 1).into_owned();
         let mut neighbours = shifts.to_vec();
         neighbours.remove(index);
         let columns = self.oscillations(&neighbours);
-        let loose = Subspace::new(&columns, INDEPENDENT);
+        let loose = Subspace::new(&columns);
         let fixed = columns.columns(0, neighbours.len()).into_owned();
-        let fixed = Subspace::new(&fixed, INDEPENDENT);
+        let fixed = Subspace::new(&fixed);
         // Twice: poles that are nearly equal leave rounding behind.
         let rest = fixed.complement(fixed.complement(own.clone()));
         let alone = loose.complement(loose.complement(own));
         let residuals = loose.complement(loose.complement(self.records.clone()));
-        let degrees = self.times.len().checked_sub(loose.rank() + 1)?;
+        let degrees = self.times.len().checked_sub(loose.columns.ncols() + 1)?;
         let (mut amplitudes, mut ratio) = (Vec::new(), 0.0);
         for (record, residual) in self.records.column_iter().zip(residuals.column_iter()) {
             amplitudes.push(rest.dotc(&record) / rest.norm_squared());
@@ -313,7 +306,7 @@ impl Demodulated {
     fn refine(&self, shifts: &mut [Complex64]) -> Option<Vec<f64>> {
         let count = shifts.len();
         let columns = self.oscillations(shifts);
-        let basis = Subspace::new(&columns.columns(0, count).into_owned(), INDEPENDENT);
+        let basis = Subspace::new(&columns.columns(0, count).into_owned());
         let slopes = basis.complement(columns.columns(count, count).into_owned());
         let residuals = basis.complement(self.records.clone());
         let degrees = self.times.len().checked_sub(2 * count).filter(|&d| d > 0)?;
@@ -393,4 +386,119 @@ fn number_of_signals(values: &[f64], rows: usize) -> usize {
         }
     }
     best
+}
+
+/// The space that some columns span, as orthonormal columns.
+struct Subspace {
+    columns: DMatrix<Complex64>,
+}
+
+impl Subspace {
+    /// Orthonormalises columns by Gram and Schmidt's method. A column is left out where less than
+    /// [`INDEPENDENT`] of its length lies outside the columns before it.
+    fn new(raw: &DMatrix<Complex64>) -> Self {
+        let mut kept: Vec<DVector<Complex64>> = Vec::new();
+        for column in raw.column_iter() {
+            let length = column.norm();
+            if length.is_nan() || length <= 0.0 {
+                continue;
+            }
+            let mut rest = column.unscale(length);
+            // The second pass removes the rounding of nearly dependent columns.
+            for _ in 0..2 {
+                for other in &kept {
+                    let share = other.dotc(&rest);
+                    rest.axpy(-share, other, Complex64::ONE);
+                }
+            }
+            let remains = rest.norm();
+            if remains > INDEPENDENT && kept.len() + 1 < raw.nrows() {
+                kept.push(rest.unscale(remains));
+            }
+        }
+        let columns = DMatrix::from_fn(raw.nrows(), kept.len(), |row, k| kept[k][row]);
+        Subspace { columns }
+    }
+
+    /// Returns columns without their projections on the space.
+    fn complement(&self, columns: DMatrix<Complex64>) -> DMatrix<Complex64> {
+        &columns - &self.columns * self.columns.ad_mul(&columns)
+    }
+}
+
+/// Mixing down, filtering and decimating, as an analyser's zoom does. Output m is at time
+/// (m * factor - delay)/sample_rate from the record's start.
+struct Decimator {
+    /// Cycles of the mixing oscillator per sample.
+    turn: f64,
+    filter: Vec<f64>,
+    factor: usize,
+}
+
+impl Decimator {
+    /// Mixes down by `centre` (Hz) and decimates by `factor`, so that `width` (Hz) around it survives.
+    fn new(sample_rate: f64, centre: f64, width: f64, factor: usize) -> Self {
+        let stop = sample_rate / factor as f64 - width / 2.0;
+        Decimator {
+            turn: centre / sample_rate,
+            filter: low_pass(width / 2.0, stop, sample_rate),
+            factor,
+        }
+    }
+
+    /// Samples by which the first output lies before the record's start.
+    fn delay(&self) -> usize {
+        self.filter.len() / 2
+    }
+
+    /// The record decimated, taken as zero outside its ends.
+    fn run(&self, samples: &[f64]) -> Vec<Complex64> {
+        let mixed: Vec<Complex64> = (samples.iter().enumerate())
+            .map(|(n, x)| Complex64::from_polar(*x, -TAU * (self.turn * n as f64).fract()))
+            .collect();
+        (0..(samples.len() + 2 * self.delay()).div_ceil(self.factor))
+            .map(|m| {
+                let mut sum = Complex64::ZERO;
+                for (k, tap) in self.filter.iter().enumerate() {
+                    let index = (m * self.factor + k).checked_sub(2 * self.delay());
+                    if let Some(x) = index.and_then(|index| mixed.get(index)) {
+                        sum += x * tap;
+                    }
+                }
+                sum
+            })
+            .collect()
+    }
+}
+
+/// Low-pass with Kaiser's window: pass band up to `pass`, stop band of -100 dB from `stop` (both Hz).
+fn low_pass(pass: f64, stop: f64, sample_rate: f64) -> Vec<f64> {
+    const STOP_BAND_DB: f64 = 100.0;
+    let transition = TAU * (stop - pass) / sample_rate;
+    let half = ((STOP_BAND_DB - 7.95) / (2.285 * transition) / 2.0).ceil() as i64;
+    let cut_off = PI * (pass + stop) / sample_rate;
+    let taps: Vec<f64> = (-half..=half)
+        .map(|n| {
+            let sinc = if n == 0 {
+                cut_off / PI
+            } else {
+                (cut_off * n as f64).sin() / (PI * n as f64)
+            };
+            let edge = n as f64 / (half as f64 + 1.0);
+            sinc * bessel_i0(0.1102 * (STOP_BAND_DB - 8.7) * (1.0 - edge * edge).sqrt())
+        })
+        .collect();
+    let sum: f64 = taps.iter().sum();
+    taps.iter().map(|tap| tap / sum).collect()
+}
+
+/// Modified Bessel function I0, the sum of ((x/2)^k/k!)^2.
+fn bessel_i0(x: f64) -> f64 {
+    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
+    while term > sum * 1e-17 {
+        term *= (x / (2.0 * k)).powi(2);
+        sum += term;
+        k += 1.0;
+    }
+    sum
 }

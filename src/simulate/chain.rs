@@ -7,6 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{PI, TAU};
+use tapjoint_numerics::bessel_i0;
 
 /// Quality of the mounting's resonance: what screws and wax have, between 10 and 30.
 const MOUNTING_QUALITY: f64 = 20.0;
@@ -315,19 +316,6 @@ fn sinc(x: f64) -> f64 {
     } else {
         (PI * x).sin() / (PI * x)
     }
-}
-
-/// Modified Bessel function of the first kind, sum of ((x/2)^n/n!)^2.
-fn bessel_i0(x: f64) -> f64 {
-    let mut term = 1.0;
-    let mut sum = 1.0;
-    let mut n = 1.0;
-    while term > 1e-17 * sum {
-        term *= (0.5 * x / n).powi(2);
-        sum += term;
-        n += 1.0;
-    }
-    sum
 }
 
 #[cfg(test)]

@@ -1,21 +1,20 @@
 //! Comparison of all hypotheses: the nominal model, single effects, drift, something unknown, and pairs of effects.
 
-use crate::amplitude::{set_joint_motions, set_levels};
+use crate::amplitude::set_joint_motions;
 use crate::dataset::{Dataset, ObservableKind};
 use crate::effect_pairs::{add_pairs, stands};
 use crate::evidence::{Fit, LocalOptimum, evaluate, log_mean, over_drifts};
-use crate::fit::{Search, fit_nominal};
+use crate::fit::{Search, add_by_multi_start, fit_nominal};
 use crate::forward::Forward;
-use crate::multi_start::add_by_multi_start;
 use crate::parameters::{CandidateEffect, NuisanceParameter, candidate_effects};
-use crate::posterior::{Candidate, set_probabilities};
 use crate::result::{Hypothesis, UnlocatedSensors};
 use crate::settings::{GapError, GapSettings};
-use crate::structure::{Nominal, NominalSensor};
+use crate::structure::Nominal;
 use crate::validate::Residuals;
+use crate::verdict::{Candidate, set_probabilities};
 use rayon::prelude::*;
 use tapjoint_beam::effects::EffectId;
-use tapjoint_identify::observation::Observations;
+use tapjoint_identify::observation::{Observations, ObservedSensor};
 use tapjoint_numerics::stats::root_mean_square;
 
 /// Fits of all hypotheses.
@@ -61,10 +60,13 @@ pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
 /// read with all of them somewhere.
 fn with_sensors(observations: &Observations, nominal: &Nominal) -> Observations {
     let mut filled = observations.clone();
+    let sensors = nominal.sensors.iter().map(|sensor| ObservedSensor {
+        name: sensor.name.clone(),
+        position: sensor.position,
+    });
     for configuration in &mut filled.configurations {
         if configuration.sensors.is_empty() && configuration.recording.is_none() {
-            let sensors = nominal.sensors.iter();
-            configuration.sensors = sensors.map(NominalSensor::observed).collect();
+            configuration.sensors = sensors.clone().collect();
         }
     }
     filled
@@ -109,12 +111,7 @@ fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
         let mut logs: Vec<f64> = same.map(|one| one.fit.log_evidence).collect();
         // A fit that failed has no evidence.
         logs.resize(all.len(), f64::NEG_INFINITY);
-        let log = if all.len() > 1 {
-            log_mean(&logs)
-        } else {
-            logs[0]
-        };
-        averages.push((hypothesis.clone(), log));
+        averages.push((hypothesis.clone(), log_mean(&logs)));
     }
     let mut best: Option<(f64, ModelComparison)> = None;
     for one in all {
@@ -146,7 +143,6 @@ pub fn least_nominal_chi_square(test: Test<'_>) -> Option<f64> {
 fn prepared(test: Test<'_>) -> Option<(Dataset, Fit)> {
     let mut dataset = Dataset::new(test.observations, test.nominal, test.settings);
     let first = fit_nominal(&dataset)?;
-    set_levels(&mut dataset, &first);
     set_joint_motions(&mut dataset, test.observations, &first);
     set_shear_slopes(&mut dataset, &first)?;
     dataset.shape_slopes = Some(Forward::new(&dataset, &[]).joint_differences(first.parameters())?);
@@ -195,11 +191,15 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     if let Some(fit) = fit_unknown(&dataset, &none) {
         candidates.push(Candidate::new(Hypothesis::Unknown, fit));
     }
-    let baseline = fit_exact(&dataset, is_geometry);
-    let baseline = baseline.unwrap_or_else(|| none.clone());
-    let drifting = fit_exact(&dataset, is_described);
-    let drifting = drifting.unwrap_or_else(|| baseline.clone());
-    let described = fit_described(&dataset).unwrap_or_else(|| drifting.clone());
+    let baseline = fit_exact(&dataset, is_geometry).unwrap_or_else(|| none.clone());
+    let drifting = fit_exact(&dataset, is_described).unwrap_or_else(|| baseline.clone());
+    // A joint and a temperature that are the same in all set-ups.
+    let mut alike = dataset.clone();
+    alike.settings.drift_stds = vec![EXACT];
+    let described = fit_exact(&alike, |nuisance| {
+        is_described(nuisance) || matches!(nuisance, NuisanceParameter::Temperature { .. })
+    });
+    let described = described.unwrap_or_else(|| drifting.clone());
     candidates.push(Candidate::new(Hypothesis::None, none));
     Some(ModelComparison {
         dataset,
@@ -255,30 +255,19 @@ fn fit_exact(dataset: &Dataset, is_exact: impl Fn(NuisanceParameter) -> bool) ->
     fit_nominal(&exact)
 }
 
-/// Fits the described model with a joint and a temperature that are the same in all set-ups.
-fn fit_described(dataset: &Dataset) -> Option<Fit> {
-    let mut dataset = dataset.clone();
-    dataset.settings.drift_stds = vec![EXACT];
-    fit_exact(&dataset, |nuisance| {
-        is_described(nuisance) || matches!(nuisance, NuisanceParameter::Temperature { .. })
-    })
-}
-
 /// Returns whether a description states a nuisance parameter.
 fn is_described(nuisance: NuisanceParameter) -> bool {
     use NuisanceParameter::{FastenedMass, SensorInertia, SensorMass};
-    is_geometry(nuisance)
-        || matches!(
-            nuisance,
-            SensorMass { .. } | SensorInertia { .. } | FastenedMass { .. }
-        )
+    let is_mass = matches!(
+        nuisance,
+        SensorMass { .. } | SensorInertia { .. } | FastenedMass { .. }
+    );
+    is_mass || is_geometry(nuisance)
 }
 
 fn is_geometry(nuisance: NuisanceParameter) -> bool {
-    matches!(
-        nuisance,
-        NuisanceParameter::Scale | NuisanceParameter::Shear
-    )
+    use NuisanceParameter::{Scale, Shear};
+    matches!(nuisance, Scale | Shear)
 }
 
 /// Spreads of a discrepancy that no effect explains (1): 0.05 to 3 %, equally spaced in their logarithm.
@@ -329,10 +318,8 @@ fn fit_drift(dataset: &Dataset, nominal: &Fit) -> Option<(Fit, f64)> {
     dataset.first_drift()?;
     let layout = dataset.layout(&[]);
     let (priors, optimum) = (&nominal.best.priors, &nominal.best.optimum);
-    let found = LARGE_DRIFTS
-        .into_iter()
-        .map(|drift| over_drifts(dataset, &layout, priors, optimum, &[drift]));
-    let fit = Fit::of_variants(found.collect())?;
+    let found = LARGE_DRIFTS.map(|drift| over_drifts(dataset, &layout, priors, optimum, &[drift]));
+    let fit = Fit::of_variants(found.into())?;
     let (drift, _) = *fit.best.drifts.first()?;
     Some((fit, drift))
 }

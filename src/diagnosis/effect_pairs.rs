@@ -2,14 +2,12 @@
 
 use crate::dataset::Dataset;
 use crate::evidence::Fit;
-use crate::fit::Search;
-use crate::goodness_of_fit::{GoodnessOfFit, refutes_by_holdout};
-use crate::multi_start::{CoarseModel, Start, settle, unexplained};
+use crate::fit::{CoarseModel, Search, Start, settle, unexplained};
 use crate::parameters::{CandidateEffect, LocationKind};
-use crate::posterior::{Candidate, set_probabilities};
 use crate::result::Hypothesis;
-use crate::thresholds::{LEAST_DATA_FOR_PAIRS, MISSED_HOLDOUT, PROMISED_BY_SECOND, SECOND_EFFECT};
+use crate::settings::{LEAST_DATA_FOR_PAIRS, MISSED_HOLDOUT, PROMISED_BY_SECOND, SECOND_EFFECT};
 use crate::validate::{HoldoutErrors, Residuals, holdout_goodness};
+use crate::verdict::{Candidate, GoodnessOfFit, refutes_by_holdout, set_probabilities};
 use rayon::prelude::*;
 use tapjoint_beam::effects::EffectId;
 
@@ -319,7 +317,7 @@ fn distinct(found: Vec<Candidate>) -> Vec<Candidate> {
 
 /// Returns whether neither the fitted data refute a fit nor the hold-out data.
 pub fn stands(dataset: &Dataset, fit: &Fit) -> bool {
-    GoodnessOfFit::new(dataset, fit).is_some_and(|goodness| !goodness.is_refuted())
+    GoodnessOfFit::new(dataset, fit).is_some_and(|one| one.refuting_p_value().is_none())
 }
 
 /// Returns whether the hold-out data are predicted better, or at least do not refute the fit: two effects leave

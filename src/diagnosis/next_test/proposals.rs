@@ -4,8 +4,8 @@ use crate::compare::MORE_MODES;
 use crate::dataset::{Dataset, Observable};
 use crate::parameters::{CandidateEffect, NuisanceParameter};
 use crate::result::Proposal;
+use crate::settings::MOVED_SENSOR;
 use crate::structure::{Arrangement, ROTATION};
-use crate::thresholds::MOVED_SENSOR;
 use tapjoint_beam::effects::EffectId;
 use tapjoint_numerics::stats::median;
 
@@ -43,15 +43,18 @@ impl TestedStructure {
         match self {
             TestedStructure::Whole => true,
             TestedStructure::Unbiased => effect.effect != EffectId::Resolution,
-            TestedStructure::Bare => matches!(
-                effect.effect,
-                EffectId::Modulus
-                    | EffectId::Length
-                    | EffectId::Timebase
-                    | EffectId::AddedMass
-                    | EffectId::LocalCrack
-                    | EffectId::ShearRotary
-            ),
+            TestedStructure::Bare => {
+                use EffectId::{AddedMass, Length, LocalCrack, Modulus, ShearRotary, Timebase};
+                let shown = [
+                    Modulus,
+                    Length,
+                    Timebase,
+                    AddedMass,
+                    LocalCrack,
+                    ShearRotary,
+                ];
+                shown.contains(&effect.effect)
+            }
         }
     }
 }
@@ -112,10 +115,7 @@ impl PlannedTests {
             bare: None,
             turned: None,
         };
-        if dataset.modes + MORE_MODES <= dataset.settings.highest_mode {
-            planned.read_higher(dataset);
-        }
-        planned.read_finer(dataset);
+        planned.read_again(dataset);
         planned.tap_again(dataset);
         planned.move_sensor(dataset);
         planned.fasten_mass(dataset);
@@ -138,33 +138,27 @@ impl PlannedTests {
         });
     }
 
-    /// Plans to read higher modes.
-    fn read_higher(&mut self, dataset: &Dataset) {
+    /// Plans to read the recordings again: higher modes, and on finer lines.
+    fn read_again(&mut self, dataset: &Dataset) {
         let (first, last) = (dataset.modes + 1, dataset.modes + MORE_MODES);
-        let mut planned = Vec::new();
-        for configuration in 0..self.whole.arrangements.len() {
-            planned.extend(frequencies_of(dataset, configuration, first..=last));
-        }
-        let proposal = Proposal::HigherModes {
-            first,
-            last,
-            is_recorded: dataset.arrangements.iter().any(|one| one.is_recorded),
-        };
-        self.propose(proposal, TestedStructure::Whole, planned);
-    }
-
-    /// Plans to read on finer lines.
-    fn read_finer(&mut self, dataset: &Dataset) {
-        if let Some(bias) = dataset.nominal.reading_bias {
-            let planned = observed_modes(dataset).map(|mode| {
-                (
-                    Observable::frequency(0, mode),
-                    std_without_bias(dataset, mode, bias),
-                )
-            });
-            let proposal = Proposal::FinerLines {
-                spacing: 2.0 * FIT_BIAS * bias,
+        if last <= dataset.settings.highest_mode {
+            let configurations = 0..self.whole.arrangements.len();
+            let planned = configurations.flat_map(|one| frequencies_of(dataset, one, first..=last));
+            let proposal = Proposal::HigherModes {
+                first,
+                last,
+                is_recorded: dataset.arrangements.iter().any(|one| one.is_recorded),
             };
+            self.propose(proposal, TestedStructure::Whole, planned.collect());
+        }
+        if let Some(bias) = dataset.nominal.reading_bias {
+            let modes = observed_modes(dataset);
+            let planned = modes.map(|mode| {
+                let std = std_without_bias(dataset, mode, bias);
+                (Observable::frequency(0, mode), std)
+            });
+            let spacing = 2.0 * FIT_BIAS * bias;
+            let proposal = Proposal::FinerLines { spacing };
             self.propose(proposal, TestedStructure::Unbiased, planned.collect());
         }
     }

@@ -50,7 +50,35 @@ pub struct Test<'a> {
 /// [`GapError::NoFit`] where the nominal model has no fit.
 pub fn compare(test: Test<'_>) -> Result<ModelComparison, GapError> {
     let all = at_locations(test, compare_singles);
-    let mut comparison = over_locations(all).ok_or(GapError::NoFit)?;
+    // The evidence is averaged over the locations of sensors; fits and residuals are those of the location that
+    // explains most.
+    let mut averages: Vec<(Hypothesis, f64)> = Vec::new();
+    for candidate in &all.first().ok_or(GapError::NoFit)?.candidates {
+        let hypothesis = &candidate.hypothesis;
+        let same = all.iter().filter_map(|one| {
+            let mut candidates = one.candidates.iter();
+            candidates.find(|one| one.hypothesis == *hypothesis)
+        });
+        let mut logs: Vec<f64> = same.map(|one| one.fit.log_evidence).collect();
+        // A fit that failed has no evidence.
+        logs.resize(all.len(), f64::NEG_INFINITY);
+        averages.push((hypothesis.clone(), log_mean(&logs)));
+    }
+    let mut best: Option<(f64, ModelComparison)> = None;
+    for one in all {
+        let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
+        let own = evidences.fold(f64::NEG_INFINITY, f64::max);
+        if best.as_ref().is_none_or(|(most, _)| own > *most) {
+            best = Some((own, one));
+        }
+    }
+    let (_, mut comparison) = best.ok_or(GapError::NoFit)?;
+    for candidate in &mut comparison.candidates {
+        let average = averages.iter().find(|one| one.0 == candidate.hypothesis);
+        if let Some((_, log)) = average {
+            candidate.fit.log_evidence = *log;
+        }
+    }
     set_probabilities(&mut comparison.candidates, 0);
     add_pairs(&comparison.dataset, &mut comparison.candidates);
     Ok(comparison)
@@ -97,38 +125,6 @@ fn at_locations<T>(test: Test<'_>, fit: impl Fn(Test<'_>) -> Option<T>) -> Vec<T
         }));
     }
     all
-}
-
-/// Averages the evidence over the locations of sensors; fits and residuals are those of the location that explains most.
-fn over_locations(all: Vec<ModelComparison>) -> Option<ModelComparison> {
-    let mut averages: Vec<(Hypothesis, f64)> = Vec::new();
-    for candidate in &all.first()?.candidates {
-        let hypothesis = &candidate.hypothesis;
-        let same = all.iter().filter_map(|one| {
-            let mut candidates = one.candidates.iter();
-            candidates.find(|one| one.hypothesis == *hypothesis)
-        });
-        let mut logs: Vec<f64> = same.map(|one| one.fit.log_evidence).collect();
-        // A fit that failed has no evidence.
-        logs.resize(all.len(), f64::NEG_INFINITY);
-        averages.push((hypothesis.clone(), log_mean(&logs)));
-    }
-    let mut best: Option<(f64, ModelComparison)> = None;
-    for one in all {
-        let evidences = one.candidates.iter().map(|one| one.fit.log_evidence);
-        let own = evidences.fold(f64::NEG_INFINITY, f64::max);
-        if best.as_ref().is_none_or(|(most, _)| own > *most) {
-            best = Some((own, one));
-        }
-    }
-    let (_, mut best) = best?;
-    for candidate in &mut best.candidates {
-        let average = averages.iter().find(|one| one.0 == candidate.hypothesis);
-        if let Some((_, log)) = average {
-            candidate.fit.log_evidence = *log;
-        }
-    }
-    Some(best)
 }
 
 /// Returns the least chi square of the nominal model over the unknown positions of sensors.
@@ -183,9 +179,15 @@ fn compare_singles(test: Test<'_>) -> Option<ModelComparison> {
     if !one_stands && !stands(&dataset, &none) {
         add_large_effects(&search, &effects, &mut candidates);
     }
-    if let Some((fit, drift)) = fit_drift(&dataset, &none) {
+    if dataset.first_drift().is_some() {
+        // A joint that differs from set-up to set-up.
+        let (layout, best) = (dataset.layout(&[]), &none.best);
+        let found = LARGE_DRIFTS
+            .map(|drift| over_drifts(&dataset, &layout, &best.priors, &best.optimum, &[drift]));
+        let fit = Fit::of_variants(found.into())?;
+        let drift = fit.best.drifts.first().map(|drift| drift.0);
         let mut candidate = single(EffectId::JointDrift, fit);
-        candidate.drift = Some(drift);
+        candidate.drift = drift;
         candidates.push(candidate);
     }
     if let Some(fit) = fit_unknown(&dataset, &none) {
@@ -276,9 +278,28 @@ const DISCREPANCIES: [f64; 7] = [5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.6e-2, 3e-2];
 /// Fits a discrepancy outside the catalogue: every mode's frequency off by an amount of its own,
 /// the same in all configurations, with a tenth of it for each datum and twice of it in the shapes.
 fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
+    let pairs = dataset.observables.iter().zip(&dataset.data);
+    let shapes = pairs.filter(|(observable, _)| observable.is_shape());
+    let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
+    let size = root_mean_square(&values);
     let mut found: Vec<LocalOptimum> = Vec::new();
     for spread in DISCREPANCIES {
-        let loose = with_discrepancy(dataset, spread);
+        // No prediction is better than the spread.
+        let mut loose = dataset.clone();
+        for mode in 1..=dataset.fitted_modes {
+            loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
+        }
+        for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
+            let extra = match observable.kind {
+                ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
+                    2.0 * spread * size
+                }
+                // Damping may be anything if the cause is not known.
+                ObservableKind::Damping => 50.0 * spread,
+                ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
+            };
+            datum.std = datum.std.hypot(extra);
+        }
         let forward = Forward::new(&loose, &[]);
         let priors = forward.priors();
         let mut start = nominal.parameters().to_vec();
@@ -288,41 +309,8 @@ fn fit_unknown(dataset: &Dataset, nominal: &Fit) -> Option<Fit> {
     Fit::of_variants(found)
 }
 
-/// Returns the data if no prediction is better than `spread`.
-fn with_discrepancy(dataset: &Dataset, spread: f64) -> Dataset {
-    let mut loose = dataset.clone();
-    for mode in 1..=dataset.fitted_modes {
-        loose.add_nuisance(NuisanceParameter::Discrepancy { mode }, 0.0, spread);
-    }
-    let pairs = dataset.observables.iter().zip(&dataset.data);
-    let shapes = pairs.filter(|(observable, _)| observable.is_shape());
-    let values: Vec<f64> = shapes.map(|(_, datum)| datum.value).collect();
-    let size = root_mean_square(&values);
-    for (observable, datum) in loose.observables.iter().zip(&mut loose.data) {
-        let extra = match observable.kind {
-            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => 2.0 * spread * size,
-            // Damping may be anything if the cause is not known.
-            ObservableKind::Damping => 50.0 * spread,
-            ObservableKind::Frequency | ObservableKind::Slope => 0.1 * spread,
-        };
-        datum.std = datum.std.hypot(extra);
-    }
-    loose
-}
-
 /// Spreads of the joint between set-ups that are no longer a nuisance (1).
 const LARGE_DRIFTS: [f64; 3] = [0.04, 0.07, 0.12];
-
-/// Fits the nominal model with a joint that differs from set-up to set-up; returns the spread too.
-fn fit_drift(dataset: &Dataset, nominal: &Fit) -> Option<(Fit, f64)> {
-    dataset.first_drift()?;
-    let layout = dataset.layout(&[]);
-    let (priors, optimum) = (&nominal.best.priors, &nominal.best.optimum);
-    let found = LARGE_DRIFTS.map(|drift| over_drifts(dataset, &layout, priors, optimum, &[drift]));
-    let fit = Fit::of_variants(found.into())?;
-    let (drift, _) = *fit.best.drifts.first()?;
-    Some((fit, drift))
-}
 
 /// Fits the nominal model without the masses that have no position in any recording; `None` where there are none.
 pub fn without_unlocated(test: Test<'_>) -> Option<UnlocatedSensors> {

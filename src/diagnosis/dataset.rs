@@ -188,7 +188,17 @@ fn moderate(data: &mut [Datum]) {
     let by_chance = estimated.iter().map(|r| trigamma(0.5 * r.freedom));
     let chance = by_chance.sum::<f64>() / count;
     let common_freedom = if scatter > chance {
-        2.0 * inverse_trigamma(scatter - chance)
+        // The x > 0 with psi'(x) = scatter - chance, by bisection in ln x: psi' falls from infinity to 0.
+        let (mut low, mut high) = (1e-4_f64.ln(), 1e4_f64.ln());
+        for _ in 0..80 {
+            let middle: f64 = 0.5 * (low + high);
+            if trigamma(middle.exp()) > scatter - chance {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        2.0 * (0.5 * (low + high)).exp()
     } else {
         // No more scatter than chance: one variance for all, known as well as all together know it.
         estimated.iter().map(|r| r.freedom).sum::<f64>()
@@ -219,20 +229,6 @@ fn trigamma(mut x: f64) -> f64 {
     }
     let y = 1.0 / (x * x);
     sum + 0.5 * y + (1.0 + y * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))) / x
-}
-
-/// Returns the x > 0 with psi'(x) = value, by bisection in ln x: psi' falls from infinity to 0.
-fn inverse_trigamma(value: f64) -> f64 {
-    let (mut low, mut high) = (1e-4_f64.ln(), 1e4_f64.ln());
-    for _ in 0..80 {
-        let middle = 0.5 * (low + high);
-        if trigamma(middle.exp()) > value {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    (0.5 * (low + high)).exp()
 }
 
 /// Data of a test, with its arrangements and nuisance parameters.
@@ -444,9 +440,22 @@ impl Dataset {
     fn add_slopes(&mut self, observations: &Observations) {
         for (configuration, one) in observations.configurations.iter().enumerate() {
             for mode in &one.modes {
-                if let Some(mut datum) = slope_of(mode)
-                    && mode.mode <= self.fitted_modes
-                {
+                let decay = mode.decay.filter(|_| mode.mode <= self.fitted_modes);
+                let decay = decay.filter(|decay| decay.verdict != DecayVerdict::Doubtful);
+                let Some(decay) = decay else { continue };
+                // Between the ends of the followed decay, where their amplitudes are known.
+                let ends = decay.early.amplitude.zip(decay.late.amplitude);
+                let ends =
+                    ends.filter(|(early, late)| *early > DISTINCT_AMPLITUDES * late && *late > 0.0);
+                let followed = decay.frequency_change.zip(ends);
+                let (seen, folds) = followed
+                    .map_or((decay.frequency_slope, 1.0), |(change, (early, late))| {
+                        (change, (early / late).ln())
+                    });
+                let [value, std] = [seen.value, seen.std].map(|part| part / mode.frequency / folds);
+                if std.is_finite() && std > 0.0 {
+                    let mut datum = Datum::new(value, std, seen.freedom);
+                    datum.freedom = datum.freedom.max(3.0);
                     datum.inflate_std(SLOPE_FLOOR);
                     let kind = ObservableKind::Slope;
                     let own = Observable::frequency(configuration, mode.mode);
@@ -467,8 +476,8 @@ impl Dataset {
 
     fn add_nuisances(&mut self, inventory: &Inventory) {
         use NuisanceParameter::{
-            AddedInertia, Amplitude, Drift, Gain, Scale, Scatter, SensorInertia, SensorMass,
-            SensorPosition, Shear, TapPosition, Temperature,
+            AddedInertia, Amplitude, Damping, DampingTilt, Drift, Gain, Scale, Scatter,
+            SensorInertia, SensorMass, SensorPosition, Shear, TapPosition, Temperature,
         };
         let setups = self.setups();
         let position_std = self.settings.position_std;
@@ -513,7 +522,16 @@ impl Dataset {
                 self.add_nuisance(Gain { setup, name }, 0.0, self.settings.gain_std);
             }
         }
-        self.add_damping_level();
+        // Level and tilt of the nominal damping ratios, where any was observed.
+        let data = self.observables.iter().zip(&self.data);
+        let data = data.filter(|(observable, _)| observable.is_damping());
+        let logs: Vec<f64> = data.map(|(_, datum)| datum.value).collect();
+        if !logs.is_empty() {
+            // Wide: the damping of a beam is not known beforehand.
+            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+            self.add_nuisance(Damping, mean, 2.0);
+            self.add_nuisance(DampingTilt, 0.0, self.settings.damping_tilt);
+        }
         self.add_nuisance(Amplitude, 0.0, AMPLITUDE_STD);
         for fastened in 0..inventory.fastened.len() {
             self.add_fastened(fastened);
@@ -532,20 +550,6 @@ impl Dataset {
     pub fn setups(&self) -> Vec<usize> {
         let setups = self.arrangements.iter().map(|one| one.setup);
         setups.collect::<BTreeSet<_>>().into_iter().collect()
-    }
-
-    /// Adds level and tilt of the nominal damping ratios, where any was observed.
-    fn add_damping_level(&mut self) {
-        let data = self.observables.iter().zip(&self.data);
-        let data = data.filter(|(observable, _)| observable.is_damping());
-        let logs: Vec<f64> = data.map(|(_, datum)| datum.value).collect();
-        if !logs.is_empty() {
-            // Wide: the damping of a beam is not known beforehand.
-            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-            self.add_nuisance(NuisanceParameter::Damping, mean, 2.0);
-            let tilt = self.settings.damping_tilt;
-            self.add_nuisance(NuisanceParameter::DampingTilt, 0.0, tilt);
-        }
     }
 
     /// Returns the derivative of a frequency with respect to shear and rotary inertia; 0 before it is known.
@@ -650,25 +654,4 @@ impl Dataset {
 fn is_placed(configuration: &Configuration, sensor: usize) -> bool {
     let sensor = configuration.sensors.get(sensor);
     sensor.is_some_and(|sensor| sensor.position.is_some())
-}
-
-/// Returns the change of the logarithm of a frequency per e-fold of the amplitude, between the ends of the followed
-/// decay where their amplitudes are known.
-fn slope_of(mode: &ObservedMode) -> Option<Datum> {
-    let decay = mode.decay?;
-    if decay.verdict == DecayVerdict::Doubtful {
-        return None;
-    }
-    let ends = decay.early.amplitude.zip(decay.late.amplitude);
-    let ends = ends.filter(|(early, late)| *early > DISTINCT_AMPLITUDES * late && *late > 0.0);
-    let followed = decay.frequency_change.zip(ends);
-    let (seen, log_amplitude_span) = followed
-        .map_or((decay.frequency_slope, 1.0), |(change, (early, late))| {
-            (change, (early / late).ln())
-        });
-    let [value, std] =
-        [seen.value, seen.std].map(|part| part / mode.frequency / log_amplitude_span);
-    let mut datum = Datum::new(value, std, seen.freedom);
-    datum.freedom = datum.freedom.max(3.0);
-    (std.is_finite() && std > 0.0).then_some(datum)
 }

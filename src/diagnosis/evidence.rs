@@ -122,7 +122,16 @@ pub fn over_drifts(
     };
     for (k, &drift) in drifts.iter().enumerate() {
         let own = dataset.with_drift(layout, priors, drift);
-        let moved = moved_optimum(&dataset.data, layout, &own, optimum);
+        // The linearised optimum with the effects kept as they are. The other parameters are so nearly linear that
+        // another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
+        let mut held = own.clone();
+        for k in layout.joint.len()..layout.first_nuisance() {
+            held[k] = Prior::held(optimum.parameters[k]);
+        }
+        let moved = linear_optimum(&dataset.data, &held, optimum).map_or_else(
+            || optimum.clone(),
+            |moved| Optimum::new(&dataset.data, &own, moved.parameters, moved.model),
+        );
         let log_evidence = log_evidence(&dataset.data, layout, &own, &moved);
         best.drifts.push((drift, log_evidence));
         if k == 0 || log_evidence > best.log_evidence {
@@ -144,19 +153,6 @@ pub fn linear_optimum(data: &[Datum], priors: &[Prior], at: &Optimum) -> Option<
         slopes: &at.model.slopes,
     };
     maximise(data, priors, &at.parameters, &model)
-}
-
-/// Returns the linearised optimum with the effects kept as they are. The other parameters are so nearly linear that
-/// another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
-fn moved_optimum(data: &[Datum], layout: &Layout, priors: &[Prior], at: &Optimum) -> Optimum {
-    let mut held = priors.to_vec();
-    for k in layout.joint.len()..layout.first_nuisance() {
-        held[k] = Prior::held(at.parameters[k]);
-    }
-    linear_optimum(data, &held, at).map_or_else(
-        || at.clone(),
-        |moved| Optimum::new(data, priors, moved.parameters, moved.model),
-    )
 }
 
 /// Returns the parameters without the last effect, and that effect with a size and a location.
@@ -371,7 +367,17 @@ fn profile_gain(
         logs.push((t, log.map_or(f64::NEG_INFINITY, |log| log - base)));
     }
     let slope = found.optimum.gradient[at];
-    let profile = log_integral(size, from, to, |t| interpolate(&logs, t));
+    // On straight lines between the nodes.
+    let profile = log_integral(size, from, to, |t| {
+        let above = logs
+            .partition_point(|point| point.0 < t)
+            .clamp(1, NODES - 1);
+        let ((t0, y0), (t1, y1)) = (logs[above - 1], logs[above]);
+        if y0 == f64::NEG_INFINITY || y1 == f64::NEG_INFINITY {
+            return f64::NEG_INFINITY;
+        }
+        y0 + (y1 - y0) * (t - t0) / (t1 - t0)
+    });
     let parabola = log_integral(size, from, to, |t| {
         let away = t - here;
         -slope * away - 0.5 * away * away / variance + regularisation(prior, t)
@@ -386,18 +392,6 @@ fn marginal_log(priors: &[Prior], optimum: &Optimum, size: usize) -> Option<f64>
     free.retain(|&k| k != size);
     let factor = factor_of(&optimum.curvature, &free)?;
     Some(-optimum.objective - 0.5 * log_determinant(&factor))
-}
-
-/// Returns the value on straight lines between points.
-fn interpolate(points: &[(f64, f64)], t: f64) -> f64 {
-    let above = points
-        .partition_point(|point| point.0 < t)
-        .clamp(1, points.len() - 1);
-    let ((t0, y0), (t1, y1)) = (points[above - 1], points[above]);
-    if y0 == f64::NEG_INFINITY || y1 == f64::NEG_INFINITY {
-        return f64::NEG_INFINITY;
-    }
-    y0 + (y1 - y0) * (t - t0) / (t1 - t0)
 }
 
 #[cfg(test)]

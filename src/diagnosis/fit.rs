@@ -166,13 +166,8 @@ impl<'a> Search<'a> {
                 nodes.push(over_drifts(self.dataset, layout, &held, &optimum, drifts));
             }
         }
-        self.correct(forward, &mut nodes);
-        self.refine(forward, spacing, &nodes)
-    }
-
-    /// Replaces the linearised model by the true one at the most promising nodes: a fixture near
-    /// a mode's frequency promises more than it holds. The others count at most as much as these.
-    fn correct(&self, forward: &Forward<'_>, nodes: &mut [LocalOptimum]) {
+        // The true model replaces the linearised one at the most promising nodes: a fixture near a mode's frequency
+        // promises more than it holds. The others count at most as much as these.
         let mut order: Vec<usize> = (0..nodes.len()).collect();
         order.sort_by(|&a, &b| nodes[b].log_evidence.total_cmp(&nodes[a].log_evidence));
         let (first, others) = order.split_at(CORRECTED.min(nodes.len()));
@@ -188,6 +183,7 @@ impl<'a> Search<'a> {
         for &node in others {
             nodes[node].log_evidence = nodes[node].log_evidence.min(least);
         }
+        self.refine(forward, spacing, &nodes)
     }
 
     /// Frees the location from the best nodes. If the data fix it within the nodes' spacing, the

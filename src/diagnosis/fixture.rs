@@ -248,24 +248,20 @@ impl PeakSearch<'_> {
             let linear = linear_fit(forward, without, &held, Some(self.peak.log));
             starts.extend(linear.map(|optimum| optimum.parameters));
         }
-        let found = starts
-            .into_iter()
-            .filter_map(|start| self.from(start, &other.priors));
+        let priors = &other.priors;
+        // From each start first with the frequency held, then as well known as the peak states it.
+        let found = starts.into_iter().filter_map(|start| {
+            let start = self.tuned(start)?;
+            let (held, own) = self.with_frequency(&start, priors, Prior::held(start[self.at]))?;
+            let start = self.tuned(held.optimum.parameters)?;
+            let stated = Prior {
+                low: priors[self.at].low,
+                high: priors[self.at].high,
+                ..Prior::normal(start[self.at], self.peak.std / own.share)
+            };
+            self.with_frequency(&start, priors, stated)
+        });
         found.max_by(|a, b| a.0.log_evidence.total_cmp(&b.0.log_evidence))
-    }
-
-    /// Returns the fit from one start: first with the frequency held, then as well known as the peak states it.
-    fn from(&self, start: Vec<f64>, priors: &[Prior]) -> Option<(LocalOptimum, FixtureMode)> {
-        let start = self.tuned(start)?;
-        let (held, own) = self.with_frequency(&start, priors, Prior::held(start[self.at]))?;
-        let start = self.tuned(held.optimum.parameters)?;
-        let bounds = priors[self.at];
-        let stated = Prior {
-            low: bounds.low,
-            high: bounds.high,
-            ..Prior::normal(start[self.at], self.peak.std / own.share)
-        };
-        self.with_frequency(&start, priors, stated)
     }
 
     /// Returns the fit with this prior of the fixture's frequency.

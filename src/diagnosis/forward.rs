@@ -236,43 +236,34 @@ impl<'a> Forward<'a> {
 
     /// Returns all predictions without the nuisance parameters.
     fn predictions_of(&self, models: &[ModalModel], parameters: &[f64]) -> Option<Vec<f64>> {
-        let observables = self.observables.iter();
-        observables
-            .map(|one| self.prediction_of(one, models, parameters))
-            .collect()
-    }
-
-    fn prediction_of(
-        &self,
-        observable: &Observable,
-        models: &[ModalModel],
-        parameters: &[f64],
-    ) -> Option<f64> {
-        let one = &models[observable.configuration];
-        if observable.is_damping() {
-            let damping = self.damping(observable.mode, models, parameters)?;
-            return Some(damping.total.ln());
-        }
-        let place = ModeInPlace::new(self, observable, models)?;
-        match observable.kind {
-            ObservableKind::Frequency => {
-                let frequency = one.frequency(observable.mode)?;
-                let own = one.own_change(observable.mode);
-                (frequency > 0.0).then(|| frequency.ln() + own)
+        let predictions = self.observables.iter().map(|observable| {
+            let one = &models[observable.configuration];
+            if observable.is_damping() {
+                let damping = self.damping(observable.mode, models, parameters)?;
+                return Some(damping.total.ln());
             }
-            ObservableKind::Constant { sensor } => {
-                Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
+            let place = ModeInPlace::new(self, observable, models)?;
+            match observable.kind {
+                ObservableKind::Frequency => {
+                    let frequency = one.frequency(observable.mode)?;
+                    let own = one.own_change(observable.mode);
+                    (frequency > 0.0).then(|| frequency.ln() + own)
+                }
+                ObservableKind::Constant { sensor } => {
+                    Some(place.at_sensor(sensor) * place.displacement(place.arrangement.tap?))
+                }
+                ObservableKind::Ratio { sensor, reference } => {
+                    Some(place.at_sensor(sensor) / place.at_sensor(reference))
+                }
+                ObservableKind::Slope | ObservableKind::Damping => {
+                    let law = self.law(parameters);
+                    Some(law.map_or(0.0, |law| {
+                        slope_along_decay(self.dataset, observable, models, &law)
+                    }))
+                }
             }
-            ObservableKind::Ratio { sensor, reference } => {
-                Some(place.at_sensor(sensor) / place.at_sensor(reference))
-            }
-            ObservableKind::Slope | ObservableKind::Damping => {
-                let law = self.law(parameters);
-                Some(law.map_or(0.0, |law| {
-                    slope_along_decay(self.dataset, observable, models, &law)
-                }))
-            }
-        }
+        });
+        predictions.collect()
     }
 
     /// Sets the slopes with respect to the joint: see [`ModalModel::joint_slopes`]; those of shapes are taken

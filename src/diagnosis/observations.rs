@@ -160,8 +160,20 @@ fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
             // Most frequencies of both lie in pairs beside each other.
             let pairs = other.iter().zip(&one);
             let near = pairs.filter(|(a, b)| (*a / *b - 1.0).abs() <= CHANGED_FREQUENCY);
-            let known = 2 * near.count() > one.len().min(other.len())
-                || share_modes(&all[first], &all[second], &band);
+            let are_in_order = 2 * near.count() > one.len().min(other.len());
+            // Most modes with a number of either lie where the other has them.
+            let counts = [first, second].map(|k| {
+                let modes = all[k].modes.iter();
+                modes.filter(|mode| band.contains(&mode.frequency)).count()
+            });
+            let alike = all[first].modes.iter().filter(|mode| {
+                let known = all[second].mode(mode.mode);
+                let is_alike = known.is_some_and(|known| is_near(mode.frequency, known.frequency));
+                band.contains(&mode.frequency) && is_alike
+            });
+            let alike = alike.count();
+            let share_modes = alike >= LEAST_SHARED_MODES && 2 * alike > counts[0].max(counts[1]);
+            let known = are_in_order || share_modes;
             let strangers = count_new(&one, &all[first]);
             if !known
                 && are_most(strangers, one.len())
@@ -182,21 +194,6 @@ fn check_same_peaks(observations: &Observations) -> Result<(), GapError> {
 
 /// Band of frequencies (Hz).
 type Band = RangeInclusive<f64>;
-
-/// Returns whether most modes with a number of either configuration lie where the other has them.
-fn share_modes(one: &Configuration, other: &Configuration, band: &Band) -> bool {
-    let counts = [one, other].map(|one| {
-        let modes = one.modes.iter();
-        modes.filter(|mode| band.contains(&mode.frequency)).count()
-    });
-    let alike = one.modes.iter().filter(|mode| {
-        let known = other.mode(mode.mode);
-        band.contains(&mode.frequency)
-            && known.is_some_and(|known| is_near(mode.frequency, known.frequency))
-    });
-    let alike = alike.count();
-    alike >= LEAST_SHARED_MODES && 2 * alike > counts[0].max(counts[1])
-}
 
 /// Returns whether a frequency may be another one that has moved (both in Hz).
 fn is_near(frequency: f64, other: f64) -> bool {

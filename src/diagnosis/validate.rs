@@ -433,7 +433,21 @@ impl LeftOutErrors {
         for setup in setups {
             let mut arrangements = dataset.arrangements.iter();
             let file = &arrangements.find(|one| one.setup == setup)?.file;
-            if let Some((rows, predictor)) = predict_setup(dataset, &residuals, setup) {
+            let rows = (0..dataset.observables.len()).filter(|&row| {
+                let one = &dataset.observables[row];
+                !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
+            });
+            let rows: Vec<usize> = rows.collect();
+            let frequencies = 0..rows.len();
+            let frequencies = frequencies.filter(|&k| dataset.observables[rows[k]].is_frequency());
+            let frequencies: Vec<usize> = frequencies.collect();
+            // The set-up's frequencies are predicted from all residuals without any of that set-up.
+            if let Some(predictor) = residuals
+                .predictor(&rows)
+                .filter(|_| !frequencies.is_empty())
+            {
+                let predictor = predictor.select_rows(&frequencies);
+                let rows: Vec<usize> = frequencies.into_iter().map(|k| rows[k]).collect();
                 let known = all.nrows();
                 all = all.resize_vertically(known + rows.len(), 0.0);
                 all.rows_mut(known, rows.len()).copy_from(&predictor);
@@ -471,28 +485,6 @@ impl LeftOutErrors {
             closure: closure(&before.together, &self.together, seed),
         })
     }
-}
-
-/// Returns the frequencies of one set-up and the matrix that predicts them from all residuals without any of that
-/// set-up.
-fn predict_setup(
-    dataset: &Dataset,
-    residuals: &Residuals,
-    setup: usize,
-) -> Option<(Vec<usize>, DMatrix<f64>)> {
-    let rows = (0..dataset.observables.len()).filter(|&row| {
-        let one = &dataset.observables[row];
-        !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
-    });
-    let rows: Vec<usize> = rows.collect();
-    let frequencies = (0..rows.len()).filter(|&k| dataset.observables[rows[k]].is_frequency());
-    let frequencies: Vec<usize> = frequencies.collect();
-    if frequencies.is_empty() {
-        return None;
-    }
-    let predictor = residuals.predictor(&rows)?.select_rows(&frequencies);
-    let rows = frequencies.into_iter().map(|k| rows[k]).collect();
-    Some((rows, predictor))
 }
 
 #[cfg(test)]

@@ -502,7 +502,14 @@ pub fn verdict(
     }
     let holds = tested.passes_holdout() && (first.effects().len() < 2 || tested.improves_holdout());
     if groups[0].probability >= NAMED_PROBABILITY && holds {
-        return name_of(candidates, &groups[0].members);
+        // Names one effect; a group whose members the data do not separate as a group.
+        let members = &groups[0].members;
+        let total: f64 = members.iter().map(|&k| candidates[k].probability).sum();
+        if first.probability >= NAMED_PROBABILITY * total || members.len() == 1 {
+            return Verdict::Named(first.effects().to_vec());
+        }
+        let likely = likely(candidates, members, total);
+        return Verdict::Group(effects_of(candidates, &likely));
     }
     let aliases = aliases_of_first(candidates);
     let together: f64 = aliases.iter().map(|&k| candidates[k].probability).sum();
@@ -532,16 +539,6 @@ fn likely(candidates: &[Candidate], members: &[usize], all: f64) -> Vec<usize> {
     members
         .filter(|&k| candidates[k].probability > LISTED_SHARE * all)
         .collect()
-}
-
-/// Names one effect; a group whose members the data do not separate as a group.
-fn name_of(candidates: &[Candidate], members: &[usize]) -> Verdict {
-    let total: f64 = members.iter().map(|&k| candidates[k].probability).sum();
-    let first = &candidates[members[0]];
-    if first.probability >= NAMED_PROBABILITY * total || members.len() == 1 {
-        return Verdict::Named(first.effects().to_vec());
-    }
-    Verdict::Group(effects_of(candidates, &likely(candidates, members, total)))
 }
 
 /// Returns the first single effect and those after it that fit as well.

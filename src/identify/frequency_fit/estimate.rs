@@ -460,7 +460,19 @@ impl Finished<'_> {
         };
         let rows = self.best.state.jacobian.iter();
         let jacobian: Vec<Point> = rows.map(|row| row.map(|slope| unit * slope)).collect();
-        let (singular_values, directions) = decompose(&jacobian, fit);
+        // Singular values, descending, and their directions in parameter space.
+        let count = jacobian.len().max(fit.len());
+        let matrix = DMatrix::from_fn(count, fit.len(), |row, column| {
+            let slopes = jacobian.get(row);
+            slopes.map_or(0.0, |slopes| slopes[fit[column].index()])
+        });
+        let found = SVD::try_new(matrix, false, true, f64::EPSILON, 1000);
+        let found = found.and_then(|svd| Some((svd.singular_values, svd.v_t?)));
+        let (singular_values, directions) =
+            found.map_or_else(Default::default, |(values, rows)| {
+                let rows = rows.row_iter().map(|row| row.iter().copied().collect());
+                (values.as_slice().to_vec(), rows.collect::<Vec<Vec<f64>>>())
+            });
         let (largest, smallest) = (singular_values.first(), singular_values.last());
         let dead = fit.iter().filter(|parameter| {
             let column = parameter.index();
@@ -482,22 +494,6 @@ impl Finished<'_> {
             singular_values,
         }
     }
-}
-
-/// Singular values, descending, and their directions in parameter space.
-fn decompose(jacobian: &[Point], fit: &[Parameter]) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let rows = jacobian.len().max(fit.len());
-    let matrix = DMatrix::from_fn(rows, fit.len(), |row, column| {
-        jacobian
-            .get(row)
-            .map_or(0.0, |slopes| slopes[fit[column].index()])
-    });
-    let svd = SVD::try_new(matrix, false, true, f64::EPSILON, 1000);
-    let found = svd.and_then(|svd| Some((svd.singular_values, svd.v_t?)));
-    found.map_or_else(Default::default, |(values, vectors)| {
-        let directions = vectors.row_iter().map(|row| row.iter().copied().collect());
-        (values.as_slice().to_vec(), directions.collect())
-    })
 }
 
 fn flat(values: &[f64], directions: &[Vec<f64>], fit: &[Parameter]) -> Vec<FlatDirection> {

@@ -347,11 +347,11 @@ impl View {
         let groups: BTreeSet<usize> = seen.map(|at| at.group).collect();
         let costs = groups.into_iter();
         costs
-            .map(|group| self.cost_of_group(search.peaks, pairs, group))
+            .map(|group| self.cost_of(search.peaks, pairs, group))
             .sum()
     }
 
-    fn cost_of_group(&self, peaks: &[MeasuredPeak], pairs: &[(usize, usize)], group: usize) -> f64 {
+    fn cost_of(&self, peaks: &[MeasuredPeak], pairs: &[(usize, usize)], group: usize) -> f64 {
         let (mut cost, mut signs) = (0.0, [0usize; 2]);
         for &(peak, mode) in pairs {
             let Some(shape) = self.shapes.get(mode - 1) else {
@@ -374,7 +374,13 @@ impl View {
                 signs[usize::from(positive)] += 1;
             }
         }
-        cost - sign_gain(signs)
+        // Signs agree in all modes or, the sensor mounted the other way, in none. Either polarity is as likely as the
+        // other.
+        let [a, b] = [[signs[1], signs[0]], signs].map(|[right, wrong]| {
+            right as f64 * (2.0 * (1.0 - WRONG_SIGN)).ln() + wrong as f64 * (2.0 * WRONG_SIGN).ln()
+        });
+        let most = a.max(b);
+        cost - (most + (0.5 * ((a - most).exp() + (b - most).exp())).ln())
     }
 }
 
@@ -437,14 +443,4 @@ impl Products {
             measured > CLEAR * noise && model > AT_NODE * usual * (self.count as f64).sqrt();
         (clear && self.product.abs() > 0.5 * measured * model).then_some(self.product > 0.0)
     }
-}
-
-/// Signs agree in all modes or, the sensor mounted the other way, in none.
-fn sign_gain(signs: [usize; 2]) -> f64 {
-    // Either polarity is as likely as the other.
-    let [a, b] = [[signs[1], signs[0]], signs].map(|[right, wrong]| {
-        right as f64 * (2.0 * (1.0 - WRONG_SIGN)).ln() + wrong as f64 * (2.0 * WRONG_SIGN).ln()
-    });
-    let most = a.max(b);
-    most + (0.5 * ((a - most).exp() + (b - most).exp())).ln()
 }

@@ -148,7 +148,31 @@ pub fn pair_modes(
         .map(|(assignment, start)| score(&search, assignment, &neighbours, *start))
         .collect();
     numberings.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    Ok(verdict(numberings, settings.odds))
+    // The plain numbering is taken where nothing beats it clearly. Numberings are comparable where the data do not
+    // tell them apart: which of two close modes is missing is not decided by the wish that none were.
+    let best = numberings.first();
+    let (least, by_data) = best.map_or((0.0, 0.0), |best| (best.cost, best.by_data));
+    let limit = settings.odds.ln();
+    numberings.retain(|one| one.by_data.min(one.cost + by_data - least) - by_data < limit);
+    let kept = numberings.into_iter().map(|scored| Numbering {
+        odds: (scored.cost - least).exp(),
+        ..scored.numbering
+    });
+    let mut kept: Vec<Numbering> = kept.collect();
+    let plain = kept.iter().position(|one| is_plain(&one.numbers));
+    let chosen = if kept.is_empty() {
+        Numbering {
+            numbers: Vec::new(),
+            missing: Vec::new(),
+            odds: 1.0,
+        }
+    } else {
+        kept.remove(plain.unwrap_or(0))
+    };
+    Ok(Pairing {
+        chosen,
+        others: kept,
+    })
 }
 
 /// A numbering with its negative logarithm of probability, and how much of that the data say: all but
@@ -191,7 +215,15 @@ fn score(
         })
         .sum();
     let weak = neighbours.cost(assignment);
-    let shaped = comparable(&pairs, assignment, search.peaks, neighbours);
+    // Shapes may be compared without those of the weak peaks beside a stronger one that is left over and whose own
+    // shape is lost in noise. What is known of the weaker one then speaks for neither.
+    let mut shaped = pairs.clone();
+    shaped.retain(|pair| {
+        !neighbours.stronger[pair.0].iter().any(|&(other, _)| {
+            let shape = &search.peaks[other].shape;
+            assignment[other].is_none() && !shape.is_empty() && !is_clear(shape)
+        })
+    });
     let by_data = fit.cost + extra * EXTRA_COST + weak + view.cost(search, &shaped);
     Scored {
         cost: by_data + unseen,
@@ -201,37 +233,6 @@ fn score(
             missing,
             odds: 1.0,
         },
-    }
-}
-
-/// `sorted` by cost. The plain numbering is taken where nothing beats it clearly. Numberings are
-/// comparable where the data do not tell them apart: which of two close modes is missing is not decided
-/// by the wish that none were.
-fn verdict(sorted: Vec<Scored>, odds: f64) -> Pairing {
-    let (least, by_data) = sorted
-        .first()
-        .map_or((0.0, 0.0), |best| (best.cost, best.by_data));
-    let mut kept: Vec<Numbering> = sorted
-        .into_iter()
-        .filter(|scored| scored.by_data.min(scored.cost + by_data - least) - by_data < odds.ln())
-        .map(|scored| Numbering {
-            odds: (scored.cost - least).exp(),
-            ..scored.numbering
-        })
-        .collect();
-    let plain = kept.iter().position(|one| is_plain(&one.numbers));
-    let chosen = if kept.is_empty() {
-        Numbering {
-            numbers: Vec::new(),
-            missing: Vec::new(),
-            odds: 1.0,
-        }
-    } else {
-        kept.remove(plain.unwrap_or(0))
-    };
-    Pairing {
-        chosen,
-        others: kept,
     }
 }
 
@@ -274,7 +275,9 @@ fn candidates(search: &JointSearch<'_>, neighbours: &Neighbours) -> Vec<(Assignm
         .collect();
     // A weak peak at its price, lest all places take a strong one's satellites; and without, lest a strong
     // peak that is no mode hides the mode beside it. The closer look prices both alike.
-    let weak: Vec<f64> = (0..peaks.len()).map(|p| neighbours.alone(p)).collect();
+    let stronger = neighbours.stronger.iter();
+    let weak = stronger.map(|others| others.iter().map(|one| one.1).fold(0.0, f64::max));
+    let weak: Vec<f64> = weak.collect();
     let mut prices = vec![vec![0.0; peaks.len()]];
     prices.extend(weak.iter().any(|price| *price > 0.0).then_some(weak));
     let plain: Assignment = (1..=peaks.len()).map(Some).collect();
@@ -418,12 +421,6 @@ impl Neighbours {
         Neighbours { stronger }
     }
 
-    /// Price of one peak as a mode if none of its neighbours is one.
-    fn alone(&self, peak: usize) -> f64 {
-        let prices = self.stronger[peak].iter().map(|one| one.1);
-        prices.fold(0.0, f64::max)
-    }
-
     /// Price of an assignment: of each numbered peak beside the strongest one left over.
     fn cost(&self, numbers: &[Option<usize>]) -> f64 {
         let numbered = numbers
@@ -436,23 +433,6 @@ impl Neighbours {
         });
         prices.sum()
     }
-}
-
-/// Pairs whose shapes may be compared: without the weak peaks beside a stronger one that is left over and
-/// whose own shape is lost in noise. What is known of the weaker one then speaks for neither.
-fn comparable(
-    pairs: &[(usize, usize)],
-    numbers: &[Option<usize>],
-    peaks: &[MeasuredPeak],
-    neighbours: &Neighbours,
-) -> Vec<(usize, usize)> {
-    let kept = pairs.iter().filter(|pair| {
-        !neighbours.stronger[pair.0].iter().any(|&(other, _)| {
-            let shape = &peaks[other].shape;
-            numbers[other].is_none() && !shape.is_empty() && !is_clear(shape)
-        })
-    });
-    kept.copied().collect()
 }
 
 /// ln of the ratio of two amplitudes in the recording that sees the weaker one best; `None` where no

@@ -289,10 +289,9 @@ pub(super) fn perturbations(
     {
         let near = estimator.neighbourhood();
         // Without the uncertainties of all modes there is nothing to draw from.
-        let random = settings.monte_carlo.and_then(|(samples, seed)| {
-            let found = estimator.monte_carlo_near(&near, samples, seed).ok()?;
-            Some(found.joint)
-        });
+        let random = settings.monte_carlo;
+        let random =
+            random.and_then(|(samples, seed)| estimator.monte_carlo(&near, samples, seed).ok());
         let estimator = estimator.stiffnesses_near(&near);
         add(
             &mut found,

@@ -8,9 +8,7 @@ use crate::forward::Forward;
 use crate::optimum::{Model, maximise};
 use crate::parameters::NuisanceParameter;
 use crate::result::{Block, Closure, CrossValidation, LeftOutRecording, Misfit, Residual};
-use crate::thresholds::{
-    GAP_OVER_FLOOR, GAP_OVER_PREDICTION, LEAST_BLOCK_FREEDOM, LEAST_RECORDINGS,
-};
+use crate::settings::{GAP_OVER_FLOOR, GAP_OVER_PREDICTION, LEAST_BLOCK_FREEDOM, LEAST_RECORDINGS};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -431,29 +429,36 @@ impl LeftOutErrors {
         let residuals = Residuals::new(dataset, fit)?;
         let mut recordings = Vec::new();
         let mut all_rows: Vec<usize> = Vec::new();
-        let mut all: Vec<DMatrix<f64>> = Vec::new();
+        let mut all = DMatrix::zeros(0, residuals.raw.len());
         for setup in setups {
             let mut arrangements = dataset.arrangements.iter();
             let file = &arrangements.find(|one| one.setup == setup)?.file;
-            if let Some((rows, predictor)) = predict_setup(dataset, &residuals, setup) {
-                let errors = residuals.errors_of(dataset, &rows, predictor.clone());
+            let rows = (0..dataset.observables.len()).filter(|&row| {
+                let one = &dataset.observables[row];
+                !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
+            });
+            let rows: Vec<usize> = rows.collect();
+            let frequencies = 0..rows.len();
+            let frequencies = frequencies.filter(|&k| dataset.observables[rows[k]].is_frequency());
+            let frequencies: Vec<usize> = frequencies.collect();
+            // The set-up's frequencies are predicted from all residuals without any of that set-up.
+            if let Some(predictor) = residuals
+                .predictor(&rows)
+                .filter(|_| !frequencies.is_empty())
+            {
+                let predictor = predictor.select_rows(&frequencies);
+                let rows: Vec<usize> = frequencies.into_iter().map(|k| rows[k]).collect();
+                let known = all.nrows();
+                all = all.resize_vertically(known + rows.len(), 0.0);
+                all.rows_mut(known, rows.len()).copy_from(&predictor);
+                let errors = residuals.errors_of(dataset, &rows, predictor);
                 recordings.push((file.clone(), errors));
                 all_rows.extend(rows);
-                all.push(predictor);
             }
         }
-        if all.is_empty() {
-            return None;
-        }
-        let mut predictor = DMatrix::zeros(all_rows.len(), residuals.raw.len());
-        let mut at = 0;
-        for one in &all {
-            predictor.rows_mut(at, one.nrows()).copy_from(one);
-            at += one.nrows();
-        }
-        Some(LeftOutErrors {
+        (!all_rows.is_empty()).then(|| LeftOutErrors {
             recordings,
-            together: residuals.errors_of(dataset, &all_rows, predictor),
+            together: residuals.errors_of(dataset, &all_rows, all),
         })
     }
 
@@ -480,32 +485,6 @@ impl LeftOutErrors {
             closure: closure(&before.together, &self.together, seed),
         })
     }
-}
-
-/// Returns the frequencies of one set-up and the matrix that predicts them from all residuals without any of that
-/// set-up.
-fn predict_setup(
-    dataset: &Dataset,
-    residuals: &Residuals,
-    setup: usize,
-) -> Option<(Vec<usize>, DMatrix<f64>)> {
-    let rows: Vec<usize> = (0..dataset.observables.len())
-        .filter(|&row| {
-            let one = &dataset.observables[row];
-            !one.is_damping() && dataset.arrangements[one.configuration].setup == setup
-        })
-        .collect();
-    let frequencies: Vec<usize> = (0..rows.len())
-        .filter(|&k| dataset.observables[rows[k]].is_frequency())
-        .collect();
-    if frequencies.is_empty() {
-        return None;
-    }
-    let predictor = residuals.predictor(&rows)?.select_rows(&frequencies);
-    Some((
-        frequencies.into_iter().map(|k| rows[k]).collect(),
-        predictor,
-    ))
 }
 
 #[cfg(test)]

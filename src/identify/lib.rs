@@ -27,8 +27,7 @@ pub use frequency_fit as consistent;
 pub use pairing::pair_modes;
 pub use pairs::{
     Doubt, FREQUENCY_FLOOR, JointEstimate, MeasuredMode, ModeLambda, PairsEstimate, PairsModel,
-    SingleMode, Uncertain, estimate_joint, estimate_lap, estimate_pairs, estimate_three_parameter,
-    estimate_two_parameter, pairs_estimator, single_mode_stiffness,
+    SingleMode, Uncertain, estimate_joint, estimate_pairs, pairs_estimator, single_mode_stiffness,
 };
 pub use perturbation::{MonteCarlo, Spread, Stiffnesses, monte_carlo};
 pub use predict::{

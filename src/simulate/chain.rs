@@ -7,6 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{PI, TAU};
+use tapjoint_numerics::bessel_i0;
 
 /// Quality of the mounting's resonance: what screws and wax have, between 10 and 30.
 const MOUNTING_QUALITY: f64 = 20.0;
@@ -266,20 +267,13 @@ impl Decimator {
                 let offset = index as f64 - half as f64;
                 let x = offset / half as f64;
                 let argument = BETA * (1.0 - x * x).max(0.0).sqrt();
-                // Modified Bessel function of the first kind, sum of ((x/2)^n/n!)^2.
-                let (mut term, mut window, mut n) = (1.0, 1.0, 1.0);
-                while term > 1e-17 * window {
-                    term *= (0.5 * argument / n).powi(2);
-                    window += term;
-                    n += 1.0;
-                }
                 // Cut-off in the middle of the transition, half the rate after decimation.
                 let angle = PI * (offset / factor as f64);
                 let sinc = match offset == 0.0 {
                     true => 1.0,
                     false => angle.sin() / angle,
                 };
-                window * sinc
+                bessel_i0(argument) * sinc
             })
             .collect();
         let sum: f64 = weights.iter().sum();

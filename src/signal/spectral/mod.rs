@@ -12,7 +12,7 @@ pub use average::{
     AveragedSpectra, FrfEstimator, LinePowers, LineQuality, SpectralAverager, TapRecord,
     average_records, random_error,
 };
-pub(crate) use transform::{bessel_i0, kaiser_beta};
+pub(crate) use transform::kaiser_beta;
 pub use transform::{Transformer, Workspace, band_limited, transform_block};
 pub use window::{
     DecayCheck, RUNG_DOWN, Window, apply_force_window, choose_window, exponential_to,

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
+use tapjoint_numerics::bessel_i0;
 
 use super::{DISPLAY_RATIO, Lines, smallest_smooth_block};
 
@@ -175,18 +176,6 @@ const STOP_BAND_DB: f64 = 100.0;
 /// (Oppenheim & Schafer).
 pub(crate) fn kaiser_beta(attenuation: f64) -> f64 {
     0.1102 * (attenuation - 8.7)
-}
-
-/// Modified Bessel function I0, by its power series: converges for every argument used here.
-pub(crate) fn bessel_i0(x: f64) -> f64 {
-    let quarter = x * x / 4.0;
-    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
-    while term > sum * 1e-17 {
-        term *= quarter / (k * k);
-        sum += term;
-        k += 1.0;
-    }
-    sum
 }
 
 /// By how much a band of this width (Hz) can be decimated: to the next whole divisor above the complex

@@ -5,10 +5,11 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
+use tapjoint_numerics::bessel_i0;
 use tapjoint_numerics::stats::median;
 
 use super::{Decay, FILTER, KnownMode, LONGEST_FILTER};
-use crate::spectral::{bessel_i0, kaiser_beta};
+use crate::spectral::kaiser_beta;
 
 /// Attenuation of the stop band (dB): a neighbour a hundred times as strong is left at 3 %.
 const ATTENUATION: f64 = 70.0;

@@ -11,8 +11,8 @@ use super::observed_mode::{ModeSeen, SeenTaps, independent, judge_scatter, of_ta
 use tapjoint_beam::JointStiffness;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::Joint;
-use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, JointModel, SensorKind, TestDescription};
+use tapjoint_description::{coupling, described_beam, described_specimen};
 use tapjoint_diagnosis::{Diagnosis, GapError, GapSettings, Nominal, NominalSensor, diagnose};
 use tapjoint_identify::observation::{
     Configuration, ExtraPeak, Observations, ObservedMode, ObservedSensor, UNPAIRED,

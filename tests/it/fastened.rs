@@ -4,8 +4,8 @@ use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use tapjoint::described::described_specimen;
 use tapjoint::description::TestDescription;
+use tapjoint::description::described_specimen;
 use tapjoint::effects::{Effect, EffectId};
 use tapjoint::gap::{
     GapSettings, Nominal, TestPlan, Verdict, diagnose, nominal_chi_square, observe,

@@ -1,11 +1,10 @@
 //! From readings to stiffnesses, by both estimators, and the errors of these against the draw's truth.
 
 use super::plan::{BlockPlan, Layout};
-use super::reading::{BandReadings, index_of};
 use super::result::StudiedStiffness;
-use super::virtual_test::Truth;
+use super::virtual_test::{BandReadings, Truth, index_of};
 use super::{ResolutionError, StudiedTest};
-use tapjoint_analysis::EstimateMethod;
+use tapjoint_analysis::{EstimateMethod, jointed_structure};
 use tapjoint_beam::{Assembly, JointStiffness};
 use tapjoint_description::ReadBy;
 use tapjoint_identify::consistent::{
@@ -56,7 +55,22 @@ impl<'a> Estimators<'a> {
         layout: &'a Layout,
         nominal: &Truth,
     ) -> Result<Self, ResolutionError> {
-        let parameters = parameters_of(test);
+        // Finite stiffnesses are estimated, rigid and absent ones are held.
+        let three = test.structure.regression == Some(PairsModel::ThreeParameter);
+        let mut parameters = Vec::new();
+        if test.structure.assembly == Assembly::Free {
+            parameters.push(Parameter::Modulus);
+        } else {
+            let springs = [
+                (Parameter::Kt, test.joint.kx),
+                (Parameter::Kr, test.joint.ky),
+            ];
+            let finite = springs.iter().filter(|(_, k)| *k > 0.0 && k.is_finite());
+            parameters.extend(finite.map(|(parameter, _)| *parameter));
+            if three && test.joint.kz().is_some() {
+                parameters.push(Parameter::Coupling);
+            }
+        }
         if parameters.is_empty() {
             return Err(IdentifyError::NothingToEstimate.into());
         }
@@ -75,7 +89,7 @@ impl<'a> Estimators<'a> {
             },
             parameters,
             layout,
-            structure: test.jointed(),
+            structure: jointed_structure(&test.structure, &test.details),
             regression: test.structure.regression,
             nominal: nominal.clone(),
         })
@@ -107,7 +121,10 @@ impl<'a> Estimators<'a> {
             let both = modes.as_deref().and_then(|modes| match method {
                 EstimateMethod::Consistent => {
                     let found = self.consistent(modes, truth)?;
-                    Some((found, self.true_values(&truth.joint)))
+                    Some((
+                        found,
+                        self.values(&truth.joint, self.structure.beam.modulus),
+                    ))
                 }
                 // The regression's own error on exact frequencies is not due to the reading.
                 EstimateMethod::Pairs | EstimateMethod::FreeBeam => {
@@ -136,10 +153,6 @@ impl<'a> Estimators<'a> {
             std: None,
         })
         .collect()
-    }
-
-    fn true_values(&self, joint: &JointStiffness) -> Vec<f64> {
-        self.values(joint, self.structure.beam.modulus)
     }
 
     /// The values of the estimated stiffnesses.
@@ -187,7 +200,7 @@ impl<'a> Estimators<'a> {
     /// Returns the stiffnesses of the study with their nominal values.
     pub fn described(&self) -> Vec<StudiedStiffness> {
         let pairs = self.pairs(&self.exact(&self.nominal));
-        let values = self.true_values(&self.nominal.joint);
+        let values = self.values(&self.nominal.joint, self.structure.beam.modulus);
         let parameters = self.parameters.iter().zip(values).enumerate();
         parameters
             .map(|(index, (&parameter, value))| StudiedStiffness {
@@ -258,26 +271,4 @@ impl<'a> Estimators<'a> {
         }
         Some(sums)
     }
-}
-
-/// Finite stiffnesses are estimated, rigid and absent ones are held.
-fn parameters_of(test: &StudiedTest) -> Vec<Parameter> {
-    if test.structure.assembly == Assembly::Free {
-        return vec![Parameter::Modulus];
-    }
-    let mut parameters = Vec::new();
-    let springs = [
-        (Parameter::Kt, test.joint.kx),
-        (Parameter::Kr, test.joint.ky),
-    ];
-    for (parameter, value) in springs {
-        if value > 0.0 && value.is_finite() {
-            parameters.push(parameter);
-        }
-    }
-    let three = test.structure.regression == Some(PairsModel::ThreeParameter);
-    if three && test.joint.kz().is_some() {
-        parameters.push(Parameter::Coupling);
-    }
-    parameters
 }

@@ -64,7 +64,18 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
         None => all.find(|one| one.hypothesis != Hypothesis::Unknown),
     }?;
     let mut effects = found.effects.clone();
-    add_coupling(&mut effects, found.coupling)?;
+    // Descriptions have no coupling of the joint's own model: it goes to the effects.
+    if found.coupling != 0.0 {
+        let mut all = effects.iter_mut();
+        let own = all.find(|one| one.id == EffectId::CrossCoupling);
+        let beside = own.as_ref().and_then(|one| one.value("coupling"));
+        let total = found.coupling + beside.unwrap_or(0.0);
+        let whole = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", total)]).ok()?;
+        match own {
+            Some(own) => *own = whole,
+            None => effects.push(whole),
+        }
+    }
     let mut text = heading(diagnosis, found);
     text.push_str(&described(test, found));
     for effect in &effects {
@@ -75,24 +86,6 @@ pub fn updated_model(test: &TestDescription, diagnosis: &Diagnosis) -> Option<Up
         hypothesis: found.hypothesis.name(),
         text,
     })
-}
-
-/// Adds the coupling of the joint's own model to the effects, because descriptions have none.
-fn add_coupling(effects: &mut Vec<Effect>, held: f64) -> Option<()> {
-    if held == 0.0 {
-        return Some(());
-    }
-    let own = effects
-        .iter_mut()
-        .find(|one| one.id == EffectId::CrossCoupling);
-    let found = own.as_ref().and_then(|one| one.value("coupling"));
-    let total = held + found.unwrap_or(0.0);
-    let whole = Effect::from_pairs(EffectId::CrossCoupling, &[("coupling", total)]).ok()?;
-    match own {
-        Some(own) => *own = whole,
-        None => effects.push(whole),
-    }
-    Some(())
 }
 
 fn heading(diagnosis: &Diagnosis, found: &HypothesisResult) -> String {

@@ -18,7 +18,7 @@ pub use result::{
 pub use tapjoint_analysis::EstimateMethod;
 pub use tapjoint_description::ReadBy;
 
-use estimate::{Estimators, ParameterErrors, name_of};
+use estimate::{BandReadings, Estimators, ParameterErrors, Read, index_of, name_of, read_band};
 use plan::{BlockPlan, Layout, ModePlan};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -30,7 +30,7 @@ use tapjoint_description::TestDescription;
 use tapjoint_identify::IdentifyError;
 use tapjoint_numerics::stats::root_mean_square;
 use tapjoint_signal::spectral::SpectralError;
-use virtual_test::{BandReadings, Read, Truth, Truths, VirtualRecord, index_of, read_band};
+use virtual_test::{Truth, Truths, VirtualRecord};
 
 /// A test that is studied virtually.
 #[derive(Debug, Clone, PartialEq)]

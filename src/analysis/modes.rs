@@ -1,14 +1,14 @@
 //! One list of numbered modes from several recordings, or from frequencies read elsewhere.
 
-use super::analysis::{ModeResult, RecordingResult};
-use super::between_recordings::between;
 use super::identification::measured_modes;
 use super::observed_mode::shape_of;
+use super::recording_result::RecordingResult;
+use super::results::{ModeResult, between};
 use super::structure::{
     NO_SPRING, StructureDetails, TestedStructure, estimator, fitted, frequencies_of, jointed,
     masses_in,
 };
-use super::warning::Warning;
+use super::warnings::Warning;
 use std::f64::consts::TAU;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
@@ -224,7 +224,11 @@ fn number_free(modes: &mut [ModeResult], structure: &TestedStructure) -> Vec<War
     number_in_order(modes);
     match free.is_empty() {
         true => Vec::new(),
-        false => vec![Warning::numbered_in_order()],
+        false => vec![Warning::new(
+            "numbered-in-order",
+            "no peak lies near a natural frequency of the described free beam, so the peaks were \
+             numbered in ascending order; check the beam's dimensions and modulus",
+        )],
     }
 }
 
@@ -260,24 +264,28 @@ fn number_in_order(modes: &mut [ModeResult]) {
 fn own_numbers(modes: &[ModeResult], readings: &[ModeReading]) -> Vec<Option<usize>> {
     let mut numbers = vec![None; readings.len()];
     for mode in modes.iter().filter(|mode| mode.mode.is_some()) {
-        let mut nearest: Option<(usize, f64)> = None;
-        for (index, reading) in readings.iter().enumerate() {
-            let distance = (mode.frequency - reading.frequency).abs();
-            let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
-            if reading.label.is_none()
-                && numbers[index].is_none()
-                && distance <= half_lines + OTHER_CONFIGURATION * mode.frequency
-                && nearest.is_none_or(|(_, least)| distance < least)
+        let near = readings.iter().enumerate().filter(|(index, reading)| {
+            reading.label.is_none()
+                && numbers[*index].is_none()
+                && is_within(reading, mode, OTHER_CONFIGURATION)
                 && !is_of_another(reading, mode, modes, readings)
-            {
-                nearest = Some((index, distance));
-            }
-        }
+        });
+        let nearest = near.min_by(|a, b| distance(a.1, mode).total_cmp(&distance(b.1, mode)));
         if let Some((nearest, _)) = nearest {
             numbers[nearest] = mode.mode;
         }
     }
     numbers
+}
+
+fn distance(reading: &ModeReading, mode: &ModeResult) -> f64 {
+    (reading.frequency - mode.frequency).abs()
+}
+
+/// Returns true if a reading lies within the half lines of both and this share of the mode's frequency (1).
+fn is_within(reading: &ModeReading, mode: &ModeResult, share: f64) -> bool {
+    let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
+    distance(reading, mode) <= half_lines + share * mode.frequency
 }
 
 /// Peaks without a number that lie nearer than this to a mode may be a part of its line (1, relative).
@@ -291,14 +299,11 @@ fn is_of_another(
     modes: &[ModeResult],
     readings: &[ModeReading],
 ) -> bool {
-    let own = (reading.frequency - mode.frequency).abs();
     modes.iter().filter(|peak| peak.is_unpaired()).any(|peak| {
         let apart = (peak.frequency - mode.frequency).abs() > OF_ITS_LINE * mode.frequency;
-        let distance = (reading.frequency - peak.frequency).abs();
+        let own = distance(reading, peak);
         let mut others = readings.iter().filter(|other| other.label.is_none());
-        apart
-            && distance < own
-            && !others.any(|other| (other.frequency - peak.frequency).abs() < distance)
+        apart && own < distance(reading, mode) && !others.any(|other| distance(other, peak) < own)
     })
 }
 
@@ -365,15 +370,18 @@ fn measured_peak(
     let mode = &modes[index];
     let (mut shape, mut strengths) = (Vec::new(), Vec::new());
     for (group, recording) in (1..).zip(recordings) {
-        let Some(reading) = reading_of(mode, recording) else {
+        // The recording's own reading of the peak.
+        let readings = recording.readings().iter();
+        let near = readings.filter(|one| one.label.is_none() && is_within(one, mode, SAME_PEAK));
+        let nearest = near.min_by(|a, b| distance(a, mode).total_cmp(&distance(b, mode)));
+        let Some(reading) = nearest else {
             strengths.push(None);
             continue;
         };
         shape.extend(shape_in(recording, reading, group));
         // Where the reading is nearer to another peak, it is the other peak's.
-        let own = (mode.frequency - reading.frequency).abs();
-        let mut others = modes.iter();
-        let of_another = others.any(|other| (other.frequency - reading.frequency).abs() < own);
+        let own = distance(reading, mode);
+        let of_another = modes.iter().any(|other| distance(reading, other) < own);
         strengths.push((!of_another).then(|| PeakStrength {
             energy: energy(reading),
             level_db: reading.prominence_db.and(reading.above_noise_db),
@@ -420,22 +428,6 @@ fn shape_in(recording: &RecordingResult, reading: &ModeReading, group: usize) ->
         });
     }
     values
-}
-
-/// Returns the recording's own reading of a peak.
-fn reading_of<'a>(mode: &ModeResult, recording: &'a RecordingResult) -> Option<&'a ModeReading> {
-    let mut nearest: Option<(&ModeReading, f64)> = None;
-    for reading in recording.readings() {
-        let distance = (reading.frequency - mode.frequency).abs();
-        let half_lines = mode.half_line.unwrap_or(0.0) + reading.half_line;
-        if reading.label.is_none()
-            && distance <= half_lines + SAME_PEAK * mode.frequency
-            && nearest.is_none_or(|(_, least)| distance < least)
-        {
-            nearest = Some((reading, distance));
-        }
-    }
-    nearest.map(|(reading, _)| reading)
 }
 
 /// The warning about modes that no peak was taken for.

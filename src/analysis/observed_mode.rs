@@ -1,17 +1,15 @@
 //! One mode as the taps of one level saw it: frequency, damping, covariance, shape, amplitude.
 
-use super::RecordingResult;
 use super::frf::{form_of, form_of_kind};
-use super::measure::MeasuredSpectra;
+use super::recording_result::RecordingResult;
 use num_complex::Complex64;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use tapjoint_description::SensorKind;
 use tapjoint_identify::observation::{
     AlongDecay, DecayEnd, DecayVerdict, Observed, ObservedMode, ShapeValue,
 };
-use tapjoint_numerics::stats::{median, root_mean_square};
+use tapjoint_numerics::stats::{chi_square_tail, median, root_mean_square};
 use tapjoint_signal::modal::amplitude::{AmplitudeCurve, AmplitudeVerdict};
 use tapjoint_signal::modal::fit::{
     FittedValue, UncertaintySource, scatter_about_mean, weighted_mean,
@@ -204,9 +202,20 @@ impl<'a> ModeSeen<'a> {
         let found = constants
             .iter()
             .find(|constant| constant.sensor == sensor)?;
-        let spectra = self.recording.measurement.spectra.as_ref();
-        let of_force = spectra.map(|spectra| noise_of_force(spectra, self.reading));
-        let of_force = of_force.unwrap_or(Some(ForceNoise::NONE))?;
+        // Noise of the hammer at the mode's line; none without a hammer or a quiet stretch.
+        let mut of_force = ForceNoise::NONE;
+        if let Some(spectra) = &self.recording.measurement.spectra {
+            let averages = &spectra.averages;
+            let line = averages.lines.nearest(self.reading.frequency);
+            let noise = spectra
+                .force_noise
+                .as_ref()
+                .and_then(|noise| noise.get(line));
+            let force = averages.force.as_ref().and_then(|force| force.get(line));
+            if let Some((&noise, &force)) = noise.zip(force) {
+                of_force = ForceNoise::of(noise, force, averages.taps)?;
+            }
+        }
         Some(Observed {
             value: found.value,
             std: of_force.added_to(found.std, found.value),
@@ -353,14 +362,26 @@ impl Repeats {
                 std: joint.std,
                 freedom: Some(joint.freedom).filter(|freedom| *freedom < KNOWN),
             },
-            _ => mean_by_noise(&taps, inflation)?,
+            // Weighted mean with the weights 1/std^2.
+            _ => {
+                let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();
+                let sum: f64 = taps.iter().map(|tap| tap.1 * tap.2.powi(-2)).sum();
+                let mean = sum / total;
+                (total > 0.0 && mean.is_finite()).then(|| Observed {
+                    value: mean,
+                    std: inflation / total.sqrt(),
+                    freedom: None,
+                })?
+            }
         };
         let mut repeats = Repeats {
             taps,
             by_noise,
             scattered: false,
         };
-        repeats.scattered = repeats.probability().is_some_and(|p| p < SCATTER_LEVEL);
+        repeats.scattered = repeats.chi_squared().is_some_and(|(chi_squared, freedom)| {
+            chi_square_tail(chi_squared, freedom) < SCATTER_LEVEL
+        });
         Some(repeats)
     }
 
@@ -374,12 +395,6 @@ impl Repeats {
         (taps.len() >= LEAST_TAPS)
             .then(|| (scatter_about_mean(&taps), taps.len() as f64 - 1.0))
             .filter(|(chi_squared, _)| chi_squared.is_finite())
-    }
-
-    /// Probability that noise alone scatters as much; `None` with too few taps.
-    fn probability(&self) -> Option<f64> {
-        let (chi_squared, freedom) = self.chi_squared()?;
-        Some(ChiSquared::new(freedom).ok()?.sf(chi_squared))
     }
 
     /// The value, from the noise or from the scatter.
@@ -407,25 +422,13 @@ impl Repeats {
     }
 }
 
-/// Weighted mean with the weights 1/std^2, and its standard uncertainty.
-fn mean_by_noise(taps: &[(usize, f64, f64)], inflation: f64) -> Option<Observed> {
-    let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();
-    let mean = taps.iter().map(|tap| tap.1 * tap.2.powi(-2)).sum::<f64>() / total;
-    (total > 0.0 && mean.is_finite()).then(|| Observed {
-        value: mean,
-        std: inflation / total.sqrt(),
-        freedom: None,
-    })
-}
-
 /// Judges the frequencies' scatter over all modes together: what makes the structure differ between
 /// taps moves several modes a little, and is seen in their sum where it is not in each. Then every mode
 /// that scatters beyond its noise at all counts as scattered.
 pub(super) fn judge_scatter(modes: &mut [ModeSeen<'_>]) {
     let sums = modes.iter().filter_map(|mode| mode.frequency.chi_squared());
     let (chi_squared, freedom) = sums.fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
-    let probability = ChiSquared::new(freedom).map_or(1.0, |d| d.sf(chi_squared));
-    if probability >= SCATTER_LEVEL {
+    if chi_square_tail(chi_squared, freedom) >= SCATTER_LEVEL {
         return;
     }
     for mode in modes {
@@ -487,10 +490,17 @@ fn shrunk_correlation(modes: &[ModeSeen<'_>], which: &[usize]) -> Option<Vec<Vec
     if which.len() < 2 || common.len() < LEAST_TAPS {
         return None;
     }
-    let columns: Vec<Vec<f64>> = values
-        .iter()
-        .map(|mode| unit_deviations(common.iter().map(|tap| mode[tap]).collect()))
-        .collect();
+    // Deviations from the mean, scaled to a unit sum of squares.
+    let mut columns: Vec<Vec<f64>> = Vec::with_capacity(values.len());
+    for mode in &values {
+        let mut column: Vec<f64> = common.iter().map(|tap| mode[tap]).collect();
+        let mean = column.iter().sum::<f64>() / column.len() as f64;
+        column.iter_mut().for_each(|value| *value -= mean);
+        let size = column.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let size = size.max(f64::MIN_POSITIVE);
+        column.iter_mut().for_each(|value| *value /= size);
+        columns.push(column);
+    }
     let mut sample = vec![vec![0.0; which.len()]; which.len()];
     let (mut squares, mut variances) = (0.0, 0.0);
     for (i, a) in columns.iter().enumerate() {
@@ -508,16 +518,6 @@ fn shrunk_correlation(modes: &[ModeSeen<'_>], which: &[usize]) -> Option<Vec<Vec
         *r *= 1.0 - shrinkage;
     }
     Some(sample)
-}
-
-/// Deviations from the mean, scaled to a unit sum of squares.
-fn unit_deviations(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    values.iter_mut().for_each(|value| *value -= mean);
-    let size = values.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let size = size.max(f64::MIN_POSITIVE);
-    values.iter_mut().for_each(|value| *value /= size);
-    values
 }
 
 /// Error of a ratio to the force by the hammer's noise (1, relative).
@@ -552,21 +552,6 @@ impl ForceNoise {
     fn added_to(self, std: f64, value: f64) -> f64 {
         std.max(self.random * value.abs())
             .hypot(self.common * value)
-    }
-}
-
-/// Noise of the hammer at a mode's line; none without a hammer or a quiet stretch.
-fn noise_of_force(spectra: &MeasuredSpectra, reading: &ModeReading) -> Option<ForceNoise> {
-    let averages = &spectra.averages;
-    let line = averages.lines.nearest(reading.frequency);
-    let noise = spectra
-        .force_noise
-        .as_ref()
-        .and_then(|noise| noise.get(line));
-    let force = averages.force.as_ref().and_then(|force| force.get(line));
-    match (noise, force) {
-        (Some(&noise), Some(&force)) => ForceNoise::of(noise, force, averages.taps),
-        _ => Some(ForceNoise::NONE),
     }
 }
 

@@ -304,7 +304,7 @@ fn write_file(folder: &Path, shown: &Path, name: &str, bytes: &[u8]) -> Result<(
 
 /// Diagnoses a test. A test that cannot be analysed has no answer, which is counted separately.
 fn case_of(test: &TestDescription, folder: &Path, truth: &Truth) -> Case {
-    let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::none(), |d| Answer::of(&d));
+    let answer = diagnosis_of(test, folder).map_or_else(|_| Answer::default(), |d| Answer::of(&d));
     (truth.clone(), answer)
 }
 
@@ -374,7 +374,7 @@ fn elsewhere(
                 "the test \"{}\" could not be diagnosed, and counts as not diagnosed: {error:#}",
                 truth.name
             ));
-            Answer::none()
+            Answer::default()
         });
         (truth, answer)
     });

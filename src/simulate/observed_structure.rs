@@ -7,8 +7,8 @@ use std::sync::Arc;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Body, Joint, Mesh, PointMass, Specimen, SpecimenModes};
 use tapjoint_beam::{JointStiffness, StructureError};
-use tapjoint_description::described::{coupling, described_beam, described_specimen};
 use tapjoint_description::{Assembly, RecordingDescription, SensorKind, TestDescription};
+use tapjoint_description::{coupling, described_beam, described_specimen};
 
 /// Modes beyond the highest that moves in time, whose compliances are added up: what is left out after
 /// them has fallen with the cube of their number.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use tapjoint_beam::effects::Effect;
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::specimen::{Joint, Specimen};
-use tapjoint_description::described::described_beam;
+use tapjoint_description::described_beam;
 use tapjoint_description::{Scale, TestDescription};
 use toml::{Table, Value};
 

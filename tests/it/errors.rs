@@ -272,7 +272,7 @@ fn regress_text_that_is_no_toml_names_its_line() {
         let error = TestDescription::parse(text, "t.toml").expect_err("no TOML");
         assert_eq!(error.line, line, "{text:?}: {error}");
         assert!(
-            matches!(*error.problem, DescriptionProblem::Syntax { .. }),
+            error.problem.starts_with("not valid TOML"),
             "{text:?}: {error}"
         );
     }

@@ -52,7 +52,7 @@ fn assert_has(analysis: &Analysis, expected: &[f64], tolerance: f64) {
 }
 
 fn codes(analysis: &Analysis) -> Vec<&str> {
-    analysis.warnings.iter().map(|w| w.code()).collect()
+    analysis.warnings.iter().map(|w| w.code).collect()
 }
 
 const SPRUCE: &str = "guitar_tap_wav/brace-umik-1-swift-mac-1778816093.wav";

@@ -75,7 +75,7 @@ const OF_FUNCTION: [Check; 4] = [
 
 fn is_of_function(warning: &Warning) -> bool {
     let mut checks = OF_FUNCTION.iter();
-    checks.any(|check| check.code() == warning.code())
+    checks.any(|check| check.code() == warning.code)
 }
 
 fn section(frf: &Frf) -> FrfSection {

@@ -135,7 +135,7 @@ pub fn of_the_result(warnings: &[WarningSection]) -> Vec<&WarningSection> {
 impl WarningSection {
     fn of(warning: &Warning, beside: bool) -> Self {
         WarningSection {
-            code: warning.code().to_string(),
+            code: warning.code.to_string(),
             text: with_minus_signs(&warning.to_string()),
             beside,
         }
@@ -185,7 +185,7 @@ pub fn document_of(analysis: &Analysis) -> Document {
     let has_better = identification.is_some_and(|found| found.consistent.is_some());
     let warnings = analysis.warnings.iter();
     let warnings =
-        warnings.map(|warning| WarningSection::of(warning, has_better && warning.is_of_pairs()));
+        warnings.map(|warning| WarningSection::of(warning, has_better && warning.of_pairs));
     let mut document = Document {
         version: VERSION,
         test: Some(test_section(&analysis.name, analysis.structure.as_ref())),

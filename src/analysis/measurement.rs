@@ -1,25 +1,23 @@
-//! Measuring one recording: taps, averaged spectra, free decays, readings.
+//! The measurement of one recording: taps, noise before them, averaged spectra, free decays, readings.
 
-use super::fits::{Candidates, Stabilisation, stabilisation};
-use super::noise::{PreTriggerNoise, PulseWindow, pulse_window, remove_offset};
-use super::warning::Warning;
+use super::fits::{FreeDecays, Stabilisation};
+use super::warnings::Warning;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 use tapjoint_description::WindowKind;
-use tapjoint_numerics::stats::root_mean_square;
-use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
-use tapjoint_signal::modal::fit::{
-    Column, FitError, FreeDecayCollector, ModalData, TapForce, modal_constants,
-};
+use tapjoint_numerics::stats::{median, root_mean_square};
+use tapjoint_signal::modal::amplitude::Decay;
+use tapjoint_signal::modal::fit::TapForce;
 use tapjoint_signal::modal::{
-    CompositeLevel, FittedReading, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
-    find_peaks, read_peaks,
+    CompositeLevel, LineAmplitudes, MainsSettings, ModeReading, PeakLabel, PeakSettings, ReadBy,
+    find_peaks, mains_harmonic, near_mains, read_peaks,
 };
 use tapjoint_signal::recording::{Recording, RecordingError, ResponseForm};
 use tapjoint_signal::spectral::{
     AveragedSpectra, DISPLAY_RATIO, DecayCheck, LEAST_BLOCK, Lines, MOST_BLOCK, RUNG_DOWN,
-    SpectralAverager, SpectralError, Transformer, Window, band_limited, choose_window,
-    exponential_to, largest_smooth_block, measure_decay,
+    SpectralAverager, SpectralError, Transformer, Window, apply_force_window, band_limited,
+    choose_window, exponential_to, largest_smooth_block, line_amplitude, measure_decay,
+    noise_beside, noise_power,
 };
 use tapjoint_signal::taps::{Tap, TapSettings, TapSource, Taps, find_taps};
 
@@ -136,11 +134,31 @@ pub fn measure(
         match lines_for(settings, recording.sample_rate(), available) {
             Ok(lines) => {
                 let found = Stage::new(recording, settings, &taps, lines).spectra()?;
-                warnings.extend(of_spectra(recording.name(), &found));
+                let (file, window) = (recording.name(), found.window);
+                if let Some(decay) = found.decay
+                    && decay.remaining > RUNG_DOWN
+                    && decay.remaining > decay.noise
+                {
+                    warnings.push(Warning::not_rung_down(file, decay.remaining, window));
+                }
+                if window == Window::Hann {
+                    let text = "a Hann window suppresses the start of every record, where a tap has its \
+                                signal; it is meant for steady signals";
+                    warnings.push(Warning::about(file, "hann-on-taps", text));
+                }
+                for reading in &found.readings {
+                    if let Some(label @ PeakLabel::Mains(_)) = reading.label {
+                        warnings.push(Warning::mains(file, reading.line_frequency, label));
+                    }
+                }
                 spectra = Some(found);
             }
             // The file would do, but its taps come too soon: data, not typing.
-            Err(problem) => warnings.push(Warning::taps_too_short(recording.name(), &problem)),
+            Err(problem) => warnings.push(Warning::about(
+                recording.name(),
+                "taps-too-short",
+                format!("the taps leave no spectrum: {problem}"),
+            )),
         }
     }
     Ok(Measurement {
@@ -184,37 +202,9 @@ pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
         warnings.push(Warning::rejected_taps(file, rejected, taps.taps.len()));
     }
     if accepted == 1 && matches!(source, TapSource::Hammer { .. }) {
-        warnings.push(Warning::single_tap(file));
-    }
-    warnings
-}
-
-/// Doubts about a recording's spectra.
-fn of_spectra(file: &str, spectra: &MeasuredSpectra) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    if let Some(decay) = spectra.decay
-        && decay.remaining > RUNG_DOWN
-        && decay.remaining > decay.noise
-    {
-        warnings.push(Warning::NotRungDown {
-            file: file.to_string(),
-            remaining: decay.remaining,
-            window: spectra.window,
-            others: Vec::new(),
-        });
-    }
-    if spectra.window == Window::Hann {
-        warnings.push(Warning::hann_on_taps(file));
-    }
-    for reading in &spectra.readings {
-        if let Some(label @ PeakLabel::Mains(_)) = reading.label {
-            warnings.push(Warning::Mains {
-                file: file.to_string(),
-                frequency: reading.line_frequency,
-                label,
-                others: Vec::new(),
-            });
-        }
+        let text = "only one tap was averaged, so nothing shows how well it repeats and a \
+                    coherence would mean nothing; record three to five taps";
+        warnings.push(Warning::about(file, "single-tap", text));
     }
     warnings
 }
@@ -288,7 +278,26 @@ impl<'a> Stage<'a> {
 
     fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
         let quiet = self.quiet()?;
-        let checks = self.decay_checks(&quiet)?;
+        let (rate, band) = (
+            self.recording.sample_rate(),
+            (self.lines.low, self.lines.high),
+        );
+        let noise: Vec<f64> = quiet
+            .responses
+            .iter()
+            .map(|x| root_mean_square(&band_limited(x, rate, band)))
+            .collect();
+        // The decay of each response inside the band, the largest over the accepted taps.
+        let mut checks = vec![DecayCheck::NOTHING; noise.len()];
+        for tap in self.taps.accepted() {
+            let responses = self.record(tap)?.split_off(usize::from(self.has_force));
+            for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
+                let found = measure_decay(&band_limited(samples, rate, band), noise);
+                if found.remaining >= check.remaining {
+                    *check = found;
+                }
+            }
+        }
         // The slowest of the decays that stand above their noise; of none, the slowest of all.
         let slowest = checks.iter().copied().max_by(|a, b| {
             let above = (a.remaining > a.noise).cmp(&(b.remaining > b.noise));
@@ -303,7 +312,10 @@ impl<'a> Stage<'a> {
         };
         let (averages, transforms) = self.averages(window)?;
         let mut readings = self.readings(&averages, &transforms, &quiet, window);
-        let stabilisation = self.fit(&mut readings)?;
+        let stabilisation = match self.free_decays()? {
+            Some(decays) => decays.fit(&mut readings, &self.lines, &self.settings.kinds),
+            None => Stabilisation::default(),
+        };
         for reading in &mut readings {
             reading.select_estimate(self.settings.reading);
         }
@@ -318,47 +330,6 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Fits the free decays, and puts what that gives into the readings.
-    fn fit(&self, readings: &mut Vec<ModeReading>) -> Result<Stabilisation, RecordingError> {
-        let Some(decays) = FreeDecays::read(self)? else {
-            return Ok(Stabilisation::default());
-        };
-        let functions = decays.functions();
-        let columns: Vec<&[Complex64]> = functions.iter().map(Vec::as_slice).collect();
-        let first = decays.data.frequencies().first().copied().unwrap_or(0.0);
-        let stabilisation = stabilisation(first, decays.data.spacing(), &columns);
-        let candidates = Candidates {
-            lines: &self.lines,
-            data: &decays.data,
-            stabilisation: &stabilisation,
-        };
-        candidates.fit(readings);
-        complete(readings, &decays, &self.settings.kinds);
-        Ok(stabilisation)
-    }
-
-    /// The decay of each response inside the band, the largest over the accepted taps.
-    fn decay_checks(&self, quiet: &PreTriggerNoise) -> Result<Vec<DecayCheck>, RecordingError> {
-        let rate = self.recording.sample_rate();
-        let band = (self.lines.low, self.lines.high);
-        let noise: Vec<f64> = quiet
-            .responses
-            .iter()
-            .map(|x| root_mean_square(&band_limited(x, rate, band)))
-            .collect();
-        let mut checks = vec![DecayCheck::NOTHING; noise.len()];
-        for tap in self.taps.accepted() {
-            let responses = self.record(tap)?.split_off(usize::from(self.has_force));
-            for ((samples, &noise), check) in responses.iter().zip(&noise).zip(&mut checks) {
-                let found = measure_decay(&band_limited(samples, rate, band), noise);
-                if found.remaining >= check.remaining {
-                    *check = found;
-                }
-            }
-        }
-        Ok(checks)
-    }
-
     /// Averages, and without a hammer also every tap's own transforms (their phases differ, so they
     /// cannot be averaged), up to a bound on memory.
     fn averages(
@@ -366,8 +337,7 @@ impl<'a> Stage<'a> {
         window: Window,
     ) -> Result<(AveragedSpectra, Vec<Vec<Complex64>>), RecordingError> {
         let rate = self.recording.sample_rate();
-        let responses = self.channels.len() - usize::from(self.has_force);
-        let mut averager = SpectralAverager::new(self.lines, responses);
+        let mut averager = SpectralAverager::new(self.lines, self.responses());
         let transformer = Transformer::new(rate, self.lines, self.gate as usize);
         let mut kept: Vec<Vec<Complex64>> = Vec::new();
         for tap in self.taps.accepted() {
@@ -436,8 +406,21 @@ impl<'a> Stage<'a> {
             .collect();
         let mut readings = read_peaks(&level, &spectra, &peaks, window);
         for (reading, peak) in readings.iter_mut().zip(&peaks) {
-            let force = averages.force.as_deref();
-            if force.is_some_and(|force| is_force_gap(force, &level.level_db, peak.index)) {
+            // A peak over a gap of the force's spectrum: a hammer has none just where the structure resonates, so the
+            // quotient's peak is the force's doing. The force on the peak is compared with that on its flanks, where
+            // the level has fallen by 6 dB. A gap is lower than either flank; a force that merely falls off is lower
+            // than one.
+            let (level, force) = (&level.level_db, averages.force.as_deref());
+            let foot = level[peak.index] - 6.0;
+            let mut before = level[..peak.index].iter();
+            let left = before.rposition(|&level| level < foot);
+            let mut after = level[peak.index..].iter();
+            let right = after.position(|&level| level < foot);
+            if let (Some(force), Some(left), Some(right)) = (force, left, right)
+                && let (Some(&left), Some(&right)) =
+                    (force.get(left), force.get(peak.index + right))
+                && force[peak.index] < 0.6 * left.min(right)
+            {
                 reading.label = Some(PeakLabel::ForceGap);
             }
             let mains = &self.settings.mains;
@@ -459,57 +442,34 @@ impl<'a> Stage<'a> {
 /// each). Taps beyond it are left out of them.
 const MOST_KEPT: usize = 1 << 24;
 
-/// Returns true if a peak stands over a gap of the force's spectrum: a hammer has none just where the structure
-/// resonates, so the quotient's peak is the force's doing. The force on the peak is compared with that
-/// on its flanks, where the level (dB) has fallen by 6 dB.
-fn is_force_gap(force: &[f64], level: &[f64], peak: usize) -> bool {
-    let foot = level[peak] - 6.0;
-    let left = level[..peak].iter().rposition(|&level| level < foot);
-    let right = level[peak..].iter().position(|&level| level < foot);
-    let (Some(left), Some(right)) = (left, right) else {
-        return false;
-    };
-    // A gap is lower than either flank; a force that merely falls off is lower than one.
-    match (force.get(left), force.get(peak + right)) {
-        (Some(&left), Some(&right)) => force[peak] < 0.6 * left.min(right),
-        _ => false,
-    }
-}
-
 /// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
 const AFTER_TRIGGER: f64 = 5e-3;
 /// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
 const LEAST_SAMPLES: u64 = 64;
 
-/// Decays of all taps, and what of them is fitted.
-struct FreeDecays {
-    /// Transforms of every tap and sensor on the lines of the band.
-    pub data: ModalData,
-    /// Force of each tap; empty without a hammer.
-    pub forces: Vec<TapForce>,
-    /// Samples of each tap.
-    pub decays: Vec<Decay>,
-    /// Transforms of the forces, time zero at the decays' first sample; empty without a hammer.
-    force_columns: Vec<Column>,
-}
+impl Stage<'_> {
+    /// First frame of the decay after a tap.
+    fn begin(&self, tap: &Tap) -> u64 {
+        let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();
+        let trigger = (tap.time * self.recording.sample_rate()).round();
+        tap.pulse_end.unwrap_or((trigger + after) as u64)
+    }
 
-impl FreeDecays {
     /// Reads the decays; `None` where they are too short for a fit.
-    pub fn read(stage: &Stage<'_>) -> Result<Option<Self>, RecordingError> {
-        let taps: Vec<&Tap> = stage.taps.accepted().collect();
+    fn free_decays(&self) -> Result<Option<FreeDecays>, RecordingError> {
+        let taps: Vec<&Tap> = self.taps.accepted().collect();
         let lengths = taps
             .iter()
-            .map(|tap| (tap.record.start + stage.gate).saturating_sub(stage.begin(tap)));
+            .map(|tap| (tap.record.start + self.gate).saturating_sub(self.begin(tap)));
         let shortest = lengths.min().unwrap_or(0);
         let samples = match largest_smooth_block(shortest as usize) {
             Some(samples) if samples as u64 >= LEAST_SAMPLES => samples,
             _ => return Ok(None),
         };
-        let most = MOST_KEPT / (samples * stage.responses()).max(1);
-        let mut decays = Vec::new();
-        let mut forces = Vec::new();
+        let most = MOST_KEPT / (samples * self.responses()).max(1);
+        let (mut decays, mut forces) = (Vec::new(), Vec::new());
         for (number, tap) in taps.into_iter().take(most.max(1)).enumerate() {
-            let (decay, force) = stage.decay(tap, samples)?;
+            let (decay, force) = self.decay(tap, samples)?;
             forces.extend(force.map(|samples| TapForce {
                 tap: number,
                 start: -(samples.len() as f64) / decay.sample_rate,
@@ -518,84 +478,7 @@ impl FreeDecays {
             }));
             decays.push(decay);
         }
-        Ok(transformed(stage, samples, decays, forces).ok())
-    }
-
-    /// Columns of the polyreference fit, all on the same lines: with a hammer the response of
-    /// every sensor to the force, H = sum conj(F) X/sum |F|^2 over the taps; without one every tap's
-    /// transforms.
-    pub fn functions(&self) -> Vec<Vec<Complex64>> {
-        let columns = self.data.columns();
-        if self.force_columns.is_empty() {
-            return columns.iter().map(|column| column.values.clone()).collect();
-        }
-        let sensors = columns.iter().map(|column| column.sensor + 1).max();
-        let lines = self.data.frequencies().len();
-        let mut power = vec![0.0; lines];
-        for force in &self.force_columns {
-            let values = power.iter_mut().zip(&force.values);
-            values.for_each(|(sum, f)| *sum += f.norm_sqr());
-        }
-        let mut sums = vec![vec![Complex64::ZERO; lines]; sensors.unwrap_or(0)];
-        for column in columns {
-            let Some(force) = self.force_columns.get(column.tap) else {
-                continue;
-            };
-            let pairs = force.values.iter().zip(&column.values);
-            let sum = &mut sums[column.sensor];
-            sum.iter_mut()
-                .zip(pairs)
-                .for_each(|(sum, (f, x))| *sum += f.conj() * x);
-        }
-        for sum in &mut sums {
-            for (value, &power) in sum.iter_mut().zip(&power) {
-                *value /= power.max(f64::MIN_POSITIVE);
-            }
-        }
-        sums
-    }
-}
-
-fn transformed(
-    stage: &Stage<'_>,
-    samples: usize,
-    decays: Vec<Decay>,
-    forces: Vec<TapForce>,
-) -> Result<FreeDecays, FitError> {
-    let rate = stage.recording.sample_rate();
-    let band = [(stage.lines.low, stage.lines.high)];
-    let mut responses = FreeDecayCollector::new(rate, samples, &band)?;
-    for decay in &decays {
-        responses.add_tap(&decay.responses)?;
-    }
-    let mut pulses = FreeDecayCollector::new(rate, samples, &band)?;
-    for force in &forces {
-        // The force before time zero stands at the end of the block: on multiples of rate/block a transform
-        // cannot tell a time from one a block later.
-        let kept = force.samples.len().min(samples);
-        let mut block = vec![0.0; samples - kept];
-        block.extend_from_slice(&force.samples[force.samples.len() - kept..]);
-        pulses.add_tap(&[block])?;
-    }
-    let force_columns = if forces.is_empty() {
-        Vec::new()
-    } else {
-        pulses.finish()?.columns().to_vec()
-    };
-    Ok(FreeDecays {
-        data: responses.finish()?,
-        forces,
-        decays,
-        force_columns,
-    })
-}
-
-impl Stage<'_> {
-    /// First frame of the decay after a tap.
-    fn begin(&self, tap: &Tap) -> u64 {
-        let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();
-        let trigger = (tap.time * self.recording.sample_rate()).round();
-        tap.pulse_end.unwrap_or((trigger + after) as u64)
+        Ok(FreeDecays::new(samples, &self.lines, decays, forces).ok())
     }
 
     fn responses(&self) -> usize {
@@ -633,23 +516,147 @@ impl Stage<'_> {
     }
 }
 
-/// Adds to the fits what needs the decays themselves: modal constants, and frequency and damping against
-/// amplitude.
-fn complete(readings: &mut [ModeReading], decays: &FreeDecays, kinds: &[Option<ResponseForm>]) {
-    let fitted: Vec<&mut FittedReading> = readings
-        .iter_mut()
-        .filter_map(|reading| reading.fit.as_deref_mut())
-        .collect();
-    let known: Vec<KnownMode> = fitted
-        .iter()
-        .map(|fit| KnownMode {
-            frequency: fit.mode.frequency.value,
-            damping_ratio: fit.mode.damping_ratio.value,
-        })
-        .collect();
-    let curves = follow_amplitude(&decays.decays, &known);
-    for (fit, curve) in fitted.into_iter().zip(curves) {
-        fit.amplitude = Some(curve);
-        fit.constants = modal_constants(&fit.mode, &decays.forces, kinds);
+/// Samples of a quiet stretch, means taken out, and the block they are compared with.
+struct PreTriggerNoise {
+    /// Force, where there is a hammer.
+    force: Option<Vec<f64>>,
+    /// Responses.
+    responses: Vec<Vec<f64>>,
+    /// Sample rate (Hz).
+    sample_rate: f64,
+    /// Length of a block (samples).
+    block: usize,
+    /// Length of the force window (samples), its mean over the taps.
+    force_window: f64,
+}
+
+impl PreTriggerNoise {
+    /// Power that noise alone would leave in the averages, per response: of H1 where there is a
+    /// hammer, else of the response's transform. `None` where the stretch is too short to tell.
+    ///
+    /// The response's noise is averaged down by the taps, N_x/(n F^2); the force's counts in full,
+    /// |H|^2 N_f/F^2, for it biases H1 as well: where the hammer has no energy, H1 means nothing.
+    fn noise_powers(&self, averages: &AveragedSpectra, window: Window) -> Option<Vec<Vec<f64>>> {
+        let (_, energy) = self.window_sums(window);
+        let lines = &averages.lines;
+        let force_noise = match &self.force {
+            Some(force) => Some(noise_power(force.clone(), self.sample_rate, lines)?),
+            None => None,
+        };
+        let taps = averages.taps as f64;
+        self.responses
+            .iter()
+            .enumerate()
+            .map(|(response, samples)| {
+                let noise = noise_power(samples.clone(), self.sample_rate, lines)?;
+                let power = noise.iter().enumerate().map(|(line, noise)| {
+                    let (Some(force), Some(h1)) = (&averages.force, &averages.h1) else {
+                        return noise * energy;
+                    };
+                    let gain = h1[response].get(line).map_or(0.0, Complex64::norm_sqr);
+                    let of_force = force_noise.as_ref().map_or(0.0, |noise| noise[line]);
+                    let force_power = (force[line] * force[line]).max(f64::MIN_POSITIVE);
+                    (noise * energy / taps + gain * of_force * self.force_window) / force_power
+                });
+                Some(power.collect())
+            })
+            .collect()
     }
+
+    /// Noise of the force channel in the transforms of its windowed pulses (N s), on
+    /// each line; `None` without a hammer, or where the stretch is too short to tell.
+    fn force_noise(&self, lines: &Lines) -> Option<Vec<f64>> {
+        let mut noise = noise_power(self.force.clone()?, self.sample_rate, lines)?;
+        for value in &mut noise {
+            *value = (*value * self.force_window).sqrt();
+        }
+        Some(noise)
+    }
+
+    /// The label of a peak on line `index` that is hum, judged on the response in which it is
+    /// strongest.
+    fn mains_label(
+        &self,
+        index: usize,
+        averages: &AveragedSpectra,
+        window: Window,
+        settings: &MainsSettings,
+    ) -> Option<PeakLabel> {
+        let lines = &averages.lines;
+        let frequency = lines.frequency(index);
+        near_mains(frequency, lines.half_line(), settings)?;
+        let shares = averages.responses.iter();
+        let shares = shares.map(|x| x[index] / x.iter().sum::<f64>()).enumerate();
+        let (strongest, _) = shares.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (sum, _) = self.window_sums(window);
+        let within = 2.0 * averages.responses[strongest][index] * self.sample_rate / sum;
+        let samples = self.responses.get(strongest)?;
+        let amplitudes = LineAmplitudes {
+            before: line_amplitude(samples, self.sample_rate, frequency)?,
+            within,
+            noise: noise_beside(samples, self.sample_rate, frequency)?,
+        };
+        mains_harmonic(frequency, lines.half_line(), amplitudes, settings).map(PeakLabel::Mains)
+    }
+
+    /// Sum and sum of squares of the window over a block.
+    fn window_sums(&self, window: Window) -> (f64, f64) {
+        let mut weights = vec![1.0; self.block];
+        window.apply(&mut weights, self.sample_rate);
+        (weights.iter().sum(), weights.iter().map(|w| w * w).sum())
+    }
+}
+
+/// Window about the pulse of a tap in its record (samples): zero before `start`, unity for `length`
+/// from there, a taper of the pulse's own length after it.
+#[derive(Clone, Copy)]
+struct PulseWindow {
+    start: usize,
+    length: usize,
+    taper: usize,
+}
+
+/// The ringing of a filter ahead of a pulse lasts no longer than this (s), or eight samples.
+const AHEAD_OF_PULSE: f64 = 2e-3;
+
+/// The force window of a tap: from just before the trigger to the end of the pulse, and as long again
+/// for what the search for its end may have missed. Noise and offset of the hammer before and after
+/// would ripple through every quotient. `None` without a hammer.
+fn pulse_window(tap: &Tap, sample_rate: f64) -> Option<PulseWindow> {
+    let trigger = (tap.time * sample_rate).round() as u64;
+    let pulse = tap.pulse_end?.saturating_sub(trigger).max(1) as usize;
+    let into = trigger.saturating_sub(tap.record.start) as usize;
+    let ahead = ((AHEAD_OF_PULSE * sample_rate) as usize).max(8).min(into);
+    Some(PulseWindow {
+        start: into - ahead,
+        length: ahead + 2 * pulse,
+        taper: pulse,
+    })
+}
+
+impl PulseWindow {
+    fn apply(self, force: &mut [f64]) {
+        let start = self.start.min(force.len());
+        force[..start].fill(0.0);
+        apply_force_window(&mut force[start..], self.length, self.taper);
+    }
+
+    /// Energy of the window (samples): a half-cosine taper has 3/8 of its length.
+    fn energy(self) -> f64 {
+        self.length as f64 + 0.375 * self.taper as f64
+    }
+}
+
+/// Stretch of the force in which its offset is looked for (s): long beside the pulse, so that the
+/// median is the level at rest, and short beside the drift of its amplifier.
+const OFFSET_STRETCH: f64 = 0.2;
+
+/// Takes out the level at which the force rests about its pulse. The mean of the recording is not
+/// that level: the pulses are in it, and over the force window the difference amounts to a percent
+/// of a pulse's momentum.
+fn remove_offset(force: &mut [f64], sample_rate: f64) {
+    let stretch = ((OFFSET_STRETCH * sample_rate) as usize).clamp(1, force.len().max(1));
+    let mut about: Vec<f64> = force.iter().copied().take(stretch).collect();
+    let rest = median(&mut about);
+    force.iter_mut().for_each(|x| *x -= rest);
 }

@@ -1,44 +1,16 @@
-//! Results of the chain: plain data, for the report and for callers.
+//! Results of the estimate: modes, the scatter between their recordings, the joint, perturbations. Plain data, for the
+//! report and for callers.
 
-use super::amplitude::AmplitudeChange;
-use super::measure::{MeasureError, Measurement};
 use super::structure::TestedStructure;
-use super::warning::Warning;
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::BTreeMap;
-use tapjoint_beam::specimen::{PointMass, Specimen};
+use tapjoint_beam::specimen::Specimen;
 use tapjoint_beam::{Beam, JointStiffness};
 use tapjoint_identify::consistent::ConsistentEstimate;
 use tapjoint_identify::observation::UNPAIRED;
 use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, Uncertain};
+use tapjoint_numerics::stats::chi_square_quantile;
 use tapjoint_signal::modal::ModeReading;
-use tapjoint_signal::quality::Verdict;
-use tapjoint_signal::recording::{ChannelInfo, Format, RecordingError};
-use tapjoint_signal::spectral::SpectralError;
-
-/// A finished analysis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Analysis {
-    /// Name of the test.
-    pub name: String,
-    /// The structure; `None` for a bare recording.
-    pub structure: Option<TestedStructure>,
-    /// The recordings, in the order of the description.
-    pub recordings: Vec<RecordingResult>,
-    /// Difference of each recording from the first, "8.8 times its tap level", for which modes and estimate leave
-    /// it out; `None` where they do not.
-    pub aside: Vec<Option<String>>,
-    /// Resonances of the reference configuration, ascending: the first recording and all others
-    /// with its sensor positions and tap level.
-    pub modes: Vec<ModeResult>,
-    /// The joint or the material by the modes; `None` for a bare recording.
-    pub identification: Option<Identification>,
-    /// Quality of the test: good practice, check by check.
-    pub verdicts: Vec<Verdict>,
-    /// Everything that a reader of the results has to know.
-    pub warnings: Vec<Warning>,
-}
 
 /// Method by which a joint or a beam is estimated.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -65,82 +37,6 @@ impl EstimateMethod {
             Self::FreeBeam => "free-beam",
         }
     }
-}
-
-/// One recording.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecordingResult {
-    /// File as the description names it.
-    pub file: String,
-    /// Kind of file.
-    pub format: Format,
-    /// Sample rate (Hz); `None` of frequency response functions from a file.
-    pub sample_rate: Option<f64>,
-    /// Length (s); `None` of frequency response functions from a file.
-    pub seconds: Option<f64>,
-    /// Every channel in the file.
-    pub channels: Vec<ChannelInfo>,
-    /// True if there is a hammer channel.
-    pub has_hammer: bool,
-    /// Unit of the taps' peaks: the hammer's, or without one that of all responses; `None` where
-    /// they are not known or differ.
-    pub tap_unit: Option<String>,
-    /// The responses analysed.
-    pub responses: Vec<Response>,
-    /// The analysed zoom band (Hz), where one was asked for.
-    pub band: Option<(f64, f64)>,
-    /// Circumstances as described; empty for a bare recording.
-    pub conditions: Conditions,
-    /// Taps, spectra, readings.
-    pub measurement: Measurement,
-    /// Numbers of the modes that this recording's readings belong to, one for each reading.
-    pub mode_numbers: Vec<Option<usize>>,
-    /// The channel on which taps were found, over time; `None` of frequency response functions from a
-    /// file.
-    pub overview: Option<Overview>,
-}
-
-/// Circumstances of a recording that are carried to the outputs as described.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
-pub struct Conditions {
-    /// Position of the taps (m).
-    pub tap: Option<f64>,
-    /// Position of each sensor (m); that in this recording of a sensor that was moved.
-    pub sensor_positions: BTreeMap<String, f64>,
-    /// Mass of each sensor (kg) whose mass is stated.
-    pub sensor_masses: BTreeMap<String, f64>,
-    /// Known masses that are fastened to the beam.
-    pub masses: Vec<PointMass>,
-    /// Tightening torque (N m).
-    pub torque: Option<f64>,
-    /// Temperature (degrees Celsius).
-    pub temperature: Option<f64>,
-    /// Date.
-    pub date: Option<String>,
-}
-
-/// A response channel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Response {
-    /// The sensor's name, or the channel's.
-    pub name: String,
-    /// Kind of sensor; `None` where it is not known.
-    pub kind: Option<tapjoint_description::SensorKind>,
-    /// Unit of its values; `None` where it is not known.
-    pub unit: Option<String>,
-}
-
-/// Smallest and largest value in equal pieces of a channel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Overview {
-    /// Length of a piece (s).
-    pub step: f64,
-    /// Smallest value of each piece (unit of the channel, its mean taken out).
-    pub low: Vec<f64>,
-    /// Largest value of each piece.
-    pub high: Vec<f64>,
-    /// The samples about each tap.
-    pub close_ups: Vec<CloseUp>,
 }
 
 /// One resonance.
@@ -200,6 +96,101 @@ impl ModeResult {
     }
 }
 
+/// One mode in the recordings of one configuration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BetweenRecordings {
+    /// Variance of its frequency between the recordings, sum (f - mean)^2/(n - 1), over the mean's square (1).
+    pub variance: f64,
+    /// Variance by the readings' own standard uncertainties, over the mean's square (1).
+    pub own: f64,
+    /// Recordings less one.
+    pub freedom: usize,
+}
+
+/// From the frequencies of one mode and their standard uncertainties; `None` below two.
+pub(super) fn between(readings: &[(f64, f64)]) -> Option<BetweenRecordings> {
+    let freedom = readings
+        .len()
+        .checked_sub(1)
+        .filter(|freedom| *freedom > 0)?;
+    let count = readings.len() as f64;
+    let mean = readings.iter().map(|one| one.0).sum::<f64>() / count;
+    let squares: f64 = readings.iter().map(|one| (one.0 - mean).powi(2)).sum();
+    let own: f64 = readings.iter().map(|one| one.1 * one.1).sum();
+    Some(BetweenRecordings {
+        variance: squares / freedom as f64 / (mean * mean),
+        own: own / count / (mean * mean),
+        freedom,
+    })
+}
+
+/// The share of its frequency (1) by which every mode scatters between recordings beyond its own uncertainty.
+///
+/// That with which the squares are as large as expected, sum f variance/(own + share^2) = sum f with f degrees of
+/// freedom each (in the manner of Paule & Mandel 1982, "Consensus values and weighting factors"): a mode that is read coarsely says
+/// little, and one that stands still beside others that do not decides nothing by itself. 0 where there is no more
+/// than noise.
+pub(super) fn common_share(all: &[BetweenRecordings]) -> f64 {
+    let freedom: f64 = all.iter().map(|one| one.freedom as f64).sum();
+    if all.is_empty() || squares(all, 0.0) <= freedom {
+        return 0.0;
+    }
+    // Without uncertainties of their own the mean variance would be the square: it is no larger.
+    let mean = all
+        .iter()
+        .map(|one| one.freedom as f64 * one.variance)
+        .sum::<f64>()
+        / freedom;
+    let (mut low, mut high) = (0.0, mean);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if squares(all, middle) > freedom {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high.sqrt()
+}
+
+/// Halvings of the interval in which the square lies: it is known to 1e-15 of its largest possible value.
+const HALVINGS: usize = 50;
+
+/// Sum of the squares over their variances, a common one included.
+fn squares(all: &[BetweenRecordings], common: f64) -> f64 {
+    let modes = all.iter();
+    modes
+        .map(|one| one.freedom as f64 * one.variance / (one.own + common))
+        .sum()
+}
+
+/// Returns true if the recordings differ by more than their readings' uncertainty explains.
+///
+/// One test in a hundred does so by chance where the uncertainty is known and alike in all recordings; of a few taps,
+/// several.
+pub(super) fn exceeds_noise(all: &[BetweenRecordings]) -> bool {
+    let freedom: usize = all.iter().map(|one| one.freedom).sum();
+    chi_square_quantile(0.99, freedom as f64).is_some_and(|most| squares(all, 0.0) > most)
+}
+
+/// The joint, or the material of a free beam, by the modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// The main estimate: the joint whose frequencies are nearest; `None` where it was not asked for
+    /// or could not be had.
+    pub consistent: Option<Box<ConsistentEstimate>>,
+    /// The estimate in closed form, which stands beside the main one or in its place.
+    pub estimate: Option<Estimate>,
+    /// The reason for which there is no estimate, or not the one that was asked for.
+    pub reason: Option<String>,
+    /// Predicted beside measured frequencies; empty where no joint can be predicted with.
+    pub prediction: Vec<PredictedMode>,
+    /// The structure that the prediction is of; `None` without a joint to predict with.
+    pub predicted: Option<Specimen>,
+    /// Estimates under errors of the frequencies, by each method that has one.
+    pub perturbations: Perturbations,
+}
+
 impl Identification {
     /// The method that estimate and prediction go by, if `wanted` is asked for: the consistent estimate where there is
     /// one, or where all stiffnesses are known.
@@ -247,24 +238,6 @@ impl Identification {
     pub fn predicts_with_details(&self, structure: &TestedStructure) -> bool {
         self.consistent.is_some() || structure.known.over(None).is_some()
     }
-}
-
-/// The joint, or the material of a free beam, by the modes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Identification {
-    /// The main estimate: the joint whose frequencies are nearest; `None` where it was not asked for
-    /// or could not be had.
-    pub consistent: Option<Box<ConsistentEstimate>>,
-    /// The estimate in closed form, which stands beside the main one or in its place.
-    pub estimate: Option<Estimate>,
-    /// Why there is no estimate, or not the one that was asked for.
-    pub reason: Option<String>,
-    /// Predicted beside measured frequencies; empty where no joint can be predicted with.
-    pub prediction: Vec<PredictedMode>,
-    /// The structure that the prediction is of; `None` without a joint to predict with.
-    pub predicted: Option<Specimen>,
-    /// Estimates under errors of the frequencies, by each method that has one.
-    pub perturbations: Perturbations,
 }
 
 /// An estimate in closed form.
@@ -398,100 +371,91 @@ pub struct SensitivitySection {
     pub kz_percent_per_percent: Option<f64>,
 }
 
-/// The samples about a tap.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CloseUp {
-    /// First sample (s from the trigger).
-    pub start: f64,
-    /// Distance of the samples (s).
-    pub step: f64,
-    /// The force's samples (N), the channel's mean taken out; `None` without a hammer.
-    pub force: Option<Vec<f64>>,
-    /// The first response's (its unit).
-    pub response: Option<Vec<f64>>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
 
-/// One mode in the recordings of one configuration.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BetweenRecordings {
-    /// Variance of its frequency between the recordings, sum (f - mean)^2/(n - 1), over the mean's square (1).
-    pub variance: f64,
-    /// Variance by the readings' own standard uncertainties, over the mean's square (1).
-    pub own: f64,
-    /// Recordings less one.
-    pub freedom: usize,
-}
-
-impl RecordingResult {
-    /// Returns the recording's own readings of resonances, ascending; none without spectra.
-    pub fn readings(&self) -> &[ModeReading] {
-        let spectra = self.measurement.spectra.as_ref();
-        spectra.map_or(&[], |spectra| &spectra.readings)
+    /// Modes in three recordings, each drifting by a draw of its own of `share`, and read to its own relative standard
+    /// deviation.
+    fn drawn(stds: &[f64], share: f64, random: &mut ChaCha8Rng) -> Vec<BetweenRecordings> {
+        let of_mode = |(mode, std): (usize, &f64)| {
+            let nominal = 40.0 * (mode as f64 + 1.0).powi(2);
+            let reading = |_| {
+                let (own, drift): (f64, f64) =
+                    (random.sample(StandardNormal), random.sample(StandardNormal));
+                (nominal * (1.0 + std * own + share * drift), nominal * std)
+            };
+            between(&(0..3).map(reading).collect::<Vec<_>>()).unwrap()
+        };
+        stds.iter().enumerate().map(of_mode).collect()
     }
 
-    /// Peaks of the accepted taps (`tap_unit`).
-    pub(super) fn tap_peaks(&self) -> Vec<f64> {
-        let taps = self.measurement.taps.accepted();
-        taps.map(|tap| tap.peak).collect()
+    const STDS: [f64; 5] = [1e-4, 5e-5, 2e-4, 1e-4, 5e-5];
+
+    #[test]
+    fn limit_one_reading_says_nothing_and_equal_ones_scatter_by_nothing() {
+        assert_eq!(between(&[(40.0, 0.1)]), None);
+        let still = between(&[(40.0, 0.1), (40.0, 0.1)]).unwrap();
+        assert_eq!(common_share(&[still]), 0.0);
+        assert_eq!(common_share(&[]), 0.0);
+        assert!(!exceeds_noise(&[]) && !exceeds_noise(&[still]));
     }
 
-    /// Frequencies (Hz) between which it was searched for resonances; `None` without spectra.
-    pub(super) fn looked_at(&self) -> Option<(f64, f64)> {
-        let lines = self.measurement.spectra.as_ref()?.averages.lines;
-        Some((lines.low, lines.high))
+    /// Over 400 tests of 10 degrees of freedom the mean square is known to sqrt(2/4000) = 2 % where the share is
+    /// far above the readings' own; 8 % are four times that.
+    #[test]
+    fn recover_the_share_of_a_drift() {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        for share in [1e-3, 1e-2] {
+            let squares = (0..400).map(|_| common_share(&drawn(&STDS, share, &mut random)).powi(2));
+            let found = (squares.sum::<f64>() / 400.0).sqrt();
+            assert!((found / share - 1.0).abs() < 0.04, "{found} for {share}");
+        }
     }
 
-    /// Change of a mode with its amplitude, where it is beyond the uncertainty and large enough to matter.
-    pub fn amplitude_change(&self, reading: &ModeReading) -> Option<AmplitudeChange> {
-        let curve = reading.fit.as_ref()?.amplitude.as_ref()?;
-        let change = AmplitudeChange::of(curve)?;
-        let response = curve.sensor.and_then(|sensor| self.responses.get(sensor));
-        let unit = response.and_then(|response| response.unit.clone());
-        Some(AmplitudeChange { unit, ..change })
+    /// One in a hundred of 2000 is 20 with a standard deviation of 4.5; 40 are more than four of these.
+    #[test]
+    fn recover_readings_without_drift_seldom_differ_and_hardly_scatter() {
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let all: Vec<_> = (0..2000).map(|_| drawn(&STDS, 0.0, &mut random)).collect();
+        let told = all.iter().filter(|one| exceeds_noise(one)).count();
+        assert!((2..40).contains(&told), "{told}");
+        // The finest readings are known to 5e-5 each; what ten degrees of freedom take for a share is below that.
+        let mean = all.iter().map(|one| common_share(one)).sum::<f64>() / 2000.0;
+        assert!(mean < 5e-5, "{mean}");
     }
-}
 
-/// Reasons for which an analysis stops.
-#[derive(Debug, thiserror::Error)]
-pub enum PipelineError {
-    /// A recording could not be read.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-    /// A recording could not be measured.
-    #[error(transparent)]
-    Measure(#[from] MeasureError),
-    /// A band or block of the description that does not fit its recording.
-    #[error("{file}:{line}: {recording}: {problem}")]
-    Setting {
-        /// The description.
-        file: String,
-        /// Line of the description.
-        line: usize,
-        /// The recording.
-        recording: String,
-        /// The problem.
-        problem: SpectralError,
-    },
-    /// A channel of the description that its recording does not have, or cannot be told from others, or
-    /// cannot be scaled.
-    #[error("{file}:{line}: `{key}`: {problem}")]
-    Channel {
-        /// The description.
-        file: String,
-        /// Line of the description.
-        line: usize,
-        /// The key: `sensor[2].channel`.
-        key: String,
-        /// The problem, with the channels of the recording.
-        problem: Box<RecordingError>,
-    },
-    /// A description without sensors.
-    #[error(
-        "{file}: the recordings need at least one [[sensor]] with its channel, or there is no response \
-         to analyse"
-    )]
-    NoSensors {
-        /// The description.
-        file: String,
-    },
+    /// A mode that feels no drift, and is read best of all, does not hide that of the others.
+    #[test]
+    fn regress_one_mode_that_stands_still_does_not_hide_the_others() {
+        let one = |variance: f64, own: f64| BetweenRecordings {
+            variance,
+            own,
+            freedom: 2,
+        };
+        let found = common_share(&[one(0.5e-12, 1e-12), one(2.5e-5, 1e-8)]);
+        // 4 = 2 variance/share^2, to the other mode's own variance.
+        assert!(
+            (found / (2.5e-5_f64 / 2.0).sqrt() - 1.0).abs() < 1e-3,
+            "{found}"
+        );
+    }
+
+    /// A mode read to 1 % may say that nothing drifted, with its two of twelve degrees of freedom: sqrt(12/10) is 1.1.
+    #[test]
+    fn limit_a_coarse_mode_says_little_beside_fine_ones() {
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let mut all = drawn(&STDS, 1e-3, &mut random);
+        let without = common_share(&all);
+        for off in [0.0, 0.3] {
+            let coarse = between(&[(40.0 - off, 0.4), (40.0 + off, 0.4), (40.0, 0.4)]);
+            all.push(coarse.unwrap());
+            let with = common_share(&all);
+            assert!((with / without - 1.0).abs() < 0.1, "{with} for {without}");
+            all.pop();
+        }
+    }
 }

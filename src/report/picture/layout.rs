@@ -2,13 +2,12 @@
 
 use std::collections::HashSet;
 
-use super::axis::Tick;
 use super::drawing::{
     Align, Drawing, Note, Point, Shape, Stroke, Text, WHITE, Weight, fitted, text_width,
 };
 use super::labels::{LEFT, LINE, Legend, Patch, WORDS, draw_mark, ink, spread};
-use super::thinning::decimate;
-use super::{Block, Chart, Color, Mark, Panel, Places, Rule, Series};
+use super::page::decimate;
+use super::{Block, Chart, Color, Mark, Panel, Places, Rule, Series, Tick};
 use crate::format::trimmed;
 
 /// Width of a picture that fills a page (pixels).
@@ -364,7 +363,18 @@ impl<'a> Frame<'a> {
     fn draw_content(&self, drawing: &mut Drawing) {
         let rules = self.panel.rules.iter();
         for rule in rules.filter(|rule| self.panel.x.holds(rule.at)) {
-            self.draw_rule(drawing, rule);
+            let color = rule_color(rule).rgb();
+            // Its half-line band is at least one pixel wide.
+            let (left, right) = (self.x(rule.line - rule.half), self.x(rule.line + rule.half));
+            if rule.half > 0.0 {
+                let widen = (1.0 - (right - left)).max(0.0) / 2.0;
+                let (from, to) = ((left - widen, self.top), (right + widen, self.bottom));
+                drawing.rectangle(from, to, color, 0.25);
+            }
+            let x = crisp(self.x(rule.at));
+            let dash = if rule.mode { 6.0 } else { 2.0 };
+            let stroke = Stroke::new(color, 1.0).faint(0.75);
+            drawing.dashed((x, self.top), (x, self.bottom), dash, 4.0, stroke);
         }
         for series in &self.panel.series {
             self.draw_series(drawing, series);
@@ -382,21 +392,6 @@ impl<'a> Frame<'a> {
             let title = fitted(&self.panel.title, WORDS, Weight::Bold, 0, room);
             drawing.text(ink(title, at, WORDS).bold());
         }
-    }
-
-    /// A rule with its half-line band, at least one pixel wide.
-    fn draw_rule(&self, drawing: &mut Drawing, rule: &Rule) {
-        let color = rule_color(rule).rgb();
-        let (left, right) = (self.x(rule.line - rule.half), self.x(rule.line + rule.half));
-        if rule.half > 0.0 {
-            let widen = (1.0 - (right - left)).max(0.0) / 2.0;
-            let (from, to) = ((left - widen, self.top), (right + widen, self.bottom));
-            drawing.rectangle(from, to, color, 0.25);
-        }
-        let x = crisp(self.x(rule.at));
-        let dash = if rule.mode { 6.0 } else { 2.0 };
-        let stroke = Stroke::new(color, 1.0).faint(0.75);
-        drawing.dashed((x, self.top), (x, self.bottom), dash, 4.0, stroke);
     }
 
     fn draw_names(&self, drawing: &mut Drawing, names: &[(&Rule, f64)]) {

@@ -6,7 +6,6 @@ use super::arguments::{
 };
 use super::input::{TestFile, read_test};
 use super::output::OutputFile;
-use super::run::outcome;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
@@ -106,7 +105,7 @@ pub(super) fn identify(
         ..IdentifySettings::unperturbed()
     })?;
     terminal.answer(&document_of(&analysis))?;
-    Ok(outcome(&analysis))
+    Ok(Outcome::of_analysis(&analysis))
 }
 
 /// Monte Carlo samples that give 95 % limits to a tenth of their distance.

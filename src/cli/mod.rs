@@ -31,6 +31,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 use tapjoint::description::TestDescription;
+use tapjoint::pipeline::Analysis;
 use terminal::Terminal;
 
 /// From hammer taps to joint stiffness.
@@ -88,6 +89,17 @@ impl Outcome {
             true => Outcome::Answered,
             false => Outcome::NoAnswer,
         }
+    }
+
+    /// A test is answered by an estimate, or by a prediction (from known stiffnesses) beside a measured mode.
+    /// A bare recording is answered by a mode.
+    fn of_analysis(analysis: &Analysis) -> Outcome {
+        Outcome::of(match &analysis.identification {
+            Some(found) => {
+                found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
+            }
+            None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
+        })
     }
 }
 

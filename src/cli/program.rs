@@ -43,6 +43,7 @@ const PARTS: (&str, &str) = (
 
 /// Returns the command line with its commands listed by task.
 pub(super) fn grouped<C: CommandFactory>() -> Command {
+    const ROOM: usize = 64;
     let mut command = C::command();
     // Building adds `help` to the commands.
     command.build();
@@ -59,7 +60,20 @@ pub(super) fn grouped<C: CommandFactory>() -> Command {
             .iter()
             .filter_map(|name| command.find_subcommand(name));
         let lines: Vec<String> = known
-            .map(|found| format!("  {:width$}  {}\n", found.get_name(), summary(found)))
+            .map(|found| {
+                // The first sentence of its description, cut to 80 columns.
+                let about = found
+                    .get_about()
+                    .map(ToString::to_string)
+                    .unwrap_or_default();
+                let mut about = about.trim_end_matches('.').to_owned();
+                if about.chars().count() > ROOM {
+                    let kept: String = about.chars().take(ROOM - 4).collect();
+                    let end = kept.rfind([' ', ',', ':']).unwrap_or(kept.len());
+                    about = format!("{} ...", kept[..end].trim_end_matches([',', ':']));
+                }
+                format!("  {:width$}  {about}\n", found.get_name())
+            })
             .collect();
         if !lines.is_empty() {
             template.push_str(&format!("\n{task}:\n{}", lines.concat()));
@@ -67,22 +81,6 @@ pub(super) fn grouped<C: CommandFactory>() -> Command {
     }
     template.push_str(tail);
     C::command().help_template(template)
-}
-
-/// Returns the first sentence of a command's description, cut to 80 columns.
-fn summary(command: &Command) -> String {
-    const ROOM: usize = 64;
-    let about = command
-        .get_about()
-        .map(ToString::to_string)
-        .unwrap_or_default();
-    let about = about.trim_end_matches('.');
-    if about.chars().count() <= ROOM {
-        return about.to_owned();
-    }
-    let kept: String = about.chars().take(ROOM - 4).collect();
-    let end = kept.rfind([' ', ',', ':']).unwrap_or(kept.len());
-    format!("{} ...", kept[..end].trim_end_matches([',', ':']))
 }
 
 /// Adds a suggestion to the error of a wrong command line where clap has none.

@@ -5,7 +5,6 @@ use super::Outcome;
 use super::arguments::{RecordingArguments, SpectrumSettings, reading};
 use super::input::{check_file, file_name};
 use super::output::OutputFile;
-use super::run::outcome;
 use super::terminal::Terminal;
 use anyhow::{bail, ensure};
 use clap::Args;
@@ -229,5 +228,5 @@ pub(super) fn spectrum(
         }
     }
     terminal.answer(&document)?;
-    Ok(outcome(&analysis))
+    Ok(Outcome::of_analysis(&analysis))
 }

@@ -15,7 +15,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use tapjoint::description::{ReadBy, TestDescription};
 use tapjoint::gap::GapSettings;
-use tapjoint::pipeline::{Analysis, EstimateMethod, IdentifySettings, diagnose_test};
+use tapjoint::pipeline::{EstimateMethod, IdentifySettings, diagnose_test};
 use tapjoint::report::{
     MODEL_FILE, document_of, earlier_files, gap_section, render_run, render_text,
 };
@@ -174,20 +174,7 @@ pub(super) fn run(
     terminal.say(&render_text(&document))?;
     terminal.say(&format!("Report  {}", folder.join("report.html").display()))?;
     terminal.write_document(&document)?;
-    left.map_or_else(|| Ok(outcome(&analysis)), Err)
-}
-
-/// Returns the outcome of an analysis.
-///
-/// A test is answered by an estimate, or by a prediction (from known stiffnesses) beside a measured mode.
-/// A bare recording is answered by a mode.
-pub(super) fn outcome(analysis: &Analysis) -> Outcome {
-    Outcome::of(match &analysis.identification {
-        Some(found) => {
-            found.is_answered() || found.prediction.iter().any(|mode| mode.measured.is_some())
-        }
-        None => analysis.modes.iter().any(|mode| mode.mode.is_some()),
-    })
+    left.map_or_else(|| Ok(Outcome::of_analysis(&analysis)), Err)
 }
 
 #[cfg(test)]

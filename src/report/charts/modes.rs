@@ -241,8 +241,7 @@ pub fn curves(
 ) -> Option<Chart> {
     let mut blocks: Vec<Block> = Vec::new();
     for (number, curve) in modes.iter().filter(|(_, curve)| curve.frequency.is_some()) {
-        let quantities = [Quantity::Frequency, Quantity::Damping].iter();
-        let panels = quantities.filter_map(|quantity| quantity.panel(amplitude, curve));
+        let panels = quantities(curve).map(|quantity| quantity.panel(amplitude, curve));
         let mut block = Block::new(2, panels.collect());
         block.name = format!("mode {number}");
         block.aside = verdict(curve);
@@ -269,53 +268,42 @@ pub fn curves(
 }
 
 /// One of the two quantities that may depend on amplitude.
-#[derive(Clone, Copy, PartialEq)]
-enum Quantity {
-    Frequency,
-    Damping,
+struct Quantity<'a> {
+    name: &'static str,
+    unit: &'static str,
+    /// Unit drawn over the trend's unit: damping is drawn in percent.
+    factor: f64,
+    trend: &'a Trend,
+    /// Value and standard uncertainty of every point, in the unit drawn.
+    values: Vec<(f64, f64)>,
 }
 
-impl Quantity {
-    fn trend(self, curve: &AmplitudeCurve) -> Option<&Trend> {
-        match self {
-            Quantity::Frequency => curve.frequency.as_ref(),
-            Quantity::Damping => curve.damping.as_ref(),
-        }
-    }
+/// Returns frequency and damping ratio, as far as they have a trend.
+fn quantities(curve: &AmplitudeCurve) -> impl Iterator<Item = Quantity<'_>> {
+    let points = curve.points.iter();
+    let frequencies = points
+        .clone()
+        .map(|point| (point.frequency, point.frequency_std));
+    let frequency = curve.frequency.as_ref().map(|trend| Quantity {
+        name: "frequency",
+        unit: "Hz",
+        factor: 1.0,
+        trend,
+        values: frequencies.collect(),
+    });
+    let ratios = points.map(|point| (100.0 * point.damping_ratio, 100.0 * point.damping_std));
+    let damping = curve.damping.as_ref().map(|trend| Quantity {
+        name: "damping ratio",
+        unit: "%",
+        factor: 100.0,
+        trend,
+        values: ratios.collect(),
+    });
+    frequency.into_iter().chain(damping)
+}
 
-    /// Unit drawn over the trend's unit: damping is drawn in percent.
-    fn factor(self) -> f64 {
-        match self {
-            Quantity::Frequency => 1.0,
-            Quantity::Damping => 100.0,
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Quantity::Frequency => "frequency",
-            Quantity::Damping => "damping ratio",
-        }
-    }
-
-    fn unit(self) -> &'static str {
-        match self {
-            Quantity::Frequency => "Hz",
-            Quantity::Damping => "%",
-        }
-    }
-
-    /// Value and standard uncertainty of every point, in the unit drawn.
-    fn values(self, curve: &AmplitudeCurve) -> Vec<(f64, f64)> {
-        let points = curve.points.iter().map(|point| match self {
-            Quantity::Frequency => (point.frequency, point.frequency_std),
-            Quantity::Damping => (100.0 * point.damping_ratio, 100.0 * point.damping_std),
-        });
-        points.collect()
-    }
-
-    fn panel(self, amplitude: &[String; 2], curve: &AmplitudeCurve) -> Option<Panel> {
-        let trend = self.trend(curve)?;
+impl Quantity<'_> {
+    fn panel(&self, amplitude: &[String; 2], curve: &AmplitudeCurve) -> Panel {
         let sizes = curve.points.iter().map(|point| point.amplitude);
         let (low, high) = extent(sizes).unwrap_or((1.0, 10.0));
         // Amplitudes rise to the right as on every axis: a decay runs from right to left.
@@ -326,24 +314,23 @@ impl Quantity {
         for index in 0..CURVE_POINTS {
             let share = index as f64 / (CURVE_POINTS - 1) as f64;
             let amplitude = low * (share * (high / low).ln()).exp();
-            if let Some((value, half)) = trend.at_amplitude(amplitude) {
-                let (value, half) = (self.factor() * value, self.factor() * half);
+            if let Some((value, half)) = self.trend.at_amplitude(amplitude) {
+                let (value, half) = (self.factor * value, self.factor * half);
                 line.push(amplitude, value);
                 bound.low.push(value - half);
                 bound.high.push(value + half);
             }
         }
         bound.x = line.x.clone();
-        let mut panel = Panel::new(160.0, x, self.axis(curve)).with([bound, line]);
+        let mut panel = Panel::new(160.0, x, self.axis()).with([bound, line]);
         panel.extra = Some(["time after the tap", "s"]);
-        Some(panel.with(self.dots(curve)))
+        panel.with(self.dots(curve))
     }
 
     /// The points in a colour for each tap, as long as there are few taps.
-    fn dots(self, curve: &AmplitudeCurve) -> Vec<Series> {
+    fn dots(&self, curve: &AmplitudeCurve) -> Vec<Series> {
         let taps = curve.points.iter().map(|point| point.tap + 1);
         let taps = taps.max().unwrap_or(0);
-        let values = self.values(curve);
         let groups = if taps <= MOST_COLOURS { taps } else { 1 };
         let mut dots = Vec::new();
         for group in 0..groups {
@@ -353,7 +340,7 @@ impl Quantity {
                 _ => format!("pieces of the decays of {taps} taps"),
             };
             let mut set = Series::new(&name, Color::curve(group), Mark::Dot(3.3));
-            for (point, (value, std)) in curve.points.iter().zip(&values) {
+            for (point, (value, std)) in curve.points.iter().zip(&self.values) {
                 if groups == 1 || point.tap == group {
                     set.push(point.amplitude, *value);
                     set.low.push(value - BAR * std);
@@ -368,8 +355,8 @@ impl Quantity {
 
     /// Values of the points that are known well enough to tell something, and of those that differ from them
     /// by far more than their own uncertainty, with some room.
-    fn axis(self, curve: &AmplitudeCurve) -> Axis {
-        let values = self.values(curve);
+    fn axis(&self) -> Axis {
+        let values = &self.values;
         let mut stds: Vec<f64> = values.iter().map(|(_, std)| *std).collect();
         stds.sort_by(f64::total_cmp);
         let limit = TELLING * stds.get(stds.len() / 2).copied().unwrap_or(0.0);
@@ -377,12 +364,12 @@ impl Quantity {
         let bars = telling.flat_map(|(value, std)| [value - BAR * std, value + BAR * std]);
         let (low, high) = extent(bars).unwrap_or((0.0, 1.0));
         let mut ends = vec![low, high];
-        for (value, std) in &values {
+        for (value, std) in values {
             if value + DISTANT * std < low || value - DISTANT * std > high {
                 ends.extend([value - BAR * std, value + BAR * std]);
             }
         }
-        padded(extent(ends).unwrap_or((low, high)), 0.12).of(self.name(), self.unit())
+        padded(extent(ends).unwrap_or((low, high)), 0.12).of(self.name, self.unit)
     }
 }
 
@@ -426,12 +413,9 @@ fn changes(curve: &AmplitudeCurve) -> String {
 /// "frequency +0.32 ± 0.01 Hz, damping ratio −0.14 ± 0.01 %".
 fn both(curve: &AmplitudeCurve, of: impl Fn(&Trend) -> (f64, f64)) -> String {
     let mut parts = Vec::new();
-    for quantity in [Quantity::Frequency, Quantity::Damping] {
-        let Some(trend) = quantity.trend(curve) else {
-            continue;
-        };
-        let (change, bound) = of(trend);
-        let (change, bound) = (quantity.factor() * change, quantity.factor() * bound);
+    for quantity in quantities(curve) {
+        let (change, bound) = of(quantity.trend);
+        let (change, bound) = (quantity.factor * change, quantity.factor * bound);
         // As many decimals as the bound's two leading digits have.
         let decimals = (1.0 - bound.abs().max(1e-12).log10().floor()).clamp(0.0, 8.0) as usize;
         let unit_of_last = 10f64.powi(decimals as i32);
@@ -441,8 +425,7 @@ fn both(curve: &AmplitudeCurve, of: impl Fn(&Trend) -> (f64, f64)) -> String {
         let bound = significant(bound, 2);
         parts.push(format!(
             "{} {change} \u{b1} {bound} {}",
-            quantity.name(),
-            quantity.unit()
+            quantity.name, quantity.unit
         ));
     }
     parts.join(", ")

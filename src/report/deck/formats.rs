@@ -199,7 +199,16 @@ pub fn render_nastran(deck: &Deck) -> String {
         masses.extend(rotary_inertia(deck));
     }
     for (id, own) in (element + 1..).zip(&masses) {
-        nastran_mass(&mut text, id, own);
+        let mass = match own.mass {
+            0.0 => "0.".to_owned(),
+            mass => number(mass),
+        };
+        let _ = write!(text, "CONM2*,{id},{},,{mass}\n*", own.node + 1);
+        if own.inertia != 0.0 {
+            // I33 is the second field of the fourth line.
+            let _ = write!(text, ",,,,\n*,,,,\n*,,{}", number(own.inertia));
+        }
+        text.push('\n');
     }
     let mut first = element + deck.masses.len() + deck.nodes.len();
     for joint in deck.joint.iter().chain(&deck.hinges) {
@@ -222,19 +231,6 @@ fn number(value: f64) -> String {
         Some((mantissa, exponent)) => format!("{mantissa}E{exponent}"),
         None => text,
     }
-}
-
-fn nastran_mass(text: &mut String, id: usize, own: &DeckMass) {
-    let mass = match own.mass {
-        0.0 => "0.".to_owned(),
-        mass => number(mass),
-    };
-    let _ = write!(text, "CONM2*,{id},{},,{mass}\n*", own.node + 1);
-    if own.inertia != 0.0 {
-        // I33 is the second field of the fourth line.
-        let _ = write!(text, ",,,,\n*,,,,\n*,,{}", number(own.inertia));
-    }
-    text.push('\n');
 }
 
 /// Each node's share of the sections' inertia (kg m2): half of the elements beside it.

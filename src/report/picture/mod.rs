@@ -608,7 +608,24 @@ impl Axis {
         let numbers = first..=last.min(first.saturating_add(100));
         let ticks = numbers.map(|number| {
             let value = number as f64 * step;
-            let label = Some(written(value, step));
+            let shown = if value.abs() < step * 1e-6 {
+                0.0
+            } else {
+                value
+            };
+            // Large and small numbers with a power of ten.
+            let label = if (1e-4..1e5).contains(&step) {
+                let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+                format!("{shown:.decimals$}")
+            } else if shown == 0.0 {
+                "0".to_owned()
+            } else {
+                let exponent = shown.abs().log10().floor();
+                let mantissa = shown / 10f64.powf(exponent);
+                let digits = (exponent - step.log10().floor()).clamp(0.0, 6.0) as usize;
+                format!("{mantissa:.digits$}\u{b7}{}", power_of_ten(exponent as i32))
+            };
+            let label = Some(label.replace('-', "\u{2212}"));
             Tick { value, label }
         });
         ticks.collect()
@@ -651,28 +668,6 @@ pub fn nice_step(least: f64) -> f64 {
         .map(|digit| digit * decade)
         .find(|step| *step >= least * (1.0 - 1e-9))
         .unwrap_or(10.0 * decade)
-}
-
-/// A tick's number; large and small ones with a power of ten.
-fn written(value: f64, step: f64) -> String {
-    let value = if value.abs() < step * 1e-6 {
-        0.0
-    } else {
-        value
-    };
-    let powers = !(1e-4..1e5).contains(&step);
-    let text = if powers && value == 0.0 {
-        "0".to_owned()
-    } else if powers {
-        let exponent = value.abs().log10().floor();
-        let mantissa = value / 10f64.powf(exponent);
-        let digits = (exponent - step.log10().floor()).clamp(0.0, 6.0) as usize;
-        format!("{mantissa:.digits$}\u{b7}{}", power_of_ten(exponent as i32))
-    } else {
-        let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
-        format!("{value:.decimals$}")
-    };
-    text.replace('-', "\u{2212}")
 }
 
 /// "10⁻³".

@@ -143,6 +143,14 @@ fn with_bounds(parameter: &Parameter<'_>) -> String {
 pub fn sentences(document: &Document) -> Vec<String> {
     let taps = taps(document).map(|taps| capital(&taps) + ".");
     let first = [taps, channels(document), modes(document)];
+    // One sentence for each mode that changes with the amplitude.
+    let amplitudes = document.modes.iter().flatten().filter_map(|mode| {
+        let change = mode.fit.as_ref()?.amplitude.as_ref()?.ends.as_ref()?;
+        let (number, change) = (mode.mode?, change.to_string());
+        // A number stays on the line of its unit.
+        let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
+        Some(format!("Caution: mode {number} {change}."))
+    });
     let rest = [
         quality_count(document).map(|count| capital(&count) + "."),
         estimate(document),
@@ -152,7 +160,7 @@ pub fn sentences(document: &Document) -> Vec<String> {
     let last = [resolution(document), described(document)];
     let first = first.into_iter().flatten();
     first
-        .chain(amplitudes(document))
+        .chain(amplitudes)
         .chain(rest.into_iter().flatten())
         .chain(gap_in_short(document))
         .chain(last.into_iter().flatten())
@@ -172,23 +180,6 @@ fn described(document: &Document) -> Option<String> {
          beside predicted frequencies, the joint's stiffness and the diagnosis of the gap."
             .to_owned()
     })
-}
-
-/// One sentence for each mode that changes with the amplitude.
-fn amplitudes(document: &Document) -> Vec<String> {
-    let modes = document.modes.as_deref().unwrap_or_default();
-    let mut sentences = Vec::new();
-    for mode in modes {
-        let amplitude = mode.fit.as_ref().and_then(|fit| fit.amplitude.as_ref());
-        let change = amplitude.and_then(|amplitude| amplitude.ends.as_ref());
-        if let Some((number, change)) = mode.mode.zip(change) {
-            let change = change.to_string();
-            // A number stays on the line of its unit.
-            let change = change.replace(" Hz", "\u{a0}Hz").replace(" %", "\u{a0}%");
-            sentences.push(format!("Caution: mode {number} {change}."));
-        }
-    }
-    sentences
 }
 
 /// On what taps were looked for where there is no hammer.

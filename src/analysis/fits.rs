@@ -321,7 +321,7 @@ impl FreeDecays {
                 damping_ratio: fit.mode.damping_ratio.value,
             })
             .collect();
-        let curves = follow_amplitude(&self.decays, &known, &AmplitudeSettings::default());
+        let curves = follow_amplitude(&self.decays, &known);
         for (fit, curve) in fitted.into_iter().zip(curves) {
             fit.amplitude = Some(curve);
             fit.constants = modal_constants(&fit.mode, &self.forces, kinds);

@@ -2,9 +2,8 @@
 
 use super::Outcome;
 use super::input::{TestFile, read_test};
-use super::output::{OutputError, OutputFolder, files_made_in};
-use super::overwrite::Expanded;
-use super::signature::CHECKSUMS;
+use super::output::{OutputFolder, failed, files_made_in};
+use super::overwrite::{CHECKSUMS, Expanded};
 use super::terminal::Terminal;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -274,10 +273,7 @@ fn diagnose_recorded(
     folder: &Path,
     shown: &Path,
 ) -> anyhow::Result<Case> {
-    fs::create_dir_all(folder).map_err(|cause| OutputError::Failed {
-        path: shown.to_owned(),
-        cause,
-    })?;
+    fs::create_dir_all(folder).map_err(|cause| failed(shown, &cause))?;
     write_file(folder, shown, "test.toml", recorded.description.as_bytes())?;
     for recording in &recorded.recordings {
         let mut bytes = Vec::new();
@@ -295,11 +291,8 @@ fn diagnose_recorded(
 }
 
 /// Writes a file of a test; `shown` is its folder in messages.
-fn write_file(folder: &Path, shown: &Path, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
-    fs::write(folder.join(name), bytes).map_err(|cause| OutputError::Failed {
-        path: shown.join(name),
-        cause,
-    })
+fn write_file(folder: &Path, shown: &Path, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
+    fs::write(folder.join(name), bytes).map_err(|cause| failed(&shown.join(name), &cause))
 }
 
 /// Diagnoses a test. A test that cannot be analysed has no answer, which is counted separately.

@@ -1,10 +1,9 @@
 //! `tapjoint export`: the beam with its joint as input of a finite-element program.
 
 use super::Outcome;
-use super::input::{TestFile, read_model};
+use super::input::{TestFile, effect_at, read_model};
 use super::output::OutputFile;
 use super::terminal::Terminal;
-use super::updated_model::effect_at;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use serde_json::Value;

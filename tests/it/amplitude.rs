@@ -9,9 +9,9 @@ use tapjoint::modal::amplitude::{
     AmplitudeCurve, AmplitudePoint, AmplitudeReading, AmplitudeVerdict, Decay, KnownMode,
     follow_amplitude,
 };
-use tapjoint::report::chart::drawing::Shape;
-use tapjoint::report::chart::render_png;
-use tapjoint::report::charts::amplitude::curves;
+use tapjoint::report::charts::modes::curves;
+use tapjoint::report::picture::drawing::Shape;
+use tapjoint::report::picture::render_png;
 
 const RATE: f64 = 2048.0;
 

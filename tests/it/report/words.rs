@@ -3,8 +3,8 @@
 use serde_json::Value;
 use tapjoint::recording::{ChannelHealth, ChannelInfo};
 use tapjoint::report::document::{
-    AverageSection, ChannelSection, Document, Method, ModeSection, MonteCarloSection,
-    PredictionSection, ReadBy, TapSection, ValueSection, WarningSection,
+    AverageSection, ChannelSection, Document, EstimateMethod, ModeSection, MonteCarloSection,
+    PredictionSection, ReadBy, TapSection, Uncertain, WarningSection,
 };
 use tapjoint::report::tables::parameters;
 use tapjoint::report::words::findings as summary;
@@ -444,16 +444,16 @@ fn frozen_terminal_of_doubts_and_of_the_model_that_misses() {
         "limits scaled by the misfit; a note beside the regression; a recording aside; a mode without a fit",
         &document,
     );
-    let value = |value: f64| ValueSection {
+    let value = |value: f64| Uncertain {
         value,
         std: None,
         low: Some(0.9 * value),
         high: Some(1.2 * value),
-        ..ValueSection::default()
+        ..Uncertain::default()
     };
     let mut document = Document {
         perturbation_averages: Some(vec![AverageSection {
-            method: Method::Pairs,
+            method: EstimateMethod::Pairs,
             kx_of_mean_percent: Some(0.011),
             ky_of_mean_percent: Some(0.012),
             kz_of_mean_percent: None,
@@ -463,7 +463,7 @@ fn frozen_terminal_of_doubts_and_of_the_model_that_misses() {
             kz_percent: None,
         }]),
         monte_carlo: Some(vec![MonteCarloSection {
-            method: Method::Pairs,
+            method: EstimateMethod::Pairs,
             cloud: Vec::new(),
             samples: 2000,
             failed: 3,

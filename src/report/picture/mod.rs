@@ -1,28 +1,23 @@
-//! The model of a picture: axes with units, series with words, marks and legend.
+//! Pictures: the model of a chart (axes with units, series with words, marks and legend), and what is made of it.
 //!
-//! Each kind of picture is built once, in `charts`. [`Chart::draw`] makes a PNG or SVG of it. [`Chart::page`] thins
+//! Each kind of chart is built once, in `charts`. [`Chart::draw`] makes a PNG or SVG of it. [`Chart::page`] thins
 //! it for the report's script, which reads this model as JSON. Both show the same data with the same labels.
 
-pub mod axis;
 pub mod drawing;
+mod files;
 pub mod labels;
+mod layout;
 mod page;
-mod picture;
-mod png;
-mod svg;
-pub mod thinning;
 
 use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
 use crate::ReportError;
-pub use axis::Axis;
 pub use drawing::Drawing;
 use drawing::Rgb;
-pub use page::packed;
-pub use png::render_png;
-pub use svg::{render_svg, render_svg_file};
+pub use files::{render_png, render_svg, render_svg_file};
+pub use page::{decimate, packed};
 
 /// A picture of one kind.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
@@ -338,6 +333,16 @@ impl Panel {
     }
 }
 
+impl Chart {
+    /// The bytes of a picture file.
+    ///
+    /// # Errors
+    /// [`ReportError::Picture`] if it cannot be drawn or encoded.
+    pub fn render(&self, format: PictureFormat) -> Result<Vec<u8>, ReportError> {
+        render_picture(&self.draw(), format)
+    }
+}
+
 impl Series {
     /// A series without points.
     pub fn new(name: &str, color: Color, mark: Mark) -> Series {
@@ -455,4 +460,255 @@ pub fn render_picture(drawing: &Drawing, format: PictureFormat) -> Result<Vec<u8
         PictureFormat::Png => render_png(drawing),
         PictureFormat::Svg => Ok(render_svg_file(drawing)?.into_bytes()),
     }
+}
+
+/// Equal distances are equal differences or equal ratios.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scale {
+    /// Equal differences.
+    Linear,
+    /// Equal ratios.
+    Logarithmic,
+}
+
+/// One axis of a panel.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Axis {
+    /// The quantity: "frequency".
+    pub label: String,
+    /// Its unit: "Hz"; empty for a count or a name, "1" for a ratio.
+    pub unit: String,
+    /// Scale.
+    pub scale: Scale,
+    /// Value at the start.
+    pub low: f64,
+    /// Value at the end.
+    pub high: f64,
+    /// Ticks with names; empty where the axis has numbers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<Tick>,
+    /// Length of a turn where values come round again, as 360 degrees do.
+    pub period: Option<f64>,
+}
+
+/// A tick and its words; small ticks have none.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tick {
+    /// Value at which it stands.
+    pub value: f64,
+    /// Its number or name. Lines after the first are further facts, for pictures alone.
+    pub label: Option<String>,
+}
+
+/// Decades below which a logarithmic axis has 1, 2 and 5 times each power of ten.
+const FEW_DECADES: f64 = 2.6;
+
+impl Axis {
+    /// A linear axis from `low` to `high`; an empty or broken range is widened.
+    pub fn linear(low: f64, high: f64) -> Axis {
+        let (low, high) = usable(low, high);
+        Axis {
+            label: String::new(),
+            unit: String::new(),
+            scale: Scale::Linear,
+            low,
+            high,
+            names: Vec::new(),
+            period: None,
+        }
+    }
+
+    /// A logarithmic axis; an end that is not positive is replaced.
+    pub fn logarithmic(low: f64, high: f64) -> Axis {
+        let high = if high.is_finite() && high > 0.0 {
+            high
+        } else {
+            1.0
+        };
+        let low = if low > 0.0 && low < high {
+            low
+        } else {
+            high * 1e-3
+        };
+        Axis {
+            scale: Scale::Logarithmic,
+            low,
+            high,
+            ..Axis::linear(0.0, 1.0)
+        }
+    }
+
+    /// The axis with a quantity and its unit.
+    pub fn of(mut self, label: impl Into<String>, unit: impl Into<String>) -> Axis {
+        self.label = label.into();
+        self.unit = unit.into();
+        self
+    }
+
+    /// The axis with names at some values instead of numbers.
+    pub fn named(mut self, names: impl IntoIterator<Item = (f64, String)>) -> Axis {
+        for (value, name) in names {
+            let label = Some(name);
+            self.names.push(Tick { value, label });
+        }
+        self
+    }
+
+    /// "frequency (Hz)".
+    pub fn title(&self) -> String {
+        match self.unit.as_str() {
+            "" => self.label.clone(),
+            unit => format!("{} ({unit})", self.label),
+        }
+    }
+
+    /// Place of a value as a share of the axis, 0 at its start. Values beyond an end lie on it, and what is
+    /// no number lies at the start.
+    pub fn share(&self, value: f64) -> f64 {
+        let share = match self.scale {
+            Scale::Linear => (value - self.low) / (self.high - self.low),
+            Scale::Logarithmic => {
+                (value.max(self.low) / self.low).ln() / (self.high / self.low).ln()
+            }
+        };
+        if share.is_nan() {
+            0.0
+        } else {
+            share.clamp(0.0, 1.0)
+        }
+    }
+
+    /// True for a value on the axis.
+    pub fn holds(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+
+    /// Ticks with room for about so many labels: names, or round numbers.
+    pub fn ticks(&self, room: f64) -> Vec<Tick> {
+        if !self.names.is_empty() {
+            return self.names.clone();
+        }
+        let room = room.max(1.0);
+        let decades = (self.high / self.low).log10();
+        // 1, 2 and 5 times each power of ten, all with their numbers.
+        let digits = decades < FEW_DECADES && self.low > 1e-3 && self.high < 1e5;
+        let least = if digits { 0.5 } else { 1.2 };
+        match self.scale == Scale::Linear || decades < least {
+            true => self.linear_ticks(room),
+            false => self.power_ticks(room, digits),
+        }
+    }
+
+    fn linear_ticks(&self, room: f64) -> Vec<Tick> {
+        let step = nice_step((self.high - self.low) / room);
+        // A hair of slack keeps a tick that rounding puts outside the end.
+        let first = (self.low / step - 1e-9).ceil() as i64;
+        let last = (self.high / step + 1e-9).floor() as i64;
+        let numbers = first..=last.min(first.saturating_add(100));
+        let ticks = numbers.map(|number| {
+            let value = number as f64 * step;
+            let shown = if value.abs() < step * 1e-6 {
+                0.0
+            } else {
+                value
+            };
+            // Large and small numbers with a power of ten.
+            let label = if (1e-4..1e5).contains(&step) {
+                let decimals = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+                format!("{shown:.decimals$}")
+            } else if shown == 0.0 {
+                "0".to_owned()
+            } else {
+                let exponent = shown.abs().log10().floor();
+                let mantissa = shown / 10f64.powf(exponent);
+                let digits = (exponent - step.log10().floor()).clamp(0.0, 6.0) as usize;
+                format!("{mantissa:.digits$}\u{b7}{}", power_of_ten(exponent as i32))
+            };
+            let label = Some(label.replace('-', "\u{2212}"));
+            Tick { value, label }
+        });
+        ticks.collect()
+    }
+
+    /// Ticks at multiples of powers of ten: some with their numbers, or all with the powers as far as there is room.
+    fn power_ticks(&self, room: f64, digits: bool) -> Vec<Tick> {
+        let (first, last) = (self.low.log10(), self.high.log10());
+        let stride = ((last - first) / room).ceil().max(1.0) as i32;
+        let multiples: &[i32] = match stride {
+            _ if digits => &[1, 2, 5],
+            1 => &[1, 2, 3, 4, 5, 6, 7, 8, 9],
+            _ => &[1],
+        };
+        let mut ticks = Vec::new();
+        for exponent in first.floor() as i32..=last.ceil() as i32 {
+            for multiple in multiples {
+                let value = f64::from(*multiple) * 10f64.powi(exponent);
+                let decimals = usize::try_from(-exponent).unwrap_or(0);
+                let power = *multiple == 1 && exponent.rem_euclid(stride) == 0;
+                let label = match digits {
+                    true => Some(format!("{value:.decimals$}")),
+                    false => power.then(|| power_of_ten(exponent)),
+                };
+                ticks.extend(self.holds(value).then_some(Tick { value, label }));
+            }
+        }
+        ticks
+    }
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is not below `least`.
+pub fn nice_step(least: f64) -> f64 {
+    if !(least.is_finite() && least > 0.0) {
+        return 1.0;
+    }
+    let decade = 10f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|digit| digit * decade)
+        .find(|step| *step >= least * (1.0 - 1e-9))
+        .unwrap_or(10.0 * decade)
+}
+
+/// "10⁻³".
+fn power_of_ten(exponent: i32) -> String {
+    let digits = exponent.to_string();
+    let raised = digits.chars().map(|letter| match letter {
+        '-' => '\u{207b}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    });
+    format!("10{}", raised.collect::<String>())
+}
+
+/// A range with some length and finite ends.
+fn usable(low: f64, high: f64) -> (f64, f64) {
+    if !(low.is_finite() && high.is_finite()) {
+        return (0.0, 1.0);
+    }
+    let least = 1e-9 * low.abs().max(high.abs()).max(1e-300);
+    if high - low > least {
+        (low, high)
+    } else {
+        let widen = (0.01 * low.abs()).max(1e-12);
+        (low - widen, low + widen)
+    }
+}
+
+/// Smallest and largest of the finite values; `None` if there is none.
+pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    let finite = values.into_iter().filter(|value| value.is_finite());
+    finite.fold(None, |range, value| match range {
+        None => Some((value, value)),
+        Some((low, high)) => Some((value.min(low), value.max(high))),
+    })
+}
+
+/// A linear axis over a range with `share` of its length added at both ends.
+pub fn padded(range: (f64, f64), share: f64) -> Axis {
+    let (low, high) = usable(range.0, range.1);
+    let margin = share * (high - low);
+    Axis::linear(low - margin, high + margin)
 }

@@ -1,11 +1,10 @@
 //! The gap between model and measurement: errors, odds of the explanations, and where along the beam it sits.
 
-use super::super::chart::axis::{Axis, extent, padded};
-use super::super::chart::{Block, Chart, Color, Mark, Panel, Series};
-use super::super::document::{Document, GapSection};
-use super::super::format::{probability, rounded, signed_percent};
-use super::super::words::gap::{found_best, place_of};
-use super::HIGH;
+use super::spectra::HIGH;
+use crate::document::{Document, GapSection};
+use crate::format::{probability, rounded, signed_percent};
+use crate::picture::{Axis, Block, Chart, Color, Mark, Panel, Series, extent, padded};
+use crate::words::diagnosis::{found_best, place_of};
 use tapjoint_diagnosis::{LocationMap, Residual};
 
 /// Hypotheses shown.
@@ -84,30 +83,25 @@ fn with_errors(
     errors: impl Iterator<Item = (f64, f64)>,
 ) -> Series {
     for (pull, (percent, deviations)) in pulls.iter().zip(errors) {
-        series.push(abscissa(pulls, pull), percent);
+        // The tap levels of all recordings that saw a mode stand beside each other over half its width. One recording
+        // can hold taps of two levels, which saw the mode apart.
+        let mut seats: Vec<(&str, Option<f64>)> = Vec::new();
+        for other in pulls.iter().filter(|other| other.mode == pull.mode) {
+            let seat = (other.recording.as_str(), other.level);
+            if !seats.contains(&seat) {
+                seats.push(seat);
+            }
+        }
+        let own = (pull.recording.as_str(), pull.level);
+        let place = seats.iter().position(|taken| *taken == own);
+        let share = (place.unwrap_or(0) as f64 + 0.5) / seats.len().max(1) as f64;
+        series.push(pull.mode as f64 + 0.5 * (share - 0.5), percent);
         series.extra.push(deviations);
         let words = format!("mode {} in {}", pull.mode, place_of(pull));
         series.words.push(words);
         series.said.push(signed_percent(Some(percent)) + " %");
     }
     series
-}
-
-/// Returns the place of an error: the tap levels of all recordings that saw a mode stand beside each other over half
-/// its width.
-fn abscissa(pulls: &[Residual], pull: &Residual) -> f64 {
-    // One recording can hold taps of two levels, which saw the mode apart.
-    let mut seats: Vec<(&str, Option<f64>)> = Vec::new();
-    for other in pulls.iter().filter(|other| other.mode == pull.mode) {
-        let seat = (other.recording.as_str(), other.level);
-        if !seats.contains(&seat) {
-            seats.push(seat);
-        }
-    }
-    let own = (pull.recording.as_str(), pull.level);
-    let place = seats.iter().position(|taken| *taken == own);
-    let share = (place.unwrap_or(0) as f64 + 0.5) / seats.len().max(1) as f64;
-    pull.mode as f64 + 0.5 * (share - 0.5)
 }
 
 fn odds_panel(gap: &GapSection) -> Panel {

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use super::super::document::{Baseline, Document, GapSection};
-use super::super::format::{MISSING, or_missing, probability, significant};
-use super::super::words::gap::{
+use super::{Table, number, page_words, words};
+use crate::document::{Baseline, Document, GapSection};
+use crate::format::{MISSING, or_missing, probability, significant};
+use crate::words::diagnosis::{
     EQUALLY_LIKELY, LEAST_PROBABILITY, confirms, left, names, not_predicted, percent, sizes,
     together, unit_of,
 };
-use super::{Table, number, words};
 use tapjoint_beam::effects::EffectId;
-use tapjoint_diagnosis::{Hypothesis, HypothesisResult, Verdict};
+use tapjoint_diagnosis::{Hypothesis, Verdict};
 
 /// At least so many hypotheses are listed.
 const LEAST_LISTED: usize = 4;
@@ -23,33 +23,33 @@ pub fn hypotheses(document: &Document) -> Option<Table> {
     }
     let mut rows = Vec::new();
     for (index, found) in gap.hypotheses.iter().enumerate() {
-        let is_effect = matches!(found.hypothesis, Hypothesis::Effects(_));
-        if index < LEAST_LISTED || found.probability >= LEAST_PROBABILITY || !is_effect {
-            rows.push(vec![
-                together(&found.hypothesis),
-                probability(found.probability),
-                left(found.gap_after, gap.noise_floor),
-                left(found.holdout_after, gap.noise_floor),
-                sizes(found),
-                told_apart(found),
-                looks_like(&found.confounded_with),
-            ]);
+        let effects = match &found.hypothesis {
+            Hypothesis::Effects(effects) => effects.len(),
+            _ => 0,
+        };
+        if index >= LEAST_LISTED && found.probability < LEAST_PROBABILITY && effects > 0 {
+            continue;
         }
+        // The size of a single effect from which these readings would tell it from every other.
+        let told_apart = found.parameters.iter().find_map(|parameter| {
+            let (unit, factor) = unit_of(parameter.name);
+            let least = factor * parameter.smallest_separable?;
+            Some(format!("{}{unit}", significant(least, 2)))
+        });
+        rows.push([
+            words("Hypothesis", together(&found.hypothesis)),
+            number("Probability", probability(found.probability)),
+            number("Fitted (%)", left(found.gap_after, gap.noise_floor)),
+            number("Withheld (%)", left(found.holdout_after, gap.noise_floor)),
+            words("Size", sizes(found)),
+            page_words(
+                "Told apart from",
+                or_missing(told_apart.filter(|_| effects < 2)),
+            ),
+            page_words("Looks like", looks_like(&found.confounded_with)),
+        ]);
     }
-    Some(Table {
-        caption: "What may be missing".to_owned(),
-        columns: vec![
-            words("Hypothesis"),
-            number("Probability"),
-            number("Fitted (%)"),
-            number("Withheld (%)"),
-            words("Size"),
-            words("Told apart from").on_page(),
-            words("Looks like").on_page(),
-        ],
-        rows,
-        note: note(document, gap),
-    })
+    Some(Table::of("What may be missing", rows, note(document, gap)))
 }
 
 /// Explains the columns, why even the hypothesis that nothing is missing mostly leaves less than the described model,
@@ -94,19 +94,6 @@ fn note(document: &Document, gap: &GapSection) -> String {
     note
 }
 
-/// The size of a single effect from which these readings would tell it from every other.
-fn told_apart(found: &HypothesisResult) -> String {
-    if matches!(&found.hypothesis, Hypothesis::Effects(effects) if effects.len() > 1) {
-        return MISSING.to_owned();
-    }
-    let least = found.parameters.iter().find_map(|parameter| {
-        let (unit, factor) = unit_of(parameter.name);
-        let least = factor * parameter.smallest_separable?;
-        Some(format!("{}{unit}", significant(least, 2)))
-    });
-    or_missing(least)
-}
-
 /// Hypotheses named among those that cannot be told from one; report.json has them all.
 const NAMED: usize = 4;
 
@@ -123,40 +110,28 @@ fn looks_like(effects: &[EffectId]) -> String {
 /// Tests that would tell more; `None` where none would.
 pub fn next_tests(document: &Document) -> Option<Table> {
     let gap = document.gap.as_ref()?;
-    let tests = &gap.next_test;
-    if tests.is_empty() {
-        return None;
-    }
     let premise = match gap.verdict {
         Verdict::Unknown => EQUALLY_LIKELY,
         _ => "by the hypotheses above",
     };
-    let mut rows = Vec::new();
-    for test in tests {
-        rows.push(vec![
-            test.action.clone() + &not_predicted(test, "; could not be predicted for "),
-            match confirms(test) {
-                true => MISSING.to_owned(),
-                false => format!("{:.2}", test.expected_information),
-            },
-            format!("{:.0}", test.effort),
-            test.separates.join(", "),
-        ]);
-    }
-    Some(Table {
-        caption: "What to do next".to_owned(),
-        columns: vec![
-            words("Test"),
-            number("Information (bit)"),
-            number("Effort"),
-            words("Tells apart").on_page(),
-        ],
-        rows,
-        note: format!(
-            "Information about the cause that the test is expected to bring at least, {premise}; effort in \
-             multiples of reading again what is recorded. Ranked by one over the other."
-        ),
-    })
+    let rows = gap.next_test.iter().map(|test| {
+        let unpredicted = not_predicted(test, "; could not be predicted for ");
+        let information = match confirms(test) {
+            true => MISSING.to_owned(),
+            false => format!("{:.2}", test.expected_information),
+        };
+        [
+            words("Test", test.action.clone() + &unpredicted),
+            number("Information (bit)", information),
+            number("Effort", format!("{:.0}", test.effort)),
+            page_words("Tells apart", test.separates.join(", ")),
+        ]
+    });
+    let note = format!(
+        "Information about the cause that the test is expected to bring at least, {premise}; effort in \
+         multiples of reading again what is recorded. Ranked by one over the other."
+    );
+    (!gap.next_test.is_empty()).then(|| Table::of("What to do next", rows, note))
 }
 
 #[cfg(test)]

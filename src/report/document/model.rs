@@ -1,13 +1,19 @@
-//! The joint, or the free beam's material, in the document; and predicted beside measured frequencies.
+//! The model in the document: the joint or the free beam's material, predicted beside measured frequencies, and the
+//! diagnosis of what the model misses.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::format::significant;
+use crate::format::significant;
 use tapjoint_analysis::{Estimate, EstimateMethod, Identification};
 use tapjoint_beam::Beam;
+use tapjoint_beam::effects::EffectId;
+use tapjoint_diagnosis::{
+    AmplitudeDependence, DecidedBy, Diagnosis, GapError, Hypothesis, HypothesisResult, JointShift,
+    LocationMap, LocationProbabilities, NextTest, Residual, UnlocatedSensors, Verdict,
+};
 use tapjoint_identify::consistent::{ConsistentEstimate, Correlation, Limit, Quantity};
-use tapjoint_identify::{FreeBeamEstimate, JointEstimate, PredictedMode, SingleMode, Uncertain};
+use tapjoint_identify::{SingleMode, Uncertain};
 use tapjoint_numerics::stats::times;
 
 /// The joint, or the free beam's material.
@@ -132,10 +138,56 @@ pub struct PredictionSection {
     pub used: bool,
 }
 
+/// Returns the main estimate, with the closed form beside it.
 pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection> {
     let closed = found.estimate.as_ref().map(|estimate| match estimate {
-        Estimate::Joint(joint) => joint_section(joint),
-        Estimate::FreeBeam(free) => free_section(free),
+        Estimate::Joint(joint) => {
+            let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
+            EstimateSection {
+                method: EstimateMethod::Pairs,
+                modes_used: joint.modes_used.clone(),
+                reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
+                kx: joint.kx,
+                ky: joint.ky,
+                kz: joint.kz,
+                coupling: joint.coupling,
+                kt: joint.kt,
+                kr: joint.kr,
+                ktr: joint.ktr,
+                pairs: Some(PairsSection {
+                    kx: joint.pairs.kx,
+                    ky: joint.pairs.ky,
+                    kz: joint.pairs.kz,
+                    kt: joint.kt.map(|kt| kt.value),
+                    kr: joint.kr.map(|kr| kr.value),
+                    ktr: joint.ktr.map(|ktr| ktr.value),
+                    closure: joint.pairs.closure,
+                    condition: Some(joint.pairs.condition),
+                }),
+                single_modes: joint.single_modes.clone(),
+                ..Default::default()
+            }
+        }
+        Estimate::FreeBeam(free) => EstimateSection {
+            method: EstimateMethod::FreeBeam,
+            modes_used: free.modes_used.clone(),
+            modulus: Some(free.modulus),
+            density: Some(free.density),
+            free_beam: Some(FreeBeamSection {
+                modulus: free.modulus.value,
+                density: free.density.value,
+            }),
+            single_modes: free
+                .per_mode
+                .iter()
+                .map(|&(mode, modulus)| SingleMode {
+                    mode,
+                    modulus: Some(modulus),
+                    ..Default::default()
+                })
+                .collect(),
+            ..Default::default()
+        },
     });
     let Some(consistent) = &found.consistent else {
         return closed;
@@ -147,68 +199,6 @@ pub(super) fn estimate_section(found: &Identification) -> Option<EstimateSection
         single_modes: closed.single_modes,
         ..consistent_section(consistent)
     })
-}
-
-fn joint_section(joint: &JointEstimate) -> EstimateSection {
-    let doubts: Vec<String> = joint.doubts.iter().map(ToString::to_string).collect();
-    EstimateSection {
-        method: EstimateMethod::Pairs,
-        modes_used: joint.modes_used.clone(),
-        reason: (!doubts.is_empty()).then(|| doubts.join("; ")),
-        kx: joint.kx,
-        ky: joint.ky,
-        kz: joint.kz,
-        coupling: joint.coupling,
-        kt: joint.kt,
-        kr: joint.kr,
-        ktr: joint.ktr,
-        pairs: Some(PairsSection {
-            kx: joint.pairs.kx,
-            ky: joint.pairs.ky,
-            kz: joint.pairs.kz,
-            kt: joint.kt.map(|kt| kt.value),
-            kr: joint.kr.map(|kr| kr.value),
-            ktr: joint.ktr.map(|ktr| ktr.value),
-            closure: joint.pairs.closure,
-            condition: Some(joint.pairs.condition),
-        }),
-        single_modes: joint.single_modes.clone(),
-        ..Default::default()
-    }
-}
-
-fn free_section(free: &FreeBeamEstimate) -> EstimateSection {
-    EstimateSection {
-        method: EstimateMethod::FreeBeam,
-        modes_used: free.modes_used.clone(),
-        modulus: Some(free.modulus),
-        density: Some(free.density),
-        free_beam: Some(FreeBeamSection {
-            modulus: free.modulus.value,
-            density: free.density.value,
-        }),
-        single_modes: free
-            .per_mode
-            .iter()
-            .map(|&(mode, modulus)| SingleMode {
-                mode,
-                modulus: Some(modulus),
-                ..Default::default()
-            })
-            .collect(),
-        ..Default::default()
-    }
-}
-
-pub(super) fn prediction_section(mode: &PredictedMode) -> PredictionSection {
-    PredictionSection {
-        mode: mode.mode,
-        measured: mode.measured,
-        predicted: Some(mode.predicted),
-        lambda: Some(mode.lambda),
-        error_percent: mode.error_percent,
-        used: mode.used,
-    }
 }
 
 /// The main estimate; what stands beside it is added by the caller.
@@ -286,27 +276,6 @@ fn is_asked(found: &ConsistentEstimate, quantity: Quantity) -> bool {
     parameters.any(|parameter| parameter.name() == quantity.name())
 }
 
-/// Sentences on the uncertain properties of the beam that were fitted along.
-fn fitted_along(found: &ConsistentEstimate) -> Vec<String> {
-    let beam = [
-        (Quantity::Modulus, "Pa"),
-        (Quantity::Density, "kg/m3"),
-        (Quantity::Length, "m"),
-        (Quantity::Width, "m"),
-        (Quantity::Thickness, "m"),
-    ];
-    beam.iter()
-        .filter(|(quantity, _)| !is_asked(found, *quantity))
-        .filter_map(|(quantity, unit)| {
-            let value = found.quantity(*quantity)?.value?;
-            Some(format!(
-                "{} has a tolerance and was fitted along, to {value:.6e} {unit}",
-                quantity.name()
-            ))
-        })
-        .collect()
-}
-
 fn identifiability(found: &ConsistentEstimate) -> IdentifiabilitySection {
     let report = &found.identifiability;
     let dead = report
@@ -321,14 +290,171 @@ fn identifiability(found: &ConsistentEstimate) -> IdentifiabilitySection {
         };
         format!("{} is at the end of its range: {end}", parameter.name())
     });
+    // The uncertain properties of the beam that were fitted along.
+    let beam = [
+        (Quantity::Modulus, "Pa"),
+        (Quantity::Density, "kg/m3"),
+        (Quantity::Length, "m"),
+        (Quantity::Width, "m"),
+        (Quantity::Thickness, "m"),
+    ];
+    let along = beam
+        .iter()
+        .filter(|(quantity, _)| !is_asked(found, *quantity));
+    let along = along.filter_map(|(quantity, unit)| {
+        let value = found.quantity(*quantity)?.value?;
+        Some(format!(
+            "{} has a tolerance and was fitted along, to {value:.6e} {unit}",
+            quantity.name()
+        ))
+    });
     let flat = report.flat.iter().map(|flat| flat.words.clone());
     IdentifiabilitySection {
         singular_values: report.singular_values.clone(),
         condition: report.condition,
-        statements: flat
-            .chain(dead)
-            .chain(limits)
-            .chain(fitted_along(found))
-            .collect(),
+        statements: flat.chain(dead).chain(limits).chain(along).collect(),
+    }
+}
+
+/// The gap between model and measurement.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct GapSection {
+    /// The answer.
+    pub verdict: Verdict,
+    /// Location of the gap, given that there is one; null without a diagnosis.
+    #[serde(rename = "where")]
+    pub place: Option<GapPlaceSection>,
+    /// All hypotheses, the most probable first.
+    pub hypotheses: Vec<HypothesisResult>,
+    /// Root mean square of the standard uncertainties of the fitted frequencies (%).
+    pub noise_floor: Option<f64>,
+    /// Probability of a misfit as large or larger, under the best hypothesis.
+    pub goodness_of_fit: Option<f64>,
+    /// Change of the joint when the best hypothesis is added.
+    pub joint_shift: Option<JointShift>,
+    /// Modes above this number took no part in the fit; null without a diagnosis.
+    pub fitted_modes: Option<usize>,
+    /// The described model without sensors that have a mass but no stated position; null where every position is
+    /// known.
+    pub unplaced: Option<UnlocatedSensors>,
+    /// "readings", or "priors" where the readings alone would leave the first two hypotheses.
+    pub decided_by: Option<DecidedBy>,
+    /// Evidence of the decays alone for a joint whose stiffness depends on the amplitude, whatever the
+    /// verdict; null where no frequency changes along them.
+    pub along_decays: Option<AmplitudeDependence>,
+    /// Changes along the beam that would explain the residual of the nominal model.
+    pub map: Option<LocationMap>,
+    /// Two plain answers beside the diagnosis: nothing added, and one common factor.
+    pub baselines: Vec<BaselineSection>,
+    /// Tests that would tell more, those first that tell most for their effort.
+    pub next_test: Vec<NextTest>,
+    /// The model with what was found, to predict with; null where nothing predicts, and where the verdict is
+    /// "unknown".
+    pub updated_model: Option<UpdatedModelSection>,
+}
+
+/// Location of the gap.
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
+pub struct GapPlaceSection {
+    /// Probability (1) of joint, fixture, sensor, body, acquisition, unknown.
+    pub probability: LocationProbabilities,
+    /// Every frequency's error.
+    pub modes: Vec<Residual>,
+    /// The readings that fit worst.
+    pub worst_block: Option<String>,
+}
+
+/// A plain answer to set the diagnosis against.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct BaselineSection {
+    /// "none" or "scale".
+    pub name: Baseline,
+    /// Errors of the fitted frequencies (%, rms).
+    pub gap_after: Option<f64>,
+    /// Errors of withheld frequencies (%, rms).
+    #[serde(rename = "withheld_after")]
+    pub holdout_after: Option<f64>,
+}
+
+/// Addition of a plain answer to the model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Baseline {
+    /// Nothing.
+    None,
+    /// One common factor on all frequencies.
+    Scale,
+}
+
+/// A model brought up to date.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct UpdatedModelSection {
+    /// The hypothesis that it takes for true.
+    pub effect: String,
+    /// The file that holds it as a test description; null where none was written.
+    pub file: Option<String>,
+    /// Its natural frequencies (Hz), sensors where the first recording has them; `tapjoint predict` of the
+    /// file gives the same.
+    pub frequencies: Vec<f64>,
+}
+
+/// Returns the section of a diagnosis, or of the reason why there is none.
+pub fn gap_section(diagnosis: Result<&Diagnosis, &GapError>) -> GapSection {
+    let found = match diagnosis {
+        Ok(found) => found,
+        Err(error) => {
+            return GapSection {
+                verdict: Verdict::NotEnoughData(error.to_string()),
+                ..GapSection::default()
+            };
+        }
+    };
+    let scale = Hypothesis::Effects(vec![EffectId::Modulus]);
+    let plain = [(Baseline::None, Hypothesis::None), (Baseline::Scale, scale)];
+    let baselines = plain.into_iter().filter_map(|(name, hypothesis)| {
+        let mut all = found.hypotheses.iter();
+        let answer = all.find(|one| one.hypothesis == hypothesis)?;
+        Some(BaselineSection {
+            name,
+            gap_after: answer.gap_after,
+            holdout_after: answer.holdout_after,
+        })
+    });
+    GapSection {
+        verdict: found.verdict.clone(),
+        place: Some(GapPlaceSection {
+            probability: found.locations,
+            modes: found.residuals.clone(),
+            worst_block: found.blocks.first().map(|block| block.name.clone()),
+        }),
+        hypotheses: found.hypotheses.clone(),
+        noise_floor: Some(found.noise_floor),
+        goodness_of_fit: found.goodness_of_fit,
+        joint_shift: Some(found.joint_shift),
+        fitted_modes: Some(found.fitted_modes),
+        unplaced: found.unlocated.clone(),
+        decided_by: Some(found.decided_by),
+        along_decays: found.amplitude_dependence.clone(),
+        map: found.location_map.clone(),
+        baselines: baselines.collect(),
+        next_test: found.next_tests.clone(),
+        updated_model: None,
+    }
+}
+
+impl GapSection {
+    /// The result of a hypothesis.
+    pub fn result(&self, hypothesis: &Hypothesis) -> Option<&HypothesisResult> {
+        let mut all = self.hypotheses.iter();
+        all.find(|found| found.hypothesis == *hypothesis)
+    }
+
+    /// The result of the hypothesis that the verdict names; `None` where it names none or several.
+    pub fn named(&self) -> Option<&HypothesisResult> {
+        match self.verdict.hypotheses().as_slice() {
+            [one] => self.result(one),
+            _ if self.verdict == Verdict::NoGap => self.result(&Hypothesis::None),
+            _ => None,
+        }
     }
 }

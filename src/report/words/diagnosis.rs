@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::super::document::{Document, GapSection};
-use super::super::format::{
+use crate::document::{Document, GapSection};
+use crate::format::{
     RIGID, or_missing, prefix, probability, rounded, signed_percent, significant, trimmed,
 };
 use tapjoint_beam::effects::{EffectId, Place};
@@ -137,7 +137,19 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         percent(Some(found.gap_before)),
         left(found.gap_after, gap.noise_floor),
     );
-    text.push_str(&by_drift(gap, found, has_joint));
+    // What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of
+    // the errors.
+    let remains = gap
+        .result(&Hypothesis::None)
+        .and_then(|none| none.gap_after);
+    if let Some(remains) = remains.filter(|remains| *remains < 0.5 * found.gap_before) {
+        let drift = match has_joint {
+            true => "a joint that drifts and ",
+            false => "",
+        };
+        let remains = left(Some(remains), gap.noise_floor);
+        text.push_str(&format!(", where {drift}the tolerances leave {remains} %"));
+    }
     if let Some((before, after)) = found.holdout_before.zip(found.holdout_after) {
         text.push_str(&format!(
             "; on frequencies that took no part from {} to {} %",
@@ -166,24 +178,6 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         ),
         None => format!("{text}; their own uncertainty is {floor} %."),
     })
-}
-
-/// Returns the error that is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of the
-/// errors.
-fn by_drift(gap: &GapSection, found: &HypothesisResult, has_joint: bool) -> String {
-    let none = gap.result(&Hypothesis::None);
-    match none.and_then(|none| none.gap_after) {
-        Some(remains) if remains < 0.5 * found.gap_before => format!(
-            ", where {}the tolerances leave {} %",
-            if has_joint {
-                "a joint that drifts and "
-            } else {
-                ""
-            },
-            left(Some(remains), gap.noise_floor)
-        ),
-        _ => String::new(),
-    }
 }
 
 /// ", 97 % of the gap (95 %: 93 to 99)".
@@ -422,25 +416,24 @@ fn no_gap(gap: &GapSection) -> String {
              chance would in {} of tests, but nothing else explains them better.{open}",
             probability(p)
         ),
-        None => format!(
-            "No gap: the described model explains the frequencies within their uncertainty{}.{open}",
-            of_none.map_or_else(String::new, |none| by_moving(none, gap.noise_floor))
-        ),
-    }
-}
-
-/// Returns the error that the described model itself leaves, where that is much more than the readings' uncertainty and than what is
-/// left with a joint that may differ between recordings.
-fn by_moving(none: &HypothesisResult, floor: Option<f64>) -> String {
-    let left_over = none.gap_after.zip(floor);
-    match left_over.filter(|(after, floor)| none.gap_before > 2.0 * after.max(*floor)) {
-        Some((after, floor)) => format!(
-            ", once joint, geometry and masses may differ from the description within their tolerances, and between \
-             recordings (errors {} %; exactly as described {} %)",
-            left(Some(after), Some(floor)),
-            percent(Some(none.gap_before))
-        ),
-        None => String::new(),
+        None => {
+            // Where the described model itself leaves much more than the readings' uncertainty and than what is left
+            // with a joint that may differ between recordings.
+            let floor = gap.noise_floor;
+            let left_over =
+                of_none.and_then(|none| Some((none.gap_before, none.gap_after?, floor?)));
+            let moved =
+                left_over.filter(|(before, after, floor)| *before > 2.0 * after.max(*floor));
+            let moved = moved.map_or_else(String::new, |(before, after, _)| format!(
+                ", once joint, geometry and masses may differ from the description within their tolerances, and between \
+                 recordings (errors {} %; exactly as described {} %)",
+                left(Some(after), floor),
+                percent(Some(before))
+            ));
+            format!(
+                "No gap: the described model explains the frequencies within their uncertainty{moved}.{open}"
+            )
+        }
     }
 }
 

@@ -84,13 +84,6 @@ impl Patch {
         }
     }
 
-    fn overlaps(&self, other: &Patch) -> bool {
-        self.left < other.right
-            && other.left < self.right
-            && self.top < other.bottom
-            && other.top < self.bottom
-    }
-
     /// The middle of words of this half width beside a point, inside this patch and clear of all others, which
     /// it joins; `None` without such a place.
     pub(super) fn beside(&self, at: Point, half: f64, taken: &mut Vec<Patch>) -> Option<Point> {
@@ -101,7 +94,11 @@ impl Patch {
                 && patch.right < self.right
                 && patch.top > self.top
                 && patch.bottom < self.bottom;
-            if inside && !taken.iter().any(|other| other.overlaps(&patch)) {
+            let covers = taken.iter().any(|other| {
+                let across = other.left < patch.right && patch.left < other.right;
+                across && other.top < patch.bottom && patch.top < other.bottom
+            });
+            if inside && !covers {
                 taken.push(patch);
                 return Some(middle);
             }

@@ -2,13 +2,12 @@
 
 use std::collections::HashSet;
 
-use super::axis::Tick;
 use super::drawing::{
     Align, Drawing, Note, Point, Shape, Stroke, Text, WHITE, Weight, fitted, text_width,
 };
 use super::labels::{LEFT, LINE, Legend, Patch, WORDS, draw_mark, ink, spread};
-use super::thinning::decimate;
-use super::{Block, Chart, Color, Mark, Panel, Places, Rule, Series};
+use super::page::decimate;
+use super::{Block, Chart, Color, Mark, Panel, Places, Rule, Series, Tick};
 use crate::format::trimmed;
 
 /// Width of a picture that fills a page (pixels).
@@ -158,8 +157,8 @@ impl<'a> Layout<'a> {
                 frame.draw_y_axis(drawing, !like_left, column == 0);
                 let below = frame.draw_x_axis(drawing, !shared);
                 frame.draw_content(drawing);
-                if named {
-                    frame.draw_names(drawing, &self.names);
+                for (rule, center) in self.names.iter().filter(|_| named) {
+                    frame.draw_name(drawing, rule, *center);
                 }
                 lower = lower.max(below);
             }
@@ -364,7 +363,18 @@ impl<'a> Frame<'a> {
     fn draw_content(&self, drawing: &mut Drawing) {
         let rules = self.panel.rules.iter();
         for rule in rules.filter(|rule| self.panel.x.holds(rule.at)) {
-            self.draw_rule(drawing, rule);
+            let color = rule_color(rule).rgb();
+            // Its half-line band is at least one pixel wide.
+            let (left, right) = (self.x(rule.line - rule.half), self.x(rule.line + rule.half));
+            if rule.half > 0.0 {
+                let widen = (1.0 - (right - left)).max(0.0) / 2.0;
+                let (from, to) = ((left - widen, self.top), (right + widen, self.bottom));
+                drawing.rectangle(from, to, color, 0.25);
+            }
+            let x = crisp(self.x(rule.at));
+            let dash = if rule.mode { 6.0 } else { 2.0 };
+            let stroke = Stroke::new(color, 1.0).faint(0.75);
+            drawing.dashed((x, self.top), (x, self.bottom), dash, 4.0, stroke);
         }
         for series in &self.panel.series {
             self.draw_series(drawing, series);
@@ -384,42 +394,25 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// A rule with its half-line band, at least one pixel wide.
-    fn draw_rule(&self, drawing: &mut Drawing, rule: &Rule) {
+    /// The name of a rule above the panel, and a leader to it.
+    fn draw_name(&self, drawing: &mut Drawing, rule: &Rule, center: f64) {
+        let (wish, top) = (crisp(self.x(rule.at)), self.top);
         let color = rule_color(rule).rgb();
-        let (left, right) = (self.x(rule.line - rule.half), self.x(rule.line + rule.half));
-        if rule.half > 0.0 {
-            let widen = (1.0 - (right - left)).max(0.0) / 2.0;
-            let (from, to) = ((left - widen, self.top), (right + widen, self.bottom));
-            drawing.rectangle(from, to, color, 0.25);
-        }
-        let x = crisp(self.x(rule.at));
-        let dash = if rule.mode { 6.0 } else { 2.0 };
-        let stroke = Stroke::new(color, 1.0).faint(0.75);
-        drawing.dashed((x, self.top), (x, self.bottom), dash, 4.0, stroke);
-    }
-
-    fn draw_names(&self, drawing: &mut Drawing, names: &[(&Rule, f64)]) {
-        for (rule, center) in names {
-            let (wish, top) = (crisp(self.x(rule.at)), self.top);
-            let color = rule_color(rule).rgb();
-            let name = Text::new(&rule.name, (*center, top - 52.0), WORDS, color);
-            drawing.text(name.bold().aligned(Align::Middle));
-            let at = (*center, top - 36.0);
-            let words = if rule.mode {
-                ink(&rule.words, at, WORDS)
-            } else {
-                soft(&rule.words, at, WORDS)
-            };
-            drawing.text(words.aligned(Align::Middle));
-            let leader = vec![
-                (*center, top - 26.0),
-                (*center, top - 22.0),
-                (wish, top - 4.0),
-                (wish, top),
-            ];
-            drawing.line(leader, Stroke::new(color, 1.0));
-        }
+        let name = Text::new(&rule.name, (center, top - 52.0), WORDS, color);
+        drawing.text(name.bold().aligned(Align::Middle));
+        let at = (center, top - 36.0);
+        let words = match rule.mode {
+            true => ink(&rule.words, at, WORDS),
+            false => soft(&rule.words, at, WORDS),
+        };
+        drawing.text(words.aligned(Align::Middle));
+        let leader = vec![
+            (center, top - 26.0),
+            (center, top - 22.0),
+            (wish, top - 4.0),
+            (wish, top),
+        ];
+        drawing.line(leader, Stroke::new(color, 1.0));
     }
 
     fn draw_series(&self, drawing: &mut Drawing, series: &Series) {
@@ -445,7 +438,25 @@ impl<'a> Frame<'a> {
                     drawing.rectangle((from.0, from.1 - half), corner, series.color.rgb(), 1.0);
                 }
             }
-            Mark::Cell => self.draw_cells(drawing, series),
+            Mark::Cell => {
+                // One unit wide and high, with labels inside.
+                for (index, (x, y)) in series.pairs().enumerate() {
+                    let (from, to) = (self.place(x - 0.5, y + 0.5), self.place(x + 0.5, y - 0.5));
+                    let share = series.low.get(index).copied().unwrap_or(1.0);
+                    let shade = 0.15 + 0.85 * share;
+                    let (from, to) = ((from.0 + 1.0, from.1 + 1.0), (to.0 - 1.0, to.1 - 1.0));
+                    drawing.rectangle(from, to, series.color.rgb(), shade);
+                    if let Some(label) = series.labels.get(index) {
+                        let color = if share > 0.45 {
+                            WHITE
+                        } else {
+                            Color::Ink.rgb()
+                        };
+                        let text = Text::new(label, self.place(x, y), HEADING, color);
+                        drawing.text(text.aligned(Align::Middle));
+                    }
+                }
+            }
             Mark::Dot(_) | Mark::Ring(_) | Mark::Cross(_) | Mark::Square(_) => {
                 self.draw_points(drawing, series);
             }
@@ -541,31 +552,6 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Cells one unit wide and high, their labels inside.
-    fn draw_cells(&self, drawing: &mut Drawing, series: &Series) {
-        for (index, (x, y)) in series.pairs().enumerate() {
-            let (from, to) = (self.place(x - 0.5, y + 0.5), self.place(x + 0.5, y - 0.5));
-            let share = series.low.get(index).copied().unwrap_or(1.0);
-            let shade = 0.15 + 0.85 * share;
-            let corner = (to.0 - 1.0, to.1 - 1.0);
-            drawing.rectangle(
-                (from.0 + 1.0, from.1 + 1.0),
-                corner,
-                series.color.rgb(),
-                shade,
-            );
-            if let Some(label) = series.labels.get(index) {
-                let color = if share > 0.45 {
-                    WHITE
-                } else {
-                    Color::Ink.rgb()
-                };
-                let text = Text::new(label, self.place(x, y), HEADING, color);
-                drawing.text(text.aligned(Align::Middle));
-            }
-        }
-    }
-
     /// Words beside points, where they cover nothing; words without such a place are left out.
     fn draw_labels(&self, drawing: &mut Drawing) {
         let labelled = self.panel.series.iter();
@@ -656,7 +642,27 @@ impl<'a> Frame<'a> {
                 Mark::Bar(half) => ((self.left, down - half), (self.right, down + half)),
                 _ => ((across - 8.0, down - 8.0), (across + 8.0, down + 8.0)),
             };
-            let words = saying(self.panel, series, index);
+            // As the page's script has them: "sensor, A · position 338 mm · displacement 0.43".
+            let mut parts = vec![match series.words.get(index) {
+                Some(words) if series.name.is_empty() => words.clone(),
+                Some(words) => format!("{}, {words}", series.name),
+                None => series.name.clone(),
+            }];
+            let panel = self.panel;
+            if panel.x.names.is_empty() {
+                let place = number_with_unit(trimmed(x, 5), &panel.x.unit);
+                parts.push(format!("{} {place}", panel.x.label));
+            }
+            if panel.y.names.is_empty() {
+                let said = series.said.get(index).cloned();
+                let said = said.unwrap_or_else(|| number_with_unit(trimmed(y, 5), &panel.y.unit));
+                parts.push(format!("{} {said}", panel.y.label));
+            }
+            if let (Some([label, unit]), Some(extra)) = (panel.extra, series.extra.get(index)) {
+                let extra = number_with_unit(trimmed(*extra, 4), unit);
+                parts.push(format!("{label} {extra}"));
+            }
+            let words = parts.join(" \u{b7} ");
             drawing.notes.push(Note { from, to, words });
         }
     }
@@ -673,34 +679,6 @@ const GRID: Stroke = Stroke {
     width: 1.0,
     opacity: 1.0,
 };
-
-/// Words of a point for the pointer, as the page's script has them: "sensor, A · position 338 mm ·
-/// displacement 0.43".
-fn saying(panel: &Panel, series: &Series, index: usize) -> String {
-    let mut parts = Vec::new();
-    match series.words.get(index) {
-        Some(words) if series.name.is_empty() => parts.push(words.clone()),
-        Some(words) => parts.push(format!("{}, {words}", series.name)),
-        None => parts.push(series.name.clone()),
-    }
-    if panel.x.names.is_empty() {
-        let place = number_with_unit(trimmed(series.at(index), 5), &panel.x.unit);
-        parts.push(format!("{} {place}", panel.x.label));
-    }
-    if panel.y.names.is_empty() {
-        let height = series.y.get(index).copied().unwrap_or(f64::NAN);
-        let said = series.said.get(index).cloned();
-        let said = said.unwrap_or_else(|| number_with_unit(trimmed(height, 5), &panel.y.unit));
-        parts.push(format!("{} {said}", panel.y.label));
-    }
-    if let (Some([label, unit]), Some(extra)) = (panel.extra, series.extra.get(index)) {
-        parts.push(format!(
-            "{label} {}",
-            number_with_unit(trimmed(*extra, 4), unit)
-        ));
-    }
-    parts.join(" \u{b7} ")
-}
 
 fn number_with_unit(number: String, unit: &str) -> String {
     match unit {

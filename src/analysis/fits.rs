@@ -7,7 +7,7 @@
 use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
-    Accepted, Column, ExtraMode, ExtraVerdict, FitError, FitSettings, FreeDecayCollector,
+    Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector,
     ModalData, ModeFit, PoleStart, TapForce, Unfit, fit_modes, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{

@@ -247,24 +247,6 @@ fn is_local(effect: &CandidateEffect) -> bool {
     location.is_some_and(|location| location.kind == LocationKind::Position)
 }
 
-/// Returns whether a fit has as many free parameters as a change that is spread over the beam: all its effects
-/// choose their locations, or a frequency that no peak states.
-fn is_flexible(dataset: &Dataset, fit: &Fit) -> bool {
-    let layout = dataset.layout(&fit.effects);
-    let mut effects = fit.effects.iter().enumerate();
-    let all_choose = effects.all(
-        |(k, effect)| match effect.location.map(|range| range.kind) {
-            Some(LocationKind::Position) => true,
-            // A frequency that a peak states is known to a standard deviation; else only its range is.
-            Some(LocationKind::FixtureFrequency) => layout
-                .location(k)
-                .is_some_and(|location| !fit.best.priors[location].std.is_finite()),
-            _ => false,
-        },
-    );
-    all_choose && fit.effects.iter().any(is_local)
-}
-
 /// Gives `unknown` the evidence of pairs that imitate it, and removes pairs of one kind.
 ///
 /// An unknown change may be spread over a part of the beam. Two changes at locations of their own imitate every
@@ -281,7 +263,20 @@ fn compare_with_unknown(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
         let errors = HoldoutErrors::new(dataset, fit);
         errors.is_some_and(|errors| errors.rms() > MISSED_HOLDOUT * errors.floor())
     });
-    let imitating = fits.iter().filter(|fit| is_flexible(dataset, fit));
+    // As many free parameters as a change that is spread over the beam: all effects choose their locations, or a
+    // frequency that no peak states, which is known to a standard deviation; else only its range is.
+    let imitating = fits.iter().filter(|fit| {
+        let layout = dataset.layout(&fit.effects);
+        let mut effects = fit.effects.iter().enumerate();
+        let all_choose = effects.all(|(k, effect)| {
+            let is_fixture = effect.effect == EffectId::Fixture;
+            let stated = layout
+                .location(k)
+                .map(|at| fit.best.priors[at].std.is_finite());
+            is_local(effect) || is_fixture && stated == Some(false)
+        });
+        all_choose && fit.effects.iter().any(is_local)
+    });
     let most = imitating
         .chain(failing)
         .map(|fit| fit.log_evidence)

@@ -195,7 +195,19 @@ impl<'a> Search<'a> {
             .into_iter()
             .map(|node| nodes[node].optimum.parameters.clone())
             .collect();
-        starts.extend(self.start_by_law(forward, nodes));
+        // Of a joint whose stiffness depends on the amplitude the best node, with the size and the exponent of the law
+        // that the changes along the decays call for.
+        let by_evidence = nodes
+            .iter()
+            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence));
+        if forward.layout.location_of_kind(LocationKind::Exponent) == Some(at + 1)
+            && let Some(law) = best_law(self.dataset, self.without)
+            && let Some(best) = by_evidence
+        {
+            let mut start = best.optimum.parameters.clone();
+            start[at..=at + 1].copy_from_slice(&[law.law.ratio, law.law.exponent]);
+            starts.push(start);
+        }
         let mut found: Vec<LocalOptimum> = Vec::new();
         descend(forward, &starts, &mut found);
         // A search along a bent valley may stop short of its end: search again from either side of it. Between
@@ -226,23 +238,6 @@ impl<'a> Search<'a> {
             log_mean(&all.collect::<Vec<_>>())
         };
         Some(self.finish(forward, best, total))
-    }
-
-    /// Returns the best node with the size and the exponent of the law that the changes along the decays call for, for a
-    /// joint whose stiffness depends on the amplitude.
-    fn start_by_law(&self, forward: &Forward<'_>, nodes: &[LocalOptimum]) -> Option<Vec<f64>> {
-        let last = forward.layout.effects.last()?;
-        last.location
-            .filter(|range| range.kind == LocationKind::Exponent)?;
-        let law = best_law(self.dataset, self.without)?.law;
-        let best = nodes
-            .iter()
-            .max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence))?;
-        let mut start = best.optimum.parameters.clone();
-        let at = forward.layout.last_size();
-        start[at] = law.ratio;
-        start[at + 1] = law.exponent;
-        Some(start)
     }
 }
 

@@ -291,10 +291,8 @@ impl UnpairedPeaks {
     pub fn new(observations: &Observations) -> Self {
         let mut searched: Vec<(usize, &Configuration)> = Vec::new();
         for (index, one) in observations.configurations.iter().enumerate() {
-            let is_new = searched
-                .iter()
-                .all(|known| known.1.recording != one.recording);
-            if one.recording.is_some() && is_new {
+            let mut known = searched.iter();
+            if one.recording.is_some() && known.all(|known| known.1.recording != one.recording) {
                 searched.push((index, one));
             }
         }
@@ -310,14 +308,21 @@ impl UnpairedPeaks {
         let doubtful = peaks
             .map(|peak| peak.frequency.ln())
             .filter(|log| all.iter().all(|one| (one.log - log).abs() >= SAME_PEAK));
+        // A peak far over the noise would still be read if it were weaker by its distance to the readable level.
+        let least = searched.iter().map(|(index, one)| {
+            let peaks = one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED);
+            let logs = peaks.filter_map(|peak| {
+                let spare = (peak.level_db? - READABLE_LEVEL).max(0.0);
+                Some(peak.constant?.abs().ln() - spare / DECIBEL)
+            });
+            let logs = logs.filter(|log| log.is_finite());
+            (*index, logs.min_by(f64::total_cmp))
+        });
         UnpairedPeaks {
             doubtful: doubtful.collect(),
+            searched: least.collect(),
             all,
             band: (low < high).then_some((low, high)),
-            searched: searched
-                .iter()
-                .map(|(index, one)| (*index, least_log_constant(one)))
-                .collect(),
         }
     }
 
@@ -332,19 +337,6 @@ impl UnpairedPeaks {
     pub fn contains(&self, log: f64) -> bool {
         self.band.is_some_and(|(low, high)| log > low && log < high)
     }
-}
-
-/// Returns the logarithm of the least modal constant that is read: a peak far over the noise
-/// would still be read if it were weaker by its distance to the readable level.
-fn least_log_constant(one: &Configuration) -> Option<f64> {
-    let peaks = one.extra_peaks.iter().filter(|peak| peak.label == UNPAIRED);
-    peaks
-        .filter_map(|peak| {
-            let spare = (peak.level_db? - READABLE_LEVEL).max(0.0);
-            Some(peak.constant?.abs().ln() - spare / DECIBEL)
-        })
-        .filter(|log| log.is_finite())
-        .min_by(f64::total_cmp)
 }
 
 /// Returns the peaks that at least half of the recordings show whose band reaches them. They belong to no mode and are

@@ -85,8 +85,27 @@ impl Residuals {
     /// block is taken as g chi2_n with the mean tr B and the variance 2 tr B^2 that the covariance B of its data gives
     /// it (Satterthwaite).
     pub fn blocks(&self, dataset: &Dataset) -> Vec<Block> {
+        // The data by mode, by configuration, and by kind.
+        let mut named: Vec<(String, Vec<usize>)> = Vec::new();
+        for (row, observable) in dataset.observables.iter().enumerate() {
+            let mut names = vec![match observable.kind {
+                ObservableKind::Frequency => format!("mode {}", observable.mode),
+                ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => "shapes".into(),
+                ObservableKind::Damping => "damping".into(),
+                ObservableKind::Slope => "along the decays".into(),
+            }];
+            if observable.is_frequency() && dataset.arrangements.len() > 1 {
+                names.push(dataset.arrangements[observable.configuration].label());
+            }
+            for name in names {
+                match named.iter_mut().find(|block| block.0 == name) {
+                    Some(block) => block.1.push(row),
+                    None => named.push((name, vec![row])),
+                }
+            }
+        }
         let mut blocks = Vec::new();
-        for (name, rows) in block_rows(dataset) {
+        for (name, rows) in named {
             let spread = self.spread.select_rows(&rows).select_columns(&rows);
             let (mean, square) = (spread.trace(), (&spread * &spread).trace());
             if mean < LEAST_BLOCK_FREEDOM {
@@ -169,34 +188,6 @@ pub fn noise_floor(dataset: &Dataset) -> f64 {
     let rows = dataset.frequencies();
     let stds: Vec<f64> = rows.map(|row| 100.0 * dataset.data[row].std).collect();
     root_mean_square(&stds)
-}
-
-/// Returns the data by mode, by configuration, and by kind.
-fn block_rows(dataset: &Dataset) -> Vec<(String, Vec<usize>)> {
-    let mut blocks: Vec<(String, Vec<usize>)> = Vec::new();
-    for (row, observable) in dataset.observables.iter().enumerate() {
-        let mut names = Vec::new();
-        match observable.kind {
-            ObservableKind::Frequency => {
-                names.push(format!("mode {}", observable.mode));
-                if dataset.arrangements.len() > 1 {
-                    names.push(dataset.arrangements[observable.configuration].label());
-                }
-            }
-            ObservableKind::Constant { .. } | ObservableKind::Ratio { .. } => {
-                names.push("shapes".to_string());
-            }
-            ObservableKind::Damping => names.push("damping".to_string()),
-            ObservableKind::Slope => names.push("along the decays".to_string()),
-        }
-        for name in names {
-            match blocks.iter_mut().find(|block| block.0 == name) {
-                Some(block) => block.1.push(row),
-                None => blocks.push((name, vec![row])),
-            }
-        }
-    }
-    blocks
 }
 
 /// Returns 100 (predicted - measured)/measured (%) from the residual of a frequency's logarithm.

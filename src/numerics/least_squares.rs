@@ -215,11 +215,10 @@ pub fn minimise<P: Problem>(
         if longest <= settings.step {
             return Some(at.ended(StopReason::SmallStep));
         }
-        idle_steps = if gain > settings.idle * at.cost {
-            0
-        } else {
-            idle_steps + 1
-        };
+        idle_steps += 1;
+        if gain > settings.idle * at.cost {
+            idle_steps = 0;
+        }
         if idle_steps >= settings.idle_steps {
             return Some(at.ended(StopReason::Idle));
         }

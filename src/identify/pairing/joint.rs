@@ -345,42 +345,38 @@ impl View {
     pub fn cost(&self, search: &JointSearch<'_>, pairs: &[(usize, usize)]) -> f64 {
         let seen = search.peaks.iter().flat_map(|peak| &peak.shape);
         let groups: BTreeSet<usize> = seen.map(|at| at.group).collect();
-        let costs = groups.into_iter();
-        costs
-            .map(|group| self.cost_of(search.peaks, pairs, group))
-            .sum()
-    }
-
-    fn cost_of(&self, peaks: &[MeasuredPeak], pairs: &[(usize, usize)], group: usize) -> f64 {
-        let (mut cost, mut signs) = (0.0, [0usize; 2]);
-        for &(peak, mode) in pairs {
-            let Some(shape) = self.shapes.get(mode - 1) else {
-                continue;
-            };
-            let seen = peaks[peak].shape.iter().filter(|at| at.group == group);
-            let seen: Vec<&ShapeAt> = seen.collect();
-            let products = Products::new(&seen, shape);
-            cost -= products.likeness();
-            // The size that the modes usually show at these places.
-            let squares = self.shapes.iter().flat_map(|shape| {
-                let sizes = seen.iter().map(|at| Self::at(shape, at.sensor, at.tap));
-                sizes.map(|size| size.powi(2))
-            });
-            let count = (self.shapes.len() * seen.len()).max(1) as f64;
-            let usual = (squares.sum::<f64>() / count).sqrt();
-            if seen.iter().all(|at| at.tap.is_some())
-                && let Some(positive) = products.sign(usual)
-            {
-                signs[usize::from(positive)] += 1;
+        let mut total = 0.0;
+        for group in groups {
+            let (mut cost, mut signs) = (0.0, [0usize; 2]);
+            for &(peak, mode) in pairs {
+                let Some(shape) = self.shapes.get(mode - 1) else {
+                    continue;
+                };
+                let seen = search.peaks[peak].shape.iter();
+                let seen: Vec<&ShapeAt> = seen.filter(|at| at.group == group).collect();
+                let products = Products::new(&seen, shape);
+                cost -= products.likeness();
+                // The size that the modes usually show at these places.
+                let squares = self.shapes.iter().flat_map(|shape| {
+                    let sizes = seen.iter().map(|at| Self::at(shape, at.sensor, at.tap));
+                    sizes.map(|size| size.powi(2))
+                });
+                let count = (self.shapes.len() * seen.len()).max(1) as f64;
+                let usual = (squares.sum::<f64>() / count).sqrt();
+                let is_tapped = seen.iter().all(|at| at.tap.is_some());
+                if let Some(positive) = products.sign(usual).filter(|_| is_tapped) {
+                    signs[usize::from(positive)] += 1;
+                }
             }
+            // Signs agree in all modes or, the sensor mounted the other way, in none. Either polarity is as likely as
+            // the other.
+            let (right, wrong) = ((2.0 * (1.0 - WRONG_SIGN)).ln(), (2.0 * WRONG_SIGN).ln());
+            let [no, yes] = signs.map(|count| count as f64);
+            let (a, b) = (yes * right + no * wrong, no * right + yes * wrong);
+            let most = a.max(b);
+            total += cost - (most + (0.5 * ((a - most).exp() + (b - most).exp())).ln());
         }
-        // Signs agree in all modes or, the sensor mounted the other way, in none. Either polarity is as likely as the
-        // other.
-        let [a, b] = [[signs[1], signs[0]], signs].map(|[right, wrong]| {
-            right as f64 * (2.0 * (1.0 - WRONG_SIGN)).ln() + wrong as f64 * (2.0 * WRONG_SIGN).ln()
-        });
-        let most = a.max(b);
-        cost - (most + (0.5 * ((a - most).exp() + (b - most).exp())).ln())
+        total
     }
 }
 

@@ -405,7 +405,7 @@ mod tests {
         );
     }
 
-    /// Whose frequency stays within its bounds is ranked by its damping, and not by noise.
+    /// A mode whose frequency stays within its bounds is ranked by its damping, and not by noise.
     #[test]
     fn regress_modes_that_rub_are_ranked_by_their_damping() {
         let little = change([80.0, 80.015], [0.002, 0.003]);

@@ -1,7 +1,7 @@
 //! The whole chain as one library call.
 //!
 //! ```text
-//! test.toml -> recordings -> taps -> spectra -> readings      (measure, per recording)
+//! test.toml -> recordings -> taps -> spectra -> readings      (measurement, per recording)
 //!           -> one list of numbered modes                      (modes)
 //!           -> joint, prediction, perturbation                 (identification)
 //! ```

@@ -209,6 +209,15 @@ pub(super) fn of_recording(recording: &Recording, source: &TapSource, taps: &Tap
     warnings
 }
 
+/// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
+/// each). Taps beyond it are left out of them.
+const MOST_KEPT: usize = 1 << 24;
+
+/// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
+const AFTER_TRIGGER: f64 = 5e-3;
+/// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
+const LEAST_SAMPLES: u64 = 64;
+
 /// Data that every step of one recording's measurement needs.
 struct Stage<'a> {
     recording: &'a Recording,
@@ -278,10 +287,8 @@ impl<'a> Stage<'a> {
 
     fn spectra(&self) -> Result<MeasuredSpectra, RecordingError> {
         let quiet = self.quiet()?;
-        let (rate, band) = (
-            self.recording.sample_rate(),
-            (self.lines.low, self.lines.high),
-        );
+        let rate = self.recording.sample_rate();
+        let band = (self.lines.low, self.lines.high);
         let noise: Vec<f64> = quiet
             .responses
             .iter()
@@ -436,18 +443,7 @@ impl<'a> Stage<'a> {
         }
         readings
     }
-}
 
-/// Bound on what is kept of all taps for readings without a hammer and for fits (values of 8 or 16 bytes
-/// each). Taps beyond it are left out of them.
-const MOST_KEPT: usize = 1 << 24;
-
-/// Without a hammer a decay begins this long after its trigger (s): hammer pulses are shorter.
-const AFTER_TRIGGER: f64 = 5e-3;
-/// Fewest samples of a decay that is fitted: some 16 lines for a mode and its surroundings.
-const LEAST_SAMPLES: u64 = 64;
-
-impl Stage<'_> {
     /// First frame of the decay after a tap.
     fn begin(&self, tap: &Tap) -> u64 {
         let after = (AFTER_TRIGGER * self.recording.sample_rate()).ceil();

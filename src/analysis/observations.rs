@@ -218,8 +218,8 @@ pub fn nominal(test: &TestDescription, analysis: &Analysis) -> Nominal {
     let estimate = found.and_then(|found| found.consistent.as_ref());
     // The estimate's stiffnesses are in units of the beam that was estimated with them.
     let joint_before = estimate.map(|estimate| {
-        let units = StiffnessUnits::of(&estimate.beam);
-        [estimate.joint.kx * units.kt, estimate.joint.ky * units.kr]
+        let joint = estimate.joint.in_si(&estimate.beam);
+        [joint.kt, joint.kr]
     });
     Nominal {
         joint_before: joint_before.filter(|joint| joint.iter().all(|k| *k > 0.0 && k.is_finite())),

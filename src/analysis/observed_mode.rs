@@ -61,11 +61,7 @@ impl<'a> ModeSeen<'a> {
         // Without a fit the reading is what there is.
         let read = Repeats {
             taps: Vec::new(),
-            by_noise: Observed {
-                value: reading.frequency,
-                std: reading.std.unwrap_or(f64::NAN),
-                freedom: None,
-            },
+            by_noise: normal(reading.frequency, reading.std.unwrap_or(f64::NAN)),
             scattered: false,
         };
         ModeSeen {
@@ -88,7 +84,7 @@ impl<'a> ModeSeen<'a> {
         self.frequency.observed()
     }
 
-    /// The plain data; `hardest`: whether what belongs to all taps of the recording stands here.
+    /// The plain data. With the `hardest` taps stands what belongs to all taps of the recording.
     pub fn observed(&self, hardest: bool) -> ObservedMode {
         let frequency = self.frequency();
         let shape = self.shape();
@@ -118,14 +114,13 @@ impl<'a> ModeSeen<'a> {
     }
 
     fn damping(&self) -> Option<Observed> {
-        if let Some(damping) = &self.damping {
-            return Some(damping.observed());
+        match &self.damping {
+            Some(damping) => Some(damping.observed()),
+            None => Some(normal(
+                self.reading.damping_ratio?,
+                self.reading.damping_std?,
+            )),
         }
-        Some(Observed {
-            value: self.reading.damping_ratio?,
-            std: self.reading.damping_std?,
-            freedom: None,
-        })
     }
 
     /// Number of time derivatives of the displacement that a sensor senses; `None` where it is not known.
@@ -176,22 +171,16 @@ impl<'a> ModeSeen<'a> {
         };
         let mut shape = Vec::with_capacity(all.len());
         for (sensor, amplitudes) in all.iter().enumerate() {
-            if sensor == reference {
-                shape.push(ShapeValue {
-                    sensor,
-                    value: 1.0,
-                    std: 0.0,
-                });
-                continue;
-            }
-            let repeats = Repeats::new(ratios(amplitudes, &all[reference]), None, 1.0);
-            if let Some(observed) = repeats.map(|repeats| repeats.observed()) {
-                shape.push(ShapeValue {
-                    sensor,
-                    value: observed.value,
-                    std: observed.std,
-                });
-            }
+            let ratio = match sensor == reference {
+                true => Some(normal(1.0, 0.0)),
+                false => Repeats::new(ratios(amplitudes, &all[reference]), None, 1.0)
+                    .map(|repeats| repeats.observed()),
+            };
+            shape.extend(ratio.map(|ratio| ShapeValue {
+                sensor,
+                value: ratio.value,
+                std: ratio.std,
+            }));
         }
         shape
     }
@@ -216,11 +205,10 @@ impl<'a> ModeSeen<'a> {
                 of_force = ForceNoise::of(noise, force, averages.taps)?;
             }
         }
-        Some(Observed {
-            value: found.value,
-            std: of_force.added_to(found.std, found.value),
-            freedom: None,
-        })
+        Some(normal(
+            found.value,
+            of_force.added_to(found.std, found.value),
+        ))
     }
 
     /// Median displacement amplitude at the decays' begin (m).
@@ -289,16 +277,8 @@ impl<'a> ModeSeen<'a> {
         });
         Some(DecayEnd {
             amplitude: displacement,
-            frequency: Observed {
-                value: reading.frequency,
-                std: reading.frequency_bound / BOUND,
-                freedom: None,
-            },
-            damping: Observed {
-                value: reading.damping_ratio,
-                std: reading.damping_bound / BOUND,
-                freedom: None,
-            },
+            frequency: normal(reading.frequency, reading.frequency_bound / BOUND),
+            damping: normal(reading.damping_ratio, reading.damping_bound / BOUND),
         })
     }
 }
@@ -337,6 +317,15 @@ const LEAST_TAPS: usize = 3;
 /// With more degrees of freedom than this Student's t is as good as normal: 2 % wider at 100.
 const KNOWN: f64 = 100.0;
 
+/// A value with the standard uncertainty of a normal distribution.
+fn normal(value: f64, std: f64) -> Observed {
+    Observed {
+        value,
+        std,
+        freedom: None,
+    }
+}
+
 /// One quantity by repeated taps.
 #[derive(Debug, Clone)]
 pub(super) struct Repeats {
@@ -367,11 +356,7 @@ impl Repeats {
                 let total: f64 = taps.iter().map(|tap| tap.2.powi(-2)).sum();
                 let sum: f64 = taps.iter().map(|tap| tap.1 * tap.2.powi(-2)).sum();
                 let mean = sum / total;
-                (total > 0.0 && mean.is_finite()).then(|| Observed {
-                    value: mean,
-                    std: inflation / total.sqrt(),
-                    freedom: None,
-                })?
+                (total > 0.0 && mean.is_finite()).then(|| normal(mean, inflation / total.sqrt()))?
             }
         };
         let mut repeats = Repeats {

@@ -16,7 +16,6 @@ use tapjoint_description::{
 use tapjoint_signal::recording::{
     ReadSettings, Recording, RecordingError, open_frequency_responses,
 };
-use tapjoint_signal::spectral::SpectralError;
 use tapjoint_signal::taps::{TapSettings, TapSource, find_taps};
 
 /// Reasons for which an analysis stops.
@@ -28,40 +27,9 @@ pub enum PipelineError {
     /// A recording could not be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// A band or block of the description that does not fit its recording.
-    #[error("{file}:{line}: {recording}: {problem}")]
-    Setting {
-        /// The description.
-        file: String,
-        /// Line of the description.
-        line: usize,
-        /// The recording.
-        recording: String,
-        /// The problem.
-        problem: SpectralError,
-    },
-    /// A channel of the description that its recording does not have, or cannot be told from others, or
-    /// cannot be scaled.
-    #[error("{file}:{line}: `{key}`: {problem}")]
-    Channel {
-        /// The description.
-        file: String,
-        /// Line of the description.
-        line: usize,
-        /// The key: `sensor[2].channel`.
-        key: String,
-        /// The problem, with the channels of the recording.
-        problem: Box<RecordingError>,
-    },
-    /// A description without sensors.
-    #[error(
-        "{file}: the recordings need at least one [[sensor]] with its channel, or there is no response \
-         to analyse"
-    )]
-    NoSensors {
-        /// The description.
-        file: String,
-    },
+    /// A description that does not fit its recordings. The message names file, line and key.
+    #[error("{0}")]
+    Description(String),
 }
 
 /// Opens and measures the recordings of a described test, `test_file`, which lie in `folder`.
@@ -107,9 +75,10 @@ fn measure_described(
         sample_rate: description.sample_rate,
     };
     if test.sensors.is_empty() {
-        return Err(PipelineError::NoSensors {
-            file: test_file.to_string(),
-        });
+        return Err(PipelineError::Description(format!(
+            "{test_file}: the recordings need at least one [[sensor]] with its channel, or there is no response to \
+             analyse"
+        )));
     }
     let mut recording = Recording::open(&path, &read)?;
     let wiring = described_wiring(test, &mut recording, test_file)?;
@@ -125,23 +94,15 @@ fn measure_described(
     }
     let finished = finish(recording.renamed(file), settings, &wiring);
     let mut result = finished.map_err(|error| match error {
-        PipelineError::Measure(MeasureError::Spectral { file, problem }) => {
-            PipelineError::Setting {
-                file: test_file.to_string(),
-                line: description.line,
-                recording: file,
-                problem,
-            }
+        PipelineError::Measure(problem @ MeasureError::Spectral { .. }) => {
+            PipelineError::Description(format!("{test_file}:{}: {problem}", description.line))
         }
         other => other,
     })?;
     result.conditions = conditions(test, description);
     for (channel, unit) in wiring.units() {
-        if let Some(info) = result
-            .channels
-            .get_mut(channel)
-            .filter(|info| info.unit.is_none())
-        {
+        let info = result.channels.get_mut(channel);
+        if let Some(info) = info.filter(|info| info.unit.is_none()) {
             info.unit.clone_from(unit);
         }
     }
@@ -175,12 +136,8 @@ fn described_wiring(
 
 /// The error about a channel, with its place in the description.
 fn at(problem: RecordingError, test_file: &str, place: &ChannelPlace) -> PipelineError {
-    PipelineError::Channel {
-        file: test_file.to_string(),
-        line: place.line,
-        key: place.key.clone(),
-        problem: Box::new(problem),
-    }
+    let (line, key) = (place.line, &place.key);
+    PipelineError::Description(format!("{test_file}:{line}: `{key}`: {problem}"))
 }
 
 /// Circumstances of a recording, as described.

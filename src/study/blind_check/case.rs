@@ -52,9 +52,9 @@ impl Class {
 /// One planted effect.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Planted {
-    /// Of the catalogue, with its parameters by name (SI).
+    /// An effect of the catalogue, with its parameters by name (SI).
     Catalogue(EffectId, BTreeMap<String, f64>),
-    /// Of a kind that the catalogue does not have.
+    /// Something of a kind that the catalogue does not have.
     OutOfCatalogue(String),
 }
 

@@ -238,7 +238,7 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// Of all cases for which `hit` says something.
+    /// Counts the cases for which `hit` says something.
     pub fn of<T>(
         cases: impl IntoIterator<Item = T>,
         mut hit: impl FnMut(T) -> Option<bool>,
@@ -383,7 +383,7 @@ pub fn shuffled(cases: &[Case], seed: u64) -> Vec<Case> {
         .collect()
 }
 
-/// The same answer to every case: one common factor on all frequencies.
+/// One answer to every case: one common factor on all frequencies.
 pub fn always_scale(cases: &[Case]) -> Vec<Case> {
     let answer = Answer {
         verdict: Some(Verdict::Named(vec![EffectId::Modulus])),

@@ -421,7 +421,7 @@ fn table_8() -> Rows {
     Ok(rows)
 }
 
-/// What table 9 may have changed by a percentage.
+/// Numbers that table 9 may have changed by a percentage.
 #[derive(Clone, Copy, PartialEq)]
 enum Changed {
     /// The frequencies of table 4.

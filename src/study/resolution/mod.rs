@@ -115,7 +115,7 @@ pub struct ResolutionSettings {
     pub readings: Vec<ReadBy>,
     /// Virtual tests for each block size. 1000: an rms error then has a standard error of 1 to 2 %.
     pub draws: usize,
-    /// Of these, so many are fitted too. 100: a fit takes longer than all else, and its errors of some
+    /// Number of them that are fitted too. 100: a fit takes longer than all else, and its errors of some
     /// hundredths of a line need no more digits.
     pub fit_draws: usize,
     /// Damping ratio of every mode. 0.003: a bolted steel beam.

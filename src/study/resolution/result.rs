@@ -45,7 +45,7 @@ impl From<WindowKind> for WindowName {
 pub struct ResolutionStudy {
     /// Virtual tests for each block size.
     pub draws: usize,
-    /// Of these, fitted.
+    /// Number of them that were fitted.
     pub fit_draws: usize,
     /// Seed.
     pub seed: u64,
@@ -165,7 +165,7 @@ pub struct FrequencyError {
     pub spread_lines: Option<f64>,
     /// Draws that had a reading.
     pub found: usize,
-    /// Of these, read by the method named; the others could be read on the line only.
+    /// Number of them that were read by the method named; the others could be read on the line only.
     pub own: usize,
     /// Draws.
     pub draws: usize,

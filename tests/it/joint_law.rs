@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use tapjoint::structure::effects::{JointLaw, JointLawKind};
 
 /// Moment, sliders and dissipation of a law.
-pub(crate) trait ClosedForm {
+pub(crate) trait LawInClosedForm {
     /// Moment over k0 (rad) on first loading, at a rotation (rad); `coefficient` is [`JointLaw::coefficient`].
     fn first_loading(&self, rotation: f64, coefficient: f64) -> f64;
 
@@ -21,7 +21,7 @@ pub(crate) trait ClosedForm {
     fn loss_factor(&self, relative_amplitude: f64) -> f64;
 }
 
-impl ClosedForm for JointLaw {
+impl LawInClosedForm for JointLaw {
     fn first_loading(&self, rotation: f64, coefficient: f64) -> f64 {
         rotation * (1.0 + coefficient * rotation.abs().powf(self.exponent))
     }

@@ -84,11 +84,10 @@ fn compare_swapped(
         let place = (first.lines.frequency(line) - second.lines.low) / second.lines.spacing;
         let index = (place + 1e-9).floor();
         let share = (place - index).max(0.0);
-        let Some([one, next]) = (index >= 0.0).then(|| [0, 1].map(|k| h2.get(index as usize + k)))
-        else {
+        if index < 0.0 {
             continue;
-        };
-        let y = match (one, next) {
+        }
+        let y = match (h2.get(index as usize), h2.get(index as usize + 1)) {
             (Some(one), Some(next)) => one * (1.0 - share) + next * share,
             (Some(one), None) if share < 1e-6 => *one,
             _ => continue,

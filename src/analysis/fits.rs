@@ -7,8 +7,8 @@
 use num_complex::Complex64;
 use tapjoint_signal::modal::amplitude::{Decay, KnownMode, follow_amplitude};
 use tapjoint_signal::modal::fit::{
-    Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector,
-    ModalData, ModeFit, PoleStart, TapForce, Unfit, fit_modes, modal_constants,
+    Accepted, Column, ExtraMode, FitError, FitSettings, FreeDecayCollector, ModalData, ModeFit,
+    PoleStart, TapForce, Unfit, fit_modes, modal_constants,
 };
 use tapjoint_signal::modal::polyreference::{
     BandSearch, MOST_DAMPING, PolyreferenceMode, PolyreferenceSettings, ResponseMatrix, all_modes,

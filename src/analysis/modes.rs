@@ -16,7 +16,7 @@ use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
 use tapjoint_identify::pairing::{
     MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, PeakStrength,
-    ShapeAt, is_plain,
+    ShapeAt,
 };
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::{median, times};
@@ -353,8 +353,8 @@ fn number_jointed(
         number_in_order(modes);
         return Vec::new();
     };
-    let text = "with them no joint explains the peaks as well; torsion, another direction of \
-                bending, the fixture or the suspension are the usual causes";
+    let text = "as modes they would make every joint fit worse; torsion, another direction of bending, the \
+                fixture or the suspension are the usual causes";
     let mut warnings = apply_numbers(modes, &free, &pairing.chosen.numbers, text);
     warnings.extend(missing(&pairing.chosen.missing));
     warnings.extend(ambiguous(&pairing, &peaks));
@@ -446,22 +446,17 @@ fn missing(modes: &[MissingMode]) -> Option<Warning> {
         ));
     }
     let text = format!(
-        "no peak was taken for {}; the peaks above keep the numbers that the beam gives them; tap \
-         and measure elsewhere, or from a lower frequency on, to see it",
+        "no peak was taken for {}; higher peaks keep the mode numbers of the model; tap and measure elsewhere, or from a \
+         lower frequency on, to see it",
         list.join(", ")
     );
     (!list.is_empty()).then(|| Warning::new("missing-mode", text))
 }
 
-/// The warning about another numbering that explains the peaks comparably.
+/// The warning about the most probable other numbering, with the peaks that it numbers otherwise.
 fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     let other = pairing.others.first()?;
     let chosen = &pairing.chosen;
-    let kept = if is_plain(&chosen.numbers) {
-        "kept in ascending order"
-    } else {
-        "taken as the most probable"
-    };
     let times = chosen.odds / other.odds;
     let odds = if (0.95..1.05).contains(&times) {
         "as probable".to_owned()
@@ -470,24 +465,34 @@ fn ambiguous(pairing: &Pairing, peaks: &[MeasuredPeak]) -> Option<Warning> {
     } else {
         format!("{:.1} times less probable", 1.0 / times)
     };
+    let mut changes = Vec::new();
+    for ((peak, now), then) in peaks.iter().zip(&chosen.numbers).zip(&other.numbers) {
+        if now != then {
+            let [now, then] = [now, then].map(|number| match number {
+                Some(number) => format!("mode {number}"),
+                None => "no mode".to_owned(),
+            });
+            changes.push(format!(
+                "{:.2} Hz as {then} instead of {now}",
+                peak.frequency
+            ));
+        }
+    }
+    let more = changes.len().saturating_sub(MOST_CHANGES);
+    changes.truncate(MOST_CHANGES);
+    if more > 0 {
+        changes.push(format!("{more} more"));
+    }
     let text = format!(
-        "which peak is which mode is not certain: {} is {kept}, but {} explains the peaks comparably \
-         ({odds}); another sensor or tap position, or more modes, would decide",
-        words(chosen, peaks),
-        words(other, peaks),
+        "the mode numbers are not certain: another numbering is {odds}, with {}; another sensor or tap position, or more \
+         modes, would decide",
+        changes.join(", ")
     );
     Some(Warning::new("ambiguous-pairing", text))
 }
 
-/// "(1: 17.00 Hz, 3: 335.60 Hz, none: 50.00 Hz)".
-fn words(numbering: &Numbering, peaks: &[MeasuredPeak]) -> String {
-    let mut list = Vec::with_capacity(peaks.len());
-    for (number, peak) in numbering.numbers.iter().zip(peaks) {
-        let number = number.map_or("none".to_string(), |number| number.to_string());
-        list.push(format!("{number}: {:.2} Hz", peak.frequency));
-    }
-    format!("({})", list.join(", "))
-}
+/// Peaks that a warning about the numbering lists.
+const MOST_CHANGES: usize = 4;
 
 /// Numbers the readings of all recordings with other fastened masses than the first, by the frequencies to
 /// which these masses take the reference configuration's modes. Where that is not known they lose the numbers

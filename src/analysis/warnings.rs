@@ -79,10 +79,10 @@ impl Warning {
         let advice = match window {
             Window::Exponential { decay } => format!(
                 "an exponential window with a decay of {decay:.3} 1/s was applied to force and response, \
-                 and taken out of every damping read from the spectra (fits take the decays without it); taps \
-                 farther apart need none"
+                 and taken out of every damping read from the spectra (fits take the decays without it); a longer \
+                 block, or taps farther apart where the block reaches to the next tap, need no window"
             ),
-            _ => "readings on lines suffer from it; leave the window to the program, or set the taps farther apart"
+            _ => "readings on lines suffer from it; leave the window to the program, or give a longer block"
                 .to_owned(),
         };
         let text = format!(
@@ -192,10 +192,8 @@ pub(super) fn of_estimate(
             Doubt::Closure { closure } => {
                 let percent = 100.0 * closure;
                 let text = format!(
-                    "the pair regression does not satisfy its own frequency equation: the product it \
-                     implies differs from the product of its estimates by {percent:+.0} %; the eliminated product \
-                     is left free by the method, and an error of this size means that the stiffnesses are \
-                     not to be trusted singly"
+                    "the pair regression fails its own check: the product of the compliances that it finds differs \
+                     by {percent:+.0} % from the product of its two estimates; do not use its stiffnesses"
                 );
                 Warning::about_pairs("closure", text)
             }
@@ -327,9 +325,8 @@ fn misfit(found: &ConsistentEstimate) -> Option<String> {
     let intervals = found.quantities.iter().filter_map(two_intervals);
     let intervals: Vec<String> = intervals.map(|words| format!("; {words}")).collect();
     Some(format!(
-        "the model misses the frequencies by {} % rms; uncertainties that would allow that are {} times the stated \
-         ones (goodness of fit {}); std and 95 % limits stand for the frequencies' uncertainty alone, and {sought} is \
-         not known that well{}",
+        "the model misses the frequencies by {} % rms, {} times as much as their uncertainty allows (goodness of fit \
+         {}); std and limits from the frequencies' uncertainty alone are too small for {sought}{}",
         two_digits(percent),
         times(factor),
         chance(goodness.probability.unwrap_or(0.0)),
@@ -374,14 +371,14 @@ fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     let own = two_digits(PERCENT_95 * std / value.abs());
     let scaled = within(50.0 * (high - low) / value.abs());
     Some(format!(
-        "95 % interval of {name} from the frequencies' uncertainty alone \u{b1}{own} %, scaled by the misfit {scaled}"
+        "95 % interval of {name}: \u{b1}{own} % from the frequencies' uncertainty alone, {scaled} with the misfit"
     ))
 }
 
 /// Words for the half width (%) of an interval; one beyond the value itself determines nothing.
 fn within(percent: f64) -> String {
     match percent > 100.0 {
-        true => "not determined (beyond \u{b1}100 %)".to_owned(),
+        true => "wider than \u{b1}100 %".to_owned(),
         false => format!("\u{b1}{} %", two_digits(percent)),
     }
 }

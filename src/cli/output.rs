@@ -22,7 +22,9 @@ const PREFIX: &str = ".tapjoint-";
 fn not_writable(path: &Path, folder: &Path, cause: &io::Error) -> anyhow::Error {
     // `tempfile` adds the name of the temporary file, which tells the user nothing.
     let text = cause.to_string();
-    let cause = text.split_once(" at path ").map_or(&*text, |(cause, _)| cause);
+    let cause = text
+        .split_once(" at path ")
+        .map_or(&*text, |(cause, _)| cause);
     let (path, folder) = (path.display(), folder.display());
     anyhow!(
         "{path}: cannot be written: {cause}; choose another place, or make {folder} a folder that you may write to"

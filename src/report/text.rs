@@ -96,7 +96,7 @@ fn estimate(document: &Document) -> String {
     if let Some(closure) = found.pairs.as_ref().and_then(|pairs| pairs.closure) {
         let percent = signed_percent(Some(100.0 * closure));
         let words = format!(
-            "From modes {}. The pair regression contradicts itself by {percent} % (0: not at all).",
+            "From modes {}. Self-check of the pair regression (closure): {percent} %; 0 is perfect.",
             listed(&found.modes_used)
         );
         text.push_str(&wrapped(&words, 0));

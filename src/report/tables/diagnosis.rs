@@ -65,21 +65,20 @@ fn note(document: &Document, gap: &GapSection) -> String {
     let (one_joint, drift) = match !document.has_joint() || recordings.len() < 2 {
         true => ("", ""),
         false => (
-            "there is one joint for all recordings, and ",
-            "lets the joint and the temperature differ a little between recordings (so does the described model on \
-             withheld ones), and ",
+            "It has one joint for all recordings. ",
+            "joint and temperature differ a little between recordings, and ",
         ),
     };
     let part = gap
         .fitted_modes
         .map_or_else(String::new, |last| format!(" (modes up to {last})"));
     let mut note = format!(
-        "Fitted, withheld: rms errors of the frequencies that are left; the described model leaves {described} \
-         %{withheld}. In the described model {one_joint}geometry, shear and masses are exactly as described. Every \
-         hypothesis, none included, {drift}lets these and sensors' inertias move within their uncertainty, and so \
-         usually leaves less. The fit weighs each reading by its uncertainty, so a plain rms may also be larger. All are \
-         errors of fits to the readings that take part in the diagnosis{part}; the estimate weighs all modes and may \
-         leave others. Size \u{b1} one standard deviation."
+        "Fitted, withheld: rms errors that are left at the frequencies that were fitted, and at those withheld from the \
+         fit. The described model leaves {described} %{withheld}. {one_joint}Its geometry, shear and masses are exactly as \
+         described. Every hypothesis, also none, lets {drift}geometry, masses and the inertia of sensors move within their \
+         uncertainty. So it usually leaves less. The fit weighs each reading by its uncertainty, so a plain rms may also be \
+         larger. The errors are those of the diagnosis{part}. The estimate uses all modes and can leave other errors. Size \
+         \u{b1} one standard deviation."
     );
     if let Some(scale) = gap.baselines.iter().find(|one| one.name == Baseline::Scale) {
         let withheld = scale.holdout_after.map_or_else(String::new, |after| {
@@ -112,7 +111,7 @@ pub fn next_tests(document: &Document) -> Option<Table> {
     let gap = document.gap.as_ref()?;
     let premise = match gap.verdict {
         Verdict::Unknown => EQUALLY_LIKELY,
-        _ => "by the hypotheses above",
+        _ => "with the probabilities above",
     };
     let rows = gap.next_test.iter().map(|test| {
         let unpredicted = not_predicted(test, "; could not be predicted for ");
@@ -128,8 +127,9 @@ pub fn next_tests(document: &Document) -> Option<Table> {
         ]
     });
     let note = format!(
-        "Information about the cause that the test is expected to bring at least, {premise}; effort in \
-         multiples of reading again what is recorded. Ranked by one over the other."
+        "Information: the least that the test is expected to tell about the cause, {premise}. One bit tells two equally \
+         probable causes apart. Effort: reading the existing recordings again is 1. The test with the most information \
+         for its effort stands first."
     );
     (!gap.next_test.is_empty()).then(|| Table::of("What to do next", rows, note))
 }

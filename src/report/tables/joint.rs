@@ -134,16 +134,13 @@ pub fn parameters(document: &Document) -> Option<Table> {
     let stated = !misses || list.iter().any(|p| p.value.std.is_some());
     let mut rows = Vec::new();
     for parameter in &list {
-        let [value, std, mut low, mut high, unit] = parameter.written();
+        let [value, std, low, high, unit] = parameter.written();
         let name = parameter.symbol.to_owned();
         let meaning = parameter.meaning.to_owned();
         let scaled = parameter.written_scaled();
         let limits = parameter.written_scaled_limits();
-        let [from, to] = limits.unwrap_or_else(|| [MISSING.to_owned(), MISSING.to_owned()]);
-        // Without any uncertainty of the frequencies these are the limits that there are.
-        if !stated {
-            (low, high) = (from.clone(), to.clone());
-        }
+        // Without a misfit the readings give the limits that there are.
+        let [from, to] = limits.unwrap_or_else(|| [low.clone(), high.clone()]);
         rows.push(vec![
             name, meaning, value, unit, std, scaled, low, high, from, to,
         ]);
@@ -151,13 +148,13 @@ pub fn parameters(document: &Document) -> Option<Table> {
     let scaled_note = match (misses, stated) {
         (false, _) => "",
         (true, true) => {
-            " Std and limits stand for the frequencies' uncertainty alone; the model misses the \
-             frequencies by more than their uncertainty, and the scaled std takes the misfit for it, and so do the \
-             scaled 95 % limits, by Student's distribution."
+            " The model misses the frequencies by more than their uncertainty. So the scaled std and the 95 % limits take \
+             the misfit for the uncertainty, by Student's distribution. Std and the limits from the readings stand for \
+             the frequencies' uncertainty alone."
         }
         (true, false) => {
-            " Not every frequency has an uncertainty, so that all weigh alike: the scaled std takes the \
-             misfit for it, and so do the 95 % limits, by Student's distribution."
+            " Not every frequency has an uncertainty, so all weigh alike. The scaled std and the 95 % limits take the \
+             misfit for the uncertainty, by Student's distribution."
         }
     };
     let heads = [
@@ -167,10 +164,10 @@ pub fn parameters(document: &Document) -> Option<Table> {
         words("Unit", ""),
         number("Std", ""),
         number("Scaled std", ""),
+        page_number("Readings low", ""),
+        page_number("Readings high", ""),
         number("95 % low", ""),
         number("95 % high", ""),
-        page_number("Scaled low", ""),
-        page_number("Scaled high", ""),
     ];
     let caption = format!("Estimated parameters, method: {}", estimate.method.name());
     let note = format!(
@@ -180,8 +177,8 @@ pub fn parameters(document: &Document) -> Option<Table> {
     );
     let table = Table::with_heads(caption, heads, rows, note);
     Some(match (misses, stated) {
-        (false, _) => table.without_columns(&["Scaled std", "Scaled low", "Scaled high"]),
-        (true, false) => table.without_columns(&["Scaled low", "Scaled high"]),
+        (false, _) => table.without_columns(&["Scaled std", "Readings low", "Readings high"]),
+        (true, false) => table.without_columns(&["Readings low", "Readings high"]),
         (true, true) => table,
     })
 }
@@ -377,9 +374,9 @@ pub fn averages(document: &Document) -> Option<Table> {
             number("Kx off by (%)", optional(row.kx_percent, 3)),
             number("Ky off by (%)", optional(row.ky_percent, 3)),
             number("Kz off by (%)", optional(row.kz_percent, 3)),
-            number("mean of Kx (%)", optional(row.kx_of_mean_percent, 3)),
-            number("mean of Ky (%)", optional(row.ky_of_mean_percent, 3)),
-            number("mean of Kz (%)", optional(row.kz_of_mean_percent, 3)),
+            number("mean Kx off by (%)", optional(row.kx_of_mean_percent, 3)),
+            number("mean Ky off by (%)", optional(row.ky_of_mean_percent, 3)),
+            number("mean Kz off by (%)", optional(row.kz_of_mean_percent, 3)),
         ]
     });
     let note = "Off by: mean size of the changes of the table above, up and down. Mean of: how far the \
@@ -499,7 +496,7 @@ pub fn sensitivity(document: &Document) -> Option<Table> {
             number("Mode", row.mode.to_string()),
             by_method(span.method, &methods),
             number("Bound (Hz)", significant(row.half_line, 3)),
-            number("Reading (%)", or_missing(percent.map(bound_percent))),
+            number("Bound (%)", or_missing(percent.map(bound_percent))),
         ];
         let moves = [row.kx_percent, row.ky_percent, row.kz_percent];
         for (name, percent) in names.iter().zip(moves) {

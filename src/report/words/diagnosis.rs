@@ -48,9 +48,12 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
         .modes
         .iter()
         .max_by(|a, b| a.z.abs().total_cmp(&b.z.abs()))?;
+    let places = match place.probability.unknown > 0.95 {
+        true => "The place of the cause is not known.".to_owned(),
+        false => format!("Where, if something is missing: {}.", listed.join(", ")),
+    };
     Some(format!(
-        "Where, if something is missing: {}. Largest misfit for its uncertainty: mode {} in {}, {} % ({} standard deviations).",
-        listed.join(", "),
+        "{places} The described model misses mode {} in {} most, for its uncertainty: {} % ({} standard deviations).",
         worst.mode,
         place_of(worst),
         change(worst.error_percent, 3),
@@ -139,20 +142,24 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     );
     // What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of
     // the errors.
-    let remains = gap
-        .result(&Hypothesis::None)
-        .and_then(|none| none.gap_after);
-    if let Some(remains) = remains.filter(|remains| *remains < 0.5 * found.gap_before) {
-        let drift = match has_joint {
-            true => "a joint that drifts and ",
-            false => "",
-        };
-        let remains = left(Some(remains), gap.noise_floor);
-        text.push_str(&format!(", where {drift}the tolerances leave {remains} %"));
-    }
+    let none = gap.result(&Hypothesis::None);
+    let remains = none
+        .and_then(|none| none.gap_after)
+        .filter(|remains| *remains < 0.5 * found.gap_before);
+    let without = remains.map_or_else(String::new, |remains| {
+        format!(
+            " Without it, {}the tolerances of the description leave {} %.",
+            if has_joint {
+                "a drift of the joint and "
+            } else {
+                ""
+            },
+            left(Some(remains), gap.noise_floor)
+        )
+    });
     if let Some((before, after)) = found.holdout_before.zip(found.holdout_after) {
         text.push_str(&format!(
-            "; on frequencies that took no part from {} to {} %",
+            "; on withheld frequencies from {} to {} %",
             percent(Some(before)),
             left(Some(after), gap.noise_floor)
         ));
@@ -174,9 +181,10 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
     let outside = gap.noise_floor.filter(|floor| found.gap_before < *floor);
     Some(match outside {
         Some(_) => format!(
-            "{text}. Their uncertainty is {floor} %: the cause shows elsewhere, not in the mean frequencies."
+            "{text}.{without} The frequencies are uncertain by {floor} %: the cause shows elsewhere, not in the mean \
+             frequencies."
         ),
-        None => format!("{text}; their own uncertainty is {floor} %."),
+        None => format!("{text}.{without} The frequencies are uncertain by {floor} %."),
     })
 }
 
@@ -199,7 +207,8 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             .total_cmp(&(b.percent_per_fold / b.std).abs())
     })?;
     let seen = format!(
-        "Along the decays frequencies change with amplitude (mode {} in {} by {} % per factor e)",
+        "Along the decays frequencies change with amplitude: mode {} in {} by {} % when the amplitude grows by a factor of e \
+         (2.7)",
         largest.mode,
         largest.recording,
         change(largest.percent_per_fold, 3)
@@ -207,10 +216,10 @@ fn along_decays(gap: &GapSection) -> Option<String> {
     let Some(effect) = found.effect else {
         return Some(match found.enough {
             true => format!(
-                "{seen}, but not as a joint whose stiffness depends on the amplitude would make them."
+                "{seen}. A joint whose stiffness depends on the amplitude would change them in another way."
             ),
             false => {
-                format!("{seen}; one frequency alone cannot tell whether the joint causes that.")
+                format!("{seen}. One frequency alone cannot tell whether the joint causes that.")
             }
         });
     };
@@ -234,11 +243,10 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             100.0 * found.ratio_std
         )
     } else {
-        "modes that hardly turn it change too, so that its rotation alone does not say by how much"
-            .to_owned()
+        "modes that hardly rotate the joint change too, so the size stays open".to_owned()
     };
     Some(format!(
-        "{seen}: the joint {} ({}); {size}. This follows from the decays alone and explains \
+        "{seen}. The joint {} as the amplitude grows ({}); {size}. This follows from the decays alone and explains \
          no misfit of the frequencies.",
         found.direction(),
         effect.name()
@@ -261,7 +269,7 @@ fn price(gap: &GapSection) -> Option<String> {
     let moves = parts.join(", ");
     Some(match joint(found, true) {
         Some(joint) => {
-            format!("With it the joint is {joint}: {moves} against the joint without it.")
+            format!("With it the joint is {joint}. Against the joint without it: {moves}.")
         }
         None => format!("Adding it moves the joint: {moves}."),
     })
@@ -382,8 +390,7 @@ fn unknown(gap: &GapSection, has_joint: bool) -> String {
     });
     let likeness = found.map_or_else(String::new, |found| {
         format!(
-            " A crack and a mass would explain it ({}), and so would any change that is spread over a part of \
-             the beam: look there first.",
+            " A crack and a mass would explain it ({}). So would any change that is spread over a part of the beam.",
             sizes(found)
         )
     });
@@ -393,8 +400,8 @@ fn unknown(gap: &GapSection, has_joint: bool) -> String {
         "what is estimated"
     };
     format!(
-        "Something is missing in the model, and nothing in the catalogue explains it alone: do not trust \
-         {estimated} beyond the misfit.{likeness}"
+        "Something is missing in the model, and nothing in the catalogue explains it alone. Do not use {estimated} \
+         before the cause is found: check the description and the mode numbers first.{likeness}"
     )
 }
 
@@ -403,7 +410,7 @@ fn no_gap(gap: &GapSection) -> String {
     let first = gap.hypotheses.first();
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
-            " No effect is established: that takes odds of {:.0} to 1 against none.",
+            " No effect is established: its odds against none would have to be {:.0} to 1.",
             DETECTED.exp()
         ),
         None => String::new(),
@@ -412,7 +419,7 @@ fn no_gap(gap: &GapSection) -> String {
     let misfit = of_none.and_then(|none| none.goodness_of_fit.filter(|p| *p < MISFIT));
     match misfit {
         Some(p) => format!(
-            "No gap is established: the described model misses the frequencies by more than their uncertainty, as \
+            "No gap is established. The described model misses the frequencies by more than their uncertainty, as \
              chance would in {} of tests, but nothing else explains them better.{open}",
             probability(p)
         ),
@@ -425,7 +432,7 @@ fn no_gap(gap: &GapSection) -> String {
             let moved =
                 left_over.filter(|(before, after, floor)| *before > 2.0 * after.max(*floor));
             let moved = moved.map_or_else(String::new, |(before, after, _)| format!(
-                ", once joint, geometry and masses may differ from the description within their tolerances, and between \
+                " if joint, geometry and masses may differ from the description within their tolerances, and between \
                  recordings (errors {} %; exactly as described {} %)",
                 left(Some(after), floor),
                 percent(Some(before))
@@ -534,7 +541,7 @@ pub(crate) fn missing(verdict: &Verdict, there: bool) -> String {
         }
     }
     match verdict {
-        Verdict::NoGap => "no gap is established".to_owned(),
+        Verdict::NoGap => "no gap found".to_owned(),
         Verdict::Named(_) => format!("missing in it: {}", listed(&names, "and")),
         Verdict::Group(_) => format!("missing in it: one of {}", listed(&names, "or")),
         Verdict::Set(_) if names.len() == 1 => format!("perhaps missing in it: {}", names[0]),
@@ -542,7 +549,9 @@ pub(crate) fn missing(verdict: &Verdict, there: bool) -> String {
             "these data do not decide what is missing in it: {}",
             listed(&names, "or")
         ),
-        Verdict::Unknown => "missing in it: something unknown".to_owned(),
+        Verdict::Unknown => {
+            "missing in it: something unknown, so do not use the estimate".to_owned()
+        }
         _ if there => "something is missing in it, and these data cannot say what".to_owned(),
         _ => "not enough data to tell whether something is missing in it".to_owned(),
     }
@@ -588,10 +597,10 @@ fn next_test(gap: &GapSection) -> Option<String> {
         return Some(format!("{purpose}: {}.", test.action));
     }
     Some(format!(
-        "{purpose}: {} (about {:.2} bit{premise}; it tells {} apart{}).",
+        "{purpose}: {}. It separates {} (about {:.2} bit{premise}{}).",
         test.action,
+        listed(&test.separates, "and"),
         test.expected_information,
-        test.separates.join(", "),
         not_predicted(test, "; it could not be predicted for ")
     ))
 }
@@ -610,7 +619,7 @@ pub(crate) fn not_predicted(test: &NextTest, lead: &str) -> String {
 }
 
 /// Premise of the information of a test where nothing explains the readings: the ranking then says little.
-pub(crate) const EQUALLY_LIKELY: &str = "taking the catalogue's effects as equally likely";
+pub(crate) const EQUALLY_LIKELY: &str = "if all effects of the catalogue are equally probable";
 
 /// Hypotheses less probable than this are not listed.
 pub(crate) const LEAST_PROBABILITY: f64 = 0.005;

@@ -28,6 +28,9 @@ pub fn brief(document: &Document) -> Vec<(&'static str, String)> {
         ))
     });
     let warnings = match document.main_warnings().count() {
+        0 if document.modes.is_none() => {
+            "no warnings about the files; the spectra are not checked here".to_owned()
+        }
         0 => "no warnings".to_owned(),
         1 => "1 warning, see above".to_owned(),
         count => format!("{count} warnings, see above"),
@@ -108,7 +111,12 @@ fn joint(document: &Document) -> Option<String> {
         return no_estimate(document);
     };
     let physical = physical(estimate, with_bounds);
-    (!physical.is_empty()).then(|| physical.join(", "))
+    let untested = estimate.misfit.as_ref();
+    let untested = match untested.is_some_and(|misfit| misfit.degrees_of_freedom == 0) {
+        true => "; untested: as many unknowns as frequencies",
+        false => "",
+    };
+    (!physical.is_empty()).then(|| physical.join(", ") + untested)
 }
 
 /// The parameters that have a unit, in words.

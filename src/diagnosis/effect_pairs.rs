@@ -215,10 +215,26 @@ impl<'a> PairSearch<'a> {
         };
         let [own, one, other] = [&fit, first, second].map(|fit| fit.best.optimum.objective);
         // A pair that explains less than one of its members has not reached its optimum.
-        if own > one.min(other)
-            || fit.log_evidence < alone.log_evidence + SECOND_EFFECT
-            || !improves(self.dataset, alone, &fit)
-        {
+        if own > one.min(other) || fit.log_evidence < alone.log_evidence + SECOND_EFFECT {
+            return None;
+        }
+        // The hold-out data are predicted better, or at least do not refute the fit: two effects leave more open than one
+        // does. Without hold-out data each mode is predicted better from the others.
+        let dataset = self.dataset;
+        let [before, after] = [alone, &fit].map(|fit| HoldoutErrors::new(dataset, fit));
+        let improves = match before.zip(after) {
+            Some((before, after)) => {
+                after.rms() < before.rms()
+                    || holdout_goodness(dataset, &fit, refutes_by_holdout)
+                        .is_some_and(|p| !refutes_by_holdout(p))
+            }
+            None => {
+                let [before, after] =
+                    [alone, &fit].map(|fit| Residuals::new(dataset, fit)?.left_out_rms(dataset));
+                (before.zip(after)).is_some_and(|(before, after)| after < before)
+            }
+        };
+        if !improves {
             return None;
         }
         let effects = fit.effects.iter().map(|one| one.effect).collect();
@@ -310,22 +326,6 @@ fn distinct(found: Vec<Candidate>) -> Vec<Candidate> {
 /// Returns whether neither the fitted data refute a fit nor the hold-out data.
 pub fn stands(dataset: &Dataset, fit: &Fit) -> bool {
     GoodnessOfFit::new(dataset, fit).is_some_and(|one| one.refuting_p_value().is_none())
-}
-
-/// Returns whether the hold-out data are predicted better, or at least do not refute the fit: two effects leave
-/// more open than one does. Without hold-out data, whether each mode is predicted better from the others.
-fn improves(dataset: &Dataset, before: &Fit, after: &Fit) -> bool {
-    let [errors_before, errors_after] = [before, after].map(|fit| HoldoutErrors::new(dataset, fit));
-    if let (Some(errors_before), Some(errors_after)) = (errors_before, errors_after) {
-        return errors_after.rms() < errors_before.rms()
-            || holdout_goodness(dataset, after, refutes_by_holdout)
-                .is_some_and(|p| !refutes_by_holdout(p));
-    }
-    let [before, after] =
-        [before, after].map(|fit| Residuals::new(dataset, fit)?.left_out_rms(dataset));
-    before
-        .zip(after)
-        .is_some_and(|(before, after)| after < before)
 }
 
 #[cfg(test)]

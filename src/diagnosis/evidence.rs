@@ -125,8 +125,10 @@ pub fn over_drifts(
         // The linearised optimum with the effects kept as they are. The other parameters are so nearly linear that
         // another spread of the drift moves them as the linearised model predicts; sizes and locations are not.
         let mut held = own.clone();
-        for k in layout.joint.len()..layout.first_nuisance() {
-            held[k] = Prior::held(optimum.parameters[k]);
+        let effects = layout.joint.len()..layout.first_nuisance();
+        let values = &optimum.parameters[effects.clone()];
+        for (prior, value) in held[effects].iter_mut().zip(values) {
+            *prior = Prior::held(*value);
         }
         let moved = linear_optimum(&dataset.data, &held, optimum).map_or_else(
             || optimum.clone(),

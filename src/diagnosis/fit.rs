@@ -10,7 +10,7 @@ use crate::evidence::{
 use crate::fixture::{log_unread, with_peaks};
 use crate::forward::Forward;
 use crate::optimum::{Model, Optimum, maximise, objective_at};
-use crate::parameters::{CandidateEffect, Layout, LocationKind, LocationRange, Prior};
+use crate::parameters::{CandidateEffect, LocationKind, LocationRange, Prior};
 use crate::settings::{FOLLOWED_SHARE, LOCATED, SIZE_DETECTED};
 use crate::structure::COUPLING;
 use tapjoint_beam::effects::EffectId;
@@ -456,17 +456,35 @@ impl CoarseModel {
 
     /// Returns optima from the starts of least misfit, the last effect at several sizes and locations; the best first.
     fn optima(&self, forward: &Forward<'_>, bases: &[Vec<f64>], tried: usize) -> Vec<Start> {
-        let effects = &forward.layout.effects;
+        let layout = &forward.layout;
+        let candidate = &layout.effects[layout.effects.len() - 1];
+        let (at, size) = (layout.last_size(), &candidate.size);
+        let sizes = START_SIZES.iter().flat_map(|share| [*share, -share]);
+        let sizes = sizes.map(|share| size.neutral + share * size.scale);
+        let sizes = sizes.filter(|value| (size.low..=size.high).contains(value));
+        let locations = candidate.location.map_or(vec![None], |range| {
+            let (low, high) = range.searched_bounds();
+            let shares = (0..START_LOCATIONS).map(|k| (high - low) * (k as f64 + 0.5));
+            shares
+                .map(|share| Some(low + share / START_LOCATIONS as f64))
+                .collect()
+        });
         let mut starts = Vec::new();
         for base in bases {
-            for parameters in with_last(&forward.layout, base) {
-                if let Some(objective) = self.objective(forward, &parameters) {
-                    let effects = effects.clone();
-                    starts.push(Start {
-                        effects,
-                        parameters,
-                        objective,
-                    });
+            for size in sizes.clone() {
+                for location in &locations {
+                    let mut parameters = base.clone();
+                    parameters[at] = size;
+                    if let Some(location) = location {
+                        parameters[at + 1] = *location;
+                    }
+                    if let Some(objective) = self.objective(forward, &parameters) {
+                        starts.push(Start {
+                            effects: layout.effects.clone(),
+                            parameters,
+                            objective,
+                        });
+                    }
                 }
             }
         }
@@ -474,31 +492,6 @@ impl CoarseModel {
         let optima = starts.iter().filter_map(|start| self.continued(start));
         least(optima.collect(), tried)
     }
-}
-
-/// Returns the parameters with sizes and locations of the last effect.
-fn with_last(layout: &Layout, base: &[f64]) -> Vec<Vec<f64>> {
-    let candidate = &layout.effects[layout.effects.len() - 1];
-    let (at, size) = (layout.last_size(), &candidate.size);
-    let mut starts = Vec::new();
-    for share in START_SIZES.iter().flat_map(|share| [*share, -share]) {
-        let value = size.neutral + share * size.scale;
-        if !(size.low..=size.high).contains(&value) {
-            continue;
-        }
-        let mut start = base.to_vec();
-        start[at] = value;
-        let Some(range) = candidate.location else {
-            starts.push(start);
-            continue;
-        };
-        let (low, high) = range.searched_bounds();
-        for k in 0..START_LOCATIONS {
-            start[at + 1] = low + (high - low) * (k as f64 + 0.5) / START_LOCATIONS as f64;
-            starts.push(start.clone());
-        }
-    }
-    starts
 }
 
 /// Fits an effect by multi-start search, where that promises more than the fit `found` so far.

@@ -432,9 +432,13 @@ impl Recording {
             })
             .filter(|(similarity, _)| *similarity >= NEAR)
             .max_by(|a, b| a.0.total_cmp(&b.0));
-        let proposal = nearest.map_or(String::new(), |(_, name)| {
-            format!("; did you mean \"{name}\"?")
-        });
+        let number = lower.parse().ok();
+        let number = number.filter(|number| (1..=self.channels.len()).contains(number));
+        let proposal = match (nearest, number) {
+            (Some((_, name)), _) => format!("; did you mean \"{name}\"?"),
+            (None, Some(number)) => format!("; did you mean the number, channel = {number}?"),
+            (None, None) => String::new(),
+        };
         Err(self.no_channel(&format!("named \"{}\"{proposal}", name.trim())))
     }
 

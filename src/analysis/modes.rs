@@ -15,8 +15,7 @@ use tapjoint_beam::{Assembly, JointStiffness, natural_frequencies};
 use tapjoint_description::{FitParameter, MeasuredFrequencies, TestDescription};
 use tapjoint_identify::consistent::{FrequencyModel, Parameter};
 use tapjoint_identify::pairing::{
-    MeasuredPeak, MissingCause, MissingMode, Numbering, Pairing, PairingSettings, PeakStrength,
-    ShapeAt,
+    MeasuredPeak, MissingCause, MissingMode, Pairing, PairingSettings, PeakStrength, ShapeAt,
 };
 use tapjoint_identify::{FREQUENCY_FLOOR, WeightedPeak, pair_by_ratio, pair_modes};
 use tapjoint_numerics::stats::{median, times};

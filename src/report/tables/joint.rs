@@ -3,8 +3,8 @@
 use super::{Cell, Table, listed, mode_of, number, page_number, words};
 use crate::document::{Document, EstimateMethod, EstimateSection, SensitivitySection, Uncertain};
 use crate::format::{
-    MISSING, RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix,
-    rounded_to, signed, signed_percent, significant, trimmed, unit_words,
+    RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix, rounded_to,
+    signed, signed_percent, significant, trimmed, unit_words,
 };
 use tapjoint_identify::consistent::Parameter as Fitted;
 

@@ -62,10 +62,10 @@ fn is_unmoved(a: Option<f64>, b: Option<f64>) -> bool {
 }
 
 /// Sensors of a recording at a position (m).
-fn sensors_near<'a>(
-    recording: &'a RecordingEvidence,
+fn sensors_near(
+    recording: &RecordingEvidence,
     position: Option<f64>,
-) -> impl Iterator<Item = &'a SensorEvidence> {
+) -> impl Iterator<Item = &SensorEvidence> {
     let sensors = recording.sensors.iter();
     sensors.filter(move |sensor| is_near(sensor.position, position))
 }

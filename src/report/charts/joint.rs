@@ -1,5 +1,7 @@
-//! The estimated joint: errors of the predicted frequencies, estimates under changed frequencies, and mode shapes with
-//! the places of sensors and taps.
+//! The estimated joint.
+//!
+//! Charts of the errors of predicted frequencies, of estimates under changed frequencies, and of mode shapes with the
+//! places of sensors and taps.
 
 use std::collections::BTreeMap;
 

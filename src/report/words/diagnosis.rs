@@ -137,8 +137,7 @@ fn how_far(gap: &GapSection, has_joint: bool) -> Option<String> {
         percent(Some(found.gap_before)),
         left(found.gap_after, gap.noise_floor),
     );
-    // What is left where nothing is added, if the tolerances, and a joint's drift between recordings, explain half of
-    // the errors.
+    // Tolerances, and a joint's drift between recordings, may explain half of the errors by themselves.
     let remains = gap
         .result(&Hypothesis::None)
         .and_then(|none| none.gap_after);

@@ -1,5 +1,6 @@
-//! `tapjoint diagnose`: the cause of the gap between model and measurement. The model with the diagnosed effects, for
-//! report.json and as a file.
+//! `tapjoint diagnose`: the cause of the gap between model and measurement.
+//!
+//! The model with the diagnosed effects goes into report.json and into a file, here and in `run`.
 
 use super::Outcome;
 use super::identify::{FrequencyArguments, resolve};

@@ -1,5 +1,6 @@
-//! The program itself: help that lists the commands by task, and the commands that only print what it knows (`init`,
-//! `reproduce`, `completions`, `man`).
+//! The program itself: its help, and the commands that print what it knows.
+//!
+//! These commands are `init`, `reproduce`, `completions` and `man`.
 
 use super::Outcome;
 use super::arguments::assembly;

@@ -1,5 +1,7 @@
-//! Bare files, without a description: `tapjoint inspect` (the contents of recordings), `tapjoint spectrum` (the averaged
-//! spectrum of one recording and its peaks), and the analysis of samples in time or frequency response functions.
+//! Bare files, without a description.
+//!
+//! `tapjoint inspect` shows the contents of recordings. `tapjoint spectrum` shows the averaged spectrum of one recording
+//! and its peaks. `run` and `frf` analyse bare files from here, too.
 
 use super::Outcome;
 use super::arguments::{RecordingArguments, SpectrumSettings, reading};

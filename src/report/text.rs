@@ -15,12 +15,12 @@ const MOST_TAPS: usize = 10;
 
 /// Everything the document holds.
 pub fn render_text(document: &Document) -> String {
-    // Of recordings that were only looked at their channels are shown.
+    // Channels are shown where recordings were only looked at.
     let inspected = document.modes.is_none();
     let channels = tables::channels(document).filter(|_| inspected);
     let recordings = document.recordings.iter().flatten();
     let taps: usize = recordings.map(|recording| recording.taps.len()).sum();
-    // Of many taps the rejected ones, and how many were used.
+    // Many taps are not listed: only the rejected ones are, and how many were used.
     let taps = match taps > MOST_TAPS {
         true => [tables::taps_used(document), tables::rejected_taps(document)],
         false => [tables::taps(document), None],

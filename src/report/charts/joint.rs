@@ -1,5 +1,7 @@
-//! The estimated joint: errors of the predicted frequencies, estimates under changed frequencies, and mode shapes with
-//! the places of sensors and taps.
+//! The estimated joint.
+//!
+//! Charts of the errors of predicted frequencies, of estimates under changed frequencies, and of mode shapes with the
+//! places of sensors and taps.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +52,20 @@ pub fn frequencies(document: &Document) -> Option<Chart> {
     }
     let count = errors.len();
     let names = errors.iter().enumerate();
-    let names = names.map(|(at, error)| (at as f64, tick_words(error.prediction, count)));
+    let names = names.map(|(at, error)| {
+        // The number of a mode, and as far as there is room what was measured and predicted.
+        let mut words = error.prediction.mode.to_string();
+        let rows = [
+            ("measured ", error.prediction.measured),
+            ("predicted ", error.prediction.predicted),
+        ];
+        for (name, value) in rows.iter().filter(|_| count <= MOST_WITH_NUMBERS) {
+            let name = if count <= MOST_WITH_WORDS { name } else { "" };
+            let value = value.map_or(String::new(), |value| significant(value, 5));
+            words.push_str(&format!("\n{name}{value} Hz"));
+        }
+        (at as f64, words)
+    });
     let x = Axis::linear(-0.5, count as f64 - 0.5)
         .of("mode", "")
         .named(names);
@@ -81,24 +96,6 @@ pub fn frequencies(document: &Document) -> Option<Chart> {
         )],
         ..Chart::default()
     })
-}
-
-/// The number of a mode, and as far as there is room what was measured and predicted.
-fn tick_words(prediction: &PredictionSection, modes: usize) -> String {
-    let mut words = prediction.mode.to_string();
-    if modes > MOST_WITH_NUMBERS {
-        return words;
-    }
-    let rows = [
-        ("measured ", prediction.measured),
-        ("predicted ", prediction.predicted),
-    ];
-    for (name, value) in rows {
-        let name = if modes <= MOST_WITH_WORDS { name } else { "" };
-        let value = value.map_or(String::new(), |value| significant(value, 5));
-        words.push_str(&format!("\n{name}{value} Hz"));
-    }
-    words
 }
 
 fn error_series(errors: &[FrequencyError<'_>], used: bool, bounded: bool) -> Series {

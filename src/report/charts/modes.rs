@@ -1,5 +1,7 @@
-//! How the modes of a recording were found, and how they change: the stabilisation diagram (poles of every order over
-//! frequency, the level behind them, and the modes), and natural frequency and damping against amplitude.
+//! How the modes of a recording were found, and how they change.
+//!
+//! The stabilisation diagram shows the poles of every order, the level behind them, and the modes. A second chart shows
+//! natural frequency and damping against amplitude.
 
 use super::spectra::{frequency_axis, magnitude_axis, magnitudes, rules, unit_of};
 use crate::format::{significant, trimmed};

@@ -1,5 +1,6 @@
-//! What a recording holds: averaged spectra and frequency response functions with their resonances, and the signal over
-//! time with its taps.
+//! The contents of a recording.
+//!
+//! Charts of averaged spectra and frequency response functions with their resonances, and of the signal with its taps.
 
 use num_complex::Complex64;
 

@@ -1,5 +1,6 @@
-//! Decks in the words of two programs. Abaqus: B23 or B21 elements, SPRING1 and SPRING2, a frequency step. Nastran:
-//! CBAR elements, CELAS2 springs, SOL 103.
+//! Decks in the formats of two programs.
+//!
+//! Abaqus: B23 or B21 elements, SPRING1 and SPRING2, a frequency step. Nastran: CBAR elements, CELAS2 springs, SOL 103.
 
 use std::fmt::Write as _;
 

@@ -1,5 +1,4 @@
-//! What was measured, in the document: recordings (channels, taps, spectra, readings), resonances (fits, change with
-//! amplitude), frequency response functions, and the datasets of universal files.
+//! The measurement in the document: recordings, resonances, frequency response functions, datasets of universal files.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Serialize, Serializer};

@@ -1,5 +1,4 @@
-//! The model in the document: the joint or the free beam's material, predicted beside measured frequencies, and the
-//! diagnosis of what the model misses.
+//! The model in the document: the estimate, predicted beside measured frequencies, and the diagnosis of the gap.
 
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -1,4 +1,4 @@
-//! Pictures: the model of a chart (axes with units, series with words, marks and legend), and what is made of it.
+//! The model of a chart: axes with units, series with words, marks and legend.
 //!
 //! Each kind of chart is built once, in `charts`. [`Chart::draw`] makes a PNG or SVG of it. [`Chart::page`] thins
 //! it for the report's script, which reads this model as JSON. Both show the same data with the same labels.

@@ -57,7 +57,7 @@ pub enum Place {
     Page,
 }
 
-/// What stands in a cell, with the head of its column.
+/// A cell with the head of its column.
 pub(crate) struct Cell {
     column: Column,
     text: String,

@@ -1,4 +1,4 @@
-//! Tables of what was recorded (recordings, their channels and taps, datasets of universal files), and of how well.
+//! Tables of the recordings: their channels and taps, the datasets of universal files, and how good the test was.
 
 use std::cmp::Reverse;
 

@@ -38,7 +38,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             responses: vec![response],
         })
         .collect();
-    let lines = Lines::zoom((0.0, rate / DISPLAY_RATIO), rate, block, block as f64 / rate)?;
+    let lines = Lines::zoom(
+        (0.0, rate / DISPLAY_RATIO),
+        rate,
+        block,
+        block as f64 / rate,
+    )?;
     let mut times = Vec::with_capacity(repetitions);
     for _ in 0..repetitions {
         let start = Instant::now();

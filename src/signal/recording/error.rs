@@ -51,7 +51,7 @@ pub enum RecordingError {
     Unusable {
         /// The file, and the line (1-based) where there is one.
         place: String,
-        /// What was found, what is allowed, what to do.
+        /// The finding, allowed values, and the remedy.
         problem: String,
     },
 }

@@ -203,7 +203,7 @@ fn check_columns(
     Err(wrong_columns(source, &problem))
 }
 
-/// Returns the factor from the frequency column's unit to Hz, and the unit of the values as written, its factor and its
+/// Returns the factor from the frequency column's unit to Hz, and the unit of the values: as written, its factor, its
 /// form.
 fn units_in(header: &[Vec<String>]) -> (f64, Option<(String, f64, ResponseForm)>) {
     let mut first_cells = header.iter().filter_map(|cells| cells.first());
@@ -357,8 +357,9 @@ fn read_response(
     }
 }
 
-/// Returns the error of a value at a point (0-based) of a dataset (1-based; when writing, a response) that is no number
-/// of physical size.
+/// Returns the error of a value that is no number of physical size.
+///
+/// `dataset` is 1-based (when writing: the response), `point` 0-based.
 pub(super) fn not_finite(file: &str, dataset: usize, point: usize, value: f64) -> RecordingError {
     let problem = format!(
         "dataset {dataset}, point {} is {value}; allowed: finite numbers of magnitude up to 1e100; export the file again",

@@ -281,8 +281,9 @@ pub(super) struct UnevenStep {
 }
 
 impl UnevenStep {
-    /// In words: "2 s comes 1 s after the row before, the step elsewhere is 0.5 s". `factor` turns the column's unit
-    /// into `unit`.
+    /// Returns words such as "2 s comes 1 s after the row before, the step elsewhere is 0.5 s".
+    ///
+    /// `factor` turns the column's unit into `unit`.
     pub(super) fn words(&self, factor: f64, unit: &str, before: &str) -> String {
         let [time, step, expected] =
             [self.time, self.step, self.expected].map(|value| short(value * factor));
@@ -291,8 +292,9 @@ impl UnevenStep {
         )
     }
 
-    /// Says how many rows may be lost: " (as if 2 rows were missing)"; nothing where the gap is no whole number of
-    /// steps.
+    /// Says how many rows may be lost: " (as if 2 rows were missing)".
+    ///
+    /// It says nothing where the gap is no whole number of steps.
     pub(super) fn lost_rows(&self) -> String {
         let steps = self.step / self.expected;
         let whole = steps.round();

@@ -181,7 +181,7 @@ pub fn average_records(
     let parts: Vec<SpectralAverager> = records
         .par_chunks(share)
         .map(|records| {
-            let mut sum = SpectralAverager::new(*transformer.lines(), responses);
+            let mut sum = SpectralAverager::new(transformer.lines, responses);
             let mut workspace = Workspace::default();
             let mut of_force = Vec::new();
             let mut of_responses = vec![Vec::new(); responses];
@@ -198,7 +198,7 @@ pub fn average_records(
             sum
         })
         .collect();
-    let mut sum = SpectralAverager::new(*transformer.lines(), responses);
+    let mut sum = SpectralAverager::new(transformer.lines, responses);
     parts.iter().for_each(|part| sum.merge(part));
     sum.finish()
 }

@@ -88,8 +88,9 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// Lines of a zoom band, low and high end (Hz), with `block` real samples at the zoomed rate. Without zoom the band
-    /// is 0 to rate/2.56. `available` is the length of signal at hand (s).
+    /// Lines of a zoom band, low and high end (Hz), with `block` real samples at the zoomed rate.
+    ///
+    /// Without zoom the band is 0 to rate/2.56. `available` is the length of signal at hand (s).
     ///
     /// # Errors
     /// [`SpectralError::Band`] where the band is empty or passes half the sample rate,

@@ -20,7 +20,8 @@ use super::{DISPLAY_RATIO, Lines, smallest_smooth_block};
 /// that does not depend on the samples is computed once, here.
 #[derive(Debug)]
 pub struct Transformer {
-    lines: Lines,
+    /// The lines on which it transforms.
+    pub(super) lines: Lines,
     sample_rate: f64,
     plan: Plan,
 }
@@ -65,11 +66,6 @@ impl Transformer {
         }
     }
 
-    /// The lines on which it transforms.
-    pub fn lines(&self) -> &Lines {
-        &self.lines
-    }
-
     /// The transform of a record; of one longer than planned the rest is left out.
     pub fn transform(&self, samples: &[f64]) -> Vec<Complex64> {
         let mut values = Vec::new();
@@ -88,8 +84,21 @@ impl Transformer {
         let scale = 1.0 / self.sample_rate;
         match &self.plan {
             Plan::Full(fft) => {
-                workspace.full(fft.as_ref(), samples, scale);
-                values.extend_from_slice(&workspace.spectrum[..self.lines.points()]);
+                // Zeros are appended.
+                let Workspace {
+                    samples: block,
+                    spectrum,
+                    scratch,
+                } = workspace;
+                block.clear();
+                block.extend(samples.iter().take(fft.len()).map(|x| x * scale));
+                block.resize(fft.len(), 0.0);
+                spectrum.resize(fft.complex_len(), Complex64::ZERO);
+                scratch.resize(fft.get_scratch_len(), Complex64::ZERO);
+                // It refuses buffers of a wrong length alone, and these have just been given theirs.
+                let done = fft.process_with_scratch(block, spectrum, scratch);
+                debug_assert!(done.is_ok(), "{done:?}");
+                values.extend_from_slice(&spectrum[..self.lines.points()]);
             }
             Plan::Lines(chirp) => {
                 let transformed = chirp.transform(samples.iter().map(|&x| x.into()));
@@ -104,22 +113,6 @@ impl Transformer {
                 values.extend(transformed.iter().zip(turns).map(|(x, t)| x * t * scale));
             }
         }
-    }
-}
-
-impl Workspace {
-    /// The real FFT of `samples` times `scale`, zeros appended, into `spectrum`.
-    fn full(&mut self, fft: &dyn RealToComplex<f64>, samples: &[f64], scale: f64) {
-        self.samples.clear();
-        let kept = samples.iter().take(fft.len());
-        self.samples.extend(kept.map(|x| x * scale));
-        self.samples.resize(fft.len(), 0.0);
-        self.spectrum.resize(fft.complex_len(), Complex64::ZERO);
-        self.scratch.resize(fft.get_scratch_len(), Complex64::ZERO);
-        // It refuses buffers of a wrong length alone, and these have just been given theirs.
-        let done =
-            fft.process_with_scratch(&mut self.samples, &mut self.spectrum, &mut self.scratch);
-        debug_assert!(done.is_ok(), "{done:?}");
     }
 }
 
@@ -309,8 +302,9 @@ fn filtered(mixed: &[Complex64], filter: &[f64], index: i64) -> Complex64 {
     sums.iter().sum::<Complex64>() + rest.map(|(x, weight)| x * weight).sum::<Complex64>()
 }
 
-/// Tables of a chirp z-transform that all records share: sum over n of x(n) e^{-j 2 pi n (start + k step)} for each
-/// line k.
+/// Tables of a chirp z-transform that all records share.
+///
+/// Line k is the sum over n of x(n) e^{-j 2 pi n (start + k step)}.
 struct Chirp {
     /// e^{-j 2 pi start n} times half the chirp, for each sample.
     before: Vec<Complex64>,

@@ -166,8 +166,9 @@ impl CsvSource {
         RecordingError::at_line(&self.file, self.layout.lines_before + 1, problem)
     }
 
-    /// Settles the sample rate (Hz), by the time column or as given, and adds doubts about it. A first column of
-    /// frequencies is refused: it means a frequency response function.
+    /// Settles the sample rate (Hz), by the time column or as given, and adds doubts about it.
+    ///
+    /// A first column of frequencies is refused: it means a frequency response function.
     fn sample_rate(
         &self,
         settings: &ReadSettings,

@@ -20,7 +20,7 @@ const MAX_DATASETS: usize = 1_000_000;
 /// Columns 1 to 6 of the line that opens and of the line that closes a dataset.
 pub(super) const MARK: &[u8] = b"    -1";
 
-/// The same behind text, where it begins a line of its own.
+/// The mark behind text, where it begins a line of its own.
 const LINE_MARK: &[u8] = b"\n    -1";
 
 /// A longer line is none; the limit keeps a file without line ends out of memory.

@@ -91,8 +91,9 @@ pub(in crate::recording) fn open_uff(
         if channel.count > frames {
             channel = Measured::read(sample_rate, at, channel.values, frames, &mut 0)?;
         }
-        channels.push(channel.info(&listed, at + 1, name, &mut warnings));
-        values.push(channel.values);
+        let (info, own) = channel.info(&listed, at + 1, name, &mut warnings);
+        channels.push(info);
+        values.push(own);
     }
     warnings.extend(repeated_place(&values, &channels));
     Ok(Recording {
@@ -141,13 +142,10 @@ fn channel_names(channels: &[Measured]) -> Vec<Option<String>> {
 fn repeated_place(values: &[Values], channels: &[ChannelInfo]) -> Option<RecordingWarning> {
     for (at, Values { function, .. }) in values.iter().enumerate() {
         let place = &function.response;
-        let earlier = values[..at].iter().position(
-            |Values {
-                 function: other, ..
-             }| {
-                other.response == *place && other.numerator.quantity == function.numerator.quantity
-            },
-        );
+        let mut before = values[..at].iter().map(|values| &values.function);
+        let earlier = before.position(|other| {
+            other.response == *place && other.numerator.quantity == function.numerator.quantity
+        });
         if let Some(earlier) = earlier.filter(|_| place.node != 0) {
             let [channel, earlier] =
                 [at, earlier].map(|at| channel_label(at + 1, channels[at].name.as_deref()));
@@ -220,12 +218,12 @@ impl Measured {
     ///
     /// The unit is the label's, else that of the file's unit system.
     fn info(
-        &self,
+        self,
         file: &UniversalFile,
         number: usize,
         name: Option<String>,
         warnings: &mut Vec<RecordingWarning>,
-    ) -> ChannelInfo {
+    ) -> (ChannelInfo, Values) {
         let function = &self.values.function;
         let axis = &function.numerator;
         // Rotations have other exponents, and no sensor here measures them.
@@ -257,13 +255,14 @@ impl Measured {
             (None, _, Some((factor, unit))) => (factor, Some(unit.to_owned())),
             (None, _, None) => (1.0, None),
         };
-        ChannelInfo {
+        let info = ChannelInfo {
             name,
             unit,
             header_unit: axis.unit.clone(),
             scale,
-            health: self.meter.clone().finish().scaled(scale),
-        }
+            health: self.meter.finish().scaled(scale),
+        };
+        (info, self.values)
     }
 }
 
@@ -443,15 +442,11 @@ impl<'a> FunctionGroup<'a> {
                 Err(problem) => left_out.push((entry, problem)),
             }
         }
-        let mut largest: Option<(usize, Entry<'a>, EvenPoints)> = None;
-        for (entry, points) in &usable {
+        let largest = usable.iter().rev().max_by_key(|(_, points)| {
             let same = usable.iter().filter(|(_, other)| points.matches(other));
-            let size = same.count();
-            if largest.is_none_or(|(most, ..)| size > most) {
-                largest = Some((size, *entry, *points));
-            }
-        }
-        let Some((_, (first, _), points)) = largest else {
+            same.count()
+        });
+        let Some(((first, _), points)) = largest.copied() else {
             let problem = if let Some(((dataset, function), problem)) = left_out.first() {
                 let remedy = match unit {
                     AbscissaUnit::Seconds => "export real values at an even step",

@@ -634,7 +634,7 @@ mod tests {
     #[test]
     fn regress_a_half_width_beyond_the_value_is_none() {
         assert_eq!(within(8.8), "\u{b1}8.8 %");
-        assert_eq!(within(30659.0), "not determined (beyond \u{b1}100 %)");
+        assert_eq!(within(30659.0), "wider than \u{b1}100 %");
     }
 
     #[test]

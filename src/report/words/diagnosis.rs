@@ -53,7 +53,7 @@ fn place(document: &Document, gap: &GapSection) -> Option<String> {
         false => format!("Where, if something is missing: {}.", listed.join(", ")),
     };
     Some(format!(
-        "{places} The described model misses mode {} in {} most, for its uncertainty: {} % ({} standard deviations).",
+        "{places} Relative to its uncertainty, the described model misses mode {} in {} most: {} % ({} standard deviations).",
         worst.mode,
         place_of(worst),
         change(worst.error_percent, 3),
@@ -410,7 +410,7 @@ fn no_gap(gap: &GapSection) -> String {
     let first = gap.hypotheses.first();
     let open = match first.filter(|first| first.hypothesis != Hypothesis::None) {
         Some(_) => format!(
-            " No effect is established: its odds against none would have to be {:.0} to 1.",
+            " No effect is established: that needs odds of at least {:.0} to 1 against none.",
             DETECTED.exp()
         ),
         None => String::new(),

@@ -10,8 +10,7 @@
 //! ```text
 //! Beam, JointStiffness -> natural_lambdas / natural_frequencies -> mode_shapes
 //!                          (closed form, counted so that no root is missed)
-//! finite_elements          the same structures by an independent route
-//! specimen                 the structure with everything fastened to it -> modes
+//! specimen                 the structure with everything fastened to it, by finite elements -> modes
 //! interface                either of both seen from the joint, with exact derivatives
 //! ```
 //!

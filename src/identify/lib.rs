@@ -3,9 +3,8 @@
 //! ```text
 //! measured frequencies -> pairs      multi-linear regression over mode pairs (Ingole & Chatterjee)
 //!                         frequency_fit  least squares on the frequencies themselves
-//!                         free_beam  modulus and density of a beam without a joint
 //!                      -> estimate   with uncertainty, in SI units, with what speaks against it
-//!                      -> predict    frequencies of the estimate beside the measured ones
+//!                      -> predict    frequencies of the estimate beside the measured ones; modulus of a free beam
 //!                      -> perturbation  how far errors in the frequencies move the estimate
 //! ```
 //!

@@ -354,8 +354,8 @@ fn two_digits(size: f64) -> String {
     }
 }
 
-/// "Kx: ±0.01 % from the frequencies' uncertainty alone, ±1.3 % scaled by the misfit", for non-dimensional ones
-/// and the material.
+/// "95 % interval of Kx: ±0.01 % from the frequencies' uncertainty alone, ±1.3 % with the misfit", for non-dimensional
+/// stiffnesses and the material.
 fn two_intervals(quantity: &EstimatedQuantity) -> Option<String> {
     // Half width of a 95 % interval of a normal distribution, in standard deviations, in percent.
     const PERCENT_95: f64 = 196.0;

@@ -92,7 +92,7 @@ pub enum StructureError {
     },
 }
 
-/// Returns an error with the rule for a quantity that breaks it.
+/// Refuses a value that is not possible, with the rule that it breaks.
 fn require(
     is_possible: bool,
     quantity: &'static str,

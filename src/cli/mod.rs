@@ -1,4 +1,4 @@
-//! The command line: arguments, a file for each command that does work, exit codes.
+//! The command line: arguments, commands, exit codes.
 //!
 //! Each command turns its clap arguments into library types, calls the library, prints and
 //! writes. Exit codes: 0 = answered, 1 = these data give no answer, 2 = wrong usage or bad input.

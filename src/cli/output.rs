@@ -56,7 +56,7 @@ impl OutputFile {
     /// Checks that the file of an option can be written, if the option is given.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub(super) fn prepare_optional(path: Option<&Path>) -> anyhow::Result<Option<Self>> {
         path.map(Self::prepare).transpose()
     }
@@ -64,7 +64,7 @@ impl OutputFile {
     /// Checks that `path` can be written, without touching it.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub(super) fn prepare(path: &Path) -> anyhow::Result<Self> {
         // A link stays a link: what it points to is replaced.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -123,7 +123,7 @@ impl OutputFolder {
     /// Checks that the folder can be made or written to.
     ///
     /// # Errors
-    /// It cannot.
+    /// The folder cannot be made or written to.
     pub(super) fn prepare(path: &Path) -> anyhow::Result<Self> {
         // The nearest folder that exists: the output folder itself, or the one it will grow in.
         let mut ancestors = path.ancestors().map(or_here);
@@ -158,7 +158,7 @@ impl OutputFolder {
     /// Adds a file to the folder.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub(super) fn add(&self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
         let written = fs::write(self.staging.path().join(name), signed(bytes));
         written.map_err(|cause| failed(&self.path.join(name), &cause))

@@ -106,7 +106,7 @@ impl Files {
     /// Checks that one output is no input, and no existing file that the program did not make.
     ///
     /// # Errors
-    /// It is one.
+    /// The output is an input, or a file that the program did not make.
     fn check_output(&self, path: &Path, option: &str) -> anyhow::Result<()> {
         let shown = path.display();
         if self.reads(path) {

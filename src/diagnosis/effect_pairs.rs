@@ -277,7 +277,8 @@ fn compare_with_unknown(dataset: &Dataset, candidates: &mut Vec<Candidate>) {
     // The hold-out data are missed by more than their own uncertainty, however large that of the prediction.
     let failing = best.filter(|fit| {
         let errors = HoldoutErrors::new(dataset, fit);
-        errors.is_some_and(|errors| errors.rms() > MISSED_HOLDOUT * errors.floor())
+        // An error that is no number counts as a miss.
+        errors.is_some_and(|errors| !errors.rms().le(&(MISSED_HOLDOUT * errors.floor())))
     });
     // As many free parameters as a change that is spread over the beam: all effects choose their locations, or a
     // frequency that no peak states, which is known to a standard deviation; else only its range is.

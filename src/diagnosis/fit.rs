@@ -241,7 +241,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Returns the local optimum from a start; its evidence has the probability that no peak states its fixture.
+/// Returns the local optimum from a start; its evidence includes the probability that no peak is read at
+/// its fixture's frequency.
 fn optimum_from(forward: &Forward<'_>, start: &[f64]) -> Option<LocalOptimum> {
     let mut one = evaluate(forward, &forward.priors(), start)?;
     one.log_evidence += log_unread(forward, &one);

@@ -323,6 +323,7 @@ impl Linearised {
     /// (column), and of the residuals.
     pub fn of_rows(mut jacobian: DMatrix<f64>, residuals: &[f64]) -> Self {
         let (rows, columns) = jacobian.shape();
+        assert_eq!(rows, residuals.len(), "one residual for each row");
         jacobian = jacobian.resize(rows.max(columns), columns + 1, 0.0);
         for (row, residual) in residuals.iter().enumerate() {
             jacobian[(row, columns)] = *residual;
@@ -448,43 +449,6 @@ fn triangularise(matrix: &mut DMatrix<f64>) {
         }
         own.fill(0.0);
         own[0] = diagonal;
-    }
-}
-
-/// Weight of large misfits.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub enum Loss {
-    /// By their square: right for normally distributed errors.
-    #[default]
-    Squares,
-    /// By their square up to so many standard deviations, linearly beyond (Huber). 1.345 keeps 95 % of
-    /// the efficiency where errors are normal.
-    Huber(f64),
-    /// As the negative logarithm of Student's t with so many degrees of freedom: a wild value hardly
-    /// counts. 4 is usual.
-    StudentT(f64),
-}
-
-impl Loss {
-    /// Returns what one standardised residual contributes to the sum of squares.
-    ///
-    /// Student's t: -2 ln p = (nu + 1) ln(1 + r^2/nu), up to a constant.
-    pub fn of(self, residual: f64) -> f64 {
-        let square = residual * residual;
-        match self {
-            Self::Huber(limit) if residual.abs() > limit => limit * (2.0 * residual.abs() - limit),
-            Self::Squares | Self::Huber(_) => square,
-            Self::StudentT(freedom) => (freedom + 1.0) * (square / freedom).ln_1p(),
-        }
-    }
-
-    /// Returns the weight of the residual's square in the linearised problem.
-    pub fn weight(self, residual: f64) -> f64 {
-        match self {
-            Self::Huber(limit) if residual.abs() > limit => limit / residual.abs(),
-            Self::Squares | Self::Huber(_) => 1.0,
-            Self::StudentT(freedom) => (freedom + 1.0) / (freedom + residual * residual),
-        }
     }
 }
 

@@ -499,8 +499,9 @@ pub(super) fn lines_of(text: &str, width: usize, indent: usize) -> Vec<String> {
     let words = text.split(|c: char| c.is_whitespace() && c != '\u{a0}');
     for word in words.filter(|word| !word.is_empty()) {
         let mut word = word.to_owned();
-        if length(&word) > width - indent {
-            word = word.chars().take(width - indent - 1).collect();
+        let room = width.saturating_sub(indent);
+        if length(&word) > room {
+            word = word.chars().take(room.saturating_sub(1)).collect();
             word.push('\u{2026}');
         }
         match lines.last_mut() {

@@ -176,7 +176,7 @@ impl Damping {
 /// Reason for which a described test cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
-    /// Nothing is to be recorded, or with nothing.
+    /// There is no recording to make, or no sensor to make it with.
     #[error("there is no {0}")]
     Nothing(&'static str),
     /// A recording that cannot be made.

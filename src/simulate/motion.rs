@@ -12,7 +12,7 @@ use super::observed_structure::{Oscillator, ReducedStructure, Sensed, StruckPlac
 use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
-/// Steps after which states are looked at that may have died down.
+/// Number of steps between looks for states that have died down.
 const FORGET_EVERY: u64 = 256;
 /// Square of a state (m2 kg/s2) that is nothing beside any that was struck.
 const NOTHING: f64 = 1e-200;

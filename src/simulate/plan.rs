@@ -403,8 +403,9 @@ fn check_laboratory(laboratory: &Laboratory) -> Result<(), SimulateError> {
     check_all(&damping, |value| value >= 0.0, "at least 0")
 }
 
-/// Refuses effects that would change nothing or that no recording contains: the truth would say what is not so.
-/// Refuses also a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would then be
+/// Refuses effects that would change nothing or that no recording contains: the truth would not be true.
+///
+/// It also refuses a moment whose slope 1 + c (p + 1) a^p vanishes before the hardest tap's rotation a: what would then be
 /// simulated is not what the ratio says.
 fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), SimulateError> {
     let planted: Vec<EffectId> = effects.iter().map(|effect| effect.id).collect();
@@ -423,7 +424,7 @@ fn check_effects(test: &TestDescription, effects: &[Effect]) -> Result<(), Simul
         let law = JointLaw { ratio, exponent };
         let least = -(1.0 - LEAST_SLOPE) / (exponent + 1.0);
         let coefficient = law.coefficient(1.0);
-        if coefficient < least {
+        if coefficient.is_nan() || coefficient < least {
             let least = ratio * least / coefficient;
             return Err(SimulateError::SoftensTooFar {
                 ratio,

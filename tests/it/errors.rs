@@ -633,9 +633,9 @@ fn regress_outputs_that_cannot_be_written_are_found_out_before_any_work() {
         let title = arguments.join(" ");
         messages += &refused(&title, SPOILED, csv.as_bytes(), &[arguments]);
     }
-    assert_snapshot("errors_outputs", &messages);
-    // Where even the system's owner may make nothing.
+    // The system's own words differ from system to system. In /proc even its owner may make nothing.
     if cfg!(target_os = "linux") {
+        assert_snapshot("errors_outputs", &messages);
         let arguments = ["run", "test.toml", "--out", "/proc/tapjoint-report"];
         let said = refused("/proc", SPOILED, csv.as_bytes(), &[&arguments]);
         assert_snapshot("errors_outputs_without_permission", &said);

@@ -371,19 +371,17 @@ fn stretch(specimen: &mut Specimen, factor: f64) {
     }
 }
 
-// The non-linear rotational spring of a joint.
-//
-// Its secant stiffness at amplitude a is k0 (1 + ratio (a/a0)^p), a0 being the amplitude of the
-// hardest tap. Two laws have such a secant:
-//
-// - elastic: M = k0 theta (1 + c |theta|^p), no dissipation; for p = 2 Duffing's cubic spring;
-// - micro-slip: sliders of many strengths side by side (Iwan 1966), which soften and dissipate.
-//   By Masing's rules the branches between turning points are the first loading curve, doubled in
-//   size.
-//
-// The secant is that of the first harmonic (describing function), the one that shifts a frequency.
-
 /// Dependence of a joint's rotational stiffness on the amplitude of its rotation.
+///
+/// The secant stiffness at amplitude a is k0 (1 + ratio (a/a0)^p), a0 being the amplitude of the
+/// hardest tap. Two laws have such a secant:
+///
+/// - elastic: M = k0 theta (1 + c |theta|^p), no dissipation; for p = 2 Duffing's cubic spring;
+/// - micro-slip: sliders of many strengths side by side (Iwan 1966), which soften and dissipate.
+///   By Masing's rules the branches between turning points are the first loading curve, doubled in
+///   size.
+///
+/// The secant is that of the first harmonic (describing function), the one that shifts a frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLaw {
     /// Relative change of the secant stiffness at the hardest tap's amplitude (1).

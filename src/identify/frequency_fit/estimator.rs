@@ -34,7 +34,7 @@ pub struct ConsistentEstimator {
 pub struct PointFit {
     /// Point of least misfit.
     pub point: Point,
-    /// Sum of the squared residuals there.
+    /// Sum of the squared residuals there; infinite where no start leads to a minimum.
     pub misfit: f64,
     /// Standard deviations of the estimated coordinates (1, logarithms and atanh), in the order of
     /// the fit; `None` where nothing is known.
@@ -132,6 +132,7 @@ impl ConsistentEstimator {
         self.settings.fit.iter().copied().chain(nuisances)
     }
 
+    /// Returns the unit vectors of [`Self::free_parameters`].
     pub(super) fn directions(&self) -> Vec<Point> {
         self.free_parameters().map(along).collect()
     }

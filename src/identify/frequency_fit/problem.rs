@@ -1,5 +1,5 @@
-//! The misfit of a joint's frequencies: residuals and their derivatives at a point, the way to the nearest
-//! minimum, and the first-order uncertainty there.
+//! The misfit of a joint's frequencies: initial guesses, residuals and their derivatives at a point, the way to
+//! the nearest minimum, and the first-order uncertainty there.
 //!
 //! The search solves its linearised problem by reflections, never by the normal equations, which would
 //! square the condition number: it is for stiffnesses that the frequencies hardly feel.

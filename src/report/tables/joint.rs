@@ -3,8 +3,8 @@
 use super::{Cell, Table, listed, mode_of, number, page_number, words};
 use crate::document::{Document, EstimateMethod, EstimateSection, SensitivitySection, Uncertain};
 use crate::format::{
-    RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix, rounded_to,
-    signed, signed_percent, significant, trimmed, unit_words,
+    MISSING, RIGID, Rounded, bound_percent, capital, last_place, optional, or_missing, prefix,
+    rounded_to, signed, signed_percent, significant, trimmed, unit_words,
 };
 use tapjoint_identify::consistent::Parameter as Fitted;
 
@@ -139,8 +139,11 @@ pub fn parameters(document: &Document) -> Option<Table> {
         let meaning = parameter.meaning.to_owned();
         let scaled = parameter.written_scaled();
         let limits = parameter.written_scaled_limits();
-        // Without a misfit the readings give the limits that there are.
-        let [from, to] = limits.unwrap_or_else(|| [low.clone(), high.clone()]);
+        // With a misfit, limits from the readings alone would be too narrow.
+        let [from, to] = limits.unwrap_or_else(|| match misses {
+            true => [MISSING.to_owned(), MISSING.to_owned()],
+            false => [low.clone(), high.clone()],
+        });
         rows.push(vec![
             name, meaning, value, unit, std, scaled, low, high, from, to,
         ]);
@@ -280,7 +283,7 @@ fn base(document: &Document, method: EstimateMethod) -> [Option<f64>; 3] {
     }
 }
 
-/// By which method, shown where there are several.
+/// Returns the cell of a method, shown where there are several.
 fn by_method(method: EstimateMethod, all: &[EstimateMethod]) -> Cell {
     let several = all.iter().any(|other| Some(other) != all.first());
     words("Method", method.name()).on_page_if(!several)
@@ -379,8 +382,8 @@ pub fn averages(document: &Document) -> Option<Table> {
             number("mean Kz off by (%)", optional(row.kz_of_mean_percent, 3)),
         ]
     });
-    let note = "Off by: mean size of the changes of the table above, up and down. Mean of: how far the \
-                mean of the two estimates is off, which is less, because opposite changes cancel.";
+    let note = "Off by: mean size of the changes of the table above, up and down. Mean off by: the error of the mean of \
+                the two estimates, which is less, because opposite changes cancel.";
     Some(Table::of("Average errors of the stiffnesses", rows, note).without_empty_columns())
 }
 

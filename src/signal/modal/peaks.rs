@@ -120,7 +120,7 @@ pub fn find_peaks(level: &CompositeLevel, settings: &PeakSettings) -> Vec<Peak> 
             Some(above) => settings.prominence_db + 6.0 * 8.7 * 10f64.powf(-above / 20.0),
             None => settings.blind_prominence_db,
         };
-        if peak.prominence_db < least {
+        if peak.prominence_db.is_nan() || peak.prominence_db < least {
             continue;
         }
         // Where no noise is known, the height is that over the median of the surroundings: 25 lines or a tenth of

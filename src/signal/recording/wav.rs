@@ -387,12 +387,14 @@ impl ChunkWalker<'_> {
         let unset = promised == 0 || promised == u64::from(u32::MAX) || promised == u64::MAX;
         // 0 is the truth, and not the mark of a crash, where well-formed, known chunks fill the rest of the file.
         let mut at = start;
-        for _ in 0..MAX_CHUNKS {
-            match self.chunk_header(at)? {
-                Some((name, size)) if promised == 0 && KNOWN_CHUNKS.contains(&&name) => {
-                    at = self.after_chunk(at + 8, u64::from(size))?;
+        if promised == 0 {
+            for _ in 0..MAX_CHUNKS {
+                match self.chunk_header(at)? {
+                    Some((name, size)) if KNOWN_CHUNKS.contains(&&name) => {
+                        at = self.after_chunk(at + 8, u64::from(size))?;
+                    }
+                    _ => break,
                 }
-                _ => break,
             }
         }
         let bytes = match unset {

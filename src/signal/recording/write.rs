@@ -228,7 +228,7 @@ impl<W: Write + Seek> WavEncoder<W> {
     fn write(&mut self, frame: &[f64]) -> Result<(), RecordingError> {
         if frame.len() != self.layout.channels {
             let problem = format!(
-                "channel 1 has {} samples, channel 1 has {}; allowed: equal lengths",
+                "a frame has {} values for {} channels; give one value for each channel",
                 frame.len(),
                 self.layout.channels
             );

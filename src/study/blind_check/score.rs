@@ -23,7 +23,7 @@ pub struct Scores {
     pub failed: usize,
     /// One effect: the most probable effect group is the planted one.
     pub top_1: Rate,
-    /// Does as `top_1` among those that such readings show at all.
+    /// `top_1` of the tests whose effect such readings show at all.
     pub top_1_detectable: Rate,
     /// One effect: the planted group is among the three most probable.
     pub top_3: Rate,
@@ -49,7 +49,7 @@ pub struct Scores {
     pub outside_unknown: Rate,
     /// Several effects: all named, or refused.
     pub several_found_or_refused: Rate,
-    /// Does as the one before among those of whose effects each is noticed beside the other.
+    /// `several_found_or_refused` of the tests in which each effect is noticed beside the other.
     pub several_detectable: Rate,
     /// Several effects: all named.
     pub several_found: Rate,
@@ -355,7 +355,7 @@ pub struct Conduct {
     pub commitment: Option<String>,
     /// Share of first groups right by answers dealt out to other tests; `None` without a test of one effect.
     pub shuffled: Option<f64>,
-    /// Does as `shuffled` by always answering one common factor on all frequencies.
+    /// Share of first groups right by always answering one common factor on all frequencies.
     pub always_scale: Option<f64>,
     /// Tests that were diagnosed again under other names of their files, with the same answer.
     pub renamed: usize,

@@ -114,7 +114,7 @@ impl Row {
         self.or_if(span.is_some_and(|s| s.low - half <= value && value <= s.high + half))
     }
 
-    /// Does as [`Self::or_within`] for Kz, by way of its reciprocal.
+    /// Notes a Kz that does not lie within its span, by way of its reciprocal: see [`Self::or_within`].
     pub(super) fn or_reciprocal_within(self, span: Option<Span>) -> Self {
         let compliance = 1.0 / self.printed.value;
         self.or_if(span.is_some_and(|s| s.low <= compliance && compliance <= s.high))

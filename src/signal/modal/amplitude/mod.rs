@@ -222,7 +222,7 @@ pub fn follow_amplitude(decays: &[Decay], modes: &[KnownMode]) -> Vec<AmplitudeC
     curves.collect()
 }
 
-// Frequency and damping against log amplitude: weighted polynomials with covariance.
+// ---- Frequency and damping against log amplitude: weighted polynomials with covariance.
 
 /// Powers q of the amplitude in which the curve is a polynomial (0: its logarithm), and the highest
 /// degree of that polynomial. Slip in a joint changes frequencies with a power between 1/2 and 1, a
@@ -239,6 +239,7 @@ const OUTSIDE: f64 = 0.05;
 /// Reach of the curve beyond the outermost points (log amplitude): as far as the shortest
 /// segment reaches to either side of its point, and a little more.
 const BEYOND: f64 = 0.1;
+
 /// One quantity (frequency in Hz, or damping ratio) against log amplitude.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Trend {
@@ -252,8 +253,7 @@ pub struct Trend {
     /// than noise (between taps: the structure changed).
     #[serde(skip)]
     pub scatter: f64,
-    // First is the value at the largest amplitude, the first usable time of the hardest tap. Last is that at the
-    // smallest, the last usable time of some tap.
+    // First: at the first usable time of the hardest tap. Last: at the last usable time of some tap.
     /// Last less first.
     pub change: f64,
     /// 95 % bound of the change.

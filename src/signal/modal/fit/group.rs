@@ -1,8 +1,9 @@
 //! Fits of groups of modes, each over its band, swept until the poles stay.
 //!
-//! A sweep fits one group after the other, with the amplitudes that the other groups had before. A band reaches ten half widths to either side of its modes. Modes near each other form a group and are
-//! fitted jointly. Distant modes are subtracted, near ones keep free amplitudes, and a polynomial of the
-//! frequency stands for everything else that the data show in the band.
+//! A sweep fits one group after the other, with the amplitudes that the other groups had before. A band reaches
+//! ten half widths to either side of its modes. Modes near each other form a group and are fitted jointly.
+//! Distant modes are subtracted, near ones keep free amplitudes, and a polynomial of the frequency stands for
+//! everything else that the data show in the band.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -79,10 +80,10 @@ impl<'a> BandData<'a> {
     ///
     /// Neighbours outside the band are subtracted, once they have been fitted. Those inside, or less than a quarter
     /// of the band away, keep free amplitudes.
-    pub fn new(sweeper: &Accepted<'a>, members: &[usize]) -> Result<Self, Unfit> {
-        let data = sweeper.data;
+    pub fn new(accepted: &Accepted<'a>, members: &[usize]) -> Result<Self, Unfit> {
+        let data = accepted.data;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for pole in sweeper.poles(members) {
+        for pole in accepted.poles(members) {
             low = low.min(pole.im - half_band(pole));
             high = high.max(pole.im + half_band(pole));
         }
@@ -95,7 +96,7 @@ impl<'a> BandData<'a> {
                 least,
             });
         }
-        let lines = Lines::new(data, range, sweeper.most_lines.max(least));
+        let lines = Lines::new(data, range, accepted.most_lines.max(least));
         let (first, stride, count) = (lines.first, lines.stride, lines.count());
         let mut used: Vec<usize> = (0..data.columns().len()).collect();
         used.retain(|&index| {
@@ -113,13 +114,13 @@ impl<'a> BandData<'a> {
         let margin = 0.25 * (high - low);
         let reach = low - margin..=high + margin;
         let mut near = Vec::new();
-        for (index, pole) in sweeper.alive() {
+        for (index, pole) in accepted.alive() {
             if members.contains(&index) {
                 continue;
             }
             if reach.contains(&pole.im) {
                 near.push(pole);
-            } else if let Some(all) = &sweeper.modes[index].amplitudes {
+            } else if let Some(all) = &accepted.modes[index].amplitudes {
                 let amplitudes = DMatrix::from_fn(2, used.len(), |row, place| {
                     let value = all[used[place]];
                     if row == 0 { value.re } else { value.im }
@@ -127,7 +128,7 @@ impl<'a> BandData<'a> {
                 values -= lines.model(&[pole]) * amplitudes;
             }
         }
-        let steady = sweeper.settings.steady_lines.iter();
+        let steady = accepted.settings.steady_lines.iter();
         let hum = steady.map(|&frequency| frequency / data.spacing());
         let hum = hum.filter(|position| reach.contains(position));
         near.extend(hum.map(|position| Complex64::new(-STEADY, position)));

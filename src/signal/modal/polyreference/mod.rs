@@ -26,8 +26,7 @@
 //! therefore analysed in narrow bands of their own as well.
 //!
 //! # What it does not do
-//! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit,
-//! and the spread over the orders is a measure of stability, not an uncertainty.
+//! The estimator is linear and not efficient: its frequencies are a start for a maximum-likelihood fit.
 
 mod selection;
 mod stabilisation;

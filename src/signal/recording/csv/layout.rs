@@ -196,11 +196,11 @@ impl<'a> Head<'a> {
         if layout.time.is_some() {
             hint.push_str(" (a single row has no step)");
         } else {
-            // One that stands still may be a temperature.
             if let Some(column) = named_as_time(&layout.columns).first() {
                 let numbers = self.numbers(layout, *column);
                 let mut steps = numbers.windows(2);
                 let flat = steps.clone().find(|step| step[1].value <= step[0].value);
+                // A column that never rises is not blamed: T may be a temperature.
                 if let Some([before, flat]) = flat
                     && steps.any(|step| step[1].value > step[0].value)
                 {

@@ -8,10 +8,8 @@
     reason = "tests write the files that they read"
 )]
 
-mod matrix_pencil;
 mod modal;
 mod modal_fit;
-mod modal_matrix_pencil;
 mod modal_polyreference;
 mod quality;
 mod recording;

@@ -126,7 +126,7 @@ impl Datum {
         if self.freedom >= NORMAL_FREEDOM {
             return -0.5 * residual * residual;
         }
-        -0.5 * (self.freedom + 1.0) * (residual * residual / self.freedom).ln_1p()
+        -0.5 * stats::student::loss(residual, self.freedom)
     }
 
     /// Returns the logarithm of the density at residual 0.
@@ -146,7 +146,7 @@ impl Datum {
         if self.freedom >= NORMAL_FREEDOM {
             return 1.0;
         }
-        (self.freedom + 1.0) / (self.freedom + residual * residual)
+        stats::student::weight(residual, self.freedom)
     }
 
     /// Returns the square of the normal deviate that is as improbable as this residual under Student's t.

@@ -9,6 +9,7 @@ use std::f64::consts::{LN_10, PI};
 use tapjoint_beam::joint::StiffnessUnits;
 use tapjoint_beam::{Assembly, JointStiffness, ModeShape, mode_shapes};
 use tapjoint_numerics::least_squares::{Linearised, Problem, Settings, minimise};
+use tapjoint_numerics::stats::student;
 
 /// Degrees of freedom of Student's t: the model's discrepancy has tails in which one mode may lie far off.
 const FREEDOM: f64 = 4.0;
@@ -223,9 +224,8 @@ impl Problem for Assigned<'_> {
             let scale = self.search.settings.discrepancy.hypot(own);
             let (predicted, slopes) = self.search.response(place, mode);
             let residual = (predicted - peak.frequency.ln()) / scale;
-            let weight = (FREEDOM + 1.0) / (FREEDOM + residual * residual);
-            let loss = (FREEDOM + 1.0) * (residual * residual / FREEDOM).ln_1p();
-            at.cost += 0.5 * loss + (scale / DENSITY).ln();
+            let weight = student::weight(residual, FREEDOM);
+            at.cost += 0.5 * student::loss(residual, FREEDOM) + (scale / DENSITY).ln();
             for (i, a) in slopes.iter().enumerate() {
                 at.gradient[i] += weight * residual * a / scale;
                 for (j, b) in slopes.iter().enumerate() {

@@ -12,7 +12,7 @@ use tapjoint_signal::modal::fit::{ModalConstant, TapFit, UncertaintySource};
 use tapjoint_signal::modal::{FittedReading, ModeReading, ReadBy};
 use tapjoint_signal::quality::Check;
 use tapjoint_signal::recording::{
-    Abscissa, ChannelInfo, Format, Ordinate, Precision, Separator, UffCoding, UniversalFile,
+    Abscissa, ChannelInfo, Ordinate, Precision, UffCoding, UniversalFile,
 };
 use tapjoint_signal::spectral::Window;
 
@@ -161,7 +161,7 @@ impl RecordingSection {
         RecordingSection {
             aside,
             file: recording.file.clone(),
-            format: format_words(recording.format),
+            format: recording.format.to_string(),
             sample_rate: recording.sample_rate,
             channels: recording.channels.len(),
             channel_details: channels
@@ -191,35 +191,6 @@ impl RecordingSection {
 /// Decay that a window adds to every pole (1/s); `None` where it adds none.
 fn added_decay(window: Window) -> Option<f64> {
     matches!(window, Window::Exponential { .. }).then(|| window.added_decay())
-}
-
-fn format_words(format: Format) -> String {
-    match format {
-        Format::WavInteger { bits } => format!("WAV, {bits}-bit integer"),
-        Format::WavFloat { bits } => format!("WAV, {bits}-bit float"),
-        Format::Csv {
-            separator, decimal, ..
-        } => {
-            let separator = match separator {
-                Separator::Tab => "tab",
-                Separator::Semicolon => "semicolon",
-                Separator::Comma => "comma",
-                Separator::Blanks => "blanks",
-            };
-            let decimal = if decimal == ',' {
-                ", decimal comma"
-            } else {
-                ""
-            };
-            format!("CSV, {separator}{decimal}")
-        }
-        Format::Uff58 {
-            coding: UffCoding::Ascii,
-        } => "UFF 58, text".to_owned(),
-        Format::Uff58 { .. } => "UFF 58b, binary".to_owned(),
-        Format::FrequencyResponses => "frequency response functions".to_owned(),
-        Format::Memory => "samples in memory".to_owned(),
-    }
 }
 
 /// Returns the datasets of universal files, in their order. `name` is the file as tables show it.

@@ -109,6 +109,37 @@ pub enum Format {
     Memory,
 }
 
+impl fmt::Display for Format {
+    /// Writes "WAV, 24-bit integer", "CSV, semicolon, decimal comma".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::WavInteger { bits } => write!(f, "WAV, {bits}-bit integer"),
+            Self::WavFloat { bits } => write!(f, "WAV, {bits}-bit float"),
+            Self::Csv {
+                separator, decimal, ..
+            } => {
+                let separator = match separator {
+                    Separator::Tab => "tab",
+                    Separator::Semicolon => "semicolon",
+                    Separator::Comma => "comma",
+                    Separator::Blanks => "blanks",
+                };
+                let decimal = match decimal {
+                    ',' => ", decimal comma",
+                    _ => "",
+                };
+                write!(f, "CSV, {separator}{decimal}")
+            }
+            Self::Uff58 {
+                coding: UffCoding::Ascii,
+            } => f.write_str("UFF 58, text"),
+            Self::Uff58 { .. } => f.write_str("UFF 58b, binary"),
+            Self::FrequencyResponses => f.write_str("frequency response functions"),
+            Self::Memory => f.write_str("samples in memory"),
+        }
+    }
+}
+
 /// Source of a text file's sample rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Timing {

@@ -207,8 +207,8 @@ fn along_decays(gap: &GapSection) -> Option<String> {
             .total_cmp(&(b.percent_per_fold / b.std).abs())
     })?;
     let seen = format!(
-        "Along the decays frequencies change with amplitude: mode {} in {} by {} % when the amplitude grows by a factor of e \
-         (2.7)",
+        "Along the decays frequencies change with amplitude, most certainly mode {} in {}: by {} % when the amplitude grows by \
+         a factor of e (2.7)",
         largest.mode,
         largest.recording,
         change(largest.percent_per_fold, 3)
@@ -590,7 +590,10 @@ fn next_test(gap: &GapSection) -> Option<String> {
     let test = gap.next_test.first()?;
     let (purpose, premise) = match gap.verdict {
         Verdict::NoGap | Verdict::Named(_) => ("To confirm it", String::new()),
-        Verdict::Unknown => ("To decide", format!(", {EQUALLY_LIKELY}")),
+        Verdict::Unknown => (
+            "If the description is right, to decide",
+            format!(", {EQUALLY_LIKELY}"),
+        ),
         _ => ("To decide", String::new()),
     };
     if confirms(test) {
